@@ -1,0 +1,133 @@
+"""Every error that coneskin raises.
+
+ConeSkinError
+├── GeometryError (ValueError)            a shape that cannot be: negative radius, wrap above a full turn
+├── MeshError (ValueError)                a mesh that cannot be read or used
+├── SceneError (ValueError)               a scene file with mistakes; ``problems`` lists them all
+├── MissingExtra (ImportError)            a package that this job needs is not installed
+├── SkinError
+│   ├── SensorError (ValueError)          a sensor that cannot be: no supply, an ADC of no bits
+│   ├── FieldError (ValueError)           a field problem that cannot be: overlapping contacts, negative resistance
+│   ├── SkinConnectionError (ConnectionError)   the port cannot be opened, or is gone
+│   └── SkinTimeout (TimeoutError)        no bytes within the time allowed
+├── RobotError
+│   ├── KinematicsError (ValueError)      an unknown arm or link, an unreachable pose
+│   ├── RobotConnectionError (ConnectionError)  the controller cannot be reached, or is gone
+│   ├── RobotTimeout (TimeoutError)       the controller does not answer, or the arm does not stop in time
+│   ├── RobotRefused (RuntimeError)       the controller, or the guard, refuses to start or to go on
+│   └── Collision (RuntimeError)          the skin was touched and the arm has reacted
+└── RecordingError (ValueError)           a recording that cannot be read
+
+A leaf is also the builtin named behind it, so ``except ValueError`` works where nobody knows coneskin. Mistakes in
+calling (a wrong type) stay TypeError.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+__all__ = [
+    "Collision",
+    "ConeSkinError",
+    "FieldError",
+    "GeometryError",
+    "KinematicsError",
+    "MeshError",
+    "MissingExtra",
+    "RecordingError",
+    "RobotConnectionError",
+    "RobotError",
+    "RobotRefused",
+    "RobotTimeout",
+    "SceneError",
+    "SensorError",
+    "SkinConnectionError",
+    "SkinError",
+    "SkinTimeout",
+]
+
+
+class ConeSkinError(Exception):
+    """The root of the tree: catch it to catch everything that coneskin raises on purpose."""
+
+
+class GeometryError(ConeSkinError, ValueError):
+    """A shape that cannot be."""
+
+
+class MeshError(ConeSkinError, ValueError):
+    """A mesh that cannot be read, or that has no use as a link."""
+
+
+class SceneError(ConeSkinError, ValueError):
+    """A scene file with mistakes, all of them.
+
+    Attributes:
+        problems: one line for each mistake: key, rule, unit and value.
+    """
+
+    def __init__(self, problems: Sequence[str], source: str = "scene") -> None:
+        self.problems = tuple(problems)
+        count = f"{len(self.problems)} mistake" + ("s" if len(self.problems) != 1 else "")
+        super().__init__("\n".join([f"{source}: {count}", *(f"  {line}" for line in self.problems)]))
+
+
+class MissingExtra(ConeSkinError, ImportError):
+    """A package that this job needs is not installed.
+
+    Attributes:
+        package: the package that is missing.
+    """
+
+    def __init__(self, package: str, job: str, extra: str | None = None) -> None:
+        self.package = package
+        target = f"'coneskin[{extra}]'" if extra else package
+        super().__init__(f"{job} needs the package {package}: pip install {target}")
+
+
+class SkinError(ConeSkinError):
+    """Something is wrong with the skin."""
+
+
+class SensorError(SkinError, ValueError):
+    """A sensor that cannot be."""
+
+
+class FieldError(SkinError, ValueError):
+    """A field problem that cannot be."""
+
+
+class SkinConnectionError(SkinError, ConnectionError):
+    """The port of the skin cannot be opened, or is gone."""
+
+
+class SkinTimeout(SkinError, TimeoutError):
+    """The skin sent nothing within the time allowed."""
+
+
+class RobotError(ConeSkinError):
+    """Something is wrong with the arm or its controller."""
+
+
+class KinematicsError(RobotError, ValueError):
+    """An unknown arm or link, or a pose that it cannot reach."""
+
+
+class RobotConnectionError(RobotError, ConnectionError):
+    """The controller cannot be reached, or is gone."""
+
+
+class RobotTimeout(RobotError, TimeoutError):
+    """The controller does not answer, or the arm does not stop, within the time allowed."""
+
+
+class RobotRefused(RobotError, RuntimeError):
+    """The controller, or the guard, refuses to start or to go on."""
+
+
+class Collision(RobotError, RuntimeError):
+    """The skin was touched and the arm has reacted."""
+
+
+class RecordingError(ConeSkinError, ValueError):
+    """A recording that cannot be read."""
