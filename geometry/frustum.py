@@ -1,0 +1,197 @@
+"""A truncated cone, and the coordinates on its side.
+
+Symbols (docs/conventions.md): rho1, rho2 radii, h height, s slant, a half angle; d = rho2 - rho1 = s sin a, h = s cos a.
+Everything is written in the surface coordinates (u, phi), not in the polar coordinates (r, theta) of the flat sector,
+because r grows without bound as a cone becomes a cylinder and real links are mostly cylinders. In (u, phi) the cylinder,
+the cone with its apex, the disc and the narrowing cone are ordinary values of one formula.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from coneskin.errors import GeometryError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Frustum"]
+
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Frustum:
+    """The side of a truncated cone about the z axis: end 1 at z = 0, end 2 at z = height.
+
+    Attributes:
+        radius1: radius at end 1 [m]; 0 puts the apex there.
+        radius2: radius at end 2 [m]; smaller than radius1 where the link narrows.
+        height: distance between the ends along the axis [m]; 0 makes a flat ring.
+        wrap: angle about the axis that is covered [rad], in (0, 2 pi], from phi = 0 (the x axis) on.
+
+    Raises:
+        GeometryError: a value is not finite or negative, nothing is left of the side, or wrap is beyond a full turn.
+    """
+
+    radius1: float
+    radius2: float
+    height: float
+    wrap: float = _TURN
+
+    def __post_init__(self) -> None:
+        for name in ("radius1", "radius2", "height"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise GeometryError(f"{name} must be finite and not negative, got {value!r} m")
+            object.__setattr__(self, name, float(value))
+        if not 0.0 < self.wrap <= _TURN:
+            raise GeometryError(
+                f"wrap must be above 0 and at most a full turn (2 pi rad), got {self.wrap!r} rad"
+            )
+        if self.radius1 == self.radius2 == 0.0:
+            raise GeometryError("radius1 and radius2 must not both be 0 m: the side has no area")
+        if self.slant == 0.0:
+            raise GeometryError("height must be above 0 m where both radii are equal: the side has no length")
+
+    @property
+    def slant(self) -> float:
+        """Length of the side from end 1 to end 2 [m]."""
+        return math.hypot(self.height, self.radius2 - self.radius1)
+
+    @property
+    def half_angle(self) -> float:
+        """Angle between side and axis [rad], in [-pi/2, pi/2]; positive where the cone widens towards end 2."""
+        return math.atan2(self.radius2 - self.radius1, self.height)
+
+    @property
+    def sin_half_angle(self) -> float:
+        """Sine of the half angle, without the loss that asin or acos would bring."""
+        return (self.radius2 - self.radius1) / self.slant
+
+    @property
+    def cos_half_angle(self) -> float:
+        """Cosine of the half angle."""
+        return self.height / self.slant
+
+    @property
+    def area(self) -> float:
+        """Area of the wrapped side [m2]."""
+        return 0.5 * self.wrap * (self.radius1 + self.radius2) * self.slant
+
+    def radius_at(self, u: float) -> float:
+        """Distance from the axis [m] at slant distance u [m] from end 1."""
+        s = self.slant  # both terms are positive on the side, so nothing cancels near the apex
+        return ((s - u) * self.radius1 + u * self.radius2) / s
+
+    def point(self, u: float, phi: float) -> tuple[float, float, float]:
+        """Point of the side.
+
+        Args:
+            u: slant distance from end 1 [m].
+            phi: azimuth about the axis [rad].
+
+        Returns:
+            x, y, z in the frame of the frustum [m].
+        """
+        rho = self.radius_at(u)
+        return rho * math.cos(phi), rho * math.sin(phi), u * self.cos_half_angle
+
+    def normal(self, phi: float) -> tuple[float, float, float]:
+        """Outward unit normal of the side at azimuth phi [rad]; it does not depend on u."""
+        ca = self.cos_half_angle
+        return ca * math.cos(phi), ca * math.sin(phi), -self.sin_half_angle
+
+    def locate(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """Surface coordinates of the foot of a point, the inverse of ``point``.
+
+        Args:
+            x: first coordinate in the frame of the frustum [m].
+            y: second coordinate [m].
+            z: coordinate along the axis [m].
+
+        Returns:
+            u [m], phi [rad] and the signed distance from the side [m], positive outside. The foot is on the straight
+            continuation of the side, so u may lie outside [0, slant]; phi lies within half a turn of wrap / 2.
+        """
+        sa, ca = self.sin_half_angle, self.cos_half_angle
+        out = math.hypot(x, y) - self.radius1
+        return out * sa + z * ca, self._branch(math.atan2(y, x), self.wrap), out * ca - z * sa
+
+    def polar(self, u: float, phi: float) -> tuple[float, float]:
+        """Polar coordinates (r [m], theta [rad]) on the flat sector; r is infinite and theta 0 on a cylinder."""
+        q = abs(self.sin_half_angle)
+        return (self.radius_at(u) / q if q else math.inf), phi * q
+
+    def flat(self, u: float, phi: float) -> tuple[float, float]:
+        """Point of the flat pattern, isometric to the side and regular for every half angle.
+
+        Args:
+            u: slant distance from end 1 [m].
+            phi: azimuth [rad].
+
+        Returns:
+            x, y [m]: the origin is at (u, phi) = (0, 0), y runs along that edge, x into the sheet as seen from outside.
+        """
+        sa = self.sin_half_angle
+        rho = self.radius_at(u)
+        half = 0.5 * phi * sa
+        return rho * phi * _sinc(phi * sa), u - rho * phi * math.sin(half) * _sinc(half)
+
+    def unflat(self, x: float, y: float) -> tuple[float, float]:
+        """Surface coordinates (u [m], phi [rad]) of a point of the flat pattern, the inverse of ``flat``."""
+        sa, rho1 = self.sin_half_angle, self.radius1
+        along, across = rho1 + sa * y, sa * x
+        rho = math.hypot(across, along)
+        if rho + rho1 == 0.0:
+            return 0.0, 0.0
+        u = (sa * (x * x + y * y) + 2.0 * rho1 * y) / (rho1 + rho)
+        if along > 0.0 and abs(across) <= 1e-3 * along and self.wrap * abs(sa) < 1.0:
+            t = across / along  # atan2(across, along) / sa, without the division by a vanishing sa
+            return u, x / along * (math.atan(t) / t if t else 1.0)
+        q = abs(sa)
+        angle = math.atan2(math.copysign(1.0, sa) * across, along)
+        return u, self._branch(angle, self.wrap * q) / q
+
+    @staticmethod
+    def _branch(angle: float, span: float) -> float:
+        """The angle, by whole turns, that lies within half a turn of span / 2."""
+        return angle - _TURN * round((angle - 0.5 * span) / _TURN)
+
+    def points(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
+        """``point`` for arrays that broadcast: shape (..., 3) [m]."""
+        import numpy as np
+
+        u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
+        s = self.slant
+        rho = ((s - u) * self.radius1 + u * self.radius2) / s
+        return np.stack([rho * np.cos(phi), rho * np.sin(phi), u * self.cos_half_angle], axis=-1)
+
+    def normals(self, phi: ArrayLike) -> NDArray[np.float64]:
+        """``normal`` for an array: shape (..., 3)."""
+        import numpy as np
+
+        phi = np.asarray(phi, float)
+        ca = self.cos_half_angle
+        return np.stack(
+            [ca * np.cos(phi), ca * np.sin(phi), np.full_like(phi, -self.sin_half_angle)], axis=-1
+        )
+
+    def flats(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
+        """``flat`` for arrays that broadcast: shape (..., 2) [m]."""
+        import numpy as np
+
+        u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
+        s, sa = self.slant, self.sin_half_angle
+        rho = ((s - u) * self.radius1 + u * self.radius2) / s
+        half = 0.5 * phi * sa  # np.sinc(t) is sin(pi t) / (pi t)
+        x = rho * phi * np.sinc(phi * sa / np.pi)
+        y = u - rho * phi * np.sin(half) * np.sinc(half / np.pi)
+        return np.stack([x, y], axis=-1)
+
+
+def _sinc(x: float) -> float:
+    return math.sin(x) / x if x else 1.0

@@ -1,0 +1,108 @@
+"""A rigid motion. Named so that neighbours cancel: p_base = base_link.apply(p_link)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from coneskin.errors import GeometryError
+
+__all__ = ["Pose", "Vector"]
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Rotation and translation from one frame to another; plain floats, for the live loop.
+
+    Attributes:
+        rotation: three rows of three; its columns are the axes of the inner frame seen from the outer one.
+        translation: origin of the inner frame in the outer one [m].
+
+    Raises:
+        GeometryError: a value is not finite, or the rotation is not orthonormal and right-handed (to 1e-6).
+    """
+
+    rotation: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    translation: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        rows = tuple(tuple(float(x) for x in row) for row in self.rotation)
+        shift = tuple(float(x) for x in self.translation)
+        if [len(row) for row in rows] != [3, 3, 3] or len(shift) != 3:
+            raise GeometryError("a pose needs a rotation of 3 x 3 and a translation of 3 numbers")
+        if not all(math.isfinite(x) for row in (*rows, shift) for x in row):
+            raise GeometryError(f"rotation and translation must be finite, got {rows} and {shift} m")
+        a, b, c = rows
+        right_handed = math.isclose(
+            a[0] * (b[1] * c[2] - b[2] * c[1])
+            - a[1] * (b[0] * c[2] - b[2] * c[0])
+            + a[2] * (b[0] * c[1] - b[1] * c[0]),
+            1.0,
+            abs_tol=1e-6,
+        )
+        if not right_handed or any(abs(_dot(m, n) - (m is n)) > 1e-6 for m in rows for n in rows):
+            raise GeometryError(f"rotation must be orthonormal and right-handed, got {rows}")
+        object.__setattr__(self, "rotation", rows)
+        object.__setattr__(self, "translation", shift)
+
+    @classmethod
+    def from_xyz_rpy(
+        cls, xyz: Sequence[float] = (0.0, 0.0, 0.0), rpy: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> Pose:
+        """Pose in the way of URDF: translation [m]; roll, pitch and yaw about the fixed x, y and z axes [rad]."""
+        if len(xyz) != 3 or len(rpy) != 3:
+            raise GeometryError(f"xyz and rpy need 3 numbers each, got {len(xyz)} and {len(rpy)}")
+        (sr, sp, sy), (cr, cp, cy) = ([f(angle) for angle in rpy] for f in (math.sin, math.cos))
+        return cls(
+            (
+                (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+                (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+                (-sp, cp * sr, cp * cr),
+            ),
+            (xyz[0], xyz[1], xyz[2]),
+        )
+
+    @property
+    def rpy(self) -> Vector:
+        """Roll, pitch and yaw [rad], the inverse of ``from_xyz_rpy``; pitch in [-pi/2, pi/2]."""
+        (a00, _, _), (a10, _, _), (a20, a21, a22) = self.rotation
+        level = math.hypot(a00, a10)
+        if level < 1e-12:  # gimbal lock: only the difference of roll and yaw shows; all of it goes to roll
+            return math.atan2(-self.rotation[1][2], self.rotation[1][1]), math.atan2(-a20, level), 0.0
+        return math.atan2(a21, a22), math.atan2(-a20, level), math.atan2(a10, a00)
+
+    def rotate(self, v: Vector) -> Vector:
+        """A direction of the inner frame, seen from the outer one."""
+        x, y, z = v
+        a, b, c = self.rotation
+        return (
+            a[0] * x + a[1] * y + a[2] * z,
+            b[0] * x + b[1] * y + b[2] * z,
+            c[0] * x + c[1] * y + c[2] * z,
+        )
+
+    def apply(self, p: Vector) -> Vector:
+        """A point of the inner frame [m], seen from the outer one."""
+        x, y, z = self.rotate(p)
+        t = self.translation
+        return x + t[0], y + t[1], z + t[2]
+
+    def inverse(self) -> Pose:
+        """The outer frame, seen from the inner one."""
+        a, b, c = self.rotation
+        back = ((a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2]))
+        x, y, z = Pose(back).rotate(self.translation)
+        return Pose(back, (-x, -y, -z))
+
+    def __matmul__(self, inner: Pose) -> Pose:
+        """Chain: (a_b @ b_c) maps c to a."""
+        columns = [self.rotate(column) for column in zip(*inner.rotation, strict=True)]
+        rows = tuple(zip(*columns, strict=True))
+        return Pose((rows[0], rows[1], rows[2]), self.apply(inner.translation))
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
