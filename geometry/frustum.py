@@ -1,9 +1,10 @@
 """A truncated cone, and the coordinates on its side.
 
-Symbols (docs/conventions.md): rho1, rho2 radii, h height, s slant, a half angle; d = rho2 - rho1 = s sin a, h = s cos a.
+Symbols (docs/conventions.md): rho1, rho2 radii, h height, s slant, a half angle;
+d = rho2 - rho1 = s sin a, h = s cos a.
 Everything is written in the surface coordinates (u, phi), not in the polar coordinates (r, theta) of the flat sector,
-because r grows without bound as a cone becomes a cylinder and real links are mostly cylinders. In (u, phi) the cylinder,
-the cone with its apex, the disc and the narrowing cone are ordinary values of one formula.
+because r grows without bound as a cone becomes a cylinder and real links are mostly cylinders. In (u, phi) the
+cylinder, the cone with its apex, the disc and the narrowing cone are ordinary values of one formula.
 """
 
 from __future__ import annotations
@@ -49,9 +50,7 @@ class Frustum:
                 raise GeometryError(f"{name} must be finite and not negative, got {value!r} m")
             object.__setattr__(self, name, float(value))
         if not 0.0 < self.wrap <= _TURN:
-            raise GeometryError(
-                f"wrap must be above 0 and at most a full turn (2 pi rad), got {self.wrap!r} rad"
-            )
+            raise GeometryError(f"wrap must be above 0 and at most a full turn (2 pi rad), got {self.wrap!r} rad")
         if self.radius1 == self.radius2 == 0.0:
             raise GeometryError("radius1 and radius2 must not both be 0 m: the side has no area")
         if self.slant == 0.0:
@@ -176,9 +175,7 @@ class Frustum:
 
         phi = np.asarray(phi, float)
         ca = self.cos_half_angle
-        return np.stack(
-            [ca * np.cos(phi), ca * np.sin(phi), np.full_like(phi, -self.sin_half_angle)], axis=-1
-        )
+        return np.stack([ca * np.cos(phi), ca * np.sin(phi), np.full_like(phi, -self.sin_half_angle)], axis=-1)
 
     def flats(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
         """``flat`` for arrays that broadcast: shape (..., 2) [m]."""

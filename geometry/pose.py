@@ -29,29 +29,21 @@ class Pose:
     translation: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        rows = tuple(tuple(float(x) for x in row) for row in self.rotation)
-        shift = tuple(float(x) for x in self.translation)
-        if [len(row) for row in rows] != [3, 3, 3] or len(shift) != 3:
+        if [len(row) for row in self.rotation] != [3, 3, 3] or len(self.translation) != 3:
             raise GeometryError("a pose needs a rotation of 3 x 3 and a translation of 3 numbers")
+        a, b, c = ((float(x), float(y), float(z)) for x, y, z in self.rotation)
+        shift = (float(self.translation[0]), float(self.translation[1]), float(self.translation[2]))
+        rows = (a, b, c)
         if not all(math.isfinite(x) for row in (*rows, shift) for x in row):
             raise GeometryError(f"rotation and translation must be finite, got {rows} and {shift} m")
-        a, b, c = rows
-        right_handed = math.isclose(
-            a[0] * (b[1] * c[2] - b[2] * c[1])
-            - a[1] * (b[0] * c[2] - b[2] * c[0])
-            + a[2] * (b[0] * c[1] - b[1] * c[0]),
-            1.0,
-            abs_tol=1e-6,
-        )
-        if not right_handed or any(abs(_dot(m, n) - (m is n)) > 1e-6 for m in rows for n in rows):
+        right_handed = abs(_dot(a, _cross(b, c)) - 1.0) < 1e-6
+        if not right_handed or any(abs(_dot(m, n) - float(m is n)) > 1e-6 for m in rows for n in rows):
             raise GeometryError(f"rotation must be orthonormal and right-handed, got {rows}")
         object.__setattr__(self, "rotation", rows)
         object.__setattr__(self, "translation", shift)
 
     @classmethod
-    def from_xyz_rpy(
-        cls, xyz: Sequence[float] = (0.0, 0.0, 0.0), rpy: Sequence[float] = (0.0, 0.0, 0.0)
-    ) -> Pose:
+    def from_xyz_rpy(cls, xyz: Sequence[float] = (0.0, 0.0, 0.0), rpy: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
         """Pose in the way of URDF: translation [m]; roll, pitch and yaw about the fixed x, y and z axes [rad]."""
         if len(xyz) != 3 or len(rpy) != 3:
             raise GeometryError(f"xyz and rpy need 3 numbers each, got {len(xyz)} and {len(rpy)}")
@@ -106,3 +98,7 @@ class Pose:
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
