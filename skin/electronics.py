@@ -1,0 +1,162 @@
+"""What drives and reads a sensor: supply, converter, resistors, and the levels at which a value counts.
+
+The circuit (docs/wire-format.md): each of the electrodes A, B, C, D has one wire, which drives it in one phase and
+reads it in another. The drive current is measured in the supply line; the supply is measured behind that.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal
+
+from coneskin.errors import SensorError
+
+__all__ = ["Electronics", "Polarity", "Thresholds"]
+
+
+def _check_positive(owner: str, values: dict[str, tuple[float, str]]) -> None:
+    for name, (value, unit) in values.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise SensorError(f"{owner}.{name} must be finite and above 0 {unit}, got {value!r} {unit}")
+
+
+@dataclass(frozen=True, slots=True)
+class Electronics:
+    """Supply, converter and resistors.
+
+    Attributes:
+        supply_volts: potential of the positive electrode, U0 in the paper [V].
+        adc_volts: input that gives the highest count [V].
+        adc_bits: resolution of the converter, 8 to 16.
+        pulldown_ohms: resistor from each of C and D to ground in the touch phase [ohm].
+        input_ohms: resistor from each guide electrode to ground in the other phases [ohm]; it brings an untouched
+            guide to 0 V.
+        lead_ohms: wire and switch of one electrode [ohm].
+        current_full_scale: drive current that gives the highest count [A].
+
+    Raises:
+        SensorError: a value is not positive, or the supply does not fit into the converter's range.
+    """
+
+    supply_volts: float = 2.5
+    adc_volts: float = 3.3
+    adc_bits: int = 12
+    pulldown_ohms: float = 10e3
+    input_ohms: float = 10e6
+    lead_ohms: float = 1.0
+    current_full_scale: float = 0.02
+
+    def __post_init__(self) -> None:
+        units = {"supply_volts": "V", "adc_volts": "V", "current_full_scale": "A"}
+        _check_positive(
+            "electronics",
+            {f.name: (getattr(self, f.name), units.get(f.name, "ohm")) for f in fields(self) if f.name != "adc_bits"},
+        )
+        if not (isinstance(self.adc_bits, int) and 8 <= self.adc_bits <= 16):
+            raise SensorError(f"electronics.adc_bits must be a whole number from 8 to 16, got {self.adc_bits!r}")
+        if self.supply_volts > 0.95 * self.adc_volts:
+            raise SensorError(
+                "electronics.supply_volts must be at most 95 % of adc_volts, or a reading at the positive electrode "
+                f"looks like a short: got {self.supply_volts!r} V of {self.adc_volts!r} V"
+            )
+        if self.input_ohms < 10.0 * self.pulldown_ohms:
+            raise SensorError(
+                "electronics.input_ohms must be at least 10 times pulldown_ohms, or the guides load the field: "
+                f"got {self.input_ohms!r} ohm and {self.pulldown_ohms!r} ohm"
+            )
+
+    @property
+    def full_count(self) -> int:
+        """The highest count of the converter."""
+        return (1 << self.adc_bits) - 1
+
+    def volts(self, count: int) -> float:
+        """Potential [V] that a count stands for."""
+        return count * self.adc_volts / self.full_count
+
+    def amperes(self, count: int) -> float:
+        """Drive current [A] that a count stands for."""
+        return count * self.current_full_scale / self.full_count
+
+    def count_volts(self, volts: float) -> int:
+        """Count that the converter gives for a potential [V]: rounded, held within its range."""
+        return min(max(round(volts * self.full_count / self.adc_volts), 0), self.full_count)
+
+    def count_amperes(self, amperes: float) -> int:
+        """Count that the converter gives for a drive current [A]: rounded, held within its range."""
+        return min(max(round(amperes * self.full_count / self.current_full_scale), 0), self.full_count)
+
+
+@dataclass(frozen=True, slots=True)
+class Polarity:
+    """Which electrode of each pair is at the supply; the other is at ground.
+
+    The paper's figure 3 text and its eq. 13 agree only if r1 is the arc of B; then B is positive (eq. 13) and C is
+    (eq. 21). A sensor that is wired the other way round is described here, not re-soldered.
+
+    Attributes:
+        radial: "B" (end 1, the default) or "A" (end 2).
+        angular: "C" (the edge phi = wrap, the default) or "D" (the edge phi = 0).
+
+    Raises:
+        SensorError: another electrode is named.
+    """
+
+    radial: Literal["A", "B"] = "B"
+    angular: Literal["C", "D"] = "C"
+
+    def __post_init__(self) -> None:
+        if self.radial not in ("A", "B"):
+            raise SensorError(f'polarity.radial must be "A" or "B", got {self.radial!r}')
+        if self.angular not in ("C", "D"):
+            raise SensorError(f'polarity.angular must be "C" or "D", got {self.angular!r}')
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """From where on a value counts; all of them are ratios.
+
+    Attributes:
+        touch_level: level from which an untouched sensor is touched.
+        release_level: level below which a touched sensor is no longer touched.
+        location_level: level from which the location of a touch is to be trusted.
+        current_low: drive current of a phase that is too low, as a ratio of the normal one: an open wire.
+        current_high: drive current of a phase that is too high, as a ratio of the normal one: a short.
+        supply_tolerance: how far the supply may be from its nominal value, as a ratio of it.
+        balance: how far the drive current of the touch phase may be from the current through the two pull-downs, as a
+            ratio of the largest possible one.
+        guide_spread: difference of the two guides of a phase from which on the location is not to be trusted (two
+            touches, or one touch and a fault), as a ratio of the supply.
+        overshoot: how far outside the driven range a guide may be, as a ratio of the supply.
+
+    Raises:
+        SensorError: a ratio is outside its range, or two of them are in the wrong order.
+    """
+
+    touch_level: float = 0.10
+    release_level: float = 0.05
+    location_level: float = 0.20
+    current_low: float = 0.5
+    current_high: float = 2.0
+    supply_tolerance: float = 0.10
+    balance: float = 0.10
+    guide_spread: float = 0.15
+    overshoot: float = 0.02
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            top = math.inf if field.name == "current_high" else 1.0
+            if not (math.isfinite(value) and 0.0 < value < top):
+                raise SensorError(f"thresholds.{field.name} must be above 0 and below {top:g}, got {value!r}")
+        if not self.release_level < self.touch_level <= self.location_level:
+            raise SensorError(
+                "thresholds must satisfy release_level < touch_level <= location_level, got "
+                f"{self.release_level!r}, {self.touch_level!r}, {self.location_level!r}"
+            )
+        if not self.current_low < 1.0 < self.current_high:
+            raise SensorError(
+                f"thresholds must satisfy current_low < 1 < current_high, got {self.current_low!r} "
+                f"and {self.current_high!r}"
+            )

@@ -1,0 +1,227 @@
+"""The sensor: two conducting sheets on the side of a truncated cone, and the law from potentials to a place.
+
+Symbols (paper, section 2): U0 supply, Ur and Ut the potentials at the contact in the radial and in the angular phase,
+r1, r2, theta0 the flat sector (r1 at end 1), r and theta the polar coordinates of the contact on it.
+Inside, everything is written in the surface coordinates u (slant distance from end 1) and phi (azimuth), which stay
+finite where a cone becomes a cylinder: theta = phi theta0 / wrap, |dr| = |du|.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from coneskin.errors import SensorError
+from coneskin.geometry.frustum import Frustum
+
+from .electronics import Electronics, Polarity, Thresholds
+from .log_scale import LogScale
+
+__all__ = ["Bounds", "Sensor"]
+
+_MIN_NOMINAL_COUNTS = 16  # half of it, the limit for an open wire, is then well above noise
+
+
+class Bounds(NamedTuple):
+    """The limits of a sensor in counts of its converter, worked out once for the hot path."""
+
+    full: int  #: highest count
+    supply_low: int
+    supply_high: int
+    radial_low: int  #: drive current of the radial phase
+    radial_high: int
+    angular_low: int  #: drive current of the angular phase
+    angular_high: int
+    touch_current_per_guide: float  #: counts of drive current for one count on one guide in the touch phase
+    touch_current_slack: float  #: allowed difference [counts of drive current]
+    weaker_guide: float  #: in a touch, the lower guide is at least this ratio of the higher
+    noise: int  #: counts that mean nothing
+    drop_per_current: float  #: counts of potential lost on one lead for one count of drive current
+    load_ratio: float  #: pull-down over guide input resistance
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """One annular-sector sensor with its electronics.
+
+    Attributes:
+        frustum: the active area: between the inner rims of the arc electrodes, from electrode D (phi = 0) to C.
+        sensor_id: number of the sensor on the wire, 0..255.
+        electronics: supply, converter, resistors.
+        polarity: which electrode of each pair is positive.
+        thresholds: from where on a value counts.
+        device_id: number of the electronics on the wire, 0..65535.
+        upper_sheet_ohms: sheet resistance of the upper layer, electrodes A and B [ohm per square].
+        lower_sheet_ohms: sheet resistance of the lower layer, electrodes C and D [ohm per square].
+        name: what people call it; by default its numbers.
+
+    Raises:
+        SensorError: an end of the frustum has no arc for an electrode, a number does not fit the wire, or the normal
+            drive current does not fit the range in which it is measured.
+    """
+
+    frustum: Frustum
+    sensor_id: int = 0
+    electronics: Electronics = field(default_factory=Electronics)
+    polarity: Polarity = field(default_factory=Polarity)
+    thresholds: Thresholds = field(default_factory=Thresholds)
+    device_id: int = 0
+    upper_sheet_ohms: float = 1000.0
+    lower_sheet_ohms: float = 1000.0
+    name: str = ""
+    bounds: Bounds = field(init=False, repr=False, compare=False)
+    _from_end1: LogScale = field(init=False, repr=False, compare=False)
+    _from_end2: LogScale = field(init=False, repr=False, compare=False)
+    _b_positive: bool = field(init=False, repr=False, compare=False)
+    _c_positive: bool = field(init=False, repr=False, compare=False)
+    _wrap: float = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        cone = self.frustum
+        for end, radius in ((1, cone.radius1), (2, cone.radius2)):
+            if radius <= 0.0:
+                raise SensorError(
+                    f"frustum.radius{end} must be above 0 m for a sensor: an apex has no arc for an electrode, and "
+                    f"eq. 20 has no limit there; got {radius!r} m"
+                )
+        for name, top in (("sensor_id", 0xFF), ("device_id", 0xFFFF)):
+            value = getattr(self, name)
+            if not (isinstance(value, int) and 0 <= value <= top):
+                raise SensorError(f"{name} must be a whole number from 0 to {top}, got {value!r}")
+        for name in ("upper_sheet_ohms", "lower_sheet_ohms"):
+            value = getattr(self, name)
+            if not 0.0 < value < float("inf"):
+                raise SensorError(f"{name} must be finite and above 0 ohm per square, got {value!r}")
+        put = object.__setattr__
+        put(self, "name", self.name or f"sensor {self.device_id}/{self.sensor_id}")
+        put(self, "_from_end1", LogScale(cone.radius1, cone.radius2, cone.slant))
+        put(self, "_from_end2", LogScale(cone.radius2, cone.radius1, cone.slant))
+        put(self, "_b_positive", self.polarity.radial == "B")
+        put(self, "_c_positive", self.polarity.angular == "C")
+        put(self, "_wrap", cone.wrap)
+        put(self, "bounds", self._work_out_bounds())
+
+    @property
+    def radial_ohms(self) -> float:
+        """Resistance of the untouched upper sheet from A to B [ohm]."""
+        cone = self.frustum
+        return self.upper_sheet_ohms * cone.slant / (cone.wrap * self._from_end1.mean_radius)
+
+    @property
+    def angular_ohms(self) -> float:
+        """Resistance of the untouched lower sheet from C to D [ohm]."""
+        cone = self.frustum
+        return self.lower_sheet_ohms * cone.wrap * self._from_end1.mean_radius / cone.slant
+
+    @property
+    def radial_amperes(self) -> float:
+        """Drive current of the untouched sensor in the radial phase [A]."""
+        return self.electronics.supply_volts / (self.radial_ohms + 2.0 * self.electronics.lead_ohms)
+
+    @property
+    def angular_amperes(self) -> float:
+        """Drive current of the untouched sensor in the angular phase [A]."""
+        return self.electronics.supply_volts / (self.angular_ohms + 2.0 * self.electronics.lead_ohms)
+
+    def fractions(self, u: float, phi: float) -> tuple[float, float]:
+        """Potentials at a place as fractions of the supply (eq. 19, 22).
+
+        Args:
+            u: slant distance from end 1 [m], in [0, slant].
+            phi: azimuth [rad], in [0, wrap].
+
+        Returns:
+            the radial and the angular potential over U0, in [0, 1].
+        """
+        radial = (
+            self._from_end2.fraction(self._from_end2.length - u) if self._b_positive else self._from_end1.fraction(u)
+        )
+        angular = phi / self._wrap
+        return radial, angular if self._c_positive else 1.0 - angular
+
+    def place(self, radial: float, angular: float) -> tuple[float, float]:
+        """The place at which the potentials are these fractions of the supply (eq. 20, 24), the inverse of fractions.
+
+        Args:
+            radial: potential in the radial phase over U0; values outside [0, 1] give the end of the sensor.
+            angular: potential in the angular phase over U0; likewise.
+
+        Returns:
+            u [m] and phi [rad].
+        """
+        along = 1.0 - radial if self._b_positive else radial
+        around = angular if self._c_positive else 1.0 - angular
+        along = 0.0 if along < 0.0 else 1.0 if along > 1.0 else along
+        around = 0.0 if around < 0.0 else 1.0 if around > 1.0 else around
+        return self._from_end1.distance(along), self._wrap * around
+
+    def potentials(self, u: float, phi: float) -> tuple[float, float]:
+        """Potentials Ur and Ut at a place [V] (eq. 19, 22); u [m] and phi [rad] as in ``fractions``."""
+        radial, angular = self.fractions(u, phi)
+        return radial * self.electronics.supply_volts, angular * self.electronics.supply_volts
+
+    def polar(self, radial_volts: float, angular_volts: float) -> tuple[float, float]:
+        """Polar coordinates on the flat sector from the two potentials, eq. 20 and 24 as the paper has them.
+
+        Args:
+            radial_volts: Ur [V].
+            angular_volts: Ut [V].
+
+        Returns:
+            r [m] and theta [rad]; on a cylinder r is infinite and theta 0, which is why nothing else here uses them.
+        """
+        supply = self.electronics.supply_volts
+        fraction = radial_volts / supply
+        scale = self._from_end2 if self._b_positive else self._from_end1
+        around = angular_volts / supply if self._c_positive else 1.0 - angular_volts / supply
+        q = abs(self.frustum.sin_half_angle)
+        return (scale.radius(fraction) / q if q else float("inf")), self._wrap * around * q
+
+    def radial_sensitivity(self, u: float) -> float:
+        """How fast the radial potential changes along the side at u [m]: dUr/du [V/m], signed.
+
+        Its magnitude is |dUr/dr| of eq. 25, since |dr| = |du|; on a cylinder it is U0/slant.
+        """
+        slope = self._from_end1.slope(u) * self.electronics.supply_volts
+        return -slope if self._b_positive else slope
+
+    def angular_sensitivity(self) -> float:
+        """How fast the angular potential changes about the axis: dUt/dphi [V/rad], signed.
+
+        Eq. 26 is this times wrap/theta0.
+        """
+        slope = self.electronics.supply_volts / self._wrap
+        return slope if self._c_positive else -slope
+
+    def _work_out_bounds(self) -> Bounds:
+        parts, limits = self.electronics, self.thresholds
+        full = parts.full_count
+        volt, ampere = full / parts.adc_volts, full / parts.current_full_scale
+        nominal: dict[str, float] = {}
+        for phase, amperes in (("radial", self.radial_amperes), ("angular", self.angular_amperes)):
+            nominal[phase] = amperes * ampere
+            if not _MIN_NOMINAL_COUNTS <= nominal[phase] <= 0.9 * full:
+                raise SensorError(
+                    f"{self.name}: electronics.current_full_scale must suit the normal drive current of the {phase} "
+                    f"phase, {amperes:.3g} A ({self.upper_sheet_ohms:g} and {self.lower_sheet_ohms:g} ohm per square); with "
+                    f"{parts.current_full_scale:g} A it is {nominal[phase]:.3g} counts of {full}, allowed are "
+                    f"{_MIN_NOMINAL_COUNTS} to {0.9 * full:.0f}"
+                )
+        supply = parts.supply_volts * volt
+        largest_touch = 2.0 * parts.supply_volts / parts.pulldown_ohms * ampere
+        return Bounds(
+            full=full,
+            supply_low=round(supply * (1.0 - limits.supply_tolerance)),
+            supply_high=min(round(supply * (1.0 + limits.supply_tolerance)), full - 1),
+            radial_low=round(nominal["radial"] * limits.current_low),
+            radial_high=min(round(nominal["radial"] * limits.current_high), full - 1),
+            angular_low=round(nominal["angular"] * limits.current_low),
+            angular_high=min(round(nominal["angular"] * limits.current_high), full - 1),
+            touch_current_per_guide=ampere / volt / parts.pulldown_ohms,
+            touch_current_slack=max(limits.balance * largest_touch, 4.0),
+            # the worst place is an edge electrode: the other guide is behind the whole sheet
+            weaker_guide=0.5 * parts.pulldown_ohms / (parts.pulldown_ohms + self.angular_ohms),
+            noise=max(2, full // 100),
+            drop_per_current=parts.lead_ohms * volt / ampere,
+            load_ratio=parts.pulldown_ohms / parts.input_ohms,
+        )
