@@ -1,0 +1,143 @@
+"""One cone through points of a mesh: gated, reweighted Gauss-Newton, regular at the cylinder.
+
+The unknowns are two tilts and two shifts of the axis, the distance c = rho cos(a) of the side from the origin and the
+half angle a. There is no apex among them, so a cylinder (a = 0) is an ordinary point. The residual is the distance from
+the side, d = rho cos(a) - z sin(a) - c, where z runs along the axis and rho away from it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fit_samples import Samples
+
+__all__ = ["Cone", "fit_cone", "frame", "jacobian"]
+
+Floats = NDArray[np.float64]
+
+STEEPEST = math.radians(80.0)  #: a flatter ring is a flange, not a cone
+_STEPS = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cone:
+    """An endless cone, or cylinder.
+
+    Attributes:
+        origin: a point of the axis [m], shape (3,).
+        axis: unit vector, shape (3,).
+        radius: distance of the side from the axis at the origin [m].
+        half_angle: between side and axis [rad]; positive where it widens along the axis.
+    """
+
+    origin: Floats
+    axis: Floats
+    radius: float
+    half_angle: float
+
+    def cylindrical(self, points: Floats) -> tuple[Floats, Floats]:
+        """Distance from the axis and height along it from the origin [m], each of shape (n,)."""
+        q = points - self.origin
+        z = q @ self.axis
+        return np.linalg.norm(q - z[:, None] * self.axis, axis=1), z
+
+    def distances(self, points: Floats) -> Floats:
+        """Signed distances from the side [m], positive outside, shape (n,)."""
+        rho, z = self.cylindrical(points)
+        return np.asarray((rho - self.radius) * math.cos(self.half_angle) - z * math.sin(self.half_angle))
+
+    def alignment(self, points: Floats, normals: Floats) -> Floats:
+        """Cosines between normals given and the side's, shape (n,)."""
+        q = points - self.origin
+        across = q - (q @ self.axis)[:, None] * self.axis
+        rho = np.maximum(np.linalg.norm(across, axis=1), 1e-12)
+        out = np.einsum("ij,ij->i", across, normals) / rho
+        return np.asarray(out * math.cos(self.half_angle) - (normals @ self.axis) * math.sin(self.half_angle))
+
+
+def frame(axis: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors that make a right-handed frame with an axis: (first, second, axis)."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(helper, axis)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def jacobian(cone: Cone, points: Floats) -> Floats:
+    """Derivatives of ``Cone.distances`` by (tilt 1, tilt 2, shift 1, shift 2, c, half angle), shape (n, 6).
+
+    Tilt i turns the axis towards the i-th vector of ``frame`` [m/rad]; shift i moves the origin along it [m/m];
+    c is radius * cos(half_angle) [m/m].
+    """
+    e1, e2 = frame(cone.axis)
+    q = points - cone.origin
+    x, y, z = q @ e1, q @ e2, q @ cone.axis
+    rho = np.maximum(np.hypot(x, y), 1e-12)
+    ca, sa = math.cos(cone.half_angle), math.sin(cone.half_angle)
+    lever = -(z * ca / rho + sa)
+    return np.stack([lever * x, lever * y, -ca * x / rho, -ca * y / rho, -np.ones(len(q)), -rho * sa - z * ca], axis=1)
+
+
+def fit_cone(samples: Samples, start: Cone, gates: tuple[float, ...], angle: float = 0.2) -> Cone | None:
+    """Fit a cone to those points that lie near it and whose normals agree.
+
+    Args:
+        samples: points and normals of the hull.
+        start: where to begin; it must have some points within the first gate.
+        gates: distances [m], falling, beyond which a point has no weight; each is held until the fit rests.
+        angle: between the normals, above which a point has no weight [rad].
+
+    Returns:
+        the cone, its origin amid its points; None where too few points are left or the fit runs away.
+    """
+    cone: Cone | None = start
+    for number, gate in enumerate(gates):
+        aligned = math.cos(angle * (2.0 if number == 0 and len(gates) > 1 else 1.0))
+        for _ in range(_STEPS):
+            assert cone is not None
+            distance = cone.distances(samples.points)
+            near = (np.abs(distance) < gate) & (cone.alignment(samples.points, samples.normals) > aligned)
+            if int(near.sum()) < 24:
+                return None
+            cone, moved = _step(cone, samples.points[near], distance[near], gate)
+            if cone is None:
+                return None
+            if moved < 1e-4 * gate:
+                break
+    return cone
+
+
+def _step(cone: Cone, points: Floats, distance: Floats, gate: float) -> tuple[Cone | None, float]:
+    """One Gauss-Newton step with Tukey's weights; the new cone and how far it moved the side [m]."""
+    rho, z = cone.cylindrical(points)
+    middle = float(z.mean())
+    sa, ca = math.sin(cone.half_angle), math.cos(cone.half_angle)
+    cone = Cone(cone.origin + middle * cone.axis, cone.axis, cone.radius + middle * sa / ca, cone.half_angle)
+    weights = (1.0 - (distance / gate) ** 2) ** 2
+    slopes = jacobian(cone, points)
+    size = max(float(np.abs(z - middle).max()), float(rho.max()))
+    scale = np.array([size, size, 1.0, 1.0, 1.0, size])  # tilts in metres too
+    slopes = slopes / scale
+    weighted = slopes * weights[:, None]
+    normal = weighted.T @ slopes
+    # Prior far below the data: it only holds what the points leave open (a narrow strip, a short ring).
+    normal[np.diag_indices(6)] += 1e-9 * np.trace(normal)
+    scaled = -np.linalg.solve(normal, weighted.T @ distance)
+    longest = float(np.abs(scaled).max())
+    if longest > 0.2 * size:
+        scaled *= 0.2 * size / longest
+    tilt1, tilt2, shift1, shift2, dc, dangle = scaled / scale
+    e1, e2 = frame(cone.axis)
+    axis = cone.axis + tilt1 * e1 + tilt2 * e2
+    axis /= np.linalg.norm(axis)
+    half_angle = cone.half_angle + dangle
+    if abs(half_angle) > STEEPEST:
+        return None, math.inf
+    radius = (cone.radius * ca + dc) / math.cos(half_angle)
+    if not 1e-4 < radius < 5.0:
+        return None, math.inf
+    return Cone(cone.origin + shift1 * e1 + shift2 * e2, axis, radius, half_angle), longest

@@ -1,0 +1,258 @@
+"""Link meshes: read from a file, brought to metres, welded and checked. The only importer of trimesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.arrays import frozen
+from coneskin.errors import MeshError, MissingExtra
+
+__all__ = ["UNITS", "Mesh", "load_mesh", "make_mesh"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}  #: metres in one unit
+SUFFIXES = (".stl", ".obj", ".dae", ".ply")
+SHORTEST, LONGEST = 0.005, 5.0  #: a link's largest extent lies between these [m]
+THINNEST = 0.0005  #: and its smallest extent above this [m]
+_UP = {  # rotations that bring the named up axis to z, as COLLADA 1.4.1 describes the three frames
+    "X_UP": ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
+    "Y_UP": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
+    "Z_UP": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Triangles of one link, in the frame of the link.
+
+    Attributes:
+        vertices: corners [m], shape (n, 3), no two of them at one place.
+        faces: indices of three corners, shape (m, 3); none without area. Nothing is promised of their direction.
+        source: where it came from, for messages.
+        unit: the unit of the file, a key of ``UNITS`` or, for COLLADA, what its unit tag says.
+        notes: what was guessed or changed on the way, one sentence each.
+    """
+
+    vertices: Floats
+    faces: Indices
+    source: str = "mesh"
+    unit: str = "m"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
+        faces = np.array(self.faces, dtype=np.int64)
+        faces.setflags(write=False)
+        object.__setattr__(self, "faces", faces)
+
+    @property
+    def triangles(self) -> Floats:
+        """Corners of every face [m], shape (m, 3, 3)."""
+        return self.vertices[self.faces]
+
+    def normals_and_areas(self) -> tuple[Floats, Floats]:
+        """Unit normals, shape (m, 3), by the winding of the file, and areas [m2], shape (m,)."""
+        a, b, c = self.triangles.transpose(1, 0, 2)
+        cross = np.cross(b - a, c - a)
+        twice = np.linalg.norm(cross, axis=1)
+        return cross / twice[:, None], 0.5 * twice
+
+    @property
+    def size(self) -> Floats:
+        """Extents along the axes of the frame [m], shape (3,)."""
+        return np.asarray(np.ptp(self.vertices, axis=0))
+
+    def transformed(self, rotation: Any, translation: Any, scale: Any = 1.0) -> Mesh:
+        """Scaled (one factor or three), then rotated, then moved [m]: the order of a URDF's mesh and origin."""
+        vertices = (self.vertices * np.asarray(scale, float)) @ np.asarray(rotation, float).T
+        return Mesh(vertices + np.asarray(translation, float), self.faces, self.source, self.unit, self.notes)
+
+    def embree(self) -> Callable[[Floats, Floats], Indices] | None:
+        """Index of the first face hit by each ray (-1: none), through trimesh and embree; None without embreex."""
+        try:
+            import trimesh
+            from trimesh.ray.ray_pyembree import RayMeshIntersector
+        except ImportError:
+            return None
+        body = trimesh.Trimesh(self.vertices, self.faces, process=False, validate=False)
+        first: Callable[[Floats, Floats], Indices] = RayMeshIntersector(body).intersects_first
+        return first
+
+
+def load_mesh(path: str | Path, unit: str | None = None, up_axis: str = "ignore") -> Mesh:
+    """Read a link's mesh.
+
+    Args:
+        path: an STL, OBJ, DAE (COLLADA) or PLY file.
+        unit: the file's unit, a key of ``UNITS``; None to take COLLADA's unit tag, or to guess: a mesh of a largest
+            extent under 5 is taken to be in metres, a larger one in millimetres. The guess is in ``Mesh.notes``.
+        up_axis: what to do with COLLADA's up_axis tag: "ignore" keeps the file's axes, as RViz, MoveIt and Gazebo do,
+            so that the frame stays the link's; "apply" rotates Y_UP and X_UP files to z up, as COLLADA asks.
+
+    Returns:
+        the mesh in metres, all parts of the file in one, welded.
+
+    Raises:
+        MeshError: no such file, not a mesh, nothing in it, or a shape that cannot be a link.
+        MissingExtra: a COLLADA file without pycollada.
+    """
+    path = Path(path)
+    if unit is not None and unit not in UNITS:
+        raise MeshError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
+    if up_axis not in ("ignore", "apply"):
+        raise MeshError(f"up_axis must be 'ignore' or 'apply', got {up_axis!r}")
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file")
+    if path.suffix.lower() not in SUFFIXES:
+        raise MeshError(f"{path}: a mesh is read from {', '.join(SUFFIXES)}, got {path.suffix or 'no suffix'}")
+    if path.stat().st_size == 0:
+        raise MeshError(f"{path}: the file is empty")
+    notes: list[str] = []
+    metres = None if unit is None else UNITS[unit]
+    turn = None
+    if path.suffix.lower() == ".dae":
+        tag_name, tag_metres, up = _collada_asset(path)
+        if metres is None and tag_metres is not None:
+            unit, metres = tag_name, tag_metres
+            notes.append(f"unit {tag_name} ({tag_metres:g} m) as the COLLADA file says")
+        if up != "Z_UP" and up_axis == "apply":
+            turn = np.array(_UP[up])
+            notes.append(f"rotated from {up} to z up")
+        elif up != "Z_UP":
+            notes.append(f"the file says {up}; its axes are kept, as RViz and MoveIt do")
+    vertices, faces = _read(path)
+    if turn is not None:
+        vertices = vertices @ turn.T
+    if metres is None:
+        extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
+        unit, metres = ("m", 1.0) if extent < LONGEST else ("mm", 0.001)
+        notes.append(f"unit {unit} guessed from the largest extent, {extent:g}")
+    return make_mesh(vertices * metres, faces, str(path), unit or "m", notes)
+
+
+def make_mesh(
+    vertices: Any, faces: Any, source: str = "mesh", unit: str = "m", notes: list[str] | tuple[str, ...] = ()
+) -> Mesh:
+    """Weld corners that coincide, drop faces without area and check that the rest can be a link.
+
+    Args:
+        vertices: corners [m], shape (n, 3).
+        faces: indices of three corners, shape (m, 3).
+        source: where it came from, for messages.
+        unit: the file's unit, for messages.
+        notes: what the reader has to say.
+
+    Raises:
+        MeshError: a corner that is not finite, an index out of range, or a shape that cannot be a link.
+    """
+    vertices, faces = np.asarray(vertices, float), np.asarray(faces, np.int64)
+    if len(faces) == 0:
+        raise MeshError(f"{source}: no faces")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise MeshError(f"{source}: a face names corner {faces.max()}, there are {len(vertices)}")
+    used = np.zeros(len(vertices), bool)
+    used[faces] = True
+    bad = used & ~np.isfinite(vertices).all(axis=1)
+    if bad.any():
+        raise MeshError(f"{source}: {int(bad.sum())} of {len(vertices)} vertices are not finite; export the mesh again")
+    low = vertices[used].min(axis=0)
+    size = vertices[used].max(axis=0) - low
+    longest = float(size.max())
+    advice = f"a link measures {SHORTEST * 1e3:g} mm to {LONGEST:g} m: name the file's unit (unit m, cm, mm, inch)"
+    if longest == 0.0:
+        raise MeshError(f"{source}: all vertices are one point")
+    if longest < SHORTEST:
+        raise MeshError(f"{source}: only {longest * 1e3:.3g} mm long (unit {unit}); {advice}")
+    if longest > LONGEST:
+        raise MeshError(f"{source}: {longest:.4g} m long (unit {unit}); {advice}")
+    # One 63-bit key for each corner; a cell is a millionth of the length, far below what is modelled.
+    cells = np.where(used[:, None], (vertices - low) * (2**20 / longest), 0.0).round().astype(np.int64)
+    key = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
+    _, first, inverse = np.unique(key[used], return_index=True, return_inverse=True)
+    index = np.zeros(len(vertices), np.int64)
+    index[used] = inverse
+    welded, faces = vertices[used][first], index[faces]
+    a, b, c = welded[faces].transpose(1, 0, 2)
+    twice = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    keep = twice > 1e-12 * longest**2
+    faces = faces[keep]
+    if len(faces) == 0:
+        raise MeshError(f"{source}: no face has an area; the points lie on a line")
+    kept, faces = np.unique(faces, return_inverse=True)
+    welded, faces = welded[kept], faces.reshape(-1, 3)
+    thin = float(np.ptp((welded - welded.mean(axis=0)) @ _principal(welded).T, axis=0).min())
+    if thin < max(THINNEST, 1e-4 * longest):
+        raise MeshError(
+            f"{source}: flat, {longest * 1e3:.4g} mm long and {thin * 1e3:.2g} mm thick; a link has a volume"
+        )
+    notes = list(notes)
+    if len(welded) < len(vertices):
+        notes.append(f"welded {len(vertices)} vertices to {len(welded)}")
+    return Mesh(welded, faces, source, unit, tuple(notes))
+
+
+def _principal(points: Floats) -> Floats:
+    centred = points - points.mean(axis=0)
+    return np.asarray(np.linalg.eigh(centred.T @ centred)[1].T)
+
+
+def _read(path: Path) -> tuple[Floats, Indices]:
+    """Corners and faces of all parts of a file, in its own unit."""
+    import trimesh
+
+    try:
+        loaded = trimesh.load(str(path), process=False)
+    except ModuleNotFoundError as error:
+        raise MissingExtra(error.name or "pycollada", f"reading {path.name}", "design") from error
+    except Exception as error:  # the readers raise anything, from struct.error to KeyError
+        reason = str(error).strip().splitlines() or [type(error).__name__]
+        raise MeshError(f"{path}: not a readable {path.suffix[1:].upper()} file ({reason[0]})") from error
+    scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene([loaded])
+    corners: list[Floats] = []
+    faces: list[Indices] = []
+    count = 0
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        part = scene.geometry[name]
+        if len(getattr(part, "faces", ())) == 0:
+            continue
+        matrix = np.asarray(matrix)
+        corners.append(np.asarray(part.vertices, float) @ matrix[:3, :3].T + matrix[:3, 3])
+        faces.append(np.asarray(part.faces, np.int64) + count)
+        count += len(corners[-1])
+    if not faces:
+        raise MeshError(f"{path}: no triangles in it; is it a mesh?")
+    return np.concatenate(corners), np.concatenate(faces)
+
+
+def _collada_asset(path: Path) -> tuple[str, float | None, str]:
+    """Name of the unit, metres in it (None: not said) and up axis of a COLLADA file."""
+    name, metres, up = "m", None, "Y_UP"  # Y_UP is what COLLADA means where the tag is missing
+    try:
+        for _, element in ElementTree.iterparse(path, ("end",)):
+            tag = element.tag.rpartition("}")[2]
+            if tag == "unit":
+                metres = float(element.get("meter", "1"))
+                name = element.get("name", "unit")
+            elif tag == "up_axis":
+                up = (element.text or up).strip()
+            elif tag == "asset":
+                break
+    except ElementTree.ParseError as error:
+        raise MeshError(f"{path}: malformed XML: {error}") from error
+    except ValueError as error:
+        raise MeshError(f"{path}: the unit tag must hold a number of metres: {error}") from error
+    if metres is not None and not (np.isfinite(metres) and metres > 0.0):
+        raise MeshError(f"{path}: the unit tag must hold metres above 0, got {metres}")
+    if up not in _UP:
+        raise MeshError(f"{path}: up_axis must be X_UP, Y_UP or Z_UP, got {up!r}")
+    return name, metres, up
