@@ -54,6 +54,9 @@ class Sensor:
         upper_sheet_ohms: sheet resistance of the upper layer, electrodes A and B [ohm per square].
         lower_sheet_ohms: sheet resistance of the lower layer, electrodes C and D [ohm per square].
         name: what people call it; by default its numbers.
+        bounds: its limits in counts, for the hot path.
+        b_positive: B, not A, is at the supply in the radial phase.
+        c_positive: C, not D, is at the supply in the angular phase.
 
     Raises:
         SensorError: an end of the frustum has no arc for an electrode, a number does not fit the wire, or the normal
@@ -72,8 +75,8 @@ class Sensor:
     bounds: Bounds = field(init=False, repr=False, compare=False)
     _from_end1: LogScale = field(init=False, repr=False, compare=False)
     _from_end2: LogScale = field(init=False, repr=False, compare=False)
-    _b_positive: bool = field(init=False, repr=False, compare=False)
-    _c_positive: bool = field(init=False, repr=False, compare=False)
+    b_positive: bool = field(init=False, repr=False, compare=False)
+    c_positive: bool = field(init=False, repr=False, compare=False)
     _wrap: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -96,8 +99,8 @@ class Sensor:
         put(self, "name", self.name or f"sensor {self.device_id}/{self.sensor_id}")
         put(self, "_from_end1", LogScale(cone.radius1, cone.radius2, cone.slant))
         put(self, "_from_end2", LogScale(cone.radius2, cone.radius1, cone.slant))
-        put(self, "_b_positive", self.polarity.radial == "B")
-        put(self, "_c_positive", self.polarity.angular == "C")
+        put(self, "b_positive", self.polarity.radial == "B")
+        put(self, "c_positive", self.polarity.angular == "C")
         put(self, "_wrap", cone.wrap)
         put(self, "bounds", self._work_out_bounds())
 
@@ -134,10 +137,10 @@ class Sensor:
             the radial and the angular potential over U0, in [0, 1].
         """
         radial = (
-            self._from_end2.fraction(self._from_end2.length - u) if self._b_positive else self._from_end1.fraction(u)
+            self._from_end2.fraction(self._from_end2.length - u) if self.b_positive else self._from_end1.fraction(u)
         )
         angular = phi / self._wrap
-        return radial, angular if self._c_positive else 1.0 - angular
+        return radial, angular if self.c_positive else 1.0 - angular
 
     def place(self, radial: float, angular: float) -> tuple[float, float]:
         """The place at which the potentials are these fractions of the supply (eq. 20, 24), the inverse of fractions.
@@ -149,8 +152,8 @@ class Sensor:
         Returns:
             u [m] and phi [rad].
         """
-        along = 1.0 - radial if self._b_positive else radial
-        around = angular if self._c_positive else 1.0 - angular
+        along = 1.0 - radial if self.b_positive else radial
+        around = angular if self.c_positive else 1.0 - angular
         along = 0.0 if along < 0.0 else 1.0 if along > 1.0 else along
         around = 0.0 if around < 0.0 else 1.0 if around > 1.0 else around
         return self._from_end1.distance(along), self._wrap * around
@@ -172,8 +175,8 @@ class Sensor:
         """
         supply = self.electronics.supply_volts
         fraction = radial_volts / supply
-        scale = self._from_end2 if self._b_positive else self._from_end1
-        around = angular_volts / supply if self._c_positive else 1.0 - angular_volts / supply
+        scale = self._from_end2 if self.b_positive else self._from_end1
+        around = angular_volts / supply if self.c_positive else 1.0 - angular_volts / supply
         q = abs(self.frustum.sin_half_angle)
         return (scale.radius(fraction) / q if q else float("inf")), self._wrap * around * q
 
@@ -183,7 +186,7 @@ class Sensor:
         Its magnitude is |dUr/dr| of eq. 25, since |dr| = |du|; on a cylinder it is U0/slant.
         """
         slope = self._from_end1.slope(u) * self.electronics.supply_volts
-        return -slope if self._b_positive else slope
+        return -slope if self.b_positive else slope
 
     def angular_sensitivity(self) -> float:
         """How fast the angular potential changes about the axis: dUt/dphi [V/rad], signed.
@@ -191,7 +194,7 @@ class Sensor:
         Eq. 26 is this times wrap/theta0.
         """
         slope = self.electronics.supply_volts / self._wrap
-        return slope if self._c_positive else -slope
+        return slope if self.c_positive else -slope
 
     def _work_out_bounds(self) -> Bounds:
         parts, limits = self.electronics, self.thresholds
@@ -203,9 +206,9 @@ class Sensor:
             if not _MIN_NOMINAL_COUNTS <= nominal[phase] <= 0.9 * full:
                 raise SensorError(
                     f"{self.name}: electronics.current_full_scale must suit the normal drive current of the {phase} "
-                    f"phase, {amperes:.3g} A ({self.upper_sheet_ohms:g} and {self.lower_sheet_ohms:g} ohm per square); with "
-                    f"{parts.current_full_scale:g} A it is {nominal[phase]:.3g} counts of {full}, allowed are "
-                    f"{_MIN_NOMINAL_COUNTS} to {0.9 * full:.0f}"
+                    f"phase, {amperes:.3g} A (sheets: {self.upper_sheet_ohms:g} and {self.lower_sheet_ohms:g} ohm per "
+                    f"square); with {parts.current_full_scale:g} A it is {nominal[phase]:.3g} counts of {full}, "
+                    f"allowed are {_MIN_NOMINAL_COUNTS} to {0.9 * full:.0f}"
                 )
         supply = parts.supply_volts * volt
         largest_touch = 2.0 * parts.supply_volts / parts.pulldown_ohms * ampere
