@@ -1,0 +1,157 @@
+"""Messages between the processes of one guard, over a connected pair of stream sockets.
+
+A message is its length (u32, little endian) and its bytes. Sending never waits: what the other side does not take is
+kept, up to a bound; beyond it ``send`` says False and the message is not sent. A pair is given to a child process by
+its descriptor, so no port is opened and nobody else can join.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import subprocess
+import sys
+
+from coneskin.errors import RobotConnectionError
+
+__all__ = ["Channel", "inherit", "pair", "spawn"]
+
+_LENGTH = struct.Struct("<I")
+_LONGEST = 1 << 24
+
+
+class Channel:
+    """One end of a pair.
+
+    Attributes:
+        closed: True once the other side is gone.
+        dropped: messages that were not sent because the other side does not read.
+    """
+
+    def __init__(self, sock: socket.socket, limit: int = 1 << 22) -> None:
+        sock.setblocking(False)
+        self._sock = sock
+        self._limit = limit
+        self._out = bytearray()
+        self._in = b""
+        self.closed = False
+        self.dropped = 0
+
+    def fileno(self) -> int:
+        """The descriptor, for select and poll; -1 when closed."""
+        return self._sock.fileno()
+
+    @property
+    def pending(self) -> int:
+        """Bytes that wait for the other side to read."""
+        return len(self._out)
+
+    def send(self, message: bytes) -> bool:
+        """Send without waiting.
+
+        Returns:
+            whether the message was sent or queued; False where the other side is gone or does not read.
+        """
+        if self.closed:
+            return False
+        if len(self._out) + len(message) > self._limit:
+            self.flush()
+            if len(self._out) + len(message) > self._limit:
+                self.dropped += 1
+                return False
+        self._out += _LENGTH.pack(len(message)) + message
+        return self.flush()
+
+    def flush(self) -> bool:
+        """Hand over what waits, as far as the other side takes it; False where it is gone."""
+        try:
+            while self._out:
+                del self._out[: self._sock.send(self._out)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.closed = True
+            self._out.clear()
+        return not self.closed
+
+    def receive(self) -> list[bytes]:
+        """Every whole message that has arrived; sets ``closed`` where the other side is gone. Never waits."""
+        try:
+            while data := self._sock.recv(1 << 16):
+                self._in += data
+                if len(data) < 1 << 16:
+                    break
+            else:
+                self.closed = True
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.closed = True
+        messages, at = [], 0
+        while at + _LENGTH.size <= len(self._in):
+            (length,) = _LENGTH.unpack_from(self._in, at)
+            if length > _LONGEST:
+                self.closed = True  # the other side is not one of ours
+                break
+            if at + _LENGTH.size + length > len(self._in):
+                break
+            messages.append(self._in[at + _LENGTH.size : at + _LENGTH.size + length])
+            at += _LENGTH.size + length
+        self._in = self._in[at:]
+        return messages
+
+    def close(self) -> None:
+        """Close this end; may be called again."""
+        self.closed = True
+        self._sock.close()
+
+
+def pair() -> tuple[socket.socket, socket.socket]:
+    """Two connected stream sockets, for the two sides of a channel."""
+    return socket.socketpair()
+
+
+def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
+    """Start ``python -m module`` with these ends of pairs; the child takes them with ``inherit``.
+
+    Args:
+        module: the module to run.
+        ends: sockets for the child, closed here afterwards.
+
+    Raises:
+        RobotConnectionError: the process cannot be started.
+    """
+    command = [sys.executable, "-m", module]
+    try:
+        if sys.platform == "win32":  # written from the documentation of socket.share; not run by our tests
+            child = subprocess.Popen([*command, "shared"], stdin=subprocess.PIPE)
+            assert child.stdin is not None
+            for end in ends:
+                share = end.share(child.pid)
+                child.stdin.write(_LENGTH.pack(len(share)) + share)
+            child.stdin.close()
+        else:
+            numbers = [end.fileno() for end in ends]
+            child = subprocess.Popen(
+                [*command, *map(str, numbers)], pass_fds=numbers, stdin=subprocess.DEVNULL, start_new_session=True
+            )
+    except OSError as exc:
+        raise RobotConnectionError(f"cannot start the process {module}: {exc.strerror or exc}") from exc
+    for end in ends:
+        end.close()
+    return child
+
+
+def inherit(arguments: list[str]) -> list[Channel]:
+    """The channels that ``spawn`` gave to this process.
+
+    Args:
+        arguments: the command-line arguments of this process, without its name.
+    """
+    if arguments == ["shared"]:
+        stream = sys.stdin.buffer
+        shares = []
+        while head := stream.read(_LENGTH.size):
+            shares.append(stream.read(_LENGTH.unpack(head)[0]))
+        return [Channel(socket.fromshare(share)) for share in shares]  # type: ignore[attr-defined,unused-ignore]
+    return [Channel(socket.socket(fileno=int(number))) for number in arguments]

@@ -1,0 +1,151 @@
+"""The owner of ur_rtde: a process of its own that moves the arm for the program and stops it for the guard.
+
+Two channels: the guard's, which always comes first, and the program's. After a ``Stop`` the program is refused until
+the guard says ``Clear``. When either channel ends, the arm is stopped and the process ends; when this process ends or
+hangs, the controller's watchdog stops the arm.
+"""
+
+from __future__ import annotations
+
+import select
+import sys
+import time
+from typing import Any
+
+from coneskin.errors import ConeSkinError
+
+from .channel import Channel, inherit
+from .owner_messages import Clear, Halt, Note, Speed, Stop, decode_command, decode_json, encode_json
+from .ur_rtde import UrArm
+
+__all__ = ["Owner", "main"]
+
+_KICK_EVERY = 0.02  # well within the watchdog's period, and no load for the controller
+
+
+class Owner:
+    """Serves both channels; one step at a time, so that it can be tested with a mocked arm.
+
+    Args:
+        arm: the arm, already open.
+        guard: the guard's channel.
+        program: the program's channel.
+    """
+
+    def __init__(self, arm: UrArm, guard: Channel, program: Channel) -> None:
+        self._arm = arm
+        self._guard = guard
+        self._program = program
+        self._allowed = False
+        self._waiting = False  # the program waits for the end of a move
+        self._kicked = -1.0
+        self._deceleration = 2.0
+
+    def run(self) -> None:
+        """Serve until one of the channels ends; then stop the arm."""
+        self._guard.send(Note("ready").encode())
+        try:
+            while self.step(0.005):
+                pass
+        finally:
+            self._arm.stop(self._deceleration)
+
+    def step(self, timeout: float) -> bool:
+        """Wait for messages [s] and serve them; False once a channel has ended."""
+        select.select([self._guard, self._program], [], [], timeout)
+        for message in self._guard.receive():
+            self._serve_guard(message)
+        if self._guard.closed:
+            return False
+        for message in self._program.receive():
+            self._serve_program(message)
+        if self._program.closed:
+            return False
+        if self._waiting and not self._arm.moving():
+            self._reply({"ok": True})
+        now = time.monotonic()
+        if now - self._kicked >= _KICK_EVERY:
+            self._arm.kick()
+            self._kicked = now
+        return True
+
+    def _serve_guard(self, message: bytes) -> None:
+        command = decode_command(message)
+        try:
+            match command:
+                case Stop(deceleration) | Halt(deceleration):
+                    self._allowed = False
+                    self._deceleration = deceleration
+                    self._refuse_waiting("the guard has stopped the arm")
+                    self._arm.stop(deceleration)
+                    self._guard.send(Note("done").encode())
+                case Speed(qd, acceleration):
+                    self._allowed = False
+                    self._arm.speed_j(qd, acceleration)
+                case Clear():
+                    self._allowed = True
+        except ConeSkinError as exc:
+            self._guard.send(Note("error", str(exc)).encode())
+
+    def _serve_program(self, message: bytes) -> None:
+        try:
+            request = decode_json(message)
+            if not self._allowed:
+                self._reply({"ok": False, "stopped": True, "why": "the guard does not let the arm move"})
+                return
+            self._deceleration = float(request.get("acceleration", self._deceleration))
+            self._waiting = self._start(request)
+            if not self._waiting:
+                self._reply({"ok": True})
+        except (ConeSkinError, ValueError, KeyError, TypeError) as exc:
+            self._reply({"ok": False, "stopped": False, "why": f"{exc}"})
+
+    def _start(self, request: dict[str, Any]) -> bool:
+        """Start what the program asks for; True where it wants to wait for the end."""
+        match request["do"]:
+            case "move_j":
+                self._arm.move_j(request["q"], request["speed"], request["acceleration"])
+            case "move_l":
+                self._arm.move_l(request["pose"], request["speed"], request["acceleration"])
+            case "speed_j":
+                self._arm.speed_j(request["qd"], request["acceleration"])
+                return False
+            case "servo_j":
+                self._arm.servo_j(request["q"])
+                return False
+            case "stop":
+                self._arm.stop(request["acceleration"])
+                return False
+            case other:
+                raise ValueError(f"the arm cannot {other!r}")
+        return bool(request.get("wait", True))
+
+    def _refuse_waiting(self, why: str) -> None:
+        if self._waiting:
+            self._reply({"ok": False, "stopped": True, "why": why})
+
+    def _reply(self, answer: dict[str, Any]) -> None:
+        self._waiting = False
+        self._program.send(encode_json(answer))
+
+
+def main(arguments: list[str]) -> int:
+    """Run as ``python -m coneskin.robot.owner``: take the channels, wait for the host, serve."""
+    guard, program = inherit(arguments)
+    while not (hello := program.receive()) and not program.closed:
+        select.select([program], [], [], 1.0)
+    if not hello:
+        return 1
+    settings = decode_json(hello[0])
+    try:
+        with UrArm(settings["host"], settings["watchdog_hz"]) as arm:
+            Owner(arm, guard, program).run()
+    except ConeSkinError as exc:
+        guard.send(Note("error", str(exc)).encode())
+        program.send(encode_json({"ok": False, "stopped": False, "why": str(exc)}))
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
