@@ -5,9 +5,10 @@ the controller's *base*, frame 6 its *flange* (the TCP of an arm without a tool)
 
 Sources:
     Lengths: Universal Robots support article "DH Parameters for calculations of kinematics and dynamics" and
-    ``default_kinematics.yaml`` of Universal_Robots_ROS2_Description, which agree digit for digit. The UR7e is a UR5e
-    of higher payload: the same arm, geometry and masses. The printed CB3 service manual has other numbers for old series (UR5 series
-    1 and 2, and UR10 rounded): for those, and for any work below a millimetre or two, use ``calibrated``.
+    ``default_kinematics.yaml`` of Universal_Robots_ROS2_Description, which agree digit for digit. The UR7e is a
+    UR5e of higher payload: the same geometry and masses. The printed CB3 service manual has other numbers for old
+    series (UR5 series 1 and 2, and UR10 rounded): for those, and for any work below a few millimetres, use
+    ``calibrated``.
     Limits and speeds: user manuals as collected in ``joint_limits.yaml`` there. The elbow's 180 deg is that file's too:
     the controller would take 360 deg, but the forearm meets the upper arm before. Wrist 3 of UR3 and UR3e turns
     without end. Universal Robots publishes no joint acceleration.
