@@ -1,0 +1,192 @@
+"""Reference solutions of the field problems by NGSolve, written once and committed with their provenance.
+
+    python bench/field_reference.py --write      # makes bench/data/field_reference.json, about three minutes
+    python bench/field_reference.py              # compares the committed file with this machine's NGSolve
+
+Every sensor is solved twice, at degree 12 on one mesh and at degree 10 on a finer one; the file keeps the first and the
+largest difference between the two, which is an honest estimate of the error of the worse of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from field_problems import Array, Disc, Ports, Problem, hard_problems, ports, random_problems, standard
+
+PATH = Path(__file__).parent / "data" / "field_reference.json"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """One problem and its reference solution.
+
+    `energies` as in field_problems; `potentials` at `points` (r [m], theta [rad]), shape (2 phases, points, 2 sheets) [V];
+    `estimate`: largest difference between two meshes and orders of the electrodes' voltages (at 1 V of drive) and of
+    their currents (in units of the drive current); `field_estimate`: that of the potentials at the points [V].
+    """
+
+    problem: Problem
+    energies: Array
+    points: Array
+    potentials: Array
+    estimate: float
+    field_estimate: float
+
+    @property
+    def ports(self) -> Ports:
+        return ports(self.energies, self.problem.load)
+
+
+def phases(problem: Problem, energies: Array, modes: Array) -> Array:
+    """Potentials of the two phases from those of the three modes, shape (2, points, 2)."""
+    seen = ports(energies, problem.load).voltages
+    radial = modes[0] + (seen[0, 2] - seen[0, 3]) * modes[1] + seen[0, 3] * modes[2]
+    angular = modes[1] + (seen[1, 1] - seen[1, 0]) * modes[0] + seen[1, 0] * (1.0 - modes[2])
+    return np.array([radial, angular])
+
+
+def sample_points(problem: Problem) -> Array:
+    """The centre of the first disc, a point inside it and one outside every disc: (r, theta)."""
+    disc = problem.discs[0]
+    inside = disc.r * np.exp(1j * disc.theta) + 0.6 * disc.radius * np.exp(0.7j)
+    outside = disc.r * np.exp(1j * disc.theta)
+    for r in np.linspace(0.25, 0.75, 5) * (problem.outer - problem.inner) + problem.inner:
+        for theta in np.linspace(0.2, 0.8, 5) * problem.theta0:
+            z = r * np.exp(1j * theta)
+            clear = [abs(z - d.r * np.exp(1j * d.theta)) > 1.3 * d.radius for d in problem.discs]
+            if all(clear):
+                outside = z
+    turn = [np.angle(z * np.exp(-1j * disc.theta)) + disc.theta for z in (inside, outside)]
+    return np.array(
+        [(disc.r, disc.theta), (abs(inside), turn[0]), (abs(outside), turn[1] % (2 * math.pi))], dtype=float
+    )
+
+
+def reference(problem: Problem) -> Reference:
+    """Solve twice and keep the difference."""
+    from peers_ngsolve import solve
+
+    points = sample_points(problem)
+    widths = [d.radius * math.sqrt(d.conductance * (problem.upper + problem.lower)) for d in problem.discs]
+    # Resolve the layer of width 1/k along the rims: the potentials there converge less fast than the ports.
+    finer = min(1.0, *(4 / w for w in widths if math.isfinite(w) and w > 0), 1.0)
+    found = []
+    for order, size, inside in ((12, 0.5, 0.7), (10, 0.4, 0.5)):
+        solved = solve(problem, order, size, inside * finer, points=points)
+        assert solved.potentials is not None
+        found.append((solved.energies, phases(problem, solved.energies, solved.potentials)))
+    (first, fields), (second, other_fields) = found
+    a, b = ports(first, problem.load), ports(second, problem.load)
+    scale = np.abs(a.currents).max(axis=1, keepdims=True)
+    estimate = max(
+        np.abs(a.voltages - b.voltages).max(),
+        np.abs((a.currents - b.currents) / scale).max(),
+    )
+    field_estimate = np.abs(fields - other_fields).max()
+    return Reference(problem, (first + first.T) / 2, points, fields, float(estimate), float(field_estimate))
+
+
+def load(path: Path = PATH) -> list[Reference]:
+    """The committed references."""
+    return [_decode(entry) for entry in json.loads(path.read_text())["sensors"]]
+
+
+def provenance(path: Path = PATH) -> dict[str, Any]:
+    """Versions, orders, date and command of the committed file."""
+    found: dict[str, Any] = json.loads(path.read_text())["provenance"]
+    return found
+
+
+def write(path: Path = PATH, progress: Callable[[str], None] = print) -> None:
+    """Make the file: the standard problems, the hard ones and the random sensors."""
+    import ngsolve
+    from peers_ngsolve import versions
+
+    ngsolve.SetNumThreads(1)
+    start = time.perf_counter()
+    references = []
+    for problem in [*standard(), *hard_problems(), *random_problems()]:
+        references.append(reference(problem))
+        last = references[-1]
+        progress(f"{problem.name}: ports agree to {last.estimate:.1e}, potentials to {last.field_estimate:.1e}")
+    content = {
+        "provenance": {
+            "what": "hp-FEM in the physical plane, discs meshed with curved elements; bench/peers_ngsolve.py",
+            "command": "python bench/field_reference.py --write",
+            "versions": versions() | {"numpy": np.__version__, "python": sys.version.split()[0]},
+            "order": "degree 12, edges 0.5 width / 0.7 radius; checked by degree 10, 0.4 width / 0.5 radius",
+            "date": time.strftime("%Y-%m-%d"),
+            "worst_estimate": max(r.estimate for r in references),
+            "worst_field_estimate": max(r.field_estimate for r in references),
+            "units": "m, rad, ohm per square, S/m^2 (null: perfect bond), ohm (null: open), S, V at 1 V of drive",
+        },
+        "sensors": [_encode(r) for r in references],
+    }
+    lines = json.dumps(content["provenance"], indent=1)
+    sensors = ",\n".join(json.dumps(s, separators=(",", ":")) for s in content["sensors"])
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f'{{"provenance": {lines},\n"sensors": [\n{sensors}\n]}}\n')
+    progress(f"{len(references)} sensors in {time.perf_counter() - start:.0f} s -> {path}")
+
+
+def _encode(r: Reference) -> dict[str, Any]:
+    problem = asdict(r.problem)
+    problem["load"] = None if math.isinf(r.problem.load) else r.problem.load
+    problem["discs"] = [
+        [d.r, d.theta, d.radius, None if math.isinf(d.conductance) else d.conductance] for d in r.problem.discs
+    ]
+    return {
+        "problem": problem,
+        "energies": r.energies[np.triu_indices(3)].tolist(),
+        "points": r.points.tolist(),
+        "potentials": np.round(r.potentials, 15).tolist(),
+        "estimate": float(f"{r.estimate:.2e}"),
+        "field_estimate": float(f"{r.field_estimate:.2e}"),
+    }
+
+
+def _decode(entry: dict[str, Any]) -> Reference:
+    raw = dict(entry["problem"])
+    raw["discs"] = tuple(Disc(d[0], d[1], d[2], math.inf if d[3] is None else d[3]) for d in raw["discs"])
+    raw["load"] = math.inf if raw["load"] is None else raw["load"]
+    energies = np.zeros((3, 3))
+    energies[np.triu_indices(3)] = entry["energies"]
+    energies += np.triu(energies, 1).T
+    return Reference(
+        Problem(**raw),
+        energies,
+        np.array(entry["points"]),
+        np.array(entry["potentials"]),
+        entry["estimate"],
+        entry["field_estimate"],
+    )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", action="store_true", help="make the committed file anew")
+    arguments = parser.parse_args()
+    if arguments.write:
+        write()
+        return 0
+    worst = 0.0
+    for committed in load():
+        fresh = reference(committed.problem)
+        worst = max(worst, float(np.abs(fresh.ports.voltages - committed.ports.voltages).max()))
+    print(f"largest difference between {PATH.name} and this machine's NGSolve: {worst:.1e} V at 1 V of drive")
+    return 0 if worst < 1e-11 else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
