@@ -1,0 +1,181 @@
+"""The electronics around the sheets: what the converter reads in each phase, given the sheets as a four-port.
+
+Two sheets and any contacts between them are one reciprocal linear network with four terminals, I = Y V in the order
+A, B, C, D. Where Y comes from (ideal resistors, or the exact field) is the business of a ``ContactModel``; the supply,
+the leads, the pull-downs, broken wires and shorts are the same for each and are here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+from coneskin.errors import SensorError
+
+from .sensor import Sensor
+
+__all__ = ["Contact", "ContactModel", "Matrix", "Volts", "Wiring", "measure", "solve"]
+
+Matrix = tuple[tuple[float, ...], ...]
+_A, _B, _C, _D = range(4)
+_TERMINALS = "ABCD"
+_RAILS = ("ground", "supply", "rail")
+_SHORT_SIEMENS = 10.0  # a solid metallic short, 0.1 ohm
+
+
+class Contact(NamedTuple):
+    """Where the two layers touch."""
+
+    u: float  #: slant distance of the middle from end 1 [m]
+    phi: float  #: azimuth of the middle [rad]
+    conductance: float  #: between the layers, all of the contact [S]
+    radius: float = 0.0  #: of a round contact [m]; 0 for a point
+
+
+class ContactModel(Protocol):
+    """How the sheets and their contacts look from the four electrodes."""
+
+    def admittance(self, sensor: Sensor, contacts: Sequence[Contact]) -> Matrix:
+        """The 4 x 4 matrix Y [S] of the bare sheets, in the order A, B, C, D: symmetric, each row sums to zero."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """What is broken between the electronics and the sheets.
+
+    Attributes:
+        opened: electrodes whose wire is open.
+        shorts: pairs that are joined: two electrodes, or one of them and "ground", "supply" (before the current is
+            measured) or "rail" (behind that: a switch that is stuck).
+
+    Raises:
+        SensorError: a name is none of these.
+    """
+
+    opened: tuple[str, ...] = ()
+    shorts: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in self.opened:
+            if name not in tuple(_TERMINALS):
+                raise SensorError(f"an open wire must be one of A, B, C, D, got {name!r}")
+        for pair in self.shorts:
+            if not (len(pair) == 2 and pair[0] in tuple(_TERMINALS) and pair[1] in (*_TERMINALS, *_RAILS)):
+                raise SensorError(
+                    "a short must join one of A, B, C, D with another of them, with ground, supply or rail, "
+                    f"got {'-'.join(pair)!r}"
+                )
+
+
+class Volts(NamedTuple):
+    """What stands at the converter's inputs in one frame, in volts and amperes."""
+
+    touch_c: float
+    touch_d: float
+    touch_current: float
+    radial_c: float
+    radial_d: float
+    radial_current: float
+    angular_a: float
+    angular_b: float
+    angular_current: float
+    supply: float
+
+
+_Terminal = Literal["supply", "ground", "pulldown", "input"]
+
+
+def measure(sensor: Sensor, sheets: Sequence[Matrix], wiring: Wiring | None = None) -> Volts:
+    """What the converter's inputs see in the three phases.
+
+    Args:
+        sensor: electronics and polarity.
+        sheets: the sheets with their contacts, from a ContactModel, during the touch, radial and angular phase.
+        wiring: what is broken; nothing by default.
+
+    Returns:
+        potentials [V] and drive currents [A], without noise.
+    """
+    wiring = wiring or Wiring()
+    radial: tuple[_Terminal, _Terminal] = ("ground", "supply") if sensor.b_positive else ("supply", "ground")
+    angular: tuple[_Terminal, _Terminal] = ("supply", "ground") if sensor.c_positive else ("ground", "supply")
+    touch_at, touch_i = _phase(sensor, sheets[0], wiring, ("supply", "supply", "pulldown", "pulldown"))
+    radial_at, radial_i = _phase(sensor, sheets[1], wiring, (*radial, "input", "input"))
+    angular_at, angular_i = _phase(sensor, sheets[2], wiring, ("input", "input", *angular))
+    return Volts(
+        touch_at[_C],
+        touch_at[_D],
+        touch_i,
+        radial_at[_C],
+        radial_at[_D],
+        radial_i,
+        angular_at[_A],
+        angular_at[_B],
+        angular_i,
+        sensor.electronics.supply_volts,
+    )
+
+
+def _phase(
+    sensor: Sensor, admittance: Matrix, wiring: Wiring, terminals: tuple[_Terminal, _Terminal, _Terminal, _Terminal]
+) -> tuple[list[float], float]:
+    """Potentials at the four terminals of the electronics [V], and the current out of the supply [A]."""
+    parts = sensor.electronics
+    matrix = [list(row) for row in admittance]
+    sources = [0.0] * 4
+    loads = {"pulldown": parts.pulldown_ohms, "input": parts.input_ohms, "supply": 0.0, "ground": 0.0}
+    feeds = [0.0] * 4
+    for k, terminal in enumerate(terminals):
+        feeds[k] = 0.0 if _TERMINALS[k] in wiring.opened else 1.0 / (parts.lead_ohms + loads[terminal])
+        matrix[k][k] += feeds[k] + 1e-15  # keeps a sheet that has lost all of its wires at ground
+        sources[k] += feeds[k] * parts.supply_volts if terminal == "supply" else 0.0
+    for first, second in wiring.shorts:
+        j = _TERMINALS.index(first)
+        matrix[j][j] += _SHORT_SIEMENS
+        if second in ("supply", "rail"):
+            sources[j] += _SHORT_SIEMENS * parts.supply_volts
+        elif second != "ground":
+            k = _TERMINALS.index(second)
+            matrix[k][k] += _SHORT_SIEMENS
+            matrix[j][k] -= _SHORT_SIEMENS
+            matrix[k][j] -= _SHORT_SIEMENS
+    at = solve(matrix, sources)
+    current = sum(
+        (parts.supply_volts - at[k]) * feeds[k] for k, terminal in enumerate(terminals) if terminal == "supply"
+    )
+    current += sum(
+        (parts.supply_volts - at[_TERMINALS.index(first)]) * _SHORT_SIEMENS
+        for first, second in wiring.shorts
+        if second == "rail"
+    )
+    seen = [at[k] * feeds[k] * loads[terminal] for k, terminal in enumerate(terminals)]
+    return seen, current
+
+
+def solve(matrix: list[list[float]], right: Iterable[float]) -> list[float]:
+    """Solve a small system of nodal equations (diagonally dominant, so without pivoting).
+
+    Args:
+        matrix: n rows of n numbers; overwritten.
+        right: n numbers.
+
+    Returns:
+        the n unknowns.
+    """
+    x = list(right)
+    n = len(x)
+    for k in range(n):
+        row, inverse = matrix[k], 1.0 / matrix[k][k]
+        for i in range(k + 1, n):
+            factor = matrix[i][k] * inverse
+            if factor:
+                below = matrix[i]
+                for j in range(k + 1, n):
+                    below[j] -= factor * row[j]
+                x[i] -= factor * x[k]
+    for k in range(n - 1, -1, -1):
+        row = matrix[k]
+        x[k] = (x[k] - sum(row[j] * x[j] for j in range(k + 1, n))) / row[k]
+    return x
