@@ -1,0 +1,232 @@
+"""What stands at the four electrodes, and what is read there.
+
+Each electrode has a lead, behind it a terminal: a source with its resistance, an ADC's input, a pull-down, or nothing. The
+unknowns are the four electrode potentials and the voltage across the contact, so a weak contact is never added to a strong
+sheet and open guides carry exactly no net current.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FieldError
+from .field_coupling import Coupling
+from .field_sheet import SectorSheet
+
+__all__ = ["Phase", "Readings", "Terminal", "angular_phase", "radial_phase", "solve_phase", "touch_phase"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """A Thevenin source behind a lead; the ADC reads between the two.
+
+    Attributes:
+        emf: open-circuit potential [V].
+        resistance: of the source, or of an input to `emf` [ohm]; 0 drives ideally, inf is open.
+        lead: resistance between the terminal and the electrode [ohm].
+    """
+
+    emf: float = 0.0
+    resistance: float = math.inf
+    lead: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.emf):
+            raise FieldError(f"emf of a terminal must be finite [V], got {self.emf!r}")
+        if not self.resistance >= 0.0:
+            raise FieldError(f"resistance of a terminal must be 0 or more [ohm], got {self.resistance!r}")
+        if not (self.lead >= 0.0 and math.isfinite(self.lead)):
+            raise FieldError(f"lead of a terminal must be 0 or more and finite [ohm], got {self.lead!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """One state of the electronics.
+
+    Attributes:
+        name: radial, angular, touch or the user's own.
+        a: terminal of electrode A, on the arc of end 2 of the upper sheet.
+        b: terminal of electrode B, on the arc of end 1 of the upper sheet.
+        c: terminal of electrode C, on the edge phi=wrap of the lower sheet.
+        d: terminal of electrode D, on the edge phi=0 of the lower sheet.
+    """
+
+    name: str
+    a: Terminal
+    b: Terminal
+    c: Terminal
+    d: Terminal
+
+    @property
+    def terminals(self) -> tuple[Terminal, Terminal, Terminal, Terminal]:
+        """In the order A, B, C, D."""
+        return self.a, self.b, self.c, self.d
+
+
+def radial_phase(supply: float = 1.0, adc: float = math.inf, lead: float = 0.0, source: float = 0.0) -> Phase:
+    """B at the supply, A at 0 V, guides C and D read.
+
+    Args:
+        supply: U0 [V].
+        adc: input resistance of the ADC at C and D [ohm].
+        lead: resistance of each lead [ohm].
+        source: internal resistance of each drive [ohm].
+    """
+    guide = Terminal(0.0, adc, lead)
+    return Phase("radial", Terminal(0.0, source, lead), Terminal(supply, source, lead), guide, guide)
+
+
+def angular_phase(supply: float = 1.0, adc: float = math.inf, lead: float = 0.0, source: float = 0.0) -> Phase:
+    """C at the supply, D at 0 V, guides A and B read; arguments as for `radial_phase`."""
+    guide = Terminal(0.0, adc, lead)
+    return Phase("angular", guide, guide, Terminal(supply, source, lead), Terminal(0.0, source, lead))
+
+
+def touch_phase(supply: float = 1.0, pull_down: float = 1e5, lead: float = 0.0, source: float = 0.0) -> Phase:
+    """A and B both at the supply, C and D each pulled down through a resistor and read.
+
+    Args:
+        supply: U0 [V].
+        pull_down: from C and from D to 0 V [ohm].
+        lead: resistance of each lead [ohm].
+        source: internal resistance of each drive [ohm].
+    """
+    drive, guide = Terminal(supply, source, lead), Terminal(0.0, pull_down, lead)
+    return Phase("touch", drive, drive, guide, guide)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Readings:
+    """The answer of one phase; axes over electrodes run A, B, C, D.
+
+    Attributes:
+        phase: what was solved.
+        electrodes: potentials of the electrodes [V], shape (n, 4).
+        terminals: potentials of the terminals, behind the leads, where an ADC reads [V], shape (n, 4).
+        currents: from the terminals into the sensor [A], shape (n, 4).
+        contact: current from the upper to the lower sheet [A], shape (n,).
+    """
+
+    phase: Phase
+    electrodes: Floats
+    terminals: Floats
+    currents: Floats
+    contact: Floats
+
+    def __len__(self) -> int:
+        return int(self.contact.shape[0])
+
+
+def solve_phase(
+    coupling: Coupling, sheet: SectorSheet, upper_resistance: float, lower_resistance: float, phase: Phase
+) -> Readings:
+    """Potentials and currents of one phase.
+
+    Raises:
+        FieldError: a sheet is connected to nothing: no contact and both its electrodes open.
+    """
+    upper = sheet.breadth / (upper_resistance * sheet.length)
+    lower = sheet.length / (lower_resistance * sheet.breadth)
+    n = len(coupling)
+    opens = [math.isinf(t.resistance) for t in phase.terminals]
+    if (opens[0] and opens[1]) and (opens[2] and opens[3]):
+        raise FieldError(f"phase {phase.name}: all four electrodes are open; drive at least one sheet")
+    for pair, first in (("A and B", 0), ("C and D", 2)):
+        if opens[first] and opens[first + 1] and not (coupling.conductance > 0.0).all():
+            raise FieldError(
+                f"phase {phase.name}: without contact nothing fixes the potential of {pair}, which are open;"
+                " give their terminals a resistance, as every ADC has"
+            )
+    ideal = all(t.resistance == 0.0 and t.lead == 0.0 for t in phase.terminals if not math.isinf(t.resistance))
+    if ideal and opens == [False, False, True, True]:
+        volts, contact = _guided(coupling.x, coupling.y, coupling.xy, coupling.yy, lower, phase.b.emf, phase.a.emf)
+        electrodes = np.stack([np.full(n, phase.a.emf), np.full(n, phase.b.emf), volts[0], volts[1]], axis=-1)
+    elif ideal and opens == [True, True, False, False]:
+        volts, contact = _guided(coupling.y, coupling.x, coupling.xy, coupling.xx, upper, phase.d.emf, phase.c.emf)
+        electrodes = np.stack([volts[0], volts[1], np.full(n, phase.c.emf), np.full(n, phase.d.emf)], axis=-1)
+    else:
+        electrodes, contact = _general(coupling, upper, lower, phase)
+    currents = _currents(coupling, upper, lower, electrodes, contact)
+    for e in range(4):
+        if opens[e]:
+            currents[:, e] = 0.0
+    resistance = np.array([t.resistance if not o else 0.0 for t, o in zip(phase.terminals, opens, strict=True)])
+    lead = np.array([t.lead for t in phase.terminals])
+    emf = np.array([t.emf for t in phase.terminals])
+    # Behind a small source resistance the emf is the better reference, before a large input the electrode.
+    from_source = (resistance < lead + 1.0 / min(upper, lower)) & ~np.array(opens)
+    terminals = np.where(from_source, emf - resistance * currents, electrodes + lead * currents)
+    return Readings(phase, electrodes, terminals, currents, contact)
+
+
+def _guided(
+    along: Floats, across: Floats, coupled: Floats, stiff: Floats, guide: float, start: float, end: float
+) -> tuple[tuple[Floats, Floats], Floats]:
+    """Open guides of a sheet of conductance `guide`, the other sheet driven from `start` to `end` along `along`.
+
+    No net current passes, so the sheets meet at the electrical centre: start + h (along) = v_d + (v_c - v_d) across. The
+    guide pair is apart by v_c - v_d = (guide sheet's resistance) * (current moved across).
+    """
+    h = end - start
+    apart = h * coupled / (guide + stiff)
+    second = start + h * along - apart * across
+    return (second + apart, second), np.zeros_like(along)
+
+
+def _currents(coupling: Coupling, upper: float, lower: float, volts: Floats, contact: Floats) -> Floats:
+    """Into the sensor at each electrode; they sum to zero by construction."""
+    hx = volts[:, 0] - volts[:, 1]
+    hy = volts[:, 3] - volts[:, 2]
+    qx = coupling.xx * hx + coupling.xy * hy + coupling.x * contact
+    qy = coupling.xy * hx + coupling.yy * hy + coupling.y * contact
+    i_a = upper * hx + qx
+    i_c = -lower * hy - qy
+    return np.stack([i_a, contact - i_a, i_c, -contact - i_c], axis=-1)
+
+
+def _general(coupling: Coupling, upper: float, lower: float, phase: Phase) -> tuple[Floats, Floats]:
+    """Any four terminals: unknowns V_A, V_B, V_C, V_D and the voltage e across the contact; current = conductance * e.
+
+    A row is V + R I = E for a small R, V/R + I = E/R for a large one. The two rows of a sheet enter with exactly opposite
+    coefficients, so elimination leaves its net current without rounding.
+    """
+    n = len(coupling)
+    g = coupling.conductance
+    upper_row = np.zeros((n, 5))
+    upper_row[:, 0] = upper + coupling.xx
+    upper_row[:, 1] = -upper_row[:, 0]
+    upper_row[:, 3] = coupling.xy
+    upper_row[:, 2] = -coupling.xy
+    upper_row[:, 4] = coupling.x * g
+    lower_row = np.zeros((n, 5))
+    lower_row[:, 2] = lower + coupling.yy
+    lower_row[:, 3] = -lower_row[:, 2]
+    lower_row[:, 1] = coupling.xy
+    lower_row[:, 0] = -coupling.xy
+    lower_row[:, 4] = -coupling.y * g
+    total = np.zeros((n, 5))
+    total[:, 4] = g
+    rows = (upper_row, total - upper_row, lower_row, -total - lower_row)
+    matrix = np.empty((n, 5, 5))
+    right = np.zeros((n, 5, 1))
+    level = 1.0 / min(upper, lower)
+    for e, (terminal, current) in enumerate(zip(phase.terminals, rows, strict=True)):
+        resistance = terminal.resistance + terminal.lead
+        weight_v, weight_i = (1.0, resistance) if resistance <= level else (level / resistance, level)
+        matrix[:, e] = weight_i * current
+        matrix[:, e, e] += weight_v
+        right[:, e, 0] = weight_v * terminal.emf
+    # V_B - V_D + (V_A - V_B) X - (V_C - V_D) Y = e
+    matrix[:, 4, 0] = coupling.x
+    matrix[:, 4, 1] = 1.0 - coupling.x
+    matrix[:, 4, 2] = -coupling.y
+    matrix[:, 4, 3] = coupling.y - 1.0
+    matrix[:, 4, 4] = -1.0
+    solved = np.linalg.solve(matrix, right)[:, :, 0]
+    return solved[:, :4], g * solved[:, 4]
