@@ -25,9 +25,7 @@ def frozen(values: ArrayLike, shape: tuple[int | None, ...], name: str) -> NDArr
         GeometryError: the shape is another, or a value is not finite.
     """
     array = np.array(values, dtype=np.float64)
-    if array.ndim != len(shape) or any(
-        want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
-    ):
+    if array.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise GeometryError(f"{name} must have shape {wanted}, got {array.shape}")
     if not np.isfinite(array).all():

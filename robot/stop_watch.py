@@ -1,0 +1,93 @@
+"""Whether a stop works, judged by measured joint speed, and what to try next while it does not. Pure."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+__all__ = ["STEADY", "StopWatch", "Way"]
+
+STEADY = 5  #: samples in a row below the standstill speed that count as standing
+_SLOWER = 0.05  # rad/s; a drop by this much, or by a tenth, is a slowdown and not noise of the measurement
+
+
+class Way(Enum):
+    """A way to stop the arm, in the order in which they are tried."""
+
+    OWNER = "owner"  #: the stop of ur_rtde's mode, through the process that owns it
+    SCRIPT = "script"  #: a program of one stopj, sent to the controller: it replaces whatever program runs
+    DASHBOARD = "dashboard"  #: the dashboard's stop
+    PROTECTIVE = "protective"  #: a program that triggers a protective stop; a person has to unlock it
+
+
+class StopWatch:
+    """Follows one stop.
+
+    Args:
+        now: when it was commanded [s].
+        speed: largest joint speed then [rad/s]; None where it is not known.
+        ways: those that there are, the first of which has been used.
+        patience: without slowdown for this long, the next way is taken [s].
+        budget: time after which the arm should stand; beyond it every way is taken [s].
+        standstill: joint speed below which the arm stands [rad/s].
+
+    Attributes:
+        slowed_at: when the measured speed first showed a slowdown, or None.
+        standing_at: when the arm was first seen standing, or None.
+        used: the ways used so far.
+    """
+
+    def __init__(
+        self,
+        now: float,
+        speed: float | None,
+        ways: tuple[Way, ...],
+        patience: float,
+        budget: float,
+        standstill: float,
+    ) -> None:
+        self._top = speed
+        self._left = list(ways[1:])
+        self._patience = patience
+        self._standstill = standstill
+        self._next = now + patience
+        self._deadline = now + budget
+        self._steady = 0
+        self.used = list(ways[:1])
+        self.slowed_at: float | None = None
+        self.standing_at: float | None = None
+
+    def sample(self, time: float, speed: float) -> None:
+        """Take a measured speed [rad/s] of a host time [s]."""
+        if self._top is None or (speed > self._top and self.slowed_at is None):
+            self._top = speed  # it may still have been speeding up when the stop was commanded
+        slower = self._top - speed >= min(_SLOWER, 0.1 * self._top)
+        if self.slowed_at is None and (slower or speed < self._standstill):
+            self.slowed_at = time
+        self._steady = self._steady + 1 if speed < self._standstill else 0
+        if self._steady >= STEADY and self.standing_at is None:
+            self.standing_at = time
+        elif speed >= self._standstill:
+            self.standing_at = None
+
+    def next_ways(self, now: float) -> list[Way]:
+        """The ways to take now; each is named once."""
+        if self.standing_at is not None:
+            return []
+        take: list[Way] = []
+        if now >= self._deadline:
+            take, self._left = self._left, []
+        elif self.slowed_at is None and now >= self._next and self._left:
+            take = [self._left.pop(0)]
+            self._next = now + self._patience
+        self.used += take
+        return take
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether no way is left."""
+        return not self._left
+
+    @property
+    def by_owner_alone(self) -> bool:
+        """Whether no other way than the owner was needed, so that ur_rtde can still move the arm."""
+        return self.used == [Way.OWNER]
