@@ -1,0 +1,265 @@
+"""Touch or no touch: thresholds with hysteresis on the level, and everything that can be wrong between frames.
+
+A detector is a machine of plain numbers for one sensor. It begins *not ready*: until it has seen a run of valid
+untouched frames, nobody may take its silence for "no touch". Time is an argument, so the same frames at the same times
+give the same events, bit by bit, live and in a replay.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from coneskin.errors import SensorError
+
+from .diagnosis import Fault
+from .events import Event, SkinFault, TouchBegan, TouchEnded, TouchMoved
+from .reading import read
+from .sensor import Sensor
+from .timing import FrameTiming, TimingLimits
+from .wire import Frame, Status
+
+__all__ = ["Detection", "Detector"]
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """How a detector decides.
+
+    Attributes:
+        confirm_frames: frames above the threshold that make a touch, 1 or 2.
+        release_frames: frames below the release threshold that end it.
+        settle_frames: valid untouched frames in a row before the sensor is ready.
+        settle_step: change of level from one frame to the next above which a location is not settled yet.
+        move_distance: movement along the surface that is reported [m].
+        level_step: change of level that is reported.
+        drift_rate: fastest drift of the untouched level that is followed [1/s].
+        drift_limit: largest drift that is followed; beyond it the sensor is at fault. Below the release threshold.
+        lasting_touch: a touch this long is a fault as well [s]; it is never taken for the new zero.
+        stuck_frames: this many frames in which a drive current or the supply shows no noise at all are a fault; 0: off.
+        timing: how regular the frames must be.
+
+    Raises:
+        SensorError: a value is outside its range.
+    """
+
+    confirm_frames: int = 1
+    release_frames: int = 3
+    settle_frames: int = 50
+    settle_step: float = 0.05
+    move_distance: float = 0.002
+    level_step: float = 0.1
+    drift_rate: float = 0.002
+    drift_limit: float = 0.03
+    lasting_touch: float = 30.0
+    stuck_frames: int = 0
+    timing: TimingLimits = field(default_factory=TimingLimits)
+
+    def __post_init__(self) -> None:
+        if self.confirm_frames not in (1, 2):
+            raise SensorError(f"detection.confirm_frames must be 1 or 2, got {self.confirm_frames!r}")
+        for name in ("release_frames", "settle_frames"):
+            if not getattr(self, name) >= 1:
+                raise SensorError(f"detection.{name} must be at least 1, got {getattr(self, name)!r}")
+        for name in ("settle_step", "move_distance", "level_step", "lasting_touch"):
+            if not getattr(self, name) > 0.0:
+                raise SensorError(f"detection.{name} must be above 0, got {getattr(self, name)!r}")
+        for name in ("drift_rate", "drift_limit", "stuck_frames"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise SensorError(f"detection.{name} must be finite and not negative, got {getattr(self, name)!r}")
+
+
+class Detector:
+    """Touch detection on one sensor.
+
+    Args:
+        sensor: the sensor.
+        detection: how to decide.
+
+    Attributes:
+        sensor: the sensor.
+        ready: a run of valid untouched frames was seen, and no fault since: silence now means "no touch".
+        touched: a touch lasts.
+        fault: why the sensor cannot be believed at present, or None.
+        baseline: drift of the untouched level that is taken off.
+        timing: sequence and clocks; counts of what was missing.
+    """
+
+    __slots__ = (
+        "_above",
+        "_began",
+        "_below",
+        "_last_counts",
+        "_lasting",
+        "_level",
+        "_phi",
+        "_quiet",
+        "_radius",
+        "_raw_level",
+        "_still",
+        "_u",
+        "_valid",
+        "baseline",
+        "detection",
+        "fault",
+        "ready",
+        "sensor",
+        "timing",
+        "touched",
+    )
+
+    def __init__(self, sensor: Sensor, detection: Detection | None = None) -> None:
+        self.sensor = sensor
+        self.detection = detection or Detection()
+        if not self.detection.drift_limit < sensor.thresholds.release_level:
+            raise SensorError(
+                "detection.drift_limit must be below thresholds.release_level, got "
+                f"{self.detection.drift_limit!r} and {sensor.thresholds.release_level!r}"
+            )
+        self.timing = FrameTiming(self.detection.timing)
+        self.ready = self.touched = False
+        self.fault: Fault | None = None
+        self.baseline = 0.0
+        self._radius = max(sensor.frustum.radius1, sensor.frustum.radius2)
+        self._above = self._below = self._quiet = 0
+        self._began = 0.0
+        self._lasting = False
+        self._level = self._raw_level = self._u = self._phi = 0.0
+        self._valid = False
+        self._last_counts = (-1, -1, -1)
+        self._still = [0, 0, 0]
+
+    def age(self, now: float) -> float:
+        """Time since the newest valid frame came [s]; infinite before the first."""
+        return self.timing.age(now)
+
+    def feed(self, frame: Frame, now: float) -> list[Event]:
+        """Take the next frame of this sensor.
+
+        Args:
+            frame: the frame.
+            now: host clock when it arrived [s], monotonic.
+
+        Returns:
+            what happened; mostly nothing.
+        """
+        events: list[Event] = []
+        restarted = frame.status & Status.RESTARTED and self.timing.frames > 0
+        if restarted:
+            self.timing.restart()
+        late = self.timing.advance(frame.sequence, frame.clock_us, now)
+        if restarted:
+            self._report(events, Fault.RESTARTED, frame, now)
+        elif late is not None:
+            self._report(events, late, frame, now, self.timing.detail)
+            if late is Fault.REPLAYED:
+                return events  # an old frame says nothing about now
+        reading = read(self.sensor, frame)
+        if reading.fault is not None:
+            self._report(events, reading.fault, frame, now)
+            return events
+        self.timing.seen_valid(now)
+        if self.detection.stuck_frames and self._stands_still(frame):
+            self._report(events, Fault.STUCK, frame, now)
+            return events
+        step = abs(reading.level - self._raw_level)
+        self._raw_level = reading.level
+        level = reading.level - self.baseline
+        settled = reading.location_valid and step <= self.detection.settle_step
+        if self.touched:
+            self._while_touched(events, frame, now, level, reading.u, reading.phi, settled)
+        else:
+            self._while_untouched(events, frame, now, level, reading.u, reading.phi, settled)
+        return events
+
+    def silence(self, now: float, longest: float) -> list[Event]:
+        """Report that no valid frame has come for too long.
+
+        Args:
+            now: host clock [s].
+            longest: silence that is allowed [s].
+
+        Returns:
+            a SkinFault, once per silence, or nothing.
+        """
+        age = self.timing.age(now)
+        events: list[Event] = []
+        if age > longest:
+            frame_clock, sequence = self.timing.clock_us, self.timing.sequence
+            detail = f"{age * 1e3:.1f} ms" if math.isfinite(age) else "none at all"
+            self._put_fault(events, Fault.SILENT, now, frame_clock, sequence, detail)
+        return events
+
+    def _while_untouched(
+        self, events: list[Event], frame: Frame, now: float, level: float, u: float, phi: float, valid: bool
+    ) -> None:
+        detection, thresholds = self.detection, self.sensor.thresholds
+        if level >= thresholds.touch_level:
+            self._quiet = 0
+            self._above += 1
+            if self._above >= detection.confirm_frames:
+                self.touched, self._lasting, self._began = True, False, now
+                self._below = 0
+                self._remember(level, u, phi, valid)
+                events.append(TouchBegan(self.sensor.name, now, frame.clock_us, frame.sequence, level, u, phi, valid))
+            return
+        self._above = 0
+        if level >= thresholds.release_level:  # neither touched nor quiet: no drift is learned from it
+            self._quiet = 0
+            return
+        self._quiet += 1
+        if self._quiet >= detection.settle_frames:
+            self.ready, self.fault = True, None
+        most = detection.drift_rate * self.timing.period
+        self.baseline += most if level > most else -most if level < -most else level
+        if abs(self.baseline) > detection.drift_limit:
+            self.baseline = math.copysign(detection.drift_limit, self.baseline)
+            if abs(level) > most:
+                self._report(events, Fault.DRIFT, frame, now, f"{self.baseline + level:+.3f} of the level")
+
+    def _while_touched(
+        self, events: list[Event], frame: Frame, now: float, level: float, u: float, phi: float, valid: bool
+    ) -> None:
+        detection = self.detection
+        name, clock, sequence = self.sensor.name, frame.clock_us, frame.sequence
+        if level < self.sensor.thresholds.release_level:
+            self._below += 1
+            if self._below >= detection.release_frames:
+                self.touched = False
+                self._above = self._quiet = 0
+                events.append(TouchEnded(name, now, clock, sequence, level, self._u, self._phi, self._valid))
+            return
+        self._below = 0
+        if not self._lasting and now - self._began >= detection.lasting_touch:
+            self._lasting = True
+            self._report(events, Fault.LAYERS_CLOSED, frame, now, f"{now - self._began:.1f} s")
+        moved = math.hypot(u - self._u, self._radius * (phi - self._phi)) > detection.move_distance
+        changed = abs(level - self._level) > detection.level_step
+        if valid != self._valid or (valid and moved) or changed:
+            if not valid and self._valid:
+                u, phi = self._u, self._phi  # the last place that was certain is the better guess
+            self._remember(level, u, phi, valid)
+            events.append(TouchMoved(name, now, clock, sequence, level, u, phi, valid))
+
+    def _remember(self, level: float, u: float, phi: float, valid: bool) -> None:
+        self._level, self._u, self._phi, self._valid = level, u, phi, valid
+
+    def _report(self, events: list[Event], fault: Fault, frame: Frame, now: float, detail: str = "") -> None:
+        self._put_fault(events, fault, now, frame.clock_us, frame.sequence, detail)
+
+    def _put_fault(
+        self, events: list[Event], fault: Fault, now: float, clock_us: int, sequence: int, detail: str
+    ) -> None:
+        self._quiet = self._above = 0
+        self.ready = False
+        if fault is not self.fault:
+            self.fault = fault
+            events.append(SkinFault(self.sensor.name, now, clock_us, sequence, fault, detail))
+
+    def _stands_still(self, frame: Frame) -> bool:
+        counts = (frame.radial_current, frame.angular_current, frame.supply)
+        still = self._still
+        for k in (0, 1, 2):
+            still[k] = still[k] + 1 if counts[k] == self._last_counts[k] else 0
+        self._last_counts = counts
+        return max(still) >= self.detection.stuck_frames
