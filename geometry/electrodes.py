@@ -1,0 +1,230 @@
+"""Where the electrodes, wires and holes of a sheet lie, in surface coordinates, the same for every layer.
+
+Two electrodes on each conductive sheet (paper, figure 3 and 5): B and A on the arcs of the upper one, D and C on the
+straight edges of the lower one. The edge electrodes are wedges: both of their borders are rays, because the
+equipotentials of that sheet are rays; a strip of constant width would bend the field. Widths in millimetres become
+angles at the narrow end, so nothing is ever narrower than asked for.
+
+All four wires leave on one side. The two electrodes that run across to this side have their tabs there anyway. Of the
+other pair the near one has a tab too, and the far one a lead, for which its conductive sheet is cut back along one
+side: the lead runs above the wedge (or strip) of the other sheet, where nothing is measured.
+
+Outside the electrodes each sheet is at one potential and carries no current. The corners are in that dead margin of
+both sheets at once, the only place where a hole through all layers disturbs no field. The corner beside the lead has
+none: three holes, so that a layer laid down mirrored or turned does not fit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import get_args
+
+from coneskin.errors import GeometryError
+
+from .frustum import Frustum
+from .pen import Corner, Shape, Side, Tab
+
+__all__ = ["ElectrodePlan", "Layout", "Patch", "lay_out"]
+
+_WEB = 1e-3  # material that must stay around a hole [m]
+
+
+@dataclass(frozen=True, slots=True)
+class ElectrodePlan:
+    """Widths to lay out a sheet with [m].
+
+    Attributes:
+        margin: from the rim of the sheet to the electrodes, inactive.
+        electrode: width of the four electrodes.
+        setback: how much smaller the conductive sheets are cut, so that no two touch at the seam.
+        lead: width of leads and tabs.
+        clearance: between a lead and what it must not touch.
+        tab: how far the tabs stick out; 0 for none.
+        hole: diameter of the registration holes; 0 for none.
+        wires: the side where all four wires leave: end1 (u = 0), end2, edge0 (phi = 0) or edge1 (phi = wrap).
+
+    Raises:
+        GeometryError: a width is negative, or the hole or a tab does not fit.
+    """
+
+    margin: float = 6e-3
+    electrode: float = 6e-3
+    setback: float = 1e-3
+    lead: float = 4e-3
+    clearance: float = 1.5e-3
+    tab: float = 12e-3
+    hole: float = 2.5e-3
+    wires: Side = "end1"
+
+    def __post_init__(self) -> None:
+        for name in ("electrode", "setback", "lead", "clearance", "margin", "tab", "hole"):
+            value, may_be_none = getattr(self, name), name in ("margin", "tab", "hole")
+            if not (math.isfinite(value) and (value > 0.0 or (may_be_none and value == 0.0))):
+                rule = "not negative" if may_be_none else "above 0"
+                raise GeometryError(f"{name} must be finite and {rule} mm, got {value * 1e3:.4g} mm")
+        if self.wires not in get_args(Side):
+            raise GeometryError(f"wires must leave at one of {', '.join(get_args(Side))}, got {self.wires!r}")
+        if self.setback > self.margin:
+            raise GeometryError(
+                f"setback must be at most the margin ({self.margin * 1e3:.4g} mm), got {self.setback * 1e3:.4g} mm"
+            )
+        room = self.margin - self.setback - 2.0 * _WEB
+        if self.hole > room:
+            raise GeometryError(
+                f"hole must be at most margin - setback - 2 mm = {max(room, 0.0) * 1e3:.4g} mm, "
+                f"got {self.hole * 1e3:.4g} mm: widen the margin, or hole 0 for none"
+            )
+        if self.lead > self.electrode:
+            raise GeometryError(
+                f"lead must be at most the electrode ({self.electrode * 1e3:.4g} mm), got {self.lead * 1e3:.4g} mm"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """A piece of the side between two slant distances [m] and two azimuths [rad]."""
+
+    u1: float
+    u2: float
+    phi1: float
+    phi2: float
+
+    def area(self, frustum: Frustum) -> float:
+        """Its area on a frustum [m2]."""
+        return (self.phi2 - self.phi1) * (self.u2 - self.u1) * frustum.radius_at(0.5 * (self.u1 + self.u2))
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What lies where on a sheet.
+
+    Attributes:
+        sheet: the side of the link that the sheet covers.
+        plan: the widths.
+        field: between the electrodes: u1 is the inner edge of B, u2 of A, phi1 of D, phi2 of C. The decode maps the
+            readings 0..1 to it.
+        active: where a touch is located: inside the field of both sheets.
+        rim: outline of substrates and isolation.
+        upper: outline of the upper conductive sheet.
+        lower: outline of the lower conductive sheet.
+        foils: outlines of the electrodes A, B, C, D with their leads and tabs.
+        marks: for the "upper" and the "lower" conductive sheet, lines that show where its electrodes go.
+        folds: a line across the tab of each electrode, where it leaves the sheet.
+        holes: centres (u, phi) of the holes.
+    """
+
+    sheet: Frustum
+    plan: ElectrodePlan
+    field: Patch
+    active: Patch
+    rim: Shape
+    upper: Shape
+    lower: Shape
+    foils: dict[str, Shape]
+    marks: dict[str, tuple[Shape, ...]]
+    folds: dict[str, Shape]
+    holes: tuple[tuple[float, float], ...]
+
+    @property
+    def active_share(self) -> float:
+        """Share of the sheet that locates a touch."""
+        return self.active.area(self.sheet) / self.sheet.area
+
+
+def lay_out(sheet: Frustum, plan: ElectrodePlan | None = None) -> Layout:
+    """Place electrodes, leads, tabs and holes on a sheet.
+
+    Args:
+        sheet: the side of the link that the sheet covers.
+        plan: the widths; the default ones if None.
+
+    Raises:
+        GeometryError: nothing would stay active.
+    """
+    plan = plan or ElectrodePlan()
+    narrow = min(sheet.radius1, sheet.radius2)
+    if narrow <= 0.0:
+        raise GeometryError("a sheet cannot reach an apex: end it where the radius is above 0 m")
+    at_end = plan.wires.startswith("end")
+    # p runs from the side of the wires across the sheet, q along this side; each in its own unit (m or rad)
+    p_unit, q_unit = (1.0, 1.0 / narrow) if at_end else (1.0 / narrow, 1.0)
+    p_all, q_all = (sheet.slant, sheet.wrap) if at_end else (sheet.wrap, sheet.slant)
+    mp, ep, sp = plan.margin * p_unit, plan.electrode * p_unit, plan.setback * p_unit
+    mq, eq, sq = plan.margin * q_unit, plan.electrode * q_unit, plan.setback * q_unit
+    lead, clear = plan.lead * q_unit, plan.clearance * q_unit
+    lead_q = max(mq, sq + lead + clear)  # beside the tab of the electrode that runs along the low side
+    back = lead_q + lead + clear  # here the conductive sheet beside the lead begins
+    low, far, high = max(mq + eq, back), p_all - mp - ep, q_all - mq - eq
+    _check_room(plan, "from end to end" if at_end else "around the narrow end", far - mp - ep, p_all, p_unit)
+    _check_room(plan, "around the narrow end" if at_end else "from end to end", high - low, q_all, q_unit)
+    tab_q = (back + clear + 0.5 * lead, lead_q + 0.5 * lead, sq + 0.5 * lead, high + 0.5 * eq)
+    if plan.tab and tab_q[0] + 0.5 * lead + clear > high:
+        raise GeometryError(f"four tabs of {plan.lead * 1e3:.4g} mm do not fit on {plan.wires}: reduce the lead")
+
+    def corner(p: float, q: float) -> Corner:
+        if at_end:
+            return Corner(p if plan.wires == "end1" else sheet.slant - p, q)
+        return Corner(q, p if plan.wires == "edge0" else sheet.wrap - p)
+
+    def shape(*corners: tuple[float, float]) -> Shape:
+        return tuple(corner(p, q) for p, q in corners)
+
+    def tab(p: float, q: float) -> Shape:
+        foot = corner(p, q)
+        inside = p if at_end else p * sheet.radius_at(foot.u)
+        return (Tab(foot.u, foot.phi, plan.lead, inside + plan.tab, plan.wires),) if plan.tab else ()
+
+    def fold(q: float) -> Shape:
+        rim = corner(0.0, q)
+        half = 0.45 * plan.lead / (sheet.radius_at(rim.u) if at_end else 1.0)
+        return shape((0.0, q - half), (0.0, q + half))
+
+    end_p, end_q, edge_p, edge_q = p_all - sp, q_all - sq, p_all - mp, q_all - mq
+    across = shape((sp, back), (sp, end_q), (end_p, end_q), (end_p, sq), (far, sq), (far, back))
+    along = shape((sp, sq), (sp, end_q), (end_p, end_q), (end_p, sq))
+    near_foil = shape((mp + ep, back), (mp + ep, end_q), (mp, end_q)) + tab(mp, tab_q[0]) + shape((mp, back))
+    far_foil = (
+        shape((edge_p, lead_q), (edge_p, end_q), (far, end_q), (far, lead_q + lead), (0.0, lead_q + lead))
+        + tab(0.0, tab_q[1])
+        + shape((0.0, lead_q))
+    )
+    low_foil = (
+        shape((end_p, mq), (end_p, mq + eq), (sp, mq + eq)) + tab(sp, tab_q[2]) + shape((sp, sq), (mp, sq), (mp, mq))
+    )
+    high_foil = shape((end_p, high), (end_p, edge_q), (sp, edge_q)) + tab(sp, tab_q[3]) + shape((sp, high))
+    across_marks = (
+        *(shape((p, back), (p, end_q)) for p in (mp, mp + ep, far)),
+        shape((edge_p, sq), (edge_p, end_q)),
+    )
+    along_marks = tuple(shape((sp, q), (end_p, q)) for q in (mq, mq + eq, high, edge_q))
+    hole_p, hole_q = 0.5 * (mp + sp), 0.5 * (mq + sq)
+    holes = shape((hole_p, q_all - hole_q), (p_all - hole_p, q_all - hole_q), (p_all - hole_p, hole_q))
+    names = {"end1": "BADC", "end2": "ABDC", "edge0": "DCBA", "edge1": "CDBA"}[plan.wires]
+    return Layout(
+        sheet=sheet,
+        plan=plan,
+        field=_patch(corner(mp + ep, mq + eq), corner(far, high)),
+        active=_patch(corner(mp + ep, low), corner(far, high)),
+        rim=shape((0.0, 0.0), (0.0, q_all), (p_all, q_all), (p_all, 0.0)),
+        upper=across if at_end else along,
+        lower=along if at_end else across,
+        foils=dict(sorted(zip(names, (near_foil, far_foil, low_foil, high_foil), strict=True))),
+        marks={"upper" if at_end else "lower": across_marks, "lower" if at_end else "upper": along_marks},
+        folds={name: fold(q) for name, q in zip(names, tab_q, strict=True)} if plan.tab else {},
+        holes=tuple((at.u, at.phi) for at in holes if isinstance(at, Corner)) if plan.hole else (),
+    )
+
+
+def _check_room(plan: ElectrodePlan, where: str, active: float, whole: float, unit: float) -> None:
+    """Refuse a sheet of which nothing would stay active in one direction."""
+    if active > 1e-3 * unit:
+        return
+    raise GeometryError(
+        f"the sheet measures {whole / unit * 1e3:.4g} mm {where}; margins of {plan.margin * 1e3:.4g} mm and electrodes "
+        f"of {plan.electrode * 1e3:.4g} mm on both sides leave less than 1 mm active: make them smaller"
+    )
+
+
+def _patch(a: Corner, b: Corner) -> Patch:
+    return Patch(min(a.u, b.u), max(a.u, b.u), min(a.phi, b.phi), max(a.phi, b.phi))
