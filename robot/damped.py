@@ -29,8 +29,6 @@ MOST = 0.05**2
 #: square of the singular value below which it rises [m^2]
 NEAR = 0.1**2
 
-_EMPTY: list[float] = []
-
 
 def damping_squared(columns: Sequence[Vector]) -> float:
     """Square of the damping for a point with these Jacobian columns [m^2]."""
@@ -56,7 +54,7 @@ def damped_speeds(columns: Sequence[Vector], velocity: Vector) -> list[float]:
         velocity: wanted velocity of the point [m/s].
     """
     if not columns:
-        return _EMPTY[:]
+        return []
     damping = damping_squared(columns)
     if len(columns) < 3:  # fewer joints than rows: solve in the joints
         normal = [[_dot(a, b) + damping * (i == j) for j, b in enumerate(columns)] for i, a in enumerate(columns)]
@@ -65,7 +63,7 @@ def damped_speeds(columns: Sequence[Vector], velocity: Vector) -> list[float]:
     return [column[0] * y[0] + column[1] * y[1] + column[2] * y[2] for column in columns]
 
 
-def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> list[float]:
+def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[list[float], float]:
     """Joint speeds [rad/s] that move several points at once, none of them against its own wanted velocity.
 
     Minimises the mean of |J_k qd - v_k|^2, damped, under v_k . J_k qd >= 0 for each k.
@@ -75,11 +73,11 @@ def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> list[fl
             where a joint does not move the point) [m/rad], and its wanted velocity [m/s].
 
     Returns:
-        the joint speeds; zeros where nothing but standing still respects all points.
+        the joint speeds, zeros where nothing but standing still respects all points; and the damping [m^2].
     """
     joints = range(len(points[0][0]))
     if not joints:
-        return _EMPTY[:]
+        return [], FLOOR
     share = 1.0 / len(points)
     damping = max(damping_squared([c for c in columns if any(c)] or [(0.0, 0.0, 0.0)]) for columns, _ in points)
     normal = [[share * sum(_dot(c[i], c[j]) for c, _ in points) + damping * (i == j) for j in joints] for i in joints]
@@ -96,8 +94,8 @@ def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> list[fl
         forces = _solve([[_inner(pull, row) for row in held] for pull in pulls], [_inner(row, free) for row in held])
         speeds = [free[i] - sum(f * pull[i] for f, pull in zip(forces, pulls, strict=True)) for i in joints]
     if any(_inner(row, speeds) < -_tiny(row, speeds) for row in along):
-        return [0.0 for _ in joints]
-    return speeds
+        return [0.0 for _ in joints], damping
+    return speeds, damping
 
 
 def _tiny(row: Sequence[float], speeds: Sequence[float]) -> float:

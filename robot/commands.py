@@ -1,0 +1,139 @@
+"""What the reaction is told, how it is set, and what it answers: values, nothing else."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from coneskin.errors import RobotRefused
+from coneskin.geometry.pose import Vector
+
+from .ur_models import Joints
+
+__all__ = ["ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction", "Stop"]
+
+STILL: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ArmState:
+    """The arm as measured at one time. Not checked: one is made at each control cycle.
+
+    Attributes:
+        time: of the measurement, on the clock of the guard [s].
+        q: joint positions [rad].
+        qd: joint speeds [rad/s].
+    """
+
+    time: float
+    q: Joints
+    qd: Joints = STILL
+
+
+@dataclass(frozen=True, slots=True)
+class ContactOnLink:
+    """One touch.
+
+    Attributes:
+        link: index of the DH frame that moves with the touched link, 0 (base) to 6.
+        point: where, in that frame [m].
+        normal: outward unit normal of the skin there, in that frame; what touches is on its side.
+        level: how strong, in the detector's unit.
+        location_valid: False when it is known that there is a touch, but not where.
+    """
+
+    link: int
+    point: Vector
+    normal: Vector
+    level: float = 1.0
+    location_valid: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """How the arm reacts to a touch.
+
+    Attributes:
+        kind: "stop", or "retreat" to stop and then move the touched point away.
+        deceleration: of the leading joint while stopping [rad/s^2].
+        distance: how far the touched point retreats [m].
+        speed: of the touched point [m/s].
+        acceleration: of the leading joint while retreating [rad/s^2].
+        time_budget: after which the retreat ends wherever it is [s].
+        arm_speed: that no point of the bare arm exceeds while retreating [m/s]; a bound by the reach of each joint.
+
+    Raises:
+        RobotRefused: a value is out of its range; nothing is armed with such settings.
+    """
+
+    kind: str = "retreat"
+    deceleration: float = 10.0
+    distance: float = 0.05
+    speed: float = 0.15
+    acceleration: float = 4.0
+    time_budget: float = 2.0
+    arm_speed: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("stop", "retreat"):
+            raise RobotRefused(f"reaction kind must be stop or retreat, got {self.kind!r}")
+        # 40 rad/s^2 is the most that ur_rtde lets through; 1.5 m/s the fastest tool of the family
+        for name, unit, most in (
+            ("deceleration", "rad/s^2", 40.0),
+            ("distance", "m", 0.5),
+            ("speed", "m/s", 1.5),
+            ("acceleration", "rad/s^2", 40.0),
+            ("time_budget", "s", 60.0),
+            ("arm_speed", "m/s", 5.0),
+        ):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0.0 < value <= most):
+                raise RobotRefused(f"reaction {name} must be above 0 and at most {most} {unit}, got {value!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Brake all joints to a standstill.
+
+    Attributes:
+        deceleration: of the leading joint [rad/s^2].
+        reason: why, for the log.
+    """
+
+    deceleration: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class JointVelocity:
+    """Go to these joint speeds, as URScript's ``speedj`` does: ramped by the controller, then held.
+
+    Attributes:
+        qd: joint speeds [rad/s].
+        acceleration: of the leading joint on the way there [rad/s^2].
+        away: speed that the touched point will have away from the obstacle [m/s]; the mean over several touches.
+        progress: how far it has got so far [m]; the farthest over several touches.
+        clipped_by: what kept it from moving as set: "joint speed", "arm speed", "distance" (it brakes for the end),
+            "singularity", "joint 3 limit".
+    """
+
+    qd: Joints
+    acceleration: float
+    away: float
+    progress: float
+    clipped_by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The retreat is over, or impossible: brake and stand.
+
+    Attributes:
+        reason: why.
+        progress: how far the touched point got [m].
+        complete: it got as far as it was to.
+    """
+
+    reason: str
+    progress: float = 0.0
+    complete: bool = False
