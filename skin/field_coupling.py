@@ -2,8 +2,8 @@
 
 The electrodes impose a difference of the sheets h0 + hx x/L + hy y/T with h0 = V_B - V_D, hx = V_A - V_B,
 hy = -(V_C - V_D). The current through the contacts answers with its total and its two first moments, and by reciprocity
-through one symmetric 3 x 3 matrix W = G v v^T + P, v = (1, X, Y). Hence the sensor is a reciprocal 4-port whose rows sum to
-zero, with exactly these six numbers beside the two known sheets.
+through one symmetric 3 x 3 matrix W = G v v^T + P, v = (1, X, Y). Hence the sensor is a reciprocal 4-port whose
+rows sum to zero, with exactly these six numbers beside the two known sheets.
 """
 
 from __future__ import annotations
@@ -74,8 +74,8 @@ class Coupling:
 def admittance(coupling: Coupling, sheet: SectorSheet, upper_resistance: float, lower_resistance: float) -> Floats:
     """Y of the 4-port, I = Y V, currents into the sensor at (A, B, C, D) [S], shape (n, 4, 4).
 
-    Symmetric exactly; rows sum to zero to rounding of their entries. Where contacts are so weak that they vanish beside the
-    sheets, `field_fourport.solve` is more accurate than this matrix, because it never adds the two.
+    Symmetric exactly; rows sum to zero to rounding of their entries. Where contacts are so weak that they vanish
+    beside the sheets, `field_fourport.solve` is more accurate than this matrix, because it never adds the two.
     """
     y = _H.T @ coupling.matrix() @ _H
     y = 0.5 * (y + y.transpose(0, 2, 1))
@@ -83,4 +83,4 @@ def admittance(coupling: Coupling, sheet: SectorSheet, upper_resistance: float, 
     lower = sheet.length / (lower_resistance * sheet.breadth)
     y[:, :2, :2] += upper * np.array([[1.0, -1.0], [-1.0, 1.0]])
     y[:, 2:, 2:] += lower * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return y
+    return np.asarray(y, dtype=np.float64)

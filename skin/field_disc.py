@@ -1,11 +1,12 @@
 """A disc of contact: where it may lie, and how it answers, whatever surrounds it.
 
-Inside a disc of constant conductance g the difference of the sheets obeys lap d = k^2 d with k^2 = g (Ru + Rl), so it is
-sum c_m I_m(k rho) e^(i m phi). Against its own logarithm the m-th multipole moment of the current then meets
+Inside a disc of constant conductance g the difference of the sheets obeys lap d = k^2 d with k^2 = g (Ru + Rl), so
+it is sum c_m I_m(k rho) e^(i m phi). Against its own logarithm the m-th multipole moment of the current then meets
 
     D_0 = rs/(2 pi) I_0(ka) / (ka I_1(ka)),      D_m = rs/(2 pi m) I_(m-1)(ka) / I_(m+1)(ka),      rs = Ru + Rl
 
-(2m/x I_m = I_(m-1) - I_(m+1) joins the two parts of D_m). No contact is D = inf, a perfect bond D_0 = 0, D_m = rs/(2 pi m).
+(2m/x I_m = I_(m-1) - I_(m+1) joins the two parts of D_m). No contact is D = inf, a perfect bond D_0 = 0, D_m =
+rs/(2 pi m).
 """
 
 from __future__ import annotations
@@ -17,12 +18,30 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from ..errors import FieldError
+from coneskin.errors import FieldError
+
 from .field_sheet import SectorSheet
 
-__all__ = ["Disc", "bessel_ratios", "check_discs"]
+__all__ = ["Disc", "Discs", "bessel_ratios", "centre_distance", "check_discs"]
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Discs:
+    """n scenes of k discs each, checked; every array of shape (n, k).
+
+    Attributes:
+        u: slant distance of the centres [m].
+        phi: azimuth of the centres [rad].
+        radius: [m].
+        conductance: per area [S/m^2].
+    """
+
+    u: Floats
+    phi: Floats
+    radius: Floats
+    conductance: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +98,7 @@ def check_discs(sheet: SectorSheet, u: Floats, phi: Floats, radius: Floats, cond
         )
     for i in range(u.shape[1]):
         for j in range(i):
-            gap = _distance(sheet, u[:, i], phi[:, i], u[:, j], phi[:, j]) - radius[:, i] - radius[:, j]
+            gap = centre_distance(sheet, u[:, i], phi[:, i], u[:, j], phi[:, j]) - radius[:, i] - radius[:, j]
             if not (gap > 0.0).all():
                 n = int(np.flatnonzero(~(gap > 0.0))[0])
                 raise FieldError(
@@ -87,8 +106,8 @@ def check_discs(sheet: SectorSheet, u: Floats, phi: Floats, radius: Floats, cond
                 )
 
 
-def _distance(sheet: SectorSheet, u1: Floats, phi1: Floats, u2: Floats, phi2: Floats) -> Floats:
-    """Distance in the flat sheet of one sector; sectors above half a turn bend back, never onto themselves."""
+def centre_distance(sheet: SectorSheet, u1: Floats, phi1: Floats, u2: Floats, phi2: Floats) -> Floats:
+    """Distance of two points in the flat sheet [m]; inf beyond half a turn, where the sheet bends back."""
     x1, _ = sheet.along(u1)
     x2, _ = sheet.along(u2)
     y1, _ = sheet.across(phi1)

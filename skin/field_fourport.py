@@ -1,8 +1,8 @@
 """What stands at the four electrodes, and what is read there.
 
-Each electrode has a lead, behind it a terminal: a source with its resistance, an ADC's input, a pull-down, or nothing. The
-unknowns are the four electrode potentials and the voltage across the contact, so a weak contact is never added to a strong
-sheet and open guides carry exactly no net current.
+Each electrode has a lead, behind it a terminal: a source with its resistance, an ADC's input, a pull-down, or
+nothing. The unknowns are the four electrode potentials and the voltage across the contact, so a weak contact is
+never added to a strong sheet and open guides carry exactly no net current.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FieldError
+from coneskin.errors import FieldError
+
 from .field_coupling import Coupling
 from .field_sheet import SectorSheet
 
@@ -170,8 +171,8 @@ def _guided(
 ) -> tuple[tuple[Floats, Floats], Floats]:
     """Open guides of a sheet of conductance `guide`, the other sheet driven from `start` to `end` along `along`.
 
-    No net current passes, so the sheets meet at the electrical centre: start + h (along) = v_d + (v_c - v_d) across. The
-    guide pair is apart by v_c - v_d = (guide sheet's resistance) * (current moved across).
+    No net current passes, so the sheets meet at the electrical centre: start + h (along) = v_d + (v_c - v_d)
+    across. The guide pair is apart by v_c - v_d = (guide sheet's resistance) * (current moved across).
     """
     h = end - start
     apart = h * coupled / (guide + stiff)
@@ -193,8 +194,8 @@ def _currents(coupling: Coupling, upper: float, lower: float, volts: Floats, con
 def _general(coupling: Coupling, upper: float, lower: float, phase: Phase) -> tuple[Floats, Floats]:
     """Any four terminals: unknowns V_A, V_B, V_C, V_D and the voltage e across the contact; current = conductance * e.
 
-    A row is V + R I = E for a small R, V/R + I = E/R for a large one. The two rows of a sheet enter with exactly opposite
-    coefficients, so elimination leaves its net current without rounding.
+    A row is V + R I = E for a small R, V/R + I = E/R for a large one. The two rows of a sheet enter with exactly
+    opposite coefficients, so elimination leaves its net current without rounding.
     """
     n = len(coupling)
     g = coupling.conductance
@@ -228,5 +229,5 @@ def _general(coupling: Coupling, upper: float, lower: float, phase: Phase) -> tu
     matrix[:, 4, 2] = -coupling.y
     matrix[:, 4, 3] = coupling.y - 1.0
     matrix[:, 4, 4] = -1.0
-    solved = np.linalg.solve(matrix, right)[:, :, 0]
-    return solved[:, :4], g * solved[:, 4]
+    solved = np.asarray(np.linalg.solve(matrix, right)[:, :, 0], dtype=np.float64)
+    return solved[:, :4], np.asarray(g * solved[:, 4])

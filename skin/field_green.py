@@ -1,14 +1,16 @@
 """The Green function of the two sheets together, without cancellation.
 
-In the rectangle of `field_sheet`, call the shorter side P (coordinate p) and the longer S (coordinate s), and measure both
-in units of P/pi: p in [0, pi], s in [0, Sigma], Sigma >= pi. Sheet a has its electrodes across p (resistance Ra), sheet b
-across s (Rb); the other two edges of each insulate. With -lap G = delta, summing the images of a strip gives
+In the rectangle of `field_sheet`, call the shorter side P (coordinate p) and the longer S (coordinate s), and
+measure both in units of P/pi: p in [0, pi], s in [0, Sigma], Sigma >= pi. Sheet a has its electrodes across p
+(resistance Ra), sheet b across s (Rb); the other two edges of each insulate. With -lap G = delta, summing the
+images of a strip gives
 
     Ra G_a + Rb G_b = -(1/4 pi) [ (Ra+Rb) ln(A1/A4) + (Ra-Rb) ln(A2/A3) ] + (Rb/pi) linear
 
-where A1..A4 are the squared moduli of one theta function at w-w', w+w'*, w-w'*, w+w'. Images in edges (A2, A3) carry the
-*difference* of the sheets: between equal sheets only the images in the corners (A4) remain. Each theta function is its
-leading factor, written with expm1, times a series in q = exp(-Sigma) <= 0.0433 whose n-th term falls like q^(n^2).
+where A1..A4 are the squared moduli of one theta function at w-w', w+w'*, w-w'*, w+w'. Images in edges (A2, A3)
+carry the *difference* of the sheets: between equal sheets only the images in the corners (A4) remain. Each theta
+function is its leading factor, written with expm1, times a series in q = exp(-Sigma) <= 0.0433 whose n-th term
+falls like q^(n^2).
 
 Every point set is first mirrored so that the contact lies in the quarter next to the corner p = s = 0.
 """
@@ -107,7 +109,7 @@ def direct_features(
         direct=np.expm1(moved),
         folded=moved if equal else np.expm1(offset + (shift + 1j * p[:, None])),
         near=near,
-        x_near=1.0 - near,
+        x_near=np.asarray(1.0 - near, dtype=np.complex128),
         x_far=np.exp(w - strip.sigma),
     )
 

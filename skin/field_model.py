@@ -14,16 +14,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import FieldError
+from coneskin.errors import FieldError
+
 from .field_coupling import Coupling, admittance
-from .field_disc import Disc, check_discs
-from .field_discs import Discs, auto_order, solve_discs
+from .field_disc import Disc, Discs, check_discs
+from .field_discs import solve_discs
 from .field_fourport import Phase, Readings, solve_phase
+from .field_resolution import resolution
 from .field_sheet import SectorSheet
 
 __all__ = ["FieldModel", "solve", "solve_many"]
 
 Floats = NDArray[np.float64]
+
+#: Pairs of points in one piece of a batch, measured: larger pieces leave the cache.
+PAIRS_AT_ONCE = 12000
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +75,10 @@ class FieldModel:
         """
         if not discs:
             raise FieldError("at least one contact is needed; for no contact give one of conductance 0")
-        rows = [[getattr(d, name) for d in discs] for name in ("u", "phi", "radius", "conductance")]
-        return self.contacts(*(np.array([row]) for row in rows), order=order)
+        u, phi, radius, conductance = (
+            np.array([[getattr(d, name) for d in discs]]) for name in ("u", "phi", "radius", "conductance")
+        )
+        return self.contacts(u, phi, radius, conductance, order=order)
 
     def contacts(
         self,
@@ -98,14 +105,9 @@ class FieldModel:
             raise FieldError(f"contacts must have shape (n,) or (n, k), got {arrays[0].shape}")
         shaped = [a.reshape(-1, 1) if a.ndim < 2 else a for a in arrays]
         check_discs(self.sheet, *shaped)
-        discs = Discs(*shaped)
-        if order is not None:
-            if order < 1:
-                raise FieldError(f"order must be at least 1, got {order}")
-            orders = np.full(shaped[0].shape[0], order)
-        else:
-            orders = auto_order(self.sheet, discs, self.contrast, self.tolerance)
-        return self._in_groups(discs, orders)
+        if order is not None and order < 1:
+            raise FieldError(f"order must be at least 1, got {order}")
+        return self._in_groups(Discs(*shaped), order)
 
     def admittance(self, coupling: Coupling) -> Floats:
         """Y of the 4-port (A, B, C, D) [S], shape (n, 4, 4)."""
@@ -119,19 +121,26 @@ class FieldModel:
         """
         return solve_phase(coupling, self.sheet, self.upper_resistance, self.lower_resistance, phase)
 
-    def _in_groups(self, discs: Discs, orders: NDArray[np.int64]) -> Coupling:
-        n, k = discs.u.shape
+    def _in_groups(self, discs: Discs, order: int | None) -> Coupling:
+        """Scenes of one resolution together, in pieces whose temporaries stay in the cache."""
+        n = discs.u.shape[0]
         out = np.empty((6, n))
-        for order in np.unique(orders):
-            group = np.flatnonzero(orders == order)
-            points = (2 * int(order) + 2) * k
-            chunk = max(1, 12000 // (points * points))  # pairs: the kernel's temporaries stay in the cache
-            for start in range(0, group.size, chunk):
-                index = group[start : start + chunk]
-                part = Discs(discs.u[index], discs.phi[index], discs.radius[index], discs.conductance[index])
-                got, _ = solve_discs(self.sheet, self.upper_resistance, self.lower_resistance, part, int(order))
-                out[:, index] = (got.conductance, got.x, got.y, got.xx, got.xy, got.yy)
+        need = resolution(self.sheet, discs, self.contrast, self.tolerance, order)
+        for points in np.unique(need.points):
+            group = np.flatnonzero(need.points == points)
+            for m in np.unique(need.order[group]):
+                self._solve_group(discs, int(m), int(points), group[need.order[group] == m], out)
+        if not (out[0] >= 0.0).all():
+            raise FieldError("a contact next to an edge or to another needs a higher order than was given")
         return Coupling(*out)
+
+    def _solve_group(self, discs: Discs, order: int, points: int, group: NDArray[np.intp], out: Floats) -> None:
+        chunk = max(1, PAIRS_AT_ONCE // (points * discs.u.shape[1]) ** 2)
+        for start in range(0, group.size, chunk):
+            index = group[start : start + chunk]
+            part = Discs(discs.u[index], discs.phi[index], discs.radius[index], discs.conductance[index])
+            got, _ = solve_discs(self.sheet, self.upper_resistance, self.lower_resistance, part, order, points)
+            out[:, index] = (got.conductance, got.x, got.y, got.xx, got.xy, got.yy)
 
 
 def solve(model: FieldModel, discs: Sequence[Disc], *phases: Phase) -> tuple[Readings, ...]:

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import FieldError
+from coneskin.errors import FieldError
 
 __all__ = ["Cone", "SectorSheet", "log1p_over"]
 
@@ -161,7 +161,7 @@ class SectorSheet:
         return u, np.asarray(theta, dtype=np.float64) * (self.wrap / self.angle)
 
     def edge_distances(self, u: ArrayLike, phi: ArrayLike) -> Floats:
-        """Flat distances from a point to the arcs u=0 and u=W and to the edges phi=0 and phi=wrap [m], shape (..., 4)."""
+        """Flat distances from a point to the arcs u=0, u=W and the edges phi=0, phi=wrap [m], shape (..., 4)."""
         u, phi = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(phi, dtype=np.float64))
         stretch = self.stretch(u)
 
@@ -181,4 +181,4 @@ class SectorSheet:
         y0, _ = self.across(at[1])
         w = (x - x0) + 1j * (y - y0)
         kappa = self.curvature
-        return w if kappa == 0.0 else float(self.stretch(at[0])) * np.expm1(kappa * w) / kappa
+        return np.asarray(w if kappa == 0.0 else self.stretch(at[0]) * np.expm1(kappa * w) / kappa, dtype=np.complex128)

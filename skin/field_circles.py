@@ -1,0 +1,147 @@
+"""The circles around the contacts, in the rectangle, and the Green function from circle to circle.
+
+Fourier coefficients are taken from N equidistant points on each circle. Everything is analytic there, so truncation
+(order M) and aliasing (N) both fall geometrically.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .field_disc import Discs
+from .field_green import Points, Strip, direct_features, kernel, mirrored
+from .field_sheet import SectorSheet
+
+__all__ = ["Circles", "circle", "green_block", "make_circles"]
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Circles:
+    """The circles of n scenes of k discs in the rectangle; lengths in units of (shorter side)/pi.
+
+    Attributes:
+        order: M.
+        offset: x + i y of the points from their centres, shape (n, k, N).
+        slope: |d offset / d zeta| there, zeta on the unit circle, shape (n, k, N).
+        s: centres from s = 0, shape (n, k).
+        s_far: centres from s = Sigma, shape (n, k).
+        p: centres from p = 0, shape (n, k).
+        p_far: centres from p = pi, shape (n, k).
+        x: Fourier coefficients of x/L, shape (n, k, 2M+1).
+        y: Fourier coefficients of y/T, shape (n, k, 2M+1).
+    """
+
+    order: int
+    offset: Complex
+    slope: Floats
+    s: Floats
+    s_far: Floats
+    p: Floats
+    p_far: Floats
+    x: Floats
+    y: Floats
+
+
+@lru_cache(maxsize=64)
+def circle(order: int, points: int) -> tuple[Complex, Floats, Floats]:
+    """Points zeta, |zeta - zeta'|^2 with ones on the diagonal, and the matrix that takes Fourier coefficients."""
+    n = points
+    angle = 2.0 * math.pi * np.arange(n) / n
+    zeta = np.exp(1j * angle)
+    squared = 4.0 * np.sin(0.5 * (angle[:, None] - angle[None, :])) ** 2
+    np.fill_diagonal(squared, 1.0)
+    fourier = np.empty((2 * order + 1, n))
+    fourier[0] = 1.0 / n
+    m = np.arange(1, order + 1)[:, None]
+    fourier[1::2] = np.cos(m * angle) * (2.0 / n)
+    fourier[2::2] = np.sin(m * angle) * (2.0 / n)
+    for array in (zeta, squared, fourier):
+        array.setflags(write=False)
+    return zeta, squared, fourier
+
+
+def make_circles(sheet: SectorSheet, strip: Strip, discs: Discs, order: int, points: int) -> Circles:
+    """The circles of the discs, N points on each."""
+    zeta, _, _ = circle(order, points)
+    stretch = sheet.stretch(discs.u)
+    local = discs.radius / stretch  # a/h, the radius in the rectangle
+    bend = (sheet.curvature * local)[:, :, None]  # q = a/r_c, signed
+    if sheet.curvature == 0.0:
+        offset = local[:, :, None] * zeta
+        slope = np.broadcast_to(local[:, :, None], offset.shape) * strip.scale
+    else:
+        cos, sin = zeta.real, zeta.imag
+        offset = np.empty((*local.shape, zeta.size), dtype=np.complex128)
+        over = local[:, :, None] / bend
+        # numpy's complex log1p loses digits near zero; the two real ones do not.
+        np.multiply(0.5 * np.log1p(bend * (2.0 * cos + bend)), over, out=offset.real)
+        np.multiply(np.arctan2(bend * sin, 1.0 + bend * cos), over, out=offset.imag)
+        slope = local[:, :, None] * strip.scale / np.sqrt(1.0 + bend * (2.0 * cos + bend))
+    x, x_far = sheet.along(discs.u)
+    y, y_far = sheet.across(discs.phi)
+    m = np.arange(1, order + 1)
+    series = local[:, :, None] * (-bend) ** (m - 1) / m
+    fx = np.zeros((*local.shape, 2 * order + 1))
+    fy = np.zeros_like(fx)
+    fx[:, :, 0] = x / sheet.length
+    fx[:, :, 1::2] = series / sheet.length
+    fy[:, :, 0] = y / sheet.breadth
+    fy[:, :, 2::2] = series / sheet.breadth
+    k = strip.scale
+    s, s_far, p, p_far = (x, x_far, y, y_far) if strip.along_x else (y, y_far, x, x_far)
+    return Circles(order, offset * k, slope, s * k, s_far * k, p * k, p_far * k, fx, fy)
+
+
+def _pair(strip: Strip, circles: Circles, i: int, j: int, equal: bool) -> tuple[Points, Points, Floats, Floats, Floats]:
+    """Points of disc i and of disc j, mirrored to the near corner, and the linear part of the Green function.
+
+    That part is s_lo (Sigma - s_hi) / Sigma + (s_hi - s_ref) with s_ref the higher centre. Returned are its weights
+    on the offsets of i and of j and its value at the centres, so that a long strip loses nothing by that large
+    value.
+    """
+    flip_s = circles.s[:, i] + circles.s[:, j] > circles.s_far[:, i] + circles.s_far[:, j]
+    flip_p = circles.p[:, i] + circles.p[:, j] > circles.p_far[:, i] + circles.p_far[:, j]
+    s = [np.where(flip_s, circles.s_far[:, d], circles.s[:, d]) for d in (i, j)]
+    rest = [np.where(flip_s, circles.s[:, d], circles.s_far[:, d]) for d in (i, j)]
+    p = [np.where(flip_p, circles.p_far[:, d], circles.p[:, d]) for d in (i, j)]
+    i_high = s[0] >= s[1]
+    high, low, p_ref = np.where(i_high, s[0], s[1]), np.where(i_high, s[1], s[0]), np.where(i_high, p[0], p[1])
+    made = []
+    for place, d in enumerate((i,) if i == j else (i, j)):
+        offset = mirrored(circles.offset[:, d], strip.along_x, flip_s, flip_p)
+        made.append(direct_features(strip, offset, s[place], p[place], high, p_ref, equal))
+    above = np.where(i_high, rest[0], rest[1])
+    weight_high, weight_low = 1.0 - low / strip.sigma, above / strip.sigma
+    weight_i = np.where(i_high, weight_high, weight_low)
+    weight_j = np.where(i_high, weight_low, weight_high)
+    return made[0], made[-1], weight_i, weight_j, low * above / strip.sigma
+
+
+def green_block(strip: Strip, circles: Circles, i: int, j: int, resistance_a: float, resistance_b: float) -> Floats:
+    """Fourier coefficients of the Green function from disc j to disc i, shape (n, 2M+1, 2M+1).
+
+    On the disc itself its own logarithm, ln(|z - z'|/radius) (Ra + Rb)/(2 pi), is left out.
+    """
+    _, squared, fourier = circle(circles.order, circles.offset.shape[2])
+    first, second, weight_i, weight_j, centre = _pair(strip, circles, i, j, resistance_a == resistance_b)
+    if i == j:
+        slope = circles.slope[:, i] * np.abs(1.0 + first.direct)
+        values = kernel(strip, first, second, resistance_a, resistance_b, squared, slope * slope)
+    else:
+        values = kernel(strip, first, second, resistance_a, resistance_b)
+    b = resistance_b / math.pi
+    values += ((b * weight_i)[:, None] * first.s)[:, :, None] + ((b * weight_j)[:, None] * second.s)[:, None, :]
+    values -= (b / strip.sigma) * (first.s[:, :, None] * second.s[:, None, :])
+    n, points, _ = values.shape
+    half = (values.reshape(-1, points) @ fourier.T).reshape(n, points, -1).transpose(0, 2, 1)
+    block = (half.reshape(-1, points) @ fourier.T).reshape(n, fourier.shape[0], -1).transpose(0, 2, 1)
+    block[:, 0, 0] += b * centre
+    return block
