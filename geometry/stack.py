@@ -18,7 +18,9 @@ from .frustum import Frustum
 
 __all__ = ["PAPER_STACK", "Assembly", "Layer", "Stack", "parallel", "snap_to_cylinder"]
 
-Assembly = Literal["loose", "bonded"]
+Assembly = Literal["loose", "pairs", "bonded"]
+#: which layers are one body when the sheet is wrapped, so that they share a neutral surface
+_BODIES = {"loose": "01234", "pairs": "00122", "bonded": "00000"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +59,9 @@ class Stack:
 
     Attributes:
         layers: lower substrate, lower conductive, isolation, upper conductive, upper substrate.
-        assembly: "loose" where the layers slide on each other while the sheet is wrapped, so that each needs its own
-            length; "bonded" where they are glued together flat, so that all share one neutral surface and one length.
+        assembly: what is glued together flat, before it is wrapped, and so shares one neutral surface and one length:
+            "loose" nothing, each layer is wrapped by itself; "pairs" each conductive sheet with its substrate, as the
+            paper does (figure 13a); "bonded" all five.
 
     Raises:
         GeometryError: not five layers, or an unknown assembly.
@@ -78,23 +81,21 @@ class Stack:
         """Thickness of the whole sheet [m]."""
         return math.fsum(layer.thickness for layer in self.layers)
 
-    @property
-    def neutral_offset(self) -> float:
-        """Height of the neutral surface of the bonded stack above the link [m]: sum E t y / sum E t."""
-        weights = [layer.stiffness * layer.thickness for layer in self.layers]
-        heights = (self.face_offset(i) + layer.neutral_factor * layer.thickness for i, layer in enumerate(self.layers))
-        return math.fsum(w * y for w, y in zip(weights, heights, strict=True)) / math.fsum(weights)
-
     def face_offset(self, index: int) -> float:
         """Height of the inner face of a layer above the link [m]; index 5 gives the outer face of the sheet."""
         return math.fsum(layer.thickness for layer in self.layers[:index])
 
     def offset(self, index: int) -> float:
-        """Height above the link of the surface that keeps its length, for which a layer is cut [m]."""
-        if self.assembly == "bonded":
-            return self.neutral_offset
-        layer = self.layers[index]
-        return self.face_offset(index) + layer.neutral_factor * layer.thickness
+        """Height above the link [m] of the surface for which a layer is cut.
+
+        The neutral surface of the body that it belongs to: sum E t y / sum E t over the layers that are bonded to it,
+        y being the height of the neutral surface of each alone.
+        """
+        bodies = _BODIES[self.assembly]
+        body = [i for i in range(5) if bodies[i] == bodies[index]]
+        weights = [self.layers[i].stiffness * self.layers[i].thickness for i in body]
+        heights = [self.face_offset(i) + self.layers[i].neutral_factor * self.layers[i].thickness for i in body]
+        return math.fsum(w * y for w, y in zip(weights, heights, strict=True)) / math.fsum(weights)
 
     def surface(self, link: Frustum, index: int) -> Frustum:
         """The cone for which a layer is cut.
