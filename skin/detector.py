@@ -30,7 +30,7 @@ class Detection:
         confirm_frames: frames above the threshold that make a touch, 1 or 2.
         release_frames: frames below the release threshold that end it.
         settle_frames: valid untouched frames in a row before the sensor is ready.
-        settle_step: change of level from one frame to the next above which a location is not settled yet.
+        settle_distance: a location is settled once two frames in a row agree to within this [m].
         move_distance: movement along the surface that is reported [m].
         level_step: change of level that is reported.
         drift_rate: fastest drift of the untouched level that is followed [1/s].
@@ -46,7 +46,7 @@ class Detection:
     confirm_frames: int = 1
     release_frames: int = 3
     settle_frames: int = 50
-    settle_step: float = 0.05
+    settle_distance: float = 0.01
     move_distance: float = 0.002
     level_step: float = 0.1
     drift_rate: float = 0.002
@@ -61,7 +61,7 @@ class Detection:
         for name in ("release_frames", "settle_frames"):
             if not getattr(self, name) >= 1:
                 raise SensorError(f"detection.{name} must be at least 1, got {getattr(self, name)!r}")
-        for name in ("settle_step", "move_distance", "level_step", "lasting_touch"):
+        for name in ("settle_distance", "move_distance", "level_step", "lasting_touch"):
             if not getattr(self, name) > 0.0:
                 raise SensorError(f"detection.{name} must be above 0, got {getattr(self, name)!r}")
         for name in ("drift_rate", "drift_limit", "stuck_frames"):
@@ -93,9 +93,12 @@ class Detector:
         "_lasting",
         "_level",
         "_phi",
+        "_placed",
         "_quiet",
         "_radius",
-        "_raw_level",
+        "_seen_phi",
+        "_seen_u",
+        "_seen_valid",
         "_still",
         "_u",
         "_valid",
@@ -124,8 +127,10 @@ class Detector:
         self._above = self._below = self._quiet = 0
         self._began = 0.0
         self._lasting = False
-        self._level = self._raw_level = self._u = self._phi = 0.0
-        self._valid = False
+        self._level = self._u = self._phi = 0.0
+        self._valid = self._placed = False
+        self._seen_u = self._seen_phi = 0.0
+        self._seen_valid = False
         self._last_counts = (-1, -1, -1)
         self._still = [0, 0, 0]
 
@@ -156,20 +161,22 @@ class Detector:
                 return events  # an old frame says nothing about now
         reading = read(self.sensor, frame)
         if reading.fault is not None:
+            self._seen_valid = False
             self._report(events, reading.fault, frame, now)
             return events
         self.timing.seen_valid(now)
         if self.detection.stuck_frames and self._stands_still(frame):
             self._report(events, Fault.STUCK, frame, now)
             return events
-        step = abs(reading.level - self._raw_level)
-        self._raw_level = reading.level
         level = reading.level - self.baseline
-        settled = reading.location_valid and step <= self.detection.settle_step
+        u, phi = reading.u, reading.phi
+        agrees = self._distance(u, phi, self._seen_u, self._seen_phi) <= self.detection.settle_distance
+        settled = reading.location_valid and self._seen_valid and agrees
+        self._seen_u, self._seen_phi, self._seen_valid = u, phi, reading.location_valid
         if self.touched:
-            self._while_touched(events, frame, now, level, reading.u, reading.phi, settled)
+            self._while_touched(events, frame, now, level, u, phi, settled)
         else:
-            self._while_untouched(events, frame, now, level, reading.u, reading.phi, settled)
+            self._while_untouched(events, frame, now, level, u, phi, settled)
         return events
 
     def silence(self, now: float, longest: float) -> list[Event]:
@@ -199,7 +206,7 @@ class Detector:
             self._above += 1
             if self._above >= detection.confirm_frames:
                 self.touched, self._lasting, self._began = True, False, now
-                self._below = 0
+                self._below, self._placed = 0, False
                 self._remember(level, u, phi, valid)
                 events.append(TouchBegan(self.sensor.name, now, frame.clock_us, frame.sequence, level, u, phi, valid))
             return
@@ -227,22 +234,27 @@ class Detector:
             if self._below >= detection.release_frames:
                 self.touched = False
                 self._above = self._quiet = 0
-                events.append(TouchEnded(name, now, clock, sequence, level, self._u, self._phi, self._valid))
+                events.append(TouchEnded(name, now, clock, sequence, level, self._u, self._phi, self._placed))
             return
         self._below = 0
         if not self._lasting and now - self._began >= detection.lasting_touch:
             self._lasting = True
             self._report(events, Fault.LAYERS_CLOSED, frame, now, f"{now - self._began:.1f} s")
-        moved = math.hypot(u - self._u, self._radius * (phi - self._phi)) > detection.move_distance
+        moved = self._distance(u, phi, self._u, self._phi) > detection.move_distance
         changed = abs(level - self._level) > detection.level_step
         if valid != self._valid or (valid and moved) or changed:
-            if not valid and self._valid:
+            if not valid and self._placed:
                 u, phi = self._u, self._phi  # the last place that was certain is the better guess
             self._remember(level, u, phi, valid)
             events.append(TouchMoved(name, now, clock, sequence, level, u, phi, valid))
 
     def _remember(self, level: float, u: float, phi: float, valid: bool) -> None:
         self._level, self._u, self._phi, self._valid = level, u, phi, valid
+        self._placed = self._placed or valid
+
+    def _distance(self, u1: float, phi1: float, u2: float, phi2: float) -> float:
+        """Distance of two places along the surface [m], never too small: the larger radius counts."""
+        return math.hypot(u1 - u2, self._radius * (phi1 - phi2))
 
     def _report(self, events: list[Event], fault: Fault, frame: Frame, now: float, detail: str = "") -> None:
         self._put_fault(events, fault, now, frame.clock_us, frame.sequence, detail)

@@ -55,7 +55,7 @@ class TouchMoved(Touch):
 
 @dataclass(frozen=True, slots=True)
 class TouchEnded(Touch):
-    """The level fell below the release threshold; the place is the last one known."""
+    """The level fell below the release threshold; the place is the last one that was certain, if one ever was."""
 
 
 @dataclass(frozen=True, slots=True)

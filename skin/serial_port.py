@@ -1,0 +1,203 @@
+"""The serial port, by pyserial: any of its URLs, and the quickest way to the bytes that the system has.
+
+Where there is a descriptor, a read is ``poll`` and ``os.read``, which wakes as soon as the first byte is there and
+takes all that have come. Where there is none (Windows, loop://) pyserial's own read is used.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from types import TracebackType
+from typing import Any, Self
+
+from coneskin.errors import MissingExtra, SkinConnectionError, SkinTimeout
+
+__all__ = ["SerialPort", "list_ports"]
+
+_MOST = 4096
+_GONE = {errno.EIO, errno.ENXIO, errno.ENODEV, errno.EBADF, errno.ECONNRESET, errno.ENOTCONN}
+
+
+class SerialPort:
+    """Source of bytes from a serial port.
+
+    Args:
+        url: a port (``/dev/ttyACM0``, ``COM3``) or any pyserial URL: ``hwgrep://1234:5678``, ``socket://host:port``,
+            ``rfc2217://``, ``loop://``, ``spy://``.
+        baudrate: bits per second; a device with USB of its own ignores it.
+
+    Attributes:
+        name: the URL.
+        low_latency: the driver was told not to hold bytes back (an FTDI adapter otherwise waits 16 ms); False where
+            that is not possible or not needed.
+    """
+
+    def __init__(self, url: str, baudrate: int = 921600) -> None:
+        self.name = url
+        self.baudrate = baudrate
+        self.low_latency = False
+        self._port: Any = None
+        self._descriptor: int | None = None
+        self._wait: Callable[[float], bool] = _never
+
+    def open(self) -> None:
+        """Open the port for this process alone, and throw away what had piled up in it.
+
+        Raises:
+            SkinConnectionError: no such port, busy, not permitted, or an URL that pyserial does not know.
+            MissingExtra: pyserial is not installed.
+        """
+        if self._port is not None:
+            return
+        try:
+            import serial
+        except ImportError as error:
+            raise MissingExtra("pyserial", "reading a serial port") from error
+        try:
+            port = serial.serial_for_url(self.name, self.baudrate, timeout=0, exclusive=True)
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise SkinConnectionError(_explain(self.name, error)) from error
+        self._port = port
+        try:
+            port.set_low_latency_mode(True)
+            self.low_latency = True
+        except (AttributeError, NotImplementedError, ValueError, OSError):
+            self.low_latency = False  # no such switch here: a pseudo-terminal, a socket, not Linux
+        self._descriptor = _descriptor(port)
+        if self._descriptor is not None:
+            self._wait = _waiter(self._descriptor)
+
+    def close(self) -> None:
+        """Close the port; it does not matter whether it is open or still there."""
+        port, self._port, self._descriptor = self._port, None, None
+        self._wait = _never
+        if port is not None:
+            with suppress(OSError):  # a port that was pulled out cannot be closed any better than this
+                port.close()
+
+    def fileno(self) -> int | None:
+        """The port's descriptor, or None where the system or the kind of URL has none."""
+        return self._descriptor
+
+    def read(self, timeout: float) -> bytes:
+        """Wait for bytes, as every Source does."""
+        if self._port is None:
+            raise SkinConnectionError(f"{self.name} is not open")
+        descriptor = self._descriptor
+        if descriptor is None:
+            return self._read_by_pyserial(timeout)
+        deadline = time.monotonic() + timeout
+        left = timeout
+        while True:
+            try:
+                if self._wait(left):
+                    data = os.read(descriptor, _MOST)
+                    if data:
+                        return data
+                    raise SkinConnectionError(f"{self.name} is gone: it reached its end")
+            except (BlockingIOError, InterruptedError):
+                pass  # another reader, or a signal, was quicker
+            except SkinConnectionError:
+                raise
+            except OSError as error:
+                raise SkinConnectionError(f"{self.name} is gone: {error.strerror or error}") from error
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
+
+    def _read_by_pyserial(self, timeout: float) -> bytes:
+        port = self._port
+        try:
+            port.timeout = timeout
+            data: bytes = port.read(1)
+            if data:
+                more = min(port.in_waiting, _MOST - 1)
+                return data + port.read(more) if more else data
+        except OSError as error:  # SerialException is one
+            raise SkinConnectionError(f"{self.name} is gone: {error}") from error
+        raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
+
+    def __enter__(self) -> Self:
+        """Open it."""
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        self.close()
+
+
+def list_ports() -> list[str]:
+    """The serial ports that are there: device, description and what ``hwgrep://`` can look for.
+
+    Raises:
+        MissingExtra: pyserial is not installed.
+    """
+    try:
+        from serial.tools import list_ports as tools
+    except ImportError as error:
+        raise MissingExtra("pyserial", "listing serial ports") from error
+    lines = []
+    for port in sorted(tools.comports()):
+        facts = [port.description] if port.description not in (None, "n/a", port.name) else []
+        facts += [port.hwid] if port.hwid not in (None, "n/a") else []
+        lines.append(port.device + (f" ({', '.join(facts)})" if facts else ""))
+    return lines
+
+
+def _never(_: float) -> bool:
+    return False
+
+
+def _descriptor(port: Any) -> int | None:
+    """The port's descriptor if this system can wait on it."""
+    if sys.platform == "win32":
+        return None
+    try:
+        return int(port.fileno())
+    except (AttributeError, OSError, ValueError):  # io.UnsupportedOperation is both
+        return None
+
+
+def _waiter(descriptor: int) -> Callable[[float], bool]:
+    """A function that waits up to so many seconds for the descriptor to be readable."""
+    if hasattr(select, "epoll") or (hasattr(select, "poll") and sys.platform != "darwin"):
+        poll = select.poll()
+        poll.register(descriptor, select.POLLIN)
+
+        def wait_by_poll(timeout: float) -> bool:
+            return bool(poll.poll(-(-max(timeout, 0.0) * 1e3 // 1)))  # rounded up to whole milliseconds
+
+        return wait_by_poll
+
+    def wait_by_select(timeout: float) -> bool:  # macOS cannot poll terminals
+        return bool(select.select([descriptor], (), (), max(timeout, 0.0))[0])
+
+    return wait_by_select
+
+
+def _explain(url: str, error: Exception) -> str:
+    """One line: which port, why, what to do."""
+    code = getattr(error, "errno", None)
+    text = str(error)
+    low = text.lower()
+    if code == errno.EACCES or "access is denied" in low or "permission" in low:
+        return f"{url}: not permitted; on Linux, add yourself to the port's group (mostly dialout) and log in again"
+    if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in low or "busy" in low:
+        return f"{url}: busy, another program has it open"
+    if isinstance(error, ValueError):
+        return f"{url}: not a port or URL that pyserial knows ({text})"
+    if code == errno.ENOENT or "no ports found" in low or "filenotfound" in low:
+        present = ", ".join(list_ports()) or "none at all"
+        return f"{url}: no such port; present: {present}"
+    if code == errno.ECONNREFUSED or "refused" in low:
+        return f"{url}: nobody listens there"
+    return f"{url}: cannot be opened ({text})"

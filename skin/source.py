@@ -1,0 +1,60 @@
+"""Where bytes come from: what a real port and a virtual one have in common."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Protocol, Self, runtime_checkable
+
+__all__ = ["Source"]
+
+
+@runtime_checkable
+class Source(Protocol):
+    """A stream of bytes from a sensor; opened and closed by ``with``. Nothing happens before ``open``.
+
+    Attributes:
+        name: what to call it in a message, for instance the port.
+    """
+
+    name: str
+
+    def open(self) -> None:
+        """Open it; a source that is open stays so.
+
+        Raises:
+            SkinConnectionError: it cannot be opened; the message says which one and why.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give everything back. May be called twice, and before ``open``."""
+        ...
+
+    def fileno(self) -> int | None:
+        """The descriptor that becomes readable when bytes arrive, or None where there is none."""
+        ...
+
+    def read(self, timeout: float) -> bytes:
+        """Wait for bytes.
+
+        Args:
+            timeout: longest time to wait [s].
+
+        Returns:
+            what has arrived, at least one byte, never more than a few kilobytes.
+
+        Raises:
+            SkinTimeout: nothing arrived in time; the source stays open.
+            SkinConnectionError: it is gone, or not open.
+        """
+        ...
+
+    def __enter__(self) -> Self:
+        """Open it."""
+        ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        ...
