@@ -20,7 +20,7 @@ __all__ = ["Cone", "fit_cone", "frame", "jacobian"]
 Floats = NDArray[np.float64]
 
 STEEPEST = math.radians(80.0)  #: a flatter ring is a flange, not a cone
-_STEPS = 40
+_STEPS = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,12 +74,17 @@ def jacobian(cone: Cone, points: Floats) -> Floats:
     c is radius * cos(half_angle) [m/m].
     """
     e1, e2 = frame(cone.axis)
-    q = points - cone.origin
-    x, y, z = q @ e1, q @ e2, q @ cone.axis
-    rho = np.maximum(np.hypot(x, y), 1e-12)
-    ca, sa = math.cos(cone.half_angle), math.sin(cone.half_angle)
+    local = (points - cone.origin) @ np.stack([e1, e2, cone.axis], axis=1)
+    return _slopes(local, np.hypot(local[:, 0], local[:, 1]), cone.half_angle)
+
+
+def _slopes(local: Floats, rho: Floats, half_angle: float) -> Floats:
+    x, y, z = local.T
+    rho = np.maximum(rho, 1e-12)
+    ca, sa = math.cos(half_angle), math.sin(half_angle)
     lever = -(z * ca / rho + sa)
-    return np.stack([lever * x, lever * y, -ca * x / rho, -ca * y / rho, -np.ones(len(q)), -rho * sa - z * ca], axis=1)
+    columns = [lever * x, lever * y, -ca * x / rho, -ca * y / rho, -np.ones(len(z)), -rho * sa - z * ca]
+    return np.stack(columns, axis=1)
 
 
 def fit_cone(samples: Samples, start: Cone, gates: tuple[float, ...], angle: float = 0.2) -> Cone | None:
@@ -89,55 +94,61 @@ def fit_cone(samples: Samples, start: Cone, gates: tuple[float, ...], angle: flo
         samples: points and normals of the hull.
         start: where to begin; it must have some points within the first gate.
         gates: distances [m], falling, beyond which a point has no weight; each is held until the fit rests.
-        angle: between the normals, above which a point has no weight [rad].
+        angle: between the normals, above which a point has no weight [rad]; twice that at the first of several gates.
 
     Returns:
         the cone, its origin amid its points; None where too few points are left or the fit runs away.
     """
-    cone: Cone | None = start
+    cone = start
     for number, gate in enumerate(gates):
-        aligned = math.cos(angle * (2.0 if number == 0 and len(gates) > 1 else 1.0))
-        for _ in range(_STEPS):
-            assert cone is not None
-            distance = cone.distances(samples.points)
-            near = (np.abs(distance) < gate) & (cone.alignment(samples.points, samples.normals) > aligned)
-            if int(near.sum()) < 24:
+        last = number == len(gates) - 1
+        stride = 1 if last else max(1, len(samples) // 2000)  # the early gates only have to lead
+        points, normals = samples.points[::stride], samples.normals[::stride]
+        aligned = math.cos(angle * (2.0 if number == 0 and not last else 1.0))
+        for _ in range(_STEPS if last else _STEPS // 2):
+            better, moved = _step(cone, points, normals, gate, aligned)
+            if better is None:
                 return None
-            cone, moved = _step(cone, samples.points[near], distance[near], gate)
-            if cone is None:
-                return None
-            if moved < 1e-4 * gate:
+            cone = better
+            if moved < (1e-4 if last else 1e-2) * gate:
                 break
     return cone
 
 
-def _step(cone: Cone, points: Floats, distance: Floats, gate: float) -> tuple[Cone | None, float]:
+def _step(cone: Cone, points: Floats, normals: Floats, gate: float, aligned: float) -> tuple[Cone | None, float]:
     """One Gauss-Newton step with Tukey's weights; the new cone and how far it moved the side [m]."""
-    rho, z = cone.cylindrical(points)
-    middle = float(z.mean())
+    e1, e2 = frame(cone.axis)
+    columns = np.stack([e1, e2, cone.axis], axis=1)
     sa, ca = math.sin(cone.half_angle), math.cos(cone.half_angle)
-    cone = Cone(cone.origin + middle * cone.axis, cone.axis, cone.radius + middle * sa / ca, cone.half_angle)
-    weights = (1.0 - (distance / gate) ** 2) ** 2
-    slopes = jacobian(cone, points)
-    size = max(float(np.abs(z - middle).max()), float(rho.max()))
+    local, turned = (points - cone.origin) @ columns, normals @ columns
+    rho = np.hypot(local[:, 0], local[:, 1])
+    distance = (rho - cone.radius) * ca - local[:, 2] * sa
+    out = (local[:, 0] * turned[:, 0] + local[:, 1] * turned[:, 1]) * ca - rho * turned[:, 2] * sa
+    near = np.flatnonzero((np.abs(distance) < gate) & (out > aligned * rho))
+    if len(near) < 24:
+        return None, math.inf
+    local, rho, distance = local[near], rho[near], distance[near]
+    middle = float(local[:, 2].mean())
+    local[:, 2] -= middle
+    size = max(float(np.abs(local[:, 2]).max()), float(rho.max()))
     scale = np.array([size, size, 1.0, 1.0, 1.0, size])  # tilts in metres too
-    slopes = slopes / scale
-    weighted = slopes * weights[:, None]
+    slopes = _slopes(local, rho, cone.half_angle) / scale
+    weighted = slopes * ((1.0 - (distance / gate) ** 2) ** 2)[:, None]
     normal = weighted.T @ slopes
-    # Prior far below the data: it only holds what the points leave open (a narrow strip, a short ring).
+    # Far below the data: it only holds what the points leave open (a narrow strip, a short ring).
     normal[np.diag_indices(6)] += 1e-9 * np.trace(normal)
     scaled = -np.linalg.solve(normal, weighted.T @ distance)
     longest = float(np.abs(scaled).max())
     if longest > 0.2 * size:
         scaled *= 0.2 * size / longest
     tilt1, tilt2, shift1, shift2, dc, dangle = scaled / scale
-    e1, e2 = frame(cone.axis)
     axis = cone.axis + tilt1 * e1 + tilt2 * e2
     axis /= np.linalg.norm(axis)
     half_angle = cone.half_angle + dangle
     if abs(half_angle) > STEEPEST:
         return None, math.inf
-    radius = (cone.radius * ca + dc) / math.cos(half_angle)
+    radius = (cone.radius * ca + middle * sa + dc) / math.cos(half_angle)
     if not 1e-4 < radius < 5.0:
         return None, math.inf
-    return Cone(cone.origin + shift1 * e1 + shift2 * e2, axis, radius, half_angle), longest
+    origin = cone.origin + middle * cone.axis + shift1 * e1 + shift2 * e2
+    return Cone(origin, axis, radius, half_angle), longest

@@ -24,11 +24,13 @@ class Samples:
     Attributes:
         points: on the mesh [m], shape (n, 3).
         normals: unit normals of the faces they lie on, turned to the side that sees the outside, shape (n, 3).
+        faces: index of the face that each lies on, shape (n,).
         area: area that each point stands for [m2].
     """
 
     points: Floats
     normals: Floats
+    faces: NDArray[np.int64]
     area: float
 
     def __len__(self) -> int:
@@ -36,7 +38,7 @@ class Samples:
 
     def only(self, chosen: NDArray[np.bool_]) -> Samples:
         """The chosen ones of them."""
-        return Samples(self.points[chosen], self.normals[chosen], self.area)
+        return Samples(self.points[chosen], self.normals[chosen], self.faces[chosen], self.area)
 
 
 def surface_samples(mesh: Mesh, rays: Rays, count: int = 6000, seed: int = 1) -> Samples:
@@ -73,4 +75,4 @@ def surface_samples(mesh: Mesh, rays: Rays, count: int = 6000, seed: int = 1) ->
     if not keep.any():
         raise MeshError(f"{mesh.source}: no face of it sees the outside")
     normals = np.where(flip[:, None], -normals, normals)
-    return Samples(points[keep], normals[keep], float(total[-1]) / count)
+    return Samples(points[keep], normals[keep], face[keep], float(total[-1]) / count)
