@@ -7,7 +7,7 @@ moves in the possible direction nearest to it, and never faster than |v|. With t
 speeds drift sideways by more than they retreat (bench/retreat.py prints both).
 
 The damping is a floor of 1 mm, plus up to 50 mm as the smallest singular value of J falls below 100 mm; joint speeds
-then stay below about 14 rad/s for each m/s wanted (measured: 11.5), at the price of a slower point.
+then stay below about 14 rad/s for each m/s wanted (measured: 12.4), at the price of a slower point.
 
 Source: Nakamura, Hanafusa, "Inverse kinematic solutions with singularity robustness", ASME J. Dyn. Sys. 1986; the
 singular value is bounded by 1 / trace((J J^T)^-1), which is between a third of its square and its square.
@@ -73,7 +73,8 @@ def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[l
             where a joint does not move the point) [m/rad], and its wanted velocity [m/s].
 
     Returns:
-        the joint speeds, zeros where nothing but standing still respects all points; and the damping [m^2].
+        the joint speeds, zeros where nothing but standing still respects all points; and the square of the damping
+        [m^2].
     """
     joints = range(len(points[0][0]))
     if not joints:
