@@ -153,7 +153,11 @@ def _tiles(tiling: Tiling, title: str) -> Iterator[list[str]]:
                 neighbour = tiling.cells.index((column + dx, row + dy)) + 1
                 content.append(_neighbour(neighbour, mid_x, mid_y, dx, dy))
         content += _scale_bar(left, 8.0)
-        content.append(_text(f"{title} - page {page} of {count}, column {column + 1}, row {row + 1}", left, 4.0, 2.2))
+        content.append(
+            _text(
+                f"{title} - page {page} of {count}, column {column + 1}, row {tiling.counts[1] - row}", left, 4.0, 2.2
+            )
+        )
         yield content
 
 
