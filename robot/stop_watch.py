@@ -69,6 +69,11 @@ class StopWatch:
         elif speed >= self._standstill:
             self.standing_at = None
 
+    def hurry(self, now: float) -> None:
+        """Take the next way at the next look, slowdown or not: the one in use is known to be broken."""
+        self._next = now
+        self.slowed_at = None
+
     def next_ways(self, now: float) -> list[Way]:
         """The ways to take now; each is named once."""
         if self.standing_at is not None:

@@ -11,15 +11,15 @@ _TUBES = {"upper_arm": 1, "forearm": 2}  # link name -> index of the DH length t
 
 def check_links(scene: Scene, problems: list[str]) -> None:
     """Add what is wrong to problems: a link that the arm does not have, a sensor longer than its link."""
-    from .robot.link_frames import LINK_NAMES
+    from .robot.link_frames import LINK_INDEX
     from .robot.ur_models import model
 
     if scene.arm is None:
         return
     arm = model(scene.arm.model)
     for link in scene.links:
-        if link.name not in LINK_NAMES:
-            problems.append(f"link {link.name}: the arm {arm.name} has no such link; it has {', '.join(LINK_NAMES)}")
+        if link.name not in LINK_INDEX:
+            problems.append(f"link {link.name}: the arm {arm.name} has no such link; it has {', '.join(LINK_INDEX)}")
         elif link.name in _TUBES:
             _check_length(link, abs(arm.a[_TUBES[link.name]]), arm.name, problems)
 

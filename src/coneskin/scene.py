@@ -5,25 +5,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .geometry.placed import PlacedFrustum
+    from .robot.commands import Reaction
+    from .robot.watch import Watch
     from .skin.sensor import Sensor
+    from .skin.virtual import ScriptedTouch
 
 __all__ = [
     "ArmScene",
     "LinkScene",
     "MotionScene",
     "PlacedSensor",
-    "ReactionScene",
     "RecordingScene",
     "Scene",
     "SourceScene",
-    "TouchScene",
-    "WatchScene",
     "load",
 ]
 
@@ -74,27 +74,6 @@ class LinkScene:
 
 
 @dataclass(frozen=True, slots=True)
-class TouchScene:
-    """A touch of the virtual skin.
-
-    Attributes:
-        sensor: id of the sensor touched.
-        start: when it begins [s].
-        end: when it ends [s].
-        u: slant distance from end 1 [m].
-        phi: azimuth [rad].
-        level: how firmly, in (0, 1).
-    """
-
-    sensor: int
-    start: float
-    end: float
-    u: float
-    phi: float
-    level: float
-
-
-@dataclass(frozen=True, slots=True)
 class SourceScene:
     """Where the bytes come from.
 
@@ -112,45 +91,7 @@ class SourceScene:
     baud: int
     rate_hz: float
     seed: int
-    touches: tuple[TouchScene, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ReactionScene:
-    """What the arm does when it is touched.
-
-    Attributes:
-        kind: "stop" or "retreat".
-        deceleration: of the leading joint when stopping [rad/s2].
-        distance: of a retreat [m].
-        speed: of the touched point in a retreat [m/s].
-        acceleration: of the leading joint in a retreat [rad/s2].
-        time: longest retreat [s].
-    """
-
-    kind: str = "stop"
-    deceleration: float = 10.0
-    distance: float = 0.05
-    speed: float = 0.1
-    acceleration: float = 2.0
-    time: float = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class WatchScene:
-    """How long silence may last, and what counts as standing.
-
-    Attributes:
-        skin_silence: longest age of a sensor's newest valid frame [s].
-        arm_silence: longest age of the controller's newest state [s].
-        escalate: without slowdown for this long after a stop, the next way to stop is taken [s].
-        standstill: joint speed below which the arm stands [rad/s].
-    """
-
-    skin_silence: float = 0.05
-    arm_silence: float = 0.05
-    escalate: float = 0.025
-    standstill: float = 0.01
+    touches: tuple[ScriptedTouch, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,8 +138,8 @@ class Scene:
     arm: ArmScene | None = None
     links: tuple[LinkScene, ...] = ()
     source: SourceScene | None = None
-    reaction: ReactionScene | None = None
-    watch: WatchScene = field(default_factory=WatchScene)
+    reaction: Reaction | None = None
+    watch: Watch | None = None
     recording: RecordingScene | None = None
     motion: MotionScene | None = None
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import scene as s
 from .errors import ConeSkinError, SceneError
 from .schema import Key, check
 from .sensor_table import build_sensor
+
+if TYPE_CHECKING:
+    from .robot.commands import Reaction
+    from .robot.watch import Watch
+    from .skin.virtual import ScriptedTouch
 
 __all__ = ["parse_scene", "read_scene"]
 
@@ -35,26 +42,30 @@ _SOURCE = (
     Key("touch", dict, ()),
 )
 _TOUCH = (
-    Key("sensor", int, low=0, high=255),
+    Key("sensor", int, None, low=0, high=255),
     Key("start_s", low=0.0),
     Key("end_s", low=0.0),
     Key("u_mm", low=0.0, high=10_000.0),
     Key("phi_deg", low=0.0, high=360.0),
-    Key("level", float, 0.8, low=0.0, high=0.99, above=True),
+    Key("force_n", float, 5.0, low=0.0, high=1000.0),
+    Key("radius_mm", float, 0.0, low=0.0, high=500.0),
 )
 _REACTION = (
     Key("kind", str, choices=("stop", "retreat")),
-    Key("deceleration_rad_s2", float, 10.0, low=0.5, high=40.0),
-    Key("distance_mm", float, 0.05, low=0.0, high=500.0, above=True),
-    Key("speed_mm_s", float, 0.1, low=1.0, high=1000.0),
-    Key("acceleration_rad_s2", float, 2.0, low=0.1, high=40.0),
-    Key("time_s", float, 2.0, low=0.05, high=30.0),
+    Key("deceleration_rad_s2", low=0.5, high=40.0),
+    Key("distance_mm", low=1.0, high=500.0),
+    Key("speed_mm_s", low=1.0, high=1500.0),
+    Key("acceleration_rad_s2", low=0.1, high=40.0),
+    Key("time_budget_s", low=0.05, high=60.0),
+    Key("arm_speed_mm_s", low=1.0, high=5000.0),
 )
 _WATCH = (
-    Key("skin_silence_ms", float, 0.05, low=2.0, high=1000.0),
-    Key("arm_silence_ms", float, 0.05, low=4.0, high=1000.0),
-    Key("escalate_ms", float, 0.025, low=4.0, high=500.0),
-    Key("standstill_rad_s", float, 0.01, low=1e-4, high=0.1),
+    Key("skin_silence_ms", low=2.0, high=1000.0),
+    Key("skin_late_ms", low=2.0, high=1000.0),
+    Key("arm_silence_ms", low=4.0, high=1000.0),
+    Key("escalate_ms", low=4.0, high=500.0),
+    Key("standstill_rad_s", low=1e-4, high=0.1),
+    Key("settle_ms", low=10.0, high=10_000.0),
 )
 _RECORDING = (Key("folder", str),)
 _MOTION = (
@@ -107,24 +118,42 @@ def parse_scene(text: str, name: str = "scene", folder: Path = Path()) -> s.Scen
         folder=folder,
         arm=_arm(tables, problems),
         links=_links(tables, folder, problems),
-        source=_source(tables, problems),
-        reaction=_section(s.ReactionScene, _REACTION, tables, "reaction", problems),
-        watch=_section(s.WatchScene, _WATCH, tables, "watch", problems) or s.WatchScene(),
+        source=None,
+        reaction=_reaction(tables, problems),
+        watch=_watch(tables, problems),
         recording=_recording(tables, folder, problems),
         motion=_motion(tables, problems),
     )
+    scene = replace(scene, source=_source(scene, tables, problems))
     _check_together(scene, tables, problems)
     if problems:
         raise SceneError(problems, name)
     return scene
 
 
-def _section(kind: Any, keys: tuple[Key, ...], tables: Mapping[str, Any], name: str, problems: list[str]) -> Any:
-    """A dataclass from a table of the same keys; None where the table is missing or a required key is."""
-    if name not in tables:
+def _settings(keys: tuple[Key, ...], tables: Mapping[str, Any], name: str, problems: list[str]) -> dict[str, Any]:
+    """The values of a table whose missing keys take the defaults of the dataclass that they are for."""
+    required = {key.name for key in keys if key.kind is str}
+    optional = tuple(key if key.name in required else replace(key, default=None) for key in keys)
+    values = check(tables[name], optional, name, problems)
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _reaction(tables: Mapping[str, Any], problems: list[str]) -> Reaction | None:
+    if "reaction" not in tables:
         return None
-    values = check(tables[name], keys, name, problems)
-    return kind(**values) if len(values) == len(keys) else None
+    from .robot.commands import Reaction
+
+    values = _settings(_REACTION, tables, "reaction", problems)
+    return Reaction(**values) if "kind" in values else None
+
+
+def _watch(tables: Mapping[str, Any], problems: list[str]) -> Watch | None:
+    if "watch" not in tables:
+        return None
+    from .robot.watch import Watch
+
+    return Watch(**_settings(_WATCH, tables, "watch", problems))
 
 
 def _arm(tables: Mapping[str, Any], problems: list[str]) -> s.ArmScene | None:
@@ -161,26 +190,47 @@ def _links(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> tupl
     return tuple(links)
 
 
-def _source(tables: Mapping[str, Any], problems: list[str]) -> s.SourceScene | None:
+def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s.SourceScene | None:
     if "source" not in tables:
         return None
     values = check(tables["source"], _SOURCE, "source", problems)
-    touches = []
-    for number, table in enumerate(values["touch"], 1):
-        touch = check(table, _TOUCH, f"source.touch {number}", problems)
-        if len(touch) == len(_TOUCH):
-            touches.append(s.TouchScene(**touch))
-            if not touch["start"] < touch["end"]:
-                problems.append(f"source.touch {number}: start_s must be before end_s")
     kind = values.get("kind")
     if kind == "serial" and not values["port"]:
         problems.append("source.port is missing: a device such as /dev/ttyUSB0, COM3 or hwgrep://0403:6001")
     for key in ("rate_hz", "seed", "touch") if kind == "serial" else ("port", "baud"):
         if kind and key in tables["source"]:
             problems.append(f"source.{key} means nothing to a {kind} source: remove it")
+    touches = [
+        touch
+        for number, table in enumerate(values["touch"], 1)
+        if (touch := _touch(scene, table, f"source.touch {number}", problems)) is not None
+    ]
     if kind is None:
         return None
     return s.SourceScene(kind, values["port"], values["baud"], values["rate"], values["seed"], tuple(touches))
+
+
+def _touch(scene: s.Scene, table: Mapping[str, Any], where: str, problems: list[str]) -> ScriptedTouch | None:
+    from .skin.virtual import ScriptedTouch
+
+    before = len(problems)
+    values = check(table, _TOUCH, where, problems)
+    if len(problems) > before:
+        return None
+    wanted = values.pop("sensor")
+    sensor = next((p.sensor for p in scene.sensors if wanted in (None, p.sensor.sensor_id)), None)
+    if sensor is None:
+        problems.append(f"{where}: there is no sensor {wanted}")
+        return None
+    cone = sensor.frustum
+    if values["u"] > cone.slant or values["phi"] > cone.wrap + 1e-9:
+        problems.append(
+            f"{where} is off {sensor.name}, whose u_mm ends at {1e3 * cone.slant:g} and phi_deg at "
+            f"{math.degrees(cone.wrap):g}: got {1e3 * values['u']:g} mm and {math.degrees(values['phi']):g} deg"
+        )
+    if not values["start"] < values["end"]:
+        problems.append(f"{where}: start_s must be before end_s")
+    return ScriptedTouch(**values, sensor=sensor.name) if len(problems) == before else None
 
 
 def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> s.RecordingScene | None:
@@ -225,15 +275,6 @@ def _check_together(scene: s.Scene, tables: Mapping[str, Any], problems: list[st
         problems.append("[motion] needs an [arm] that can move")
     if "source" in tables and not tables.get("link"):
         problems.append("[source] needs a [[link]] with a [[link.sensor]] that its bytes come from")
-    for number, touch in enumerate(scene.source.touches if scene.source else (), 1):
-        cone = next((p.sensor.frustum for p in scene.sensors if p.sensor.sensor_id == touch.sensor), None)
-        if cone is None:
-            problems.append(f"source.touch {number}: there is no sensor {touch.sensor}")
-        elif touch.u > cone.slant or touch.phi > cone.wrap + 1e-9:
-            problems.append(
-                f"source.touch {number} is off sensor {touch.sensor}, which is {1e3 * cone.slant:g} mm long: "
-                f"u_mm = {1e3 * touch.u:g}"
-            )
     if scene.arm is not None:
         from .link_check import check_links
 

@@ -1,0 +1,257 @@
+"""The guard: bytes, states and time go in, commands and events come out.
+
+One machine without input or output of its own, so that a replay of a recording is the same run again, bit by bit.
+It arms itself once everything has been sound for a while; a touch or a fault then makes the arm react and latch
+(``arm_reaction``). Without an arm it reports touches and faults.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from coneskin.errors import RobotConnectionError
+from coneskin.geometry.pose import Vector
+from coneskin.skin.events import Event, SkinFault, Touch, TouchBegan, TouchEnded
+from coneskin.skin.recording import Block
+from coneskin.skin.stream import Stream
+
+from .arm_reaction import ArmReaction, Output, Phase
+from .commands import ContactOnLink
+from .journal import GuardEvent, Kind
+from .owner_messages import Note
+from .state_reader import decode_state
+from .watch import Watch
+
+__all__ = ["GuardCore", "GuardedSensor"]
+
+_TELL_EVERY = 0.5  # s between two lists of what the guard waits for
+
+
+@dataclass(frozen=True, slots=True)
+class GuardedSensor:
+    """A sensor on a link.
+
+    Attributes:
+        name: the sensor's.
+        link_name: of the link, for people.
+        link: index of the link's DH frame.
+        place: (u [m], phi [rad]) -> point [m] and outward unit normal, in the link's DH frame.
+    """
+
+    name: str
+    link_name: str
+    link: int
+    place: Callable[[float, float], tuple[Vector, Vector]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Contact:
+    touch: Touch
+    where: GuardedSensor
+    point: Vector
+    normal: Vector
+
+    def on_link(self) -> ContactOnLink:
+        return ContactOnLink(self.where.link, self.point, self.normal, self.touch.level, self.touch.location_valid)
+
+
+class GuardCore:
+    """See the module.
+
+    Args:
+        stream: decodes and detects; it knows the sensors.
+        sensors: where they are.
+        watch: the limits.
+        arm: the arm under guard, or None.
+    """
+
+    def __init__(
+        self, stream: Stream, sensors: Sequence[GuardedSensor], watch: Watch, arm: ArmReaction | None = None
+    ) -> None:
+        self._stream = stream
+        self._sensors: Mapping[str, GuardedSensor] = {sensor.name: sensor for sensor in sensors}
+        self._watch = watch
+        self._arm = arm
+        self._phase = Phase.STARTING
+        self._contacts: dict[str, _Contact] = {}
+        self._faults: dict[str, str] = {}  # since the last reset
+        self._lost: dict[str, str] = {}  # what is gone for good
+        self._sound_since: float | None = None
+        self._told = -math.inf
+        self._takers: Mapping[int, Callable[[Block, list[Output]], None]] = {
+            Kind.SKIN: self._take_skin,
+            Kind.ARM: self._take_arm,
+            Kind.OWNER: self._take_owner,
+            Kind.RESET: self._take_reset,
+            Kind.LOST: self._take_lost,
+        }
+
+    @property
+    def phase(self) -> Phase:
+        """Where the guard is."""
+        return self._phase if self._arm is None else self._arm.phase
+
+    def take(self, block: Block) -> list[Output]:
+        """Take one input.
+
+        Args:
+            block: of a kind in ``journal.INPUTS``; its time is the host's clock.
+
+        Returns:
+            what to send and what happened; a command stands before the event that explains it.
+        """
+        out: list[Output] = []
+        taker = self._takers.get(block.kind)
+        if taker is not None:
+            taker(block, out)
+        self._look(block.time, out)
+        return out
+
+    def unsound(self, now: float) -> list[str]:
+        """Why the guard cannot arm, one line each; empty where it can."""
+        wrong = [*self._lost.values(), *self._faults.values()]
+        for detector in self._stream.detectors:
+            name = detector.sensor.name
+            if detector.age(now) > self._watch.skin_silence:
+                wrong.append(f"{name}: no valid frame" + (f" ({detector.fault.value})" if detector.fault else ""))
+            elif detector.touched:
+                wrong.append(f"{name}: it is touched, or its layers are stuck together")
+            elif not detector.ready:
+                wrong.append(f"{name}: {detector.fault.value if detector.fault else 'settling'}")
+        return wrong if self._arm is None else wrong + self._arm.unsound(now)
+
+    # ---- what comes in
+
+    def _take_skin(self, block: Block, out: list[Output]) -> None:
+        for event in self._stream.feed(block.payload, block.time):
+            self._skin_event(event, out)
+
+    def _skin_event(self, event: Event, out: list[Output]) -> None:
+        if isinstance(event, SkinFault):
+            if self.phase is not Phase.STARTING or not event.sensor:
+                self._fault(event.time, event.message, out)
+            else:  # a detector that has not settled yet says so itself, in ``unsound``
+                _tell(out, "message", event.time, what=event.message)
+            return
+        assert isinstance(event, Touch)
+        if isinstance(event, TouchEnded):
+            self._contacts.pop(event.sensor, None)
+            _tell(out, "touch_ended", event.time, sensor=event.sensor)
+            return
+        where = self._sensors[event.sensor]
+        contact = self._contacts[event.sensor] = _Contact(event, where, *where.place(event.u, event.phi))
+        contacts = [item.on_link() for item in self._contacts.values()]
+        if isinstance(event, TouchBegan):
+            if self._arm is not None:
+                self._arm.react(event.time, contacts, "touch", out)
+            _tell(out, "contact", event.time, **_describe(contact))
+        elif self._arm is not None:
+            self._arm.refine(contacts)
+            if event.location_valid and self.phase is Phase.STOPPING:
+                _tell(out, "contact_moved", event.time, **_describe(contact))
+
+    def _take_arm(self, block: Block, out: list[Output]) -> None:
+        if self._arm is None:
+            return
+        try:
+            state = decode_state(block.time, block.payload)
+        except RobotConnectionError as exc:
+            self._fault(block.time, f"the controller's state cannot be read: {exc}", out)
+            return
+        self._arm.sample(state, out)
+        if state.stopped_by_safety and self.phase in (Phase.ARMED, Phase.RETREATING):
+            self._fault(block.time, "the controller's own safety system has stopped the arm", out)
+
+    def _take_owner(self, block: Block, out: list[Output]) -> None:
+        if self._arm is None:
+            return
+        note = Note.decode(block.payload)
+        if note.kind == "ready":
+            self._arm.owner_ready = True
+        elif note.kind == "error":
+            self._arm.hurry(block.time)
+            self._fault(block.time, f"ur_rtde: {note.text}", out)
+
+    def _take_lost(self, block: Block, out: list[Output]) -> None:
+        what, _, why = block.payload.decode("utf-8", "replace").partition("\n")
+        self._lost[what] = why
+        if self._arm is not None and what == "owner":
+            self._arm.owner_ready = False
+            self._arm.hurry(block.time)
+        self._react(block.time, why, out)
+        _tell(out, "fault", block.time, what=why)
+
+    def _take_reset(self, block: Block, out: list[Output]) -> None:
+        if self.phase is not Phase.LATCHED or self._arm is None:
+            _tell(out, "message", block.time, what=f"nothing to reset: the guard is {self.phase.value}")
+            return
+        self._faults.clear()
+        if wrong := self.unsound(block.time):
+            _tell(out, "refused", block.time, what="reset", reasons=wrong)
+            return
+        self._arm.reset()
+        self._sound_since = None
+        _tell(out, "reset", block.time)
+
+    # ---- what is decided
+
+    def _look(self, now: float, out: list[Output]) -> None:
+        """What only the passing of time shows."""
+        for event in self._stream.silence(now, self._watch.skin_silence):
+            self._skin_event(event, out)
+        arm = self._arm
+        if arm is not None:
+            if arm.phase in (Phase.ARMED, Phase.RETREATING) and arm.silent(now):
+                self._fault(now, f"the controller has sent no state for {1e3 * self._watch.arm_silence:g} ms", out)
+            arm.look(now, out)
+        if self.phase is Phase.STARTING:
+            self._start(now, out)
+
+    def _start(self, now: float, out: list[Output]) -> None:
+        if wrong := self.unsound(now):
+            self._sound_since = None
+            if now - self._told >= _TELL_EVERY:
+                self._told = now
+                _tell(out, "waiting", now, reasons=wrong)
+        elif self._sound_since is None:
+            self._sound_since = now
+        elif now - self._sound_since >= self._watch.settle:
+            if self._arm is None:
+                self._phase = Phase.ARMED
+            else:
+                self._arm.arm(out)
+            _tell(out, "armed", now)
+
+    def _fault(self, now: float, what: str, out: list[Output]) -> None:
+        if what in self._faults:
+            return
+        self._faults[what] = what
+        self._react(now, what, out)
+        _tell(out, "fault", now, what=what)
+
+    def _react(self, now: float, why: str, out: list[Output]) -> None:
+        if self._arm is not None:
+            self._arm.react(now, (), why, out)
+
+
+def _describe(contact: _Contact) -> dict[str, Any]:
+    touch = contact.touch
+    return {
+        "sensor": touch.sensor,
+        "link": contact.where.link_name,
+        "u": touch.u,
+        "phi": touch.phi,
+        "point": contact.point,
+        "normal": contact.normal,
+        "level": touch.level,
+        "location_valid": touch.location_valid,
+        "clock_us": touch.clock_us,
+        "sequence": touch.sequence,
+    }
+
+
+def _tell(out: list[Output], name: str, time: float, **details: Any) -> None:
+    out.append(GuardEvent(name, time, details))

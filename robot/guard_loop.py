@@ -1,0 +1,207 @@
+"""The live loop: one thread in a process of its own that joins source, core and arm.
+
+Order of work after each wake: read the skin, decide, send the command; only then tell the recorder. Whoever stalls
+beside it (disk, terminal, ur_rtde) is on the other side of a channel that never makes it wait.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import selectors
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+from coneskin.errors import ConeSkinError, SkinTimeout
+from coneskin.skin.recording import Block, encode_block
+from coneskin.skin.source import Source
+
+from .arm_reaction import Command, Phase
+from .channel import Channel
+from .foreign import ForeignStops
+from .guard_core import GuardCore
+from .journal import GuardEvent, Kind
+from .owner_messages import Clear, Halt, Speed, Stop
+from .state_reader import StateReader
+from .stop_watch import Way
+
+__all__ = ["GuardLoop", "GuardPorts"]
+
+_TICK = 0.002  # s between two looks at the clocks where nothing else happens
+_OVERRUN = 0.02  # s between two rounds from which on the loop says that it was held up
+_ENDING = 3.0  # s that the arm has to stand when the guard is told to end
+_COMMANDS = (Stop, Speed, Halt, Clear, Way)
+
+
+@dataclass(slots=True)
+class GuardPorts:
+    """What the loop is connected to; None for what the scene does not have.
+
+    Attributes:
+        supervisor: the process that records and shows.
+        source: of the skin's bytes, open.
+        reader: of the controller's state, open.
+        owner: of ur_rtde.
+        foreign: stops that do not need ur_rtde, open.
+        deceleration: of a stop by script [rad/s2].
+    """
+
+    supervisor: Channel
+    source: Source | None
+    reader: StateReader | None = None
+    owner: Channel | None = None
+    foreign: ForeignStops | None = None
+    deceleration: float = 10.0
+
+
+class GuardLoop:
+    """Runs a core on its ports.
+
+    Args:
+        core: decides.
+        ports: what it is connected to.
+        clock: monotonic seconds.
+    """
+
+    def __init__(self, core: GuardCore, ports: GuardPorts, clock: Callable[[], float] = time.monotonic) -> None:
+        self._core = core
+        self._ports = ports
+        self._clock = clock
+        self._selector = selectors.DefaultSelector()
+        self._quit = False
+        self._out: list[bytes] = []
+
+    def stop(self) -> None:
+        """End: stop the arm, see it stand, and leave ``run``. May be called from a signal handler."""
+        self._quit = True
+
+    def run(self) -> None:
+        """Serve until told to end, or until the supervisor is gone; the arm is stopped before this returns."""
+        ports = self._ports
+        for item in (ports.supervisor, ports.owner, ports.reader):
+            if item is not None:
+                self._selector.register(item, selectors.EVENT_READ)
+        if ports.source is not None and (descriptor := ports.source.fileno()) is not None:
+            self._selector.register(descriptor, selectors.EVENT_READ, "skin")
+        for sock in ports.foreign.sockets() if ports.foreign else ():
+            self._selector.register(sock, selectors.EVENT_READ, "foreign")
+        gc.collect()
+        gc.freeze()
+        gc.disable()  # nothing here lives longer than a frame
+        before = self._clock()
+        try:
+            while not self._quit:
+                self.step(_TICK)
+                now = self._clock()
+                if now - before > _OVERRUN:
+                    self._record(Block(Kind.OVERRUN, now, json.dumps({"late": now - before}).encode()))
+                before = now
+            self._end()
+        finally:
+            gc.enable()
+            self._selector.close()
+
+    def step(self, timeout: float) -> None:
+        """Wait for input, or for the timeout [s], and serve it."""
+        ports = self._ports
+        ready = {key.data or key.fileobj for key, _ in self._selector.select(timeout)}
+        if ports.source is not None and ("skin" in ready or ports.source.fileno() is None):
+            self._read_skin(ports.source)
+        if ports.reader is not None and ports.reader in ready:
+            self._read_arm(ports.reader)
+        if ports.owner is not None and ports.owner in ready:
+            for message in ports.owner.receive():
+                self._take(Kind.OWNER, message)
+            if ports.owner.closed:
+                self._lose("owner", "the process that owns ur_rtde has ended", ports.owner)
+        if "foreign" in ready and ports.foreign is not None:
+            self._drain(ports.foreign)
+        if ports.supervisor in ready:
+            for message in ports.supervisor.receive():
+                if message == b"reset":
+                    self._take(Kind.RESET, b"")
+                elif message == b"quit":
+                    self._quit = True
+        if ports.supervisor.closed:
+            self._quit = True
+        if not ready:
+            self._take(Kind.TICK, b"")
+        if self._out:
+            ports.supervisor.send(b"".join(self._out))
+            self._out.clear()
+
+    def _read_skin(self, source: Source) -> None:
+        try:
+            data = source.read(0.0 if source.fileno() is not None else _TICK)
+        except SkinTimeout:
+            return
+        except ConeSkinError as exc:
+            self._lose("skin", str(exc), source.fileno())
+            return
+        self._take(Kind.SKIN, data)
+
+    def _read_arm(self, reader: StateReader) -> None:
+        try:
+            for payload in reader.read():
+                self._take(Kind.ARM, payload)
+        except ConeSkinError as exc:
+            self._lose("controller", str(exc), reader)
+
+    def _drain(self, foreign: ForeignStops) -> None:
+        before = foreign.sockets()
+        foreign.drain()
+        for sock in before:
+            if sock.fileno() < 0:
+                self._forget(sock)
+                self._take(Kind.LOST, b"a way to stop\nthe controller has closed a connection that a stop may need")
+
+    def _take(self, kind: Kind, payload: bytes) -> None:
+        """Feed the core, send what it commands, and note both for the recorder: in this order."""
+        block = Block(kind, self._clock(), payload)
+        outputs = self._core.take(block)
+        sent = [self._send(output) for output in outputs if isinstance(output, _COMMANDS)]
+        self._record(block)
+        if outputs:
+            done = self._clock()
+            for line in sent:
+                self._record(Block(Kind.COMMAND, done, line))
+            for output in outputs:
+                if isinstance(output, GuardEvent):
+                    self._record(output.block())
+
+    def _send(self, command: Command) -> bytes:
+        """Send one command; what to record of it."""
+        ports = self._ports
+        if isinstance(command, Way):
+            taken = ports.foreign is not None and ports.foreign.use(command, ports.deceleration)
+            return f"{command.value}\n{'sent' if taken else 'not sent'}".encode()
+        message = command.encode()
+        taken = ports.owner is not None and ports.owner.send(message)
+        return (b"owner\n" if taken else b"owner, not sent\n") + message
+
+    def _record(self, block: Block) -> None:
+        self._out.append(encode_block(block))
+
+    def _lose(self, what: str, why: str, fileobj: object) -> None:
+        self._forget(fileobj)
+        if what == "skin":
+            self._ports.source = None
+        elif what == "controller":
+            self._ports.reader = None
+        else:
+            self._ports.owner = None
+        self._take(Kind.LOST, f"{what}\n{why}".encode())
+
+    def _forget(self, fileobj: object) -> None:
+        with suppress(KeyError, ValueError, OSError):
+            self._selector.unregister(fileobj)  # type: ignore[arg-type]
+
+    def _end(self) -> None:
+        """Stop the arm and see it stand."""
+        self._take(Kind.LOST, b"supervisor\nthe guard was told to end")
+        end = self._clock() + _ENDING
+        while self._core.phase in (Phase.STOPPING, Phase.HALTING, Phase.RETREATING) and self._clock() < end:
+            self.step(_TICK)
+        self._ports.supervisor.flush()

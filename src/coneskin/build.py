@@ -1,0 +1,78 @@
+"""From a scene to the guard's parts. Only what the scene names is imported and built."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .errors import SceneError
+
+if TYPE_CHECKING:
+    from .robot.arm_reaction import ArmReaction
+    from .robot.guard_core import GuardCore, GuardedSensor
+    from .robot.watch import Watch
+    from .scene import LinkScene, Scene
+
+__all__ = ["build_core"]
+
+
+def build_core(scene: Scene) -> GuardCore:
+    """The guard's core for a scene; the same for the live guard and for a replay.
+
+    Raises:
+        SceneError: the scene has no sensor to guard with.
+    """
+    if not scene.sensors:
+        raise SceneError(["a guard needs a [[link]] with a [[link.sensor]]"], scene.name)
+    from .robot.guard_core import GuardCore
+    from .robot.watch import Watch
+    from .skin.detector import Detection
+    from .skin.stream import Stream
+    from .skin.timing import TimingLimits
+
+    watch = scene.watch or Watch()
+    detection = Detection(timing=TimingLimits(late=watch.skin_late))
+    stream = Stream([item.sensor for item in scene.sensors], detection)
+    sensors = [sensor for link in scene.links for sensor in _placed(scene, link)]
+    return GuardCore(stream, sensors, watch, _arm(scene, watch) if scene.arm else None)
+
+
+def _arm(scene: Scene, watch: Watch) -> ArmReaction:
+    from .robot.arm_reaction import ArmReaction
+    from .robot.commands import Reaction
+    from .robot.compiled import compile_contact
+    from .robot.link_frames import link_index
+    from .robot.stop_watch import Way
+    from .robot.ur_models import model
+
+    assert scene.arm is not None
+    arm = model(scene.arm.model)
+    for link in scene.links:
+        if index := link_index(link.name):
+            compile_contact(arm, index)  # 2 ms that the first touch shall not wait for
+    return ArmReaction(arm, scene.reaction or Reaction(kind="stop"), watch, tuple(Way))
+
+
+def _placed(scene: Scene, link: LinkScene) -> list[GuardedSensor]:
+    from .geometry.placed import PlacedFrustum
+    from .geometry.pose import Pose, Vector
+    from .robot.guard_core import GuardedSensor
+
+    index, dh_frame = 0, Pose()
+    if scene.arm is not None:
+        from .robot.link_frames import dh_mesh, link_index
+        from .robot.ur_models import model
+
+        index = link_index(link.name)
+        if link.frame == "mesh":
+            dh_frame = dh_mesh(model(scene.arm.model), link.name)
+
+    def guarded(name: str, frustum: PlacedFrustum) -> GuardedSensor:
+        def place(u: float, phi: float) -> tuple[Vector, Vector]:
+            return frustum.point(u, phi), frustum.normal(phi)
+
+        return GuardedSensor(name, link.name, index, place)
+
+    return [
+        guarded(item.sensor.name, PlacedFrustum(item.placed.frustum, dh_frame @ item.placed.link_frustum))
+        for item in link.sensors
+    ]

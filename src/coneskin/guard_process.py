@@ -1,0 +1,73 @@
+"""The process in which the guard's loop runs alone. Started by ``coneskin.session``, not by people."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+from .build import build_core
+from .errors import ConeSkinError
+from .robot.channel import Channel, inherit
+from .robot.guard_loop import GuardLoop, GuardPorts
+from .robot.journal import GuardEvent
+from .robot.owner_messages import decode_json
+from .scene import Scene
+from .scene_reader import parse_scene
+from .skin.recording import encode_block
+
+__all__ = ["main"]
+
+
+def main(arguments: list[str]) -> int:
+    """Take the channels and the scene, open what it names, and run until told to end."""
+    supervisor, *rest = inherit(arguments)
+    owner = rest[0] if rest else None
+    while not (hello := supervisor.receive()) and not supervisor.closed:
+        select.select([supervisor], [], [], 1.0)
+    if not hello:
+        return 1
+    start = decode_json(hello[0])
+    with contextlib.suppress(OSError):
+        os.nice(-15)  # allowed for root, and where the user's limits say so
+    try:
+        scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
+        with contextlib.ExitStack() as stack:
+            _run(scene, start, supervisor, owner, stack)
+    except ConeSkinError as exc:
+        event = GuardEvent("died", 0.0, {"what": str(exc)})
+        supervisor.send(encode_block(event.block()))
+        select.select([], [supervisor], [], 1.0)
+        supervisor.flush()
+        return 1
+    return 0
+
+
+def _run(
+    scene: Scene, start: dict[str, Any], supervisor: Channel, owner: Channel | None, stack: contextlib.ExitStack
+) -> None:
+    from .skin.serial_port import SerialPort
+
+    core = build_core(scene)
+    assert scene.source is not None
+    source = stack.enter_context(SerialPort(start["port"], scene.source.baud))
+    ports = GuardPorts(supervisor, source, owner=owner)
+    if scene.arm is not None:
+        from .robot.foreign import ForeignStops
+        from .robot.state_reader import StateReader
+
+        ports.reader = stack.enter_context(StateReader(scene.arm.host))
+        ports.foreign = stack.enter_context(ForeignStops(scene.arm.host))
+        if scene.reaction is not None:
+            ports.deceleration = scene.reaction.deceleration
+    loop = GuardLoop(core, ports)
+    signal.signal(signal.SIGTERM, lambda *_: loop.stop())
+    loop.run()
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

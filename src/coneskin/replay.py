@@ -1,0 +1,130 @@
+"""Run a recording again: the same bytes through the same guard, and whether the same happens."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import RecordingError
+from .robot.journal import INPUTS, GuardEvent, Kind, decode_event
+from .scene import Scene
+from .skin.recording import Block, read_recording
+
+__all__ = ["Replay", "Run", "read_run", "replay"]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A recorded run.
+
+    Attributes:
+        header: scene, versions and times; see ``coneskin.session``.
+        blocks: all that was recorded after it.
+        missing: what the recording lacks, in a sentence; empty where it was closed.
+    """
+
+    header: dict[str, Any]
+    blocks: tuple[Block, ...]
+    missing: str
+
+    @property
+    def events(self) -> list[GuardEvent]:
+        """What happened, as it was recorded."""
+        return [decode_event(block) for block in self.blocks if block.kind == Kind.EVENT]
+
+    def scene(self) -> Scene:
+        """The scene of the run.
+
+        Raises:
+            SceneError: this coneskin cannot read it any more.
+        """
+        from .scene_reader import parse_scene
+
+        return parse_scene(self.header["scene"], self.header["name"], Path(self.header["folder"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """What a replay found.
+
+    Attributes:
+        events: what happened this time.
+        recorded: what happened then.
+        same: whether the two are equal, bit by bit.
+        differences: the first pairs that are not, for people.
+        frames: bytes of skin that were replayed.
+        duration: of the recording [s].
+        missing: what the recording lacks.
+    """
+
+    events: list[GuardEvent]
+    recorded: list[GuardEvent]
+    same: bool
+    differences: list[str]
+    frames: int
+    duration: float
+    missing: str
+
+
+def read_run(path: Path) -> Run:
+    """Read a recorded run.
+
+    Args:
+        path: the recording, or the folder of a run with one in it.
+
+    Raises:
+        RecordingError: there is none, or it has no header.
+    """
+    if path.is_dir():
+        path = path / "run.rec"
+    recording = read_recording(path)
+    if not recording.blocks or recording.blocks[0].kind != Kind.HEADER:
+        raise RecordingError(f"{path} has no header: the run ended before it began")
+    header = json.loads(recording.blocks[0].payload)
+    return Run(header, recording.blocks[1:], recording.missing)
+
+
+def replay(run: Run, scene: Scene | None = None) -> Replay:
+    """Feed the run's inputs to a new guard.
+
+    Args:
+        run: the recorded run.
+        scene: another scene than the run's own, to see what it would have done.
+
+    Raises:
+        SceneError: the scene cannot be read or built.
+    """
+    from .build import build_core
+
+    core = build_core(scene or run.scene())
+    events: list[GuardEvent] = []
+    for block in run.blocks:
+        if block.kind in INPUTS:
+            events += [output for output in core.take(block) if isinstance(output, GuardEvent)]
+    recorded = run.events
+    # a run that was cut off may lack the events of its last inputs, or have them without knowing more
+    again = [_plain(event) for event in events]
+    then = [_plain(event) for event in recorded]
+    if run.missing:
+        then = then[: len(again)]
+        again = again[: len(then)]
+    differences = list(_differences(again, then))
+    frames = sum(len(block.payload) for block in run.blocks if block.kind == Kind.SKIN)
+    duration = run.blocks[-1].time - run.blocks[0].time if run.blocks else 0.0
+    return Replay(events, recorded, not differences, differences[:5], frames, duration, run.missing)
+
+
+def _plain(event: GuardEvent) -> str:
+    """An event as text with every bit of its floats."""
+    return f"{event.time.hex()} {event.name} {json.dumps(event.details)}"
+
+
+def _differences(again: list[str], then: list[str]) -> Iterator[str]:
+    for number in range(max(len(again), len(then))):
+        new = again[number] if number < len(again) else "nothing"
+        old = then[number] if number < len(then) else "nothing"
+        if new != old:
+            yield f"event {number}: recorded {old}, replayed {new}"

@@ -1,0 +1,348 @@
+"""A guarded session: starts the processes that a scene needs, records what they do, and gives the arm to a program.
+
+    with guard("scene.toml") as g:
+        g.arm.move_j(q, speed=1.0, acceleration=2.0)     # raises Collision when the skin is touched
+
+Processes: this one records and waits; the guard's loop, the owner of ur_rtde and a virtual skin are children, each on a
+channel. A child that dies is seen as the end of its channel, and ends in a stopped arm.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from . import __version__
+from .arm_proxy import ArmProxy
+from .errors import Collision, ConeSkinError, RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
+from .robot.channel import Channel, pair, spawn
+from .robot.journal import GuardEvent, Kind, decode_event
+from .robot.owner_messages import decode_json, encode_json
+from .scene import Scene, load
+from .skin.recording import Block, Recorder, decode_blocks
+
+__all__ = ["Session", "guard"]
+
+_START = 20.0  # s for the children to be there and everything to be sound
+_END = 6.0  # s for the guard to stop the arm and end
+
+
+def guard(
+    scene: Scene | Path | str,
+    *,
+    recording: Path | None = None,
+    on_event: Callable[[GuardEvent], None] | None = None,
+    start_timeout: float = _START,
+) -> Session:
+    """Guard an arm, or watch a skin, while a ``with`` lasts.
+
+    Args:
+        scene: a scene, or the path of its file.
+        recording: file to record to; by default a new one in the folder that the scene names, if it names one.
+        on_event: called for each event, from the thread that records.
+        start_timeout: how long the guard may take to arm [s].
+
+    Raises:
+        SceneError: the scene has mistakes, or nothing to guard with.
+        RobotRefused: on entering, where the guard does not arm in time; the reasons are listed.
+        RobotConnectionError: on entering, where the controller cannot be reached.
+        SkinConnectionError: on entering, where the port cannot be opened.
+    """
+    return Session(scene if isinstance(scene, Scene) else load(scene), recording, on_event, start_timeout)
+
+
+class Session:
+    """One guarded run; see ``guard``.
+
+    Attributes:
+        scene: what is there.
+        events: what has happened so far, in order.
+        recording: the file that is recorded to, or None.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        recording: Path | None,
+        on_event: Callable[[GuardEvent], None] | None,
+        start_timeout: float,
+    ) -> None:
+        missing = [f"a guard needs a [{name}]" for name in ("source", "link") if not getattr(scene, _FIELDS[name])]
+        if missing:
+            raise SceneError(missing, scene.name)
+        self.scene = scene
+        self.events: list[GuardEvent] = []
+        self.recording = recording
+        self._on_event = on_event
+        self._start_timeout = start_timeout
+        self._changed = threading.Condition()
+        self._children: dict[str, subprocess.Popen[bytes]] = {}
+        self._guard: Channel | None = None
+        self._skin: Channel | None = None
+        self._arm: ArmProxy | None = None
+        self._recorder: Recorder | None = None
+        self._thread: threading.Thread | None = None
+        self._trouble: ConeSkinError | None = None
+        self._torn = b""
+
+    @property
+    def arm(self) -> ArmProxy:
+        """The arm, for the program.
+
+        Raises:
+            RobotRefused: the scene has none.
+        """
+        if self._arm is None:
+            raise RobotRefused(f"{self.scene.name} has no [arm]")
+        return self._arm
+
+    def __enter__(self) -> Session:
+        try:
+            self._open()
+            self._await_armed()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop the arm, end the children and close the recording; may be called again."""
+        if self._guard is not None:
+            self._guard.send(b"quit")
+        for name in ("guard", "owner", "skin"):
+            child = self._children.get(name)
+            if child is None:
+                continue
+            if name != "guard":  # the others end when their channels do, after the guard has stopped the arm
+                for channel in (self._arm.channel if self._arm else None, self._skin):
+                    if channel is not None:
+                        channel.close()
+            try:
+                child.wait(_END)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.wait()
+        self._children.clear()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        if self._guard is not None:
+            self._guard.close()
+        if self._recorder is not None:
+            recorder, self._recorder = self._recorder, None
+            recorder.close()
+
+    def reset(self, timeout: float = 5.0) -> None:
+        """Let the arm move again after a collision or a fault: call it because a person has looked.
+
+        Raises:
+            RobotRefused: something is still wrong; the reasons are listed.
+        """
+        seen = len(self.events)
+        assert self._guard is not None
+        self._guard.send(b"reset")
+        event = self.wait_for(("armed", "refused", "message"), timeout, after=seen)
+        if event is None or event.name != "armed":
+            why = "the guard did not arm in time" if event is None else "; ".join(_reasons(event))
+            raise RobotRefused(f"reset refused: {why}")
+
+    def touch(self, u: float, phi: float, force: float = 5.0, duration: float = 0.3, sensor: str = "") -> float:
+        """Touch the scene's virtual skin now.
+
+        Args:
+            u: slant distance from end 1 [m].
+            phi: azimuth [rad].
+            force: [N].
+            duration: [s].
+            sensor: its name; by default the first.
+
+        Returns:
+            when the touch begins, on the clock of the events [s].
+
+        Raises:
+            SkinConnectionError: the scene's skin is not virtual, or is gone.
+        """
+        if self._skin is None:
+            raise SkinConnectionError("only a virtual skin can be touched by a program")
+        name = sensor or self.scene.sensors[0].sensor.name
+        self._skin.send(encode_json({"u": u, "phi": phi, "force": force, "duration": duration, "sensor": name}))
+        return float(self._ask_skin("touched"))
+
+    def wait_for(self, names: tuple[str, ...], timeout: float, after: int = 0) -> GuardEvent | None:
+        """The first event of one of these names from position ``after`` on; None after the timeout [s]."""
+        end = time.monotonic() + timeout
+        with self._changed:
+            while True:
+                for event in self.events[after:]:
+                    if event.name in names:
+                        return event
+                left = end - time.monotonic()
+                if left <= 0.0 or self._trouble is not None or not self._changed.wait(left):
+                    return None
+
+    def check(self) -> None:
+        """Raise what has happened: a collision, a fault, or the end of a process.
+
+        Raises:
+            Collision: the skin was touched and the arm has reacted.
+            RobotRefused: a fault has stopped the arm.
+            RobotConnectionError: a process is gone.
+        """
+        with self._changed:
+            trouble, events = self._trouble, list(self.events)
+        if trouble is not None:
+            raise trouble
+        since = max((i for i, event in enumerate(events) if event.name == "armed"), default=-1) + 1
+        stopped = next((event for event in events[since:] if event.name == "stopping"), None)
+        if stopped is None:
+            return
+        self.wait_for(("latched",), _END, after=since)
+        contact = next((event for event in events[since:] if event.name == "contact"), None)
+        if contact is not None and stopped.details["why"] == "touch":
+            where = contact.details
+            raise Collision(
+                f"{where['sensor']} on the {where['link']} was touched at u = {1e3 * where['u']:.1f} mm, "
+                f"phi = {where['phi']:.3f} rad; the arm has stopped until a person resets the guard"
+            )
+        raise RobotRefused(f"the guard has stopped the arm: {stopped.details['why']}")
+
+    # ---- how it starts
+
+    def _open(self) -> None:
+        scene = self.scene
+        assert scene.source is not None
+        start = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve())}
+        self._open_recording(start)
+        port = scene.source.port
+        if scene.source.kind == "virtual":
+            self._skin = self._spawn("skin", "coneskin.skin_process", encode_json(start))
+            port = str(self._ask_skin("port"))
+        ours, theirs = pair()
+        ends = [theirs]
+        if scene.arm is not None:
+            guard_end, owner_guard_end = pair()
+            program_end, owner_program_end = pair()
+            self._children["owner"] = spawn("coneskin.robot.owner", owner_guard_end, owner_program_end)
+            ends.append(guard_end)
+            self._arm = ArmProxy(Channel(program_end), self.check)
+            self._arm.channel.send(encode_json({"host": scene.arm.host, "watchdog_hz": scene.arm.watchdog_hz}))
+        self._guard = Channel(ours)
+        self._children["guard"] = spawn("coneskin.guard_process", *ends)
+        self._guard.send(encode_json({**start, "port": port}))
+        self._thread = threading.Thread(target=self._listen, args=(self._guard,), name="coneskin recorder", daemon=True)
+        self._thread.start()
+
+    def _spawn(self, name: str, module: str, hello: bytes) -> Channel:
+        ours, theirs = pair()
+        channel = Channel(ours)
+        self._children[name] = spawn(module, theirs)
+        channel.send(hello)
+        return channel
+
+    def _open_recording(self, start: dict[str, Any]) -> None:
+        if self.recording is None and self.scene.recording is not None:
+            stamp = time.strftime("%Y-%m-%dT%H-%M-%S")
+            folder = self.scene.recording.folder / stamp
+            number = 1
+            while folder.exists():
+                number += 1
+                folder = self.scene.recording.folder / f"{stamp}-{number}"
+            folder.mkdir(parents=True)
+            self.recording = folder / "run.rec"
+        if self.recording is None:
+            return
+        self._recorder = Recorder(self.recording).__enter__()
+        clocks = {"monotonic": time.monotonic(), "unix": time.time()}
+        header = {**start, "coneskin": __version__, "python": sys.version.split()[0], "clocks": clocks}
+        self._recorder.write(Block(Kind.HEADER, clocks["monotonic"], json.dumps(header).encode()))
+
+    def _await_armed(self) -> None:
+        event = self.wait_for(("armed", "died"), self._start_timeout)
+        if event is not None and event.name == "armed":
+            return
+        if self._trouble is not None:
+            raise self._trouble
+        waiting = next((event for event in reversed(self.events) if event.name == "waiting"), None)
+        faults = [str(event.details["what"]) for event in self.events if event.name in ("fault", "died")]
+        reasons = _reasons(waiting) if waiting else []
+        listed = list(dict.fromkeys([*faults, *reasons])) or ["its process sent nothing"]
+        raise RobotRefused(
+            f"the guard did not arm within {self._start_timeout:g} s:\n" + "\n".join(f"  {line}" for line in listed)
+        )
+
+    def _ask_skin(self, key: str) -> Any:
+        import select
+
+        assert self._skin is not None
+        end = time.monotonic() + 10.0
+        while time.monotonic() < end and not self._skin.closed:
+            select.select([self._skin], [], [], 0.1)
+            for message in self._skin.receive():
+                answer = decode_json(message)
+                if key in answer:
+                    return answer[key]
+        raise SkinConnectionError("the process of the virtual skin does not answer")
+
+    # ---- what it hears
+
+    def _listen(self, channel: Channel) -> None:
+        """Record and note what the guard tells, until its channel ends."""
+        import select
+
+        while not channel.closed:
+            select.select([channel], [], [], 0.5)
+            data = b"".join(channel.receive())
+            if data:
+                self._hear(data)
+        with self._changed:
+            child = self._children.get("guard")
+            if self._trouble is None and child is not None and not any(e.name == "died" for e in self.events):
+                ended = any(e.details.get("what") == "the guard was told to end" for e in self.events[-20:])
+                if not ended:
+                    self._trouble = RobotConnectionError("the guard's process has ended; the owner stops the arm")
+            self._changed.notify_all()
+
+    def _hear(self, data: bytes) -> None:
+        blocks = [block for _, block in decode_blocks(data)]
+        events = [decode_event(block) for block in blocks if block.kind == Kind.EVENT]
+        if self._recorder is not None:
+            try:
+                self._recorder.write(*blocks)
+            except ConeSkinError as exc:
+                self._recorder = None
+                events.append(GuardEvent("message", blocks[-1].time, {"what": f"recording ended: {exc}"}))
+        if events:
+            with self._changed:
+                self.events += events
+                for event in events:
+                    if event.name == "died":
+                        self._trouble = _died(str(event.details["what"]), self.scene)
+                self._changed.notify_all()
+            if self._on_event is not None:
+                for event in events:
+                    self._on_event(event)
+
+
+_FIELDS = {"source": "source", "link": "links"}
+
+
+def _died(what: str, scene: Scene) -> ConeSkinError:
+    """The error for a guard that could not start, as what it is about."""
+    if scene.arm is not None and scene.arm.host in what:
+        return RobotConnectionError(what)
+    return SkinConnectionError(what)
+
+
+def _reasons(event: GuardEvent) -> list[str]:
+    details = event.details
+    return [str(reason) for reason in details.get("reasons", [details.get("what", event.name)])]
