@@ -18,6 +18,9 @@ from .virtual import VirtualSkin
 __all__ = ["Pacing", "PseudoTerminal", "play"]
 
 
+_OPENING = 0.05  # pyserial throws away what came while it was opening [s]
+
+
 class Pacing:
     """How well the bytes kept their time.
 
@@ -76,16 +79,17 @@ class PseudoTerminal:
 
     Args:
         skin: what to play.
-        wait_for_reader: begin the script only when somebody opens the port.
+        hold: begin the script at ``begin``, not at ``open``, so that a reader loses none of it.
 
     Attributes:
         path: what to give to ``SerialPort``; empty before ``open``.
         pacing: how well the bytes kept their time.
     """
 
-    def __init__(self, skin: VirtualSkin, wait_for_reader: bool = False) -> None:
+    def __init__(self, skin: VirtualSkin, hold: bool = False) -> None:
         self._skin = skin
-        self._wait_for_reader = wait_for_reader
+        self._hold = hold
+        self._begin = threading.Event()
         self.path = ""
         self.pacing = Pacing()
         self._master: int | None = None
@@ -103,12 +107,20 @@ class PseudoTerminal:
             return
         self._master, self._slave, self.path = open_raw_terminal()
         self._stop.clear()
+        self._begin.clear()
+        if not self._hold:
+            self._begin.set()
         self._thread = threading.Thread(target=self._run, name=f"virtual skin on {self.path}", daemon=True)
         self._thread.start()
+
+    def begin(self) -> None:
+        """Begin the script that was held."""
+        self._begin.set()
 
     def close(self) -> None:
         """Stop playing and take the port away; may be called twice."""
         self._stop.set()
+        self._begin.set()
         thread, self._thread = self._thread, None
         if thread is not None:
             thread.join()
@@ -124,10 +136,10 @@ class PseudoTerminal:
         master = self._master
         if master is None:
             return
-        if self._wait_for_reader and self._slave is not None:
-            os.close(self._slave)
-            self._slave = wait_for_reader(master, self.path, self._stop.wait)
-        play(self._skin, lambda data: write_all(master, data), wait=self._stop.wait, pacing=self.pacing)
+        self._begin.wait()
+        if not self._stop.is_set():
+            play(self._skin, lambda data: write_all(master, data), wait=self._stop.wait, pacing=self.pacing)
+            drain(self._slave, self._stop.wait)
         self._unplug()
 
     def _unplug(self) -> None:
@@ -189,7 +201,26 @@ def wait_for_reader(master: int, path: str, wait: Callable[[float], bool]) -> in
     while any(event & select.POLLHUP for _, event in poll.poll(0)):  # "nobody there" of a pseudo-terminal
         if wait(0.005):
             return None
+    if wait(_OPENING):
+        return None
     return os.open(path, os.O_RDWR | os.O_NOCTTY)
+
+
+def drain(slave: int | None, wait: Callable[[float], bool]) -> None:
+    """Let the reader take what is on its way, for a second at most: a hang-up would throw it away.
+
+    Args:
+        slave: the reader's end.
+        wait: lets so many seconds pass; True if the waiting shall stop.
+    """
+    import fcntl
+    import termios
+
+    if slave is None:
+        return
+    for _ in range(200):
+        if not int.from_bytes(fcntl.ioctl(slave, termios.FIONREAD, bytes(4)), sys.byteorder) or wait(0.005):
+            return
 
 
 def write_all(descriptor: int, data: bytes) -> bool:

@@ -119,7 +119,7 @@ def play_skin(
     """
     if output is not None:
         return _write_file(skin, output, as_json)
-    from .pseudo_terminal import Pacing, open_raw_terminal, play, wait_for_reader, write_all
+    from .pseudo_terminal import Pacing, drain, open_raw_terminal, play, wait_for_reader, write_all
 
     def wait(duration: float) -> bool:
         time.sleep(duration)
@@ -137,6 +137,7 @@ def play_skin(
                 os.close(slave)
                 reader = wait_for_reader(master, path, wait)
             play(skin, lambda data: write_all(master, data), wait=wait, pacing=pacing)
+            drain(reader, wait)
     except KeyboardInterrupt:
         pass  # the way to stop it
     finally:
