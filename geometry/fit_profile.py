@@ -12,7 +12,7 @@ from .fit_cone import frame
 from .mesh import Mesh
 from .rays import Rays
 
-__all__ = ["AxisFrame", "Profile", "outer_profile"]
+__all__ = ["AxisFrame", "Profile", "bridge_holes", "outer_profile"]
 
 Floats = NDArray[np.float64]
 
@@ -101,20 +101,29 @@ def outer_profile(mesh: Mesh, rays: Rays, frame: AxisFrame, step: float, around:
     depth = rays.cast(origins.reshape(-1, 3), np.ascontiguousarray(ways).reshape(-1, 3))[0]
     # a ray that has passed the axis has met nothing on its own side
     radius = np.where(depth < start, start - depth, 0.0).reshape(count, around)
-    return Profile(frame, np.asarray(z), phi, radius, _close(radius, step, bridge))
-
-
-def _close(radius: Floats, step: float, bridge: float) -> Floats:
-    """Fill what is narrower than the bridge, in length and in arc, up to its rim (a grey closing)."""
-    from scipy.ndimage import maximum_filter, minimum_filter
-
-    count, around = radius.shape
     present = radius[radius > 0.0]
     arc = 2.0 * math.pi / around * (float(np.median(present)) if len(present) else 1.0)
-    rows = 2 * int(bridge / step / 2.0) + 1
-    columns = min(2 * int(bridge / arc / 2.0) + 1, around - 1 + around % 2)
-    if rows == columns == 1:
-        return radius
-    padded = np.pad(np.pad(radius, ((rows, rows), (0, 0))), ((0, 0), (columns, columns)), mode="wrap")
-    closed = minimum_filter(maximum_filter(padded, (rows, columns)), (rows, columns))
-    return np.asarray(closed[rows : rows + count, columns : columns + around])
+    return Profile(frame, np.asarray(z), phi, radius, bridge_holes(radius, step, arc, bridge))
+
+
+def bridge_holes(height: Floats, step: float, arc: float, bridge: float, around: bool = True) -> Floats:
+    """Fill what is narrower than the bridge, in length and in arc, up to its rim (a grey closing).
+
+    Args:
+        height: not negative, 0 where nothing is, shape (k, p).
+        step: distance between rows [m].
+        arc: distance between columns [m].
+        bridge: side of the square that must fit into a hole for the hole to stay [m].
+        around: whether the columns go round.
+    """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    rows, columns = height.shape
+    tall = 2 * int(bridge / step / 2.0) + 1
+    wide = min(2 * int(bridge / arc / 2.0) + 1, columns - 1 + columns % 2)
+    if tall == wide == 1:
+        return height
+    padded = np.pad(height, ((tall, tall), (0, 0)))
+    padded = np.pad(padded, ((0, 0), (wide, wide)), mode="wrap" if around else "constant")
+    closed = minimum_filter(maximum_filter(padded, (tall, wide)), (tall, wide))
+    return np.asarray(closed[tall : tall + rows, wide : wide + columns])

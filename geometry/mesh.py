@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from coneskin.arrays import frozen
 from coneskin.errors import MeshError, MissingExtra
 
+from .pose import Pose
+
 __all__ = ["UNITS", "Mesh", "load_mesh", "make_mesh"]
 
 Floats = NDArray[np.float64]
@@ -71,10 +73,10 @@ class Mesh:
         """Extents along the axes of the frame [m], shape (3,)."""
         return np.asarray(np.ptp(self.vertices, axis=0))
 
-    def transformed(self, rotation: Any, translation: Any, scale: Any = 1.0) -> Mesh:
-        """Scaled (one factor or three), then rotated, then moved [m]: the order of a URDF's mesh and origin."""
-        vertices = (self.vertices * np.asarray(scale, float)) @ np.asarray(rotation, float).T
-        return Mesh(vertices + np.asarray(translation, float), self.faces, self.source, self.unit, self.notes)
+    def moved(self, pose: Pose) -> Mesh:
+        """The same mesh in the outer frame of a pose."""
+        vertices = self.vertices @ np.array(pose.rotation).T + np.array(pose.translation)
+        return Mesh(vertices, self.faces, self.source, self.unit, self.notes)
 
     def embree(self) -> Callable[[Floats, Floats], Indices] | None:
         """Index of the first face hit by each ray (-1: none), through trimesh and embree; None without embreex."""
@@ -88,7 +90,12 @@ class Mesh:
         return first
 
 
-def load_mesh(path: str | Path, unit: str | None = None, up_axis: str = "ignore") -> Mesh:
+def load_mesh(
+    path: str | Path,
+    unit: str | None = None,
+    up_axis: str = "ignore",
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> Mesh:
     """Read a link's mesh.
 
     Args:
@@ -97,6 +104,7 @@ def load_mesh(path: str | Path, unit: str | None = None, up_axis: str = "ignore"
             extent under 5 is taken to be in metres, a larger one in millimetres. The guess is in ``Mesh.notes``.
         up_axis: what to do with COLLADA's up_axis tag: "ignore" keeps the file's axes, as RViz, MoveIt and Gazebo do,
             so that the frame stays the link's; "apply" rotates Y_UP and X_UP files to z up, as COLLADA asks.
+        scale: factors along the axes, after the unit and the up axis, as a URDF's mesh tag has them.
 
     Returns:
         the mesh in metres, all parts of the file in one, welded.
@@ -121,7 +129,7 @@ def load_mesh(path: str | Path, unit: str | None = None, up_axis: str = "ignore"
     turn = None
     if path.suffix.lower() == ".dae":
         tag_name, tag_metres, up = _collada_asset(path)
-        if metres is None and tag_metres is not None:
+        if metres is None:
             unit, metres = tag_name, tag_metres
             notes.append(f"unit {tag_name} ({tag_metres:g} m) as the COLLADA file says")
         if up != "Z_UP" and up_axis == "apply":
@@ -136,7 +144,9 @@ def load_mesh(path: str | Path, unit: str | None = None, up_axis: str = "ignore"
         extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
         unit, metres = ("m", 1.0) if extent < LONGEST else ("mm", 0.001)
         notes.append(f"unit {unit} guessed from the largest extent, {extent:g}")
-    return make_mesh(vertices * metres, faces, str(path), unit or "m", notes)
+    if tuple(scale) != (1.0, 1.0, 1.0):
+        notes.append(f"scaled by {scale[0]:g}, {scale[1]:g}, {scale[2]:g}")
+    return make_mesh(vertices * (metres * np.asarray(scale, float)), faces, str(path), unit or "m", notes)
 
 
 def make_mesh(
@@ -234,9 +244,9 @@ def _read(path: Path) -> tuple[Floats, Indices]:
     return np.concatenate(corners), np.concatenate(faces)
 
 
-def _collada_asset(path: Path) -> tuple[str, float | None, str]:
-    """Name of the unit, metres in it (None: not said) and up axis of a COLLADA file."""
-    name, metres, up = "m", None, "Y_UP"  # Y_UP is what COLLADA means where the tag is missing
+def _collada_asset(path: Path) -> tuple[str, float, str]:
+    """Name of the unit, metres in it and up axis of a COLLADA file."""
+    name, metres, up = "m", 1.0, "Y_UP"  # what COLLADA means where the tags are missing
     try:
         for _, element in ElementTree.iterparse(path, ("end",)):
             tag = element.tag.rpartition("}")[2]
@@ -251,7 +261,7 @@ def _collada_asset(path: Path) -> tuple[str, float | None, str]:
         raise MeshError(f"{path}: malformed XML: {error}") from error
     except ValueError as error:
         raise MeshError(f"{path}: the unit tag must hold a number of metres: {error}") from error
-    if metres is not None and not (np.isfinite(metres) and metres > 0.0):
+    if not (np.isfinite(metres) and metres > 0.0):
         raise MeshError(f"{path}: the unit tag must hold metres above 0, got {metres}")
     if up not in _UP:
         raise MeshError(f"{path}: up_axis must be X_UP, Y_UP or Z_UP, got {up!r}")

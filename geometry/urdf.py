@@ -1,0 +1,127 @@
+"""The mesh of one link of a URDF, in the frame of the link."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+from xml.etree import ElementTree
+
+import numpy as np
+
+from coneskin.errors import MeshError
+
+from .mesh import Mesh, load_mesh, make_mesh
+from .pose import Pose, Vector
+
+__all__ = ["load_urdf_link", "urdf_links"]
+
+
+def urdf_links(path: str | Path) -> tuple[str, ...]:
+    """Names of the links of a URDF that have a mesh, visual or collision.
+
+    Raises:
+        MeshError: no such file, or not a URDF.
+    """
+    return tuple(link.get("name", "") for link in _robot(Path(path)).iter("link") if link.find(".//mesh") is not None)
+
+
+def load_urdf_link(
+    path: str | Path,
+    link: str,
+    geometry: str = "visual",
+    packages: Mapping[str, str | Path] | None = None,
+    up_axis: str = "ignore",
+) -> Mesh:
+    """Read the meshes of a link, scaled and placed as the URDF says, as one mesh.
+
+    Args:
+        path: the URDF; a xacro file has to be expanded first.
+        link: name of the link.
+        geometry: "visual" or "collision". Collision bodies are often hulls that have lost the tube.
+        packages: folders of the ROS packages in package:// paths; those not named are looked for at and beside the
+            folders above the URDF.
+        up_axis: what to do with COLLADA's up_axis tag, see ``load_mesh``.
+
+    Returns:
+        the mesh in the frame of the link [m].
+
+    Raises:
+        MeshError: no such file, link, package or mesh, or a mesh that cannot be read.
+    """
+    path = Path(path)
+    if geometry not in ("visual", "collision"):
+        raise MeshError(f"geometry must be 'visual' or 'collision', got {geometry!r}")
+    robot = _robot(path)
+    found = next((item for item in robot.iter("link") if item.get("name") == link), None)
+    if found is None:
+        names = ", ".join(urdf_links(path)) or "none with a mesh"
+        raise MeshError(f"{path}: no link {link!r}; there are: {names}")
+    parts: list[Mesh] = []
+    shapes: list[str] = []
+    for body in found.findall(geometry):
+        shape = body.find("geometry/*")
+        if shape is None or shape.tag != "mesh":
+            shapes += [] if shape is None else [shape.tag]
+            continue
+        file = _resolve(shape.get("filename", ""), path, packages or {})
+        scale = _numbers(shape.get("scale", "1 1 1"), f"{path}: scale of {link}")
+        # The numbers of a URDF are metres: only COLLADA says otherwise, in its own unit tag.
+        unit = None if file.suffix.lower() == ".dae" else "m"
+        origin = body.find("origin")
+        xyz = _numbers("0 0 0" if origin is None else origin.get("xyz", "0 0 0"), f"{path}: xyz of {link}")
+        rpy = _numbers("0 0 0" if origin is None else origin.get("rpy", "0 0 0"), f"{path}: rpy of {link}")
+        parts.append(load_mesh(file, unit, up_axis, scale).moved(Pose.from_xyz_rpy(xyz, rpy)))
+    source = f"{path}: {link}"
+    if not parts:
+        other = "collision" if geometry == "visual" else "visual"
+        has = f"only {', '.join(shapes)}" if shapes else "nothing"
+        hint = f"; its {other} has a mesh" if found.find(f"{other}//mesh") is not None else ""
+        raise MeshError(f"{source} has no {geometry} mesh, {has}{hint}")
+    if len(parts) == 1:
+        return Mesh(parts[0].vertices, parts[0].faces, source, parts[0].unit, parts[0].notes)
+    counts = np.cumsum([0] + [len(part.vertices) for part in parts])
+    faces = np.concatenate([part.faces + int(count) for part, count in zip(parts, counts, strict=False)])
+    notes = list(dict.fromkeys(note for part in parts for note in part.notes))
+    return make_mesh(np.concatenate([part.vertices for part in parts]), faces, source, parts[0].unit, notes)
+
+
+def _robot(path: Path) -> ElementTree.Element:
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file")
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise MeshError(f"{path}: malformed XML: {error}") from error
+    if root.tag != "robot":
+        raise MeshError(f"{path}: a URDF begins with <robot>, this begins with <{root.tag}>")
+    if any("xacro" in str(item.tag) for item in root.iter()):
+        raise MeshError(f"{path}: xacro has to be expanded first (xacro {path.name} > robot.urdf)")
+    return root
+
+
+def _resolve(name: str, urdf: Path, packages: Mapping[str, str | Path]) -> Path:
+    """Where a mesh file is; the name may be package://, file:// or a path beside the URDF."""
+    parsed = urlparse(name)
+    if parsed.scheme == "file":
+        return Path(unquote(parsed.path))
+    if parsed.scheme in ("package", "model"):
+        package, inner = parsed.netloc, unquote(parsed.path).lstrip("/")
+        if package in packages:
+            return Path(packages[package]) / inner
+        for folder in urdf.resolve().parents:
+            for root in (folder, folder / package):
+                if root.name == package and (root / inner).is_file():
+                    return root / inner
+        raise MeshError(f"{name}: package {package} is not above or beside {urdf}; say where it is (--package)")
+    if parsed.scheme and len(parsed.scheme) > 1:
+        raise MeshError(f"{name}: a mesh is named by package://, file:// or a path, got {parsed.scheme}://")
+    return (urdf.parent / name).resolve()
+
+
+def _numbers(text: str, name: str) -> Vector:
+    try:
+        x, y, z = (float(word) for word in text.split())
+    except ValueError:
+        raise MeshError(f"{name} must be 3 numbers, got {text!r}") from None
+    return x, y, z
