@@ -99,9 +99,10 @@ def joints(most: float = 2.0 * math.pi) -> st.SearchStrategy[tuple[float, ...]]:
     return st.tuples(*[angle] * 6)
 
 
-def points(most: float = 0.7) -> st.SearchStrategy[tuple[float, ...]]:
+def points(most: float = 0.7) -> st.SearchStrategy[tuple[float, float, float]]:
     """Points in a link's frame [m]."""
-    return st.tuples(*[st.floats(-most, most)] * 3)
+    number = st.floats(-most, most)
+    return st.tuples(number, number, number)
 
 
 def units() -> st.SearchStrategy[tuple[float, float, float]]:

@@ -131,7 +131,11 @@ def test_a_sensor_on_the_upper_arm_mesh_of_a_ur10_is_carried_with_its_tube() -> 
     mesh = trimesh.load(path)
     arm = model("UR10")
     pose = dh_mesh(arm, "upper_arm")
-    ring = [p for p in mesh.vertices if 0.2 < p[2] < 0.45]
+    a, b = (np.asarray(mesh.vertices)[mesh.edges_unique[:, k]] for k in (0, 1))
+    cut = (a[:, 2] - 0.3) * (b[:, 2] - 0.3) < 0.0  # edges that cross the plane z = 0.3 m, half way along the tube
+    a, b = a[cut], b[cut]
+    ring = a + (b - a) * ((0.3 - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+    assert len(ring) > 20
     off = np.array([pose.apply((p[0], p[1], p[2])) for p in ring])
     # in the DH frame the tube runs along x, from the shoulder at 0.612 m to the elbow at 0; in the mesh its axis is
     # 45 mm aside of the joints' origin, at y = -0.045

@@ -1,0 +1,324 @@
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from coneskin.errors import KinematicsError
+from coneskin.robot.commands import ArmState, ContactOnLink, Done, JointVelocity, Reaction
+from coneskin.robot.kinematics import link_pose
+from coneskin.robot.limits import MARGIN
+from coneskin.robot.retreat import CLOSE, RetreatPlan, plan_retreat, retreat_step
+from coneskin.robot.ur_models import MODEL_NAMES, ArmModel, Joints, model
+
+from .arms import FAR_UR10, NEAR_UR10, arms, points, units
+from .pin_arm import pin_jacobian
+from .speedj import follow, joints_within, touch
+
+UR10E = model("UR10e")
+Q: Joints = (0.3, -1.2, 1.1, 0.4, 0.5, 0.6)
+FOREARM = ContactOnLink(3, (0.3, 0.0, 0.06), (0.0, 0.0, 1.0))
+
+
+def planned(
+    arm: ArmModel, q: Joints, contacts: list[ContactOnLink], reaction: Reaction | None = None, qd: Joints | None = None
+) -> RetreatPlan | Done:
+    return plan_retreat(arm, ArmState(0.0, q, qd or (0.0,) * 6), contacts, reaction or Reaction())
+
+
+def six(values: Iterable[float]) -> Joints:
+    a, b, c, d, e, f = (float(value) for value in values)
+    return a, b, c, d, e, f
+
+
+@st.composite
+def states(draw: st.DrawFn) -> tuple[ArmModel, Joints, Joints, list[ContactOnLink], Reaction]:
+    """Any arm anywhere, joints at their limits and singular places often among them, moving, touched once to thrice."""
+    arm = draw(arms())
+    angles = []
+    for lower, upper in zip(arm.joint_lower, arm.joint_upper, strict=True):
+        low, up = max(lower, -7.0), min(upper, 7.0)
+        edges = [low, low + MARGIN, low + 0.05, 0.0, math.pi / 2, -math.pi / 2, up - 0.05, up - MARGIN, up]
+        angles.append(draw(st.one_of(st.floats(low, up), st.sampled_from(edges))))
+    speeds = [draw(st.floats(-most, most)) for most in arm.joint_speed]
+    contacts = [
+        ContactOnLink(draw(st.integers(1, 6)), draw(points(0.5)), draw(units()))
+        for _ in range(draw(st.sampled_from([1, 1, 1, 2, 3])))
+    ]
+    reaction = Reaction(
+        speed=draw(st.floats(0.01, 1.5)),
+        acceleration=draw(st.floats(0.5, 40.0)),
+        arm_speed=draw(st.floats(0.05, 5.0)),
+        distance=draw(st.floats(0.005, 0.5)),
+    )
+    return arm, six(angles), six(speeds), contacts, reaction
+
+
+@settings(deadline=None, derandomize=True, max_examples=400)
+@given(states(), st.floats(0.0, 1.9))
+def test_a_step_keeps_all_limits_and_never_moves_towards_an_obstacle(
+    state: tuple[ArmModel, Joints, Joints, list[ContactOnLink], Reaction], time: float
+) -> None:
+    arm, q, qd, contacts, reaction = state
+    plan = planned(arm, q, contacts, reaction, qd)
+    assume(isinstance(plan, RetreatPlan))
+    assert isinstance(plan, RetreatPlan)
+    step = retreat_step(plan, ArmState(time, q, qd))
+    assert isinstance(step, JointVelocity)
+    assert step == retreat_step(plan, ArmState(time, q, qd))  # nothing but its arguments counts
+    assert step.qd[max(c.link for c in contacts) :] == (0.0,) * (6 - max(c.link for c in contacts))
+    assert all(abs(v) <= most * (1 + 1e-12) for v, most in zip(step.qd, arm.joint_speed, strict=True))
+    assert step.acceleration == reaction.acceleration
+    for i, v in enumerate(step.qd):  # braking after the reaction time ends within the margin
+        room = arm.joint_upper[i] - q[i] if v > 0 else q[i] - arm.joint_lower[i]
+        assert v == 0.0 or abs(v) * 0.01 + v * v / (2 * reaction.acceleration) <= room - MARGIN + 1e-12
+    away = []
+    for contact in contacts:
+        rows = pin_jacobian(arm, list(q), contact.link, contact.point)[:3]
+        normal = link_pose(arm, q, contact.link).rotate(contact.normal)
+        towards = float(np.array(normal) @ rows @ np.array(step.qd))
+        away.append(-towards)
+        assert towards <= 1e-8 * reaction.speed
+        if len(contacts) == 1:  # by least squares the point is never faster than wanted
+            assert np.linalg.norm(rows @ np.array(step.qd)) <= reaction.speed * (1 + 1e-9)
+    assert step.away == pytest.approx(sum(away) / len(away), abs=1e-7)
+    flange = pin_jacobian(arm, list(q), 6, (0.0, 0.0, 0.0))[:3] @ np.array(step.qd)
+    assert np.linalg.norm(flange) <= reaction.arm_speed
+
+
+def test_the_touched_point_leaves_the_obstacle() -> None:
+    """In words: a ball rests on the skin, outside. After the retreat there is air between them."""
+    ball = link_pose(UR10E, Q, 3).apply((0.3, 0.0, 0.06 + 0.02))  # radius 2 cm, centre along the normal
+    plan = planned(UR10E, Q, [FOREARM])
+    assert isinstance(plan, RetreatPlan)
+    q = np.array(Q)
+    time = 0.0
+    while isinstance(step := retreat_step(plan, ArmState(time, six(q))), JointVelocity):
+        q, time = q + 0.002 * np.array(step.qd), time + 0.002
+    assert step.complete
+    there = link_pose(UR10E, list(q), 3).apply((0.3, 0.0, 0.06))
+    assert math.dist(there, ball) == pytest.approx(0.02 + 0.05, abs=1e-3)
+
+
+def test_the_way_made_while_braking_is_made_good() -> None:
+    """The arm moves on into the obstacle by 1 cm before it retreats: the end is counted from the touch."""
+    plan = planned(UR10E, Q, [FOREARM])
+    assert isinstance(plan, RetreatPlan)
+    rows = pin_jacobian(UR10E, list(Q), 3, FOREARM.point)[:3]
+    on = np.array(Q) + np.linalg.pinv(rows) @ (-0.01 * np.array(plan.tracks[0].away))
+    step = retreat_step(plan, ArmState(0.1, six(on)))
+    assert isinstance(step, JointVelocity)
+    assert step.progress == pytest.approx(-0.01, abs=3e-4)  # the step is linearised: 1 cm over an arm of 1 m
+    assert follow(UR10E, plan, six(on)).made == pytest.approx(0.05, abs=1e-3)
+
+
+def test_retreats_from_anywhere_end_where_they_should() -> None:
+    """bench/retreat.py prints the same over more runs, with the spread of the drift."""
+    source = random.Random(5)
+    reaction = Reaction()
+    complete = 0
+    drifts = []
+    for run in range(90):
+        arm = model(MODEL_NAMES[run % len(MODEL_NAMES)])
+        link = 2 + run % 5
+        q = joints_within(arm, source, part=0.98)
+        plan = planned(arm, q, [touch(arm, source, link)])
+        if isinstance(plan, Done):
+            continue
+        result = follow(arm, plan, q)
+        assert result.backwards < 1e-9
+        assert result.joint_speed <= 1.0 + 1e-9
+        assert result.acceleration <= reaction.acceleration * (1 + 1e-9)
+        assert result.beyond < 0.0
+        assert result.time < reaction.time_budget + 0.3  # and the ramp to standstill
+        assert result.made < reaction.distance + 1e-3
+        if result.done.complete:
+            complete += 1
+            drifts.append(result.drift / result.made)
+            assert result.made > reaction.distance - 2 * CLOSE
+            assert "distance" in result.clipped
+    assert complete > 70
+    assert sorted(drifts)[len(drifts) // 2] < 0.01
+    assert max(drifts) < math.tan(math.radians(60.0))  # what LEAST_PROGRESS lets pass
+
+
+@pytest.mark.parametrize("arm", [NEAR_UR10, FAR_UR10], ids=["near", "far"])
+def test_a_calibrated_arm_retreats_as_well(arm: ArmModel) -> None:
+    # wrist 1: the frames of links 2 and 3 of the far table are not on the arm
+    plan = planned(arm, Q, [ContactOnLink(4, (0.05, 0.0, 0.0), (1.0, 0.0, 0.0))])
+    assert isinstance(plan, RetreatPlan)
+    result = follow(arm, plan, Q)
+    assert result.done.complete
+    assert result.drift < 1e-3
+
+
+def elbow_limited(lower: float, upper: float) -> ArmModel:
+    arm = UR10E
+    return replace(
+        arm,
+        joint_lower=(*arm.joint_lower[:2], lower, *arm.joint_lower[3:]),
+        joint_upper=(*arm.joint_upper[:2], upper, *arm.joint_upper[3:]),
+    )
+
+
+def test_a_joint_before_its_limit_is_locked_and_the_others_do_it() -> None:
+    plan = planned(UR10E, Q, [FOREARM])
+    assert isinstance(plan, RetreatPlan)
+    free = retreat_step(plan, ArmState(0.0, Q))
+    assert isinstance(free, JointVelocity)
+    assert free.qd[2] > 0.01
+    assert free.clipped_by == ("arm speed",)
+    near, far = MARGIN + 1e-4, 1.0
+    behind = planned(elbow_limited(Q[2] - near, Q[2] + far), Q, [FOREARM])
+    assert isinstance(behind, RetreatPlan)
+    assert retreat_step(behind, ArmState(0.0, Q)) == free  # a limit at its back does not matter
+    ahead = planned(elbow_limited(Q[2] - far, Q[2] + near), Q, [FOREARM])
+    assert isinstance(ahead, RetreatPlan)
+    step = retreat_step(ahead, ArmState(0.0, Q))
+    assert isinstance(step, JointVelocity)
+    assert step.qd[2] == 0.0
+    assert "joint 3 limit" in step.clipped_by
+    assert step.away > 0.0
+
+
+def test_with_the_joint_that_it_needs_at_its_limit_it_stands() -> None:
+    tip = ContactOnLink(4, (0.0, 0.0, 0.0), link_pose(UR10E, Q, 4).inverse().rotate((0.0, 0.0, 1.0)))
+    assert isinstance(planned(UR10E, Q, [tip]), RetreatPlan)
+    fixed = replace(
+        UR10E,
+        joint_lower=six([angle - MARGIN for angle in Q]),
+        joint_upper=six([angle + MARGIN for angle in Q]),
+    )
+    plan = planned(fixed, Q, [tip])
+    assert isinstance(plan, Done)
+    assert "at its limit" in plan.reason
+
+
+def test_a_retreat_into_a_joint_limit_stays_within_it() -> None:
+    """Runs that begin close before a limit, whichever way they go."""
+    source = random.Random(6)
+    locked = 0
+    for run in range(60):
+        arm = model(MODEL_NAMES[run % len(MODEL_NAMES)])
+        link = 2 + run % 5
+        q = list(joints_within(arm, source, part=0.5))
+        i = source.randrange(min(link, 5))
+        q[i] = source.choice([arm.joint_lower[i] + 0.03, arm.joint_upper[i] - 0.03])
+        plan = planned(arm, six(q), [touch(arm, source, link)])
+        if isinstance(plan, Done):
+            continue
+        result = follow(arm, plan, six(q))
+        assert result.beyond < -0.5 * MARGIN  # of the margin of 20 mrad the two late cycles take some
+        locked += any("limit" in reason for reason in result.clipped)
+    assert locked > 10  # else nothing was tried
+
+
+def test_a_stretched_arm_cannot_retreat_outwards_and_says_so() -> None:
+    straight: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    # at the elbow of an arm stretched along -x, touched on the inside: it would have to move to -x, beyond its reach
+    plan = planned(UR10E, straight, [ContactOnLink(3, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))])
+    assert isinstance(plan, Done)
+    assert "singularity" in plan.reason
+    assert not plan.complete
+
+
+def test_the_shoulder_cannot_move_away_from_a_touch_on_its_side() -> None:
+    plan = planned(UR10E, Q, [ContactOnLink(1, (0.06, 0.0, 0.0), (1.0, 0.0, 0.0))])
+    assert isinstance(plan, Done)
+    assert "0 % of the speed wanted" in plan.reason
+
+
+def test_between_two_opposite_touches_the_arm_stands() -> None:
+    other = ContactOnLink(3, (0.3, 0.0, -0.06), (0.0, 0.0, -1.0))
+    plan = planned(UR10E, Q, [FOREARM, other])
+    assert isinstance(plan, Done)
+    assert "leads away from all 2 touches" in plan.reason
+
+
+def test_two_touches_on_one_side_are_left_together() -> None:
+    other = ContactOnLink(3, (0.1, 0.03, 0.052), (0.0, 0.5, math.sqrt(0.75)))
+    plan = planned(UR10E, Q, [FOREARM, other])
+    assert isinstance(plan, RetreatPlan)
+    result = follow(UR10E, plan, Q)
+    assert result.done.complete
+    assert result.backwards < 1e-9
+    assert 0.03 < result.made < 0.051  # the first of the two to make the distance ends it
+
+
+def test_touches_on_two_links_are_both_left() -> None:
+    hand = ContactOnLink(6, (0.0, 0.05, 0.0), (0.0, 1.0, 0.0))
+    plan = planned(UR10E, Q, [FOREARM, hand])
+    assert isinstance(plan, RetreatPlan)
+    step = retreat_step(plan, ArmState(0.0, Q))
+    assert isinstance(step, JointVelocity)
+    for contact in (FOREARM, hand):
+        rows = pin_jacobian(UR10E, list(Q), contact.link, contact.point)[:3]
+        normal = np.array(link_pose(UR10E, Q, contact.link).rotate(contact.normal))
+        assert normal @ rows @ np.array(step.qd) < -0.005
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"location_valid": False}, "the place of the touch on link 3 is not known"),
+        ({"link": 0}, "the base was touched, and no joint moves it"),
+        ({"normal": (0.0, 0.0, 0.0)}, "no unit normal"),
+        ({"point": (math.nan, 0.0, 0.0)}, "no unit normal"),
+    ],
+)
+def test_where_nothing_is_known_nothing_is_planned(change: dict[str, object], words: str) -> None:
+    plan = planned(UR10E, Q, [replace(FOREARM, **change)])  # type: ignore[arg-type]
+    assert isinstance(plan, Done)
+    assert words in plan.reason
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_an_arm_that_reports_nonsense_is_not_moved(bad: float) -> None:
+    plan = planned(UR10E, Q, [FOREARM])
+    assert isinstance(plan, RetreatPlan)
+    step = retreat_step(plan, ArmState(0.1, (bad, *Q[1:])))
+    assert isinstance(step, Done)
+    assert "must be finite" in step.reason
+    assert isinstance(planned(UR10E, (bad, *Q[1:]), [FOREARM]), Done)
+
+
+def test_the_time_ends_it() -> None:
+    plan = planned(UR10E, Q, [FOREARM], Reaction(time_budget=1.0))
+    assert isinstance(plan, RetreatPlan)
+    assert isinstance(retreat_step(plan, ArmState(0.999, Q)), JointVelocity)
+    late = retreat_step(plan, ArmState(1.0, Q))
+    assert isinstance(late, Done)
+    assert not late.complete
+    assert "the time of 1.0 s is over" in late.reason
+    assert isinstance(retreat_step(plan, ArmState(math.nan, Q)), Done)
+
+
+@pytest.mark.parametrize(
+    ("reaction", "reason"),
+    [
+        (Reaction(speed=1.5, arm_speed=5.0, acceleration=40.0, distance=0.5), "joint speed"),
+        (Reaction(speed=1.5, arm_speed=0.1), "arm speed"),
+        (Reaction(distance=0.001), "distance"),
+    ],
+)
+def test_what_clips_is_said(reaction: Reaction, reason: str) -> None:
+    q: Joints = (0.3, -1.2, 0.1, 0.4, 0.5, 0.6)
+    contact = ContactOnLink(2, (0.3, 0.06, 0.0), (0.0, 1.0, 0.0))
+    plan = planned(UR10E, q, [contact], reaction)
+    assert isinstance(plan, RetreatPlan)
+    step = retreat_step(plan, ArmState(0.0, q))
+    assert isinstance(step, JointVelocity)
+    assert reason in step.clipped_by
+
+
+def test_a_retreat_without_contact_or_with_a_link_that_is_not_there_is_refused() -> None:
+    with pytest.raises(KinematicsError, match="at least one contact"):
+        planned(UR10E, Q, [])
+    with pytest.raises(KinematicsError, match="link must be 1"):
+        planned(UR10E, Q, [replace(FOREARM, link=7)])
