@@ -7,7 +7,6 @@ It arms itself once everything has been sound for a while; a touch or a fault th
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -80,7 +79,7 @@ class GuardCore:
         self._faults: dict[str, str] = {}  # since the last reset
         self._lost: dict[str, str] = {}  # what is gone for good
         self._sound_since: float | None = None
-        self._told = -math.inf
+        self._told: float | None = None
         self._takers: Mapping[int, Callable[[Block, list[Output]], None]] = {
             Kind.SKIN: self._take_skin,
             Kind.ARM: self._take_arm,
@@ -131,27 +130,25 @@ class GuardCore:
 
     def _skin_event(self, event: Event, out: list[Output]) -> None:
         if isinstance(event, SkinFault):
-            if self.phase is not Phase.STARTING or not event.sensor:
+            if self.phase is not Phase.STARTING or not event.sensor:  # until then ``unsound`` says it, and no longer
                 self._fault(event.time, event.message, out)
-            else:  # a detector that has not settled yet says so itself, in ``unsound``
-                _tell(out, "message", event.time, what=event.message)
             return
         assert isinstance(event, Touch)
         if isinstance(event, TouchEnded):
             self._contacts.pop(event.sensor, None)
             _tell(out, "touch_ended", event.time, sensor=event.sensor)
             return
-        where = self._sensors[event.sensor]
+        where, before = self._sensors[event.sensor], self._contacts.get(event.sensor)
         contact = self._contacts[event.sensor] = _Contact(event, where, *where.place(event.u, event.phi))
         contacts = [item.on_link() for item in self._contacts.values()]
         if isinstance(event, TouchBegan):
             if self._arm is not None:
                 self._arm.react(event.time, contacts, "touch", out)
             _tell(out, "contact", event.time, **_describe(contact))
-        elif self._arm is not None:
+        elif event.location_valid and not (before and before.touch.location_valid):
+            _tell(out, "contact_placed", event.time, **_describe(contact))
+        if self._arm is not None:
             self._arm.refine(contacts)
-            if event.location_valid and self.phase is Phase.STOPPING:
-                _tell(out, "contact_moved", event.time, **_describe(contact))
 
     def _take_arm(self, block: Block, out: list[Output]) -> None:
         if self._arm is None:
@@ -213,7 +210,9 @@ class GuardCore:
     def _start(self, now: float, out: list[Output]) -> None:
         if wrong := self.unsound(now):
             self._sound_since = None
-            if now - self._told >= _TELL_EVERY:
+            if self._told is None:
+                self._told = now
+            elif now - self._told >= _TELL_EVERY:
                 self._told = now
                 _tell(out, "waiting", now, reasons=wrong)
         elif self._sound_since is None:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .errors import SceneError
 
 if TYPE_CHECKING:
+    from .geometry.placed import PlacedFrustum
+    from .geometry.pose import Vector
     from .robot.arm_reaction import ArmReaction
-    from .robot.guard_core import GuardCore, GuardedSensor
+    from .robot.guard_core import GuardCore
     from .robot.watch import Watch
-    from .scene import LinkScene, Scene
+    from .scene import Scene
 
-__all__ = ["build_core"]
+__all__ = ["OnArm", "build_core", "place_on_arm"]
 
 
 def build_core(scene: Scene) -> GuardCore:
@@ -23,7 +26,7 @@ def build_core(scene: Scene) -> GuardCore:
     """
     if not scene.sensors:
         raise SceneError(["a guard needs a [[link]] with a [[link.sensor]]"], scene.name)
-    from .robot.guard_core import GuardCore
+    from .robot.guard_core import GuardCore, GuardedSensor
     from .robot.watch import Watch
     from .skin.detector import Detection
     from .skin.stream import Stream
@@ -32,7 +35,7 @@ def build_core(scene: Scene) -> GuardCore:
     watch = scene.watch or Watch()
     detection = Detection(timing=TimingLimits(late=watch.skin_late))
     stream = Stream([item.sensor for item in scene.sensors], detection)
-    sensors = [sensor for link in scene.links for sensor in _placed(scene, link)]
+    sensors = [GuardedSensor(item.name, item.link_name, item.link, item.place) for item in place_on_arm(scene)]
     return GuardCore(stream, sensors, watch, _arm(scene, watch) if scene.arm else None)
 
 
@@ -52,27 +55,43 @@ def _arm(scene: Scene, watch: Watch) -> ArmReaction:
     return ArmReaction(arm, scene.reaction or Reaction(kind="stop"), watch, tuple(Way))
 
 
-def _placed(scene: Scene, link: LinkScene) -> list[GuardedSensor]:
+@dataclass(frozen=True, slots=True)
+class OnArm:
+    """A sensor's place on the arm.
+
+    Attributes:
+        name: of the sensor.
+        link_name: of the link.
+        link: index of the link's DH frame; 0 without an arm.
+        frustum: in that frame; without an arm, in the frame that the scene gives.
+    """
+
+    name: str
+    link_name: str
+    link: int
+    frustum: PlacedFrustum
+
+    def place(self, u: float, phi: float) -> tuple[Vector, Vector]:
+        """Point [m] and outward unit normal at u [m] and phi [rad]."""
+        return self.frustum.point(u, phi), self.frustum.normal(phi)
+
+
+def place_on_arm(scene: Scene) -> list[OnArm]:
+    """Where the scene's sensors are on its arm."""
     from .geometry.placed import PlacedFrustum
-    from .geometry.pose import Pose, Vector
-    from .robot.guard_core import GuardedSensor
+    from .geometry.pose import Pose
 
-    index, dh_frame = 0, Pose()
-    if scene.arm is not None:
-        from .robot.link_frames import dh_mesh, link_index
-        from .robot.ur_models import model
+    placed = []
+    for link in scene.links:
+        index, dh_frame = 0, Pose()
+        if scene.arm is not None:
+            from .robot.link_frames import dh_mesh, link_index
+            from .robot.ur_models import model
 
-        index = link_index(link.name)
-        if link.frame == "mesh":
-            dh_frame = dh_mesh(model(scene.arm.model), link.name)
-
-    def guarded(name: str, frustum: PlacedFrustum) -> GuardedSensor:
-        def place(u: float, phi: float) -> tuple[Vector, Vector]:
-            return frustum.point(u, phi), frustum.normal(phi)
-
-        return GuardedSensor(name, link.name, index, place)
-
-    return [
-        guarded(item.sensor.name, PlacedFrustum(item.placed.frustum, dh_frame @ item.placed.link_frustum))
-        for item in link.sensors
-    ]
+            index = link_index(link.name)
+            if link.frame == "mesh":
+                dh_frame = dh_mesh(model(scene.arm.model), link.name)
+        for item in link.sensors:
+            frustum = PlacedFrustum(item.placed.frustum, dh_frame @ item.placed.link_frustum)
+            placed.append(OnArm(item.sensor.name, link.name, index, frustum))
+    return placed

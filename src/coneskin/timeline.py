@@ -1,0 +1,51 @@
+"""Events as lines for people."""
+
+from __future__ import annotations
+
+import math
+
+from .robot.journal import GuardEvent
+
+__all__ = ["describe"]
+
+
+def describe(event: GuardEvent, start: float) -> str:
+    """One line for an event.
+
+    Args:
+        event: what happened.
+        start: host time that counts as 0 [s].
+    """
+    d = event.details
+    match event.name:
+        case "contact" | "contact_placed":
+            sure = "" if d["location_valid"] else " (place not settled yet)"
+            text = (
+                f"{'touch' if event.name == 'contact' else 'the touch'} on {d['sensor']} ({d['link']}): "
+                f"u = {1e3 * d['u']:.1f} mm, phi = {math.degrees(d['phi']):.1f} deg, level {d['level']:.2f}{sure}"
+            )
+        case "touch_ended":
+            text = f"touch on {d['sensor']} ended"
+        case "stopping":
+            text = f"stop: {d['why']}"
+        case "slower":
+            text = f"joint speed falling: {d['speed']:.3f} rad/s"
+        case "standstill":
+            text = f"standing: {d['speed']:.4f} rad/s, by {', '.join(d['ways'])}"
+        case "retreated":
+            text = f"retreated {1e3 * d['progress']:.1f} mm: {d['why']}"
+        case "latched":
+            text = f"latched until a person resets: {d['why']}"
+        case "escalated":
+            text = f"no slowdown: next way to stop, {d['way']}"
+        case "clipped":
+            text = f"retreat slower than set, because of {', '.join(d['by'])}"
+        case "waiting":
+            text = "waiting: " + "; ".join(d["reasons"])
+        case "refused":
+            text = f"{d['what']} refused: " + "; ".join(d["reasons"])
+        case "fault" | "message" | "died":
+            text = f"{event.name}: {d['what']}"
+        case _:
+            text = event.name
+    return f"{event.time - start:9.4f} s  {text}"
