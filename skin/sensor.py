@@ -221,7 +221,7 @@ class Sensor:
             angular_low=round(nominal["angular"] * limits.current_low),
             angular_high=min(round(nominal["angular"] * limits.current_high), full - 1),
             touch_current_per_guide=ampere / volt / parts.pulldown_ohms,
-            touch_current_slack=max(limits.balance * largest_touch, 4.0),
+            touch_current_slack=max(limits.balance * largest_touch, 6.0),
             # the worst place is an edge electrode: the other guide is behind the whole sheet
             weaker_guide=0.5 * parts.pulldown_ohms / (parts.pulldown_ohms + self.angular_ohms),
             noise=max(2, full // 100),
