@@ -221,10 +221,12 @@ def _read(path: Path) -> tuple[Floats, Indices]:
 
     try:
         loaded = trimesh.load(str(path), process=False)
-    except ModuleNotFoundError as error:
-        raise MissingExtra(error.name or "pycollada", f"reading {path.name}", "design") from error
     except Exception as error:  # the readers raise anything, from struct.error to KeyError
+        if isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0] in ("collada", "lxml"):
+            raise MissingExtra(error.name or "", f"reading {path.name}", "design") from error
         reason = str(error).strip().splitlines() or [type(error).__name__]
+        if isinstance(error, ModuleNotFoundError):  # of a reader that is tried when all else has failed
+            reason = ["neither binary nor text of that kind"]
         raise MeshError(f"{path}: not a readable {path.suffix[1:].upper()} file ({reason[0]})") from error
     scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene([loaded])
     corners: list[Floats] = []

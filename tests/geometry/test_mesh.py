@@ -1,0 +1,251 @@
+"""Reading meshes: units, axes, welding, and one clear line for each thing that is no link."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coneskin.errors import MeshError, MissingExtra
+from coneskin.geometry import mesh as mesh_module
+from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
+from coneskin.geometry.pose import Pose
+
+from .synthetic import Floats, Indices, exploded, frustum
+
+TUBE = frustum(0.05, 0.04, 0.3, segments=24, rings=2)
+
+
+def write_stl(path: Path, body: tuple[Floats, Indices], scale: float = 1.0) -> Path:
+    """Binary STL: 80 bytes of header, the count, then 12 floats and 2 bytes for each face."""
+    corners = (body[0] * scale)[body[1]].astype("<f4")
+    rows = b"".join(struct.pack("<3f", 0, 0, 0) + face.tobytes() + b"\0\0" for face in corners)
+    path.write_bytes(b"\0" * 80 + struct.pack("<I", len(corners)) + rows)
+    return path
+
+
+def write_obj(path: Path, body: tuple[Floats, Indices], scale: float = 1.0) -> Path:
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in body[0] * scale]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in body[1]]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def write_ply(path: Path, body: tuple[Floats, Indices]) -> Path:
+    corners, faces = body
+    head = ["ply", "format ascii 1.0", f"element vertex {len(corners)}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    rows = [f"{x:.9g} {y:.9g} {z:.9g}" for x, y, z in corners] + [f"3 {a} {b} {c}" for a, b, c in faces]
+    path.write_text("\n".join(head + rows) + "\n")
+    return path
+
+
+def write_dae(path: Path, body: tuple[Floats, Indices], asset: str, matrix: str = "") -> Path:
+    """The smallest COLLADA file with one geometry."""
+    corners, faces = body
+    numbers = " ".join(f"{x:.9g}" for x in corners.ravel())
+    path.write_text(f"""<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><created>2020-01-01T00:00:00</created><modified>2020-01-01T00:00:00</modified>{asset}</asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="{corners.size}">{numbers}</float_array><technique_common>
+<accessor source="#pa" count="{len(corners)}" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="{len(faces)}"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>{" ".join(str(i) for i in faces.ravel())}</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n">{matrix}<instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>""")
+    return path
+
+
+def test_formats_agree(tmp_path: Path) -> None:
+    meshes = [
+        load_mesh(write_stl(tmp_path / "a.stl", TUBE)),
+        load_mesh(write_obj(tmp_path / "a.obj", TUBE)),
+        load_mesh(write_ply(tmp_path / "a.ply", TUBE)),
+        load_mesh(write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Z_UP</up_axis>")),
+    ]
+    for mesh in meshes:
+        assert len(mesh.faces) == len(TUBE[1])
+        assert len(mesh.vertices) == len(TUBE[0])
+        # files hold float32 or nine digits
+        np.testing.assert_allclose(mesh.size, [0.1, 0.1, 0.3], atol=1e-7)
+
+
+def test_metres_are_guessed_and_said(tmp_path: Path) -> None:
+    mesh = load_mesh(write_stl(tmp_path / "a.stl", TUBE))
+    assert mesh.unit == "m"
+    assert any("unit m guessed from the largest extent, 0.3" in note for note in mesh.notes)
+
+
+def test_millimetres_are_guessed_and_said(tmp_path: Path) -> None:
+    mesh = load_mesh(write_stl(tmp_path / "a.stl", TUBE, 1000.0))
+    assert mesh.unit == "mm"
+    assert mesh.size[2] == pytest.approx(0.3, abs=1e-7)
+    assert any("unit mm guessed" in note for note in mesh.notes)
+
+
+def test_unit_overrides_the_guess(tmp_path: Path) -> None:
+    file = write_stl(tmp_path / "a.stl", TUBE, 1000.0)
+    assert load_mesh(file, unit="cm").size[2] == pytest.approx(3.0, abs=1e-6)
+    assert load_mesh(write_stl(tmp_path / "b.stl", TUBE, 1 / 0.0254), unit="inch").size[2] == pytest.approx(
+        0.3, abs=1e-6
+    )
+
+
+def test_scale_comes_after_the_unit(tmp_path: Path) -> None:
+    mesh = load_mesh(write_stl(tmp_path / "a.stl", TUBE, 1000.0), unit="m", scale=(0.001, 0.001, 0.002))
+    np.testing.assert_allclose(mesh.size, [0.1, 0.1, 0.6], atol=1e-6)
+
+
+def test_collada_unit_is_applied(tmp_path: Path) -> None:
+    body = (TUBE[0] * 100.0, TUBE[1])
+    mesh = load_mesh(
+        write_dae(tmp_path / "a.dae", body, '<unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis>')
+    )
+    assert mesh.size[2] == pytest.approx(0.3, abs=1e-6)
+    assert any("centimeter (0.01 m) as the COLLADA file says" in note for note in mesh.notes)
+
+
+def test_collada_node_matrix_is_applied(tmp_path: Path) -> None:
+    matrix = "<matrix>1 0 0 0.5 0 0 -1 0 0 1 0 0 0 0 0 1</matrix>"
+    mesh = load_mesh(write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Z_UP</up_axis>", matrix))
+    np.testing.assert_allclose(mesh.size, [0.1, 0.3, 0.1], atol=1e-7)
+    assert mesh.vertices[:, 0].mean() == pytest.approx(0.5, abs=1e-3)
+
+
+def test_collada_up_axis_is_kept_and_said_or_applied(tmp_path: Path) -> None:
+    file = write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Y_UP</up_axis>")
+    kept, applied = load_mesh(file), load_mesh(file, up_axis="apply")
+    np.testing.assert_allclose(kept.size, [0.1, 0.1, 0.3], atol=1e-7)
+    assert any("Y_UP" in note and "kept" in note for note in kept.notes)
+    # y up becomes z up, so z becomes -y
+    np.testing.assert_allclose(applied.size, [0.1, 0.3, 0.1], atol=1e-7)
+    assert applied.vertices[:, 1].min() == pytest.approx(-0.3, abs=1e-7)
+    assert any("rotated from Y_UP" in note for note in applied.notes)
+
+
+@pytest.mark.parametrize("axis", ["X_UP", "Y_UP", "Z_UP"])
+def test_up_axes_turn_up_to_z_without_mirroring(axis: str) -> None:
+    turn = np.array(mesh_module._UP[axis])
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    np.testing.assert_array_equal(turn @ np.eye(3)["XYZ".index(axis[0])], [0.0, 0.0, 1.0])
+
+
+def test_exploded_corners_are_welded() -> None:
+    mesh = make_mesh(*exploded(TUBE))
+    assert len(mesh.vertices) == len(TUBE[0])
+    assert f"welded {3 * len(TUBE[1])} vertices to {len(TUBE[0])}" in mesh.notes
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()  # closed: every edge has two faces
+
+
+def test_faces_without_area_are_dropped() -> None:
+    corners, faces = TUBE
+    assert len(make_mesh(corners, np.concatenate([faces, [[0, 0, 1], [2, 3, 3]]])).faces) == len(faces)
+
+
+def test_arrays_are_read_only_and_the_pose_moves_points() -> None:
+    mesh = make_mesh(*TUBE)
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.vertices[0, 0] = 1.0
+    pose = Pose.from_xyz_rpy((1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
+    moved = mesh.moved(pose)
+    np.testing.assert_allclose(moved.vertices[5], pose.apply(tuple(mesh.vertices[5])), atol=1e-12)
+
+
+def test_missing_collada_reader_gives_the_pip_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_reader(*_: object, **__: object) -> Mesh:
+        raise ModuleNotFoundError("No module named 'collada'", name="collada")
+
+    monkeypatch.setattr("trimesh.load", no_reader)
+    with pytest.raises(
+        MissingExtra, match=r"reading a.dae needs the package collada: pip install 'coneskin\[design\]'"
+    ):
+        load_mesh(write_dae(tmp_path / "a.dae", TUBE, ""))
+
+
+def test_no_such_file(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match=r"nowhere\.stl: no such file"):
+        load_mesh(tmp_path / "nowhere.stl")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("empty.stl", b"", "the file is empty"),
+        ("text.stl", b"dear robot, here is no mesh\n", "not a readable STL|no triangles"),
+        ("short.stl", b"\0" * 80 + struct.pack("<I", 1000) + b"\0" * 50, "not a readable STL"),
+        ("none.stl", b"\0" * 80 + struct.pack("<I", 0), "not a readable STL|no triangles|no faces"),
+        ("text.obj", b"# nothing\n", "not a readable OBJ|no triangles"),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "not a readable OBJ|no triangles"),
+        ("text.ply", b"not a ply", "not a readable PLY"),
+        ("broken.dae", b"<COLLADA><asset></COLLADA>", "malformed XML.*line 1"),
+        ("late.dae", b"<COLLADA><asset></asset><library", "not a readable DAE|malformed XML"),
+        ("other.dae", b"<html></html>", "not a readable DAE"),
+        ("mesh.step", b"ISO-10303-21;", r"a mesh is read from .stl, .obj, .dae, .ply, got .step"),
+        ("mesh", b"solid", "got no suffix"),
+    ],
+)
+def test_what_is_no_mesh(tmp_path: Path, name: str, content: bytes, words: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshError, match=words) as caught:
+        load_mesh(tmp_path / name)
+    assert "\n" not in str(caught.value)
+    assert name in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("corners", "words"),
+    [
+        (np.zeros((3, 3)), "all vertices are one point"),
+        (np.outer([0.0, 0.1, 0.2], [1.0, 1.0, 1.0]), "points lie on a line"),
+        (np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0.0]]), "flat, 100 mm long"),
+        (np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, np.nan]]), "1 of 3 vertices are not finite"),
+        (np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, np.inf]]), "1 of 3 vertices are not finite"),
+    ],
+)
+def test_shapes_that_cannot_be_links(corners: Floats, words: str) -> None:
+    with pytest.raises(MeshError, match=words):
+        make_mesh(corners, np.array([[0, 1, 2]]), "thing")
+
+
+def test_a_tilted_plane_is_flat() -> None:
+    corners = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0.0]])
+    turned = corners @ np.array(Pose.from_xyz_rpy((0, 0, 0), (0.5, 0.7, 0.1)).rotation).T
+    with pytest.raises(MeshError, match="a link has a volume"):
+        make_mesh(turned, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+@pytest.mark.parametrize(("scale", "words"), [(1e-4 / 0.3, "only 0.1 mm long"), (100.0 / 0.3, "100 m long")])
+def test_sizes_that_cannot_be_links(tmp_path: Path, scale: float, words: str) -> None:
+    file = write_stl(tmp_path / "a.stl", TUBE, scale)
+    with pytest.raises(MeshError, match=rf"{words} \(unit m\); a link measures 5 mm to 5 m: name the file's unit"):
+        load_mesh(file, unit="m")
+
+
+def test_faces_that_name_no_corner() -> None:
+    with pytest.raises(MeshError, match="a face names corner 9, there are 3"):
+        make_mesh(np.eye(3), np.array([[0, 1, 9]]))
+    with pytest.raises(MeshError, match="no faces"):
+        make_mesh(np.eye(3), np.zeros((0, 3)))
+
+
+def test_options_out_of_range(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match="unit must be one of m, cm, mm, inch, got 'yard'"):
+        load_mesh(tmp_path / "a.stl", unit="yard")
+    with pytest.raises(MeshError, match="up_axis must be 'ignore' or 'apply', got 'z'"):
+        load_mesh(tmp_path / "a.stl", up_axis="z")
+
+
+def test_bad_collada_tags(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match="unit tag must hold metres above 0, got 0"):
+        load_mesh(write_dae(tmp_path / "a.dae", TUBE, '<unit meter="0"/>'))
+    with pytest.raises(MeshError, match="unit tag must hold a number of metres"):
+        load_mesh(write_dae(tmp_path / "b.dae", TUBE, '<unit meter="one"/>'))
+    with pytest.raises(MeshError, match="up_axis must be X_UP, Y_UP or Z_UP, got 'W_UP'"):
+        load_mesh(write_dae(tmp_path / "c.dae", TUBE, "<up_axis>W_UP</up_axis>"))
