@@ -179,7 +179,7 @@ class GuardCore:
             self._arm.owner_ready = False
             self._arm.hurry(block.time)
         self._react(block.time, why, out)
-        _tell(out, "fault", block.time, what=why)
+        _tell(out, "ending" if what == "supervisor" else "fault", block.time, what=why)
 
     def _take_reset(self, block: Block, out: list[Output]) -> None:
         if self.phase is not Phase.LATCHED or self._arm is None:

@@ -37,8 +37,9 @@ class GuardEvent(NamedTuple):
     """Something that a person, or a test, wants to know about.
 
     Attributes:
-        name: "armed", "contact", "touch_ended", "fault", "stopping", "slower", "standstill", "retreating", "latched",
-            "escalated", "refused", "reset", "message".
+        name: "waiting", "armed", "contact", "contact_placed", "touch_ended", "fault", "stopping", "slower",
+            "standstill", "escalated", "retreating", "clipped", "retreated", "latched", "refused", "reset", "message",
+            "ending", "died".
         time: host clock [s].
         details: numbers and words that belong to it; SI and radians.
     """

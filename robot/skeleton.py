@@ -1,4 +1,4 @@
-"""The arm as a line to draw: where its joints really are, offsets included."""
+"""The arm as a line to draw: along its tubes, where they really are."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from coneskin.geometry.pose import Vector
 
-from .kinematics import link_pose, link_poses
-from .link_frames import dh_link
+from .kinematics import link_poses
+from .link_frames import LINK_INDEX, dh_mesh
 from .ur_models import ArmModel
 
 __all__ = ["skeleton"]
@@ -16,11 +16,11 @@ __all__ = ["skeleton"]
 def skeleton(model: ArmModel, q: Sequence[float]) -> list[Vector]:
     """Corners of a line from base to flange, in the base frame [m], at joint positions q [rad].
 
-    The tubes of upper arm and forearm lie beside the line between their joints' origins in the DH table; here they
-    start where the URDF has them.
+    Upper arm and forearm lie beside the line between the origins of the DH table; their meshes say where.
     """
-    corners: list[Vector] = [(0.0, 0.0, 0.0)]
-    for index, name in ((1, "shoulder"), (2, "upper_arm"), (3, "forearm")):
-        corners.append((link_pose(model, q, index) @ dh_link(model, name)).translation)
-    corners += [pose.translation for pose in link_poses(model, q)[4:]]
-    return corners
+    poses = link_poses(model, q)
+    corners: list[Vector] = [poses[0].translation, poses[1].translation]
+    for name, length in (("upper_arm", abs(model.a[1])), ("forearm", abs(model.a[2]))):
+        tube = poses[LINK_INDEX[name]] @ dh_mesh(model, name)
+        corners += [tube.translation, tube.apply((0.0, 0.0, length))]
+    return [*corners, *(pose.translation for pose in poses[4:])]

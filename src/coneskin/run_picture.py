@@ -13,7 +13,7 @@ from .scene import Scene
 
 __all__ = ["draw_run"]
 
-_MARKS = {"slower": "slower", "standstill": "stands", "retreating": "retreats", "latched": "latched"}
+_MARKS = {"standstill": "stands, retreats", "retreated": "far enough", "latched": "latched"}
 
 
 def draw_run(run: Run, path: Path) -> None:
@@ -31,9 +31,11 @@ def draw_run(run: Run, path: Path) -> None:
 
     scene = run.scene()
     states = [decode_state(block.time, block.payload) for block in run.blocks if block.kind == Kind.ARM]
-    contact = _last(run.events, "contact_placed") or _last(run.events, "contact")
+    contact = _first(run.events, "contact")
     zero = contact.time if contact else (run.blocks[0].time if run.blocks else 0.0)
-    window = (zero - 0.3, (_last(run.events, "latched") or GuardEvent("", zero + 1.0, {})).time + 0.2)
+    latched = _first(run.events, "latched", zero)
+    window = (zero - 0.3, (latched.time if latched else zero + 1.0) + 0.2)
+    contact = _first(run.events, "contact_placed", zero) or contact
     figure = Figure(figsize=(12.0, 6.4), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=(1.5, 1.0))
     _draw_speeds(figure.add_subplot(grid[0, 0]), states, run.events, zero, window)
@@ -43,8 +45,8 @@ def draw_run(run: Run, path: Path) -> None:
     figure.savefig(path, dpi=130)
 
 
-def _last(events: list[GuardEvent], name: str) -> GuardEvent | None:
-    return next((event for event in reversed(events) if event.name == name), None)
+def _first(events: list[GuardEvent], name: str, since: float = 0.0) -> GuardEvent | None:
+    return next((event for event in events if event.name == name and event.time >= since), None)
 
 
 def _draw_speeds(
@@ -55,15 +57,13 @@ def _draw_speeds(
     for joint in range(6):
         axes.plot(times, [state.qd[joint] for state in shown], lw=1.3, label=f"joint {joint + 1}")
     axes.axvline(0.0, color="tab:red", lw=1.0)
-    axes.text(0.0, 1.01, "touch", color="tab:red", transform=axes.get_xaxis_transform(), ha="center", fontsize=8)
-    last = -1e9
-    for event in events:
-        if event.name in _MARKS and event.time >= zero:
-            at = 1e3 * (event.time - zero)
-            axes.axvline(at, color="0.6", lw=0.7, ls=":")
-            if at - last > 0.04e3 * (window[1] - window[0]) * 1.2:
-                axes.text(at, 1.01, _MARKS[event.name], transform=axes.get_xaxis_transform(), ha="left", fontsize=8)
-                last = at
+    shown_marks = [("touch ", 0.0, "right", "tab:red")]
+    for name, words in _MARKS.items():
+        if (event := _first(events, name, zero)) is not None:
+            shown_marks.append((f" {words}", 1e3 * (event.time - zero), "left", "0.3"))
+            axes.axvline(1e3 * (event.time - zero), color="0.6", lw=0.7, ls=":")
+    for words, at, side, colour in shown_marks:
+        axes.text(at, 1.01, words, color=colour, transform=axes.get_xaxis_transform(), ha=side, fontsize=8)
     axes.set_ylabel("joint speed [rad/s]")
     axes.set_xlim(*(1e3 * (t - zero) for t in window))
     axes.legend(fontsize=7, ncols=2, loc="best")

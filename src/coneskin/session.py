@@ -10,6 +10,7 @@ channel. A child that dies is seen as the end of its channel, and ends in a stop
 from __future__ import annotations
 
 import json
+import select
 import subprocess
 import sys
 import threading
@@ -74,8 +75,8 @@ class Session:
         on_event: Callable[[GuardEvent], None] | None,
         start_timeout: float,
     ) -> None:
-        missing = [f"a guard needs a [{name}]" for name in ("source", "link") if not getattr(scene, _FIELDS[name])]
-        if missing:
+        there = {"[source]": scene.source, "[[link]] with a [[link.sensor]]": scene.sensors}
+        if missing := [f"a guard needs a {name}" for name, part in there.items() if not part]:
             raise SceneError(missing, scene.name)
         self.scene = scene
         self.events: list[GuardEvent] = []
@@ -281,8 +282,6 @@ class Session:
         )
 
     def _ask_skin(self, key: str) -> Any:
-        import select
-
         assert self._skin is not None
         end = time.monotonic() + 10.0
         while time.monotonic() < end and not self._skin.closed:
@@ -297,8 +296,6 @@ class Session:
 
     def _listen(self, channel: Channel) -> None:
         """Record and note what the guard tells, until its channel ends."""
-        import select
-
         while not channel.closed:
             select.select([channel], [], [], 0.5)
             data = b"".join(channel.receive())
@@ -307,7 +304,7 @@ class Session:
         with self._changed:
             child = self._children.get("guard")
             if self._trouble is None and child is not None and not any(e.name == "died" for e in self.events):
-                ended = any(e.details.get("what") == "the guard was told to end" for e in self.events[-20:])
+                ended = any(e.name == "ending" for e in self.events[-20:])
                 if not ended:
                     self._trouble = RobotConnectionError("the guard's process has ended; the owner stops the arm")
             self._changed.notify_all()
@@ -331,9 +328,6 @@ class Session:
             if self._on_event is not None:
                 for event in events:
                     self._on_event(event)
-
-
-_FIELDS = {"source": "source", "link": "links"}
 
 
 def _died(what: str, scene: Scene) -> ConeSkinError:

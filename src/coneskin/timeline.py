@@ -44,7 +44,7 @@ def describe(event: GuardEvent, start: float) -> str:
             text = "waiting: " + "; ".join(d["reasons"])
         case "refused":
             text = f"{d['what']} refused: " + "; ".join(d["reasons"])
-        case "fault" | "message" | "died":
+        case "fault" | "message" | "died" | "ending":
             text = f"{event.name}: {d['what']}"
         case _:
             text = event.name

@@ -1,0 +1,218 @@
+"""``coneskin demo``: a simulated arm moves, its virtual skin is touched, and the arm stops and retreats. No hardware.
+
+Everything between the two ends is the real thing: bytes through a pseudo-terminal and pyserial, the guard in its own
+process, the unmodified ur_rtde wheel against a controller in another process, a recording, and its replay.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import Collision, MissingExtra, RobotRefused
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .replay import Run
+    from .scene import Scene
+
+__all__ = ["SCENE", "add_arguments", "run"]
+
+_EXAMPLE = """\
+example:
+  coneskin demo                          about 10 s; writes runs/demo-.../
+  coneskin demo --reaction stop --json
+
+exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
+"""
+
+#: the scene of the demo; the silences are long because a pseudo-terminal on a busy machine can stall for that long
+SCENE = """\
+[arm]
+model = "UR5e"
+host = "{host}"
+
+[[link]]
+name = "forearm"
+
+[[link.sensor]]
+id = 1
+name = "forearm skin"
+radius1_mm = 37.6
+radius2_mm = 37.2
+height_mm = 260
+xyz_mm = [0, 0, 80]
+
+[source]
+kind = "virtual"
+rate_hz = 1000
+
+[reaction]
+kind = "{reaction}"
+distance_mm = 50
+
+[watch]
+skin_silence_ms = 250
+skin_late_ms = 250
+arm_silence_ms = 250
+"""
+_FROM_DEG = (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)
+_TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)
+_SPEED, _ACCELERATION = 1.0, 2.0  # rad/s, rad/s2
+_TOUCH_AFTER = 0.9  # s after the start of the second move: in the middle of it, at full speed
+_U = 0.13  # m along the sensor
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the run (default runs/demo-TIME)")
+    parser.add_argument("--reaction", choices=("stop", "retreat"), default="retreat", help="(default retreat)")
+    parser.add_argument("--host", default="127.0.0.1", help="loopback address of the simulated controller")
+    parser.add_argument("--json", action="store_true", help="print one JSON object at the end")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the demo."""
+    from .replay import read_run, replay
+    from .robot.sim_process import SimulatedController
+    from .scene_reader import parse_scene
+
+    folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
+    try:
+        folder.mkdir(parents=True)
+    except OSError as exc:
+        raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
+    text = SCENE.format(host=args.host, reaction=args.reaction)
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
+    scene = parse_scene(text, "scene.toml", folder)
+
+    def say(line: str) -> None:
+        if not args.json:
+            print(line, flush=True)
+
+    say("coneskin demo: a simulated UR5e with a virtual skin on its forearm. Not a safety-rated device.")
+    start_q = [math.radians(q) for q in _FROM_DEG]
+    with SimulatedController(model="UR5e", host=args.host, start_q=start_q):
+        touched = _collide(scene, folder, say)
+    recorded = read_run(folder)
+    again = replay(recorded)
+    facts = _facts(recorded, touched)
+    facts["same_in_replay"] = again.same
+    facts["picture"] = _draw(recorded, folder, say)
+    (folder / "summary.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+    if args.json:
+        print(json.dumps({**facts, "folder": str(folder)}))
+    else:
+        _report(facts, folder, recorded.missing)
+    return 0 if facts["standstill_ms"] is not None and again.same and facts["contacts"] == 1 else 1
+
+
+def _collide(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
+    """Move, touch on the way, and see what the guard does; when the touch began [s]."""
+    from .session import guard
+    from .timeline import describe
+
+    start = time.monotonic()
+    touches: list[float] = []
+    with guard(scene, recording=folder / "run.rec", on_event=lambda event: say(describe(event, start))) as session:
+        say(f"{time.monotonic() - start:9.4f} s  the arm moves")
+        phi = _leading_side(scene)
+        timer = threading.Timer(_TOUCH_AFTER, lambda: touches.append(session.touch(_U, phi, duration=0.25)))
+        timer.start()
+        try:
+            session.arm.move_j([math.radians(q) for q in _TO_DEG], _SPEED, _ACCELERATION)
+            print("coneskin demo: the arm arrived although it was touched", file=sys.stderr)
+        except Collision as exc:
+            say(f"{time.monotonic() - start:9.4f} s  the program gets Collision: {exc}")
+        finally:
+            timer.join()
+    if not touches:
+        raise RobotRefused("the virtual skin was not touched: its process did not answer")
+    return touches[0]
+
+
+def _leading_side(scene: Scene) -> float:
+    """Azimuth of the sensor that faces the way the arm moves: there an obstacle would hit it [rad]."""
+    from .build import place_on_arm
+    from .robot.kinematics import link_pose, point_jacobian
+    from .robot.ur_models import model
+
+    (placed,) = place_on_arm(scene)
+    assert scene.arm is not None
+    arm = model(scene.arm.model)
+    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+    qd = [math.radians(b - a) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+
+    def towards(phi: float) -> float:
+        point, normal = placed.place(_U, phi)
+        rows = point_jacobian(arm, middle, placed.link, point)
+        n = link_pose(arm, middle, placed.link).rotate(normal)
+        return sum(n[k] * sum(j * v for j, v in zip(rows[k], qd, strict=True)) for k in range(3))
+
+    return max((math.radians(degree) for degree in range(360)), key=towards)
+
+
+def _facts(run: Run, touched: float) -> dict[str, Any]:
+    """Times after the touch [ms], and what happened."""
+    from .robot.journal import Kind
+
+    events = run.events
+    contact = next((e for e in events if e.name == "contact"), None)
+
+    def after(name: str) -> float | None:
+        event = next((e for e in events if e.name == name and contact and e.time >= contact.time), None)
+        return None if event is None else round(1e3 * (event.time - touched), 3)
+
+    commands = [b.time for b in run.blocks if b.kind == Kind.COMMAND and contact and b.time >= contact.time]
+    retreated = next((e for e in events if e.name == "retreated"), None)
+    placed = next((e for e in events if e.name == "contact_placed"), contact)
+    return {
+        "contacts": sum(e.name == "contact" for e in events),
+        "frame_ms": after("contact"),
+        "command_ms": round(1e3 * (commands[0] - touched), 3) if commands else None,
+        "slower_ms": after("slower"),
+        "standstill_ms": after("standstill"),
+        "latched_ms": after("latched"),
+        "retreat_mm": None if retreated is None else round(1e3 * retreated.details["progress"], 2),
+        "u_mm": None if placed is None else round(1e3 * placed.details["u"], 2),
+        "phi_deg": None if placed is None else round(math.degrees(placed.details["phi"]), 2),
+    }
+
+
+def _draw(recorded: Run, folder: Path, say: Callable[[str], None]) -> str | None:
+    from .run_picture import draw_run
+
+    try:
+        draw_run(recorded, folder / "run.png")
+    except MissingExtra as exc:
+        say(f"no picture: {exc}")
+        return None
+    return str(folder / "run.png")
+
+
+def _report(facts: dict[str, Any], folder: Path, missing: str) -> None:
+    print("\nafter the touch began:")
+    for key, words in (
+        ("frame_ms", "frame over the threshold decoded"),
+        ("command_ms", "stop written to the owner of ur_rtde"),
+        ("slower_ms", "joint speed falling, as measured"),
+        ("standstill_ms", "standing, as measured"),
+        ("latched_ms", "standing after the reaction"),
+    ):
+        value = facts[key]
+        print(f"  {'never' if value is None else f'{value:8.2f} ms'}  {words}")
+    if facts["retreat_mm"] is not None:
+        print(f"  retreated {facts['retreat_mm']} mm along the normal")
+    print("replay: " + ("the same events, bit by bit" if facts["same_in_replay"] else "NOT the same events"))
+    if missing:
+        print(f"recording: {missing}")
+    print(f"written to {folder}: run.rec, scene.toml, summary.json" + (", run.png" if facts["picture"] else ""))
