@@ -13,7 +13,7 @@ from .scene import Scene
 
 __all__ = ["draw_run"]
 
-_MARKS = {"standstill": "stands, retreats", "retreated": "far enough", "latched": "latched"}
+_MARKS = {"standstill": "stands", "latched": "latched"}
 
 
 def draw_run(run: Run, path: Path) -> None:
