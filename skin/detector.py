@@ -96,6 +96,7 @@ class Detector:
         "_placed",
         "_quiet",
         "_radius",
+        "_reported",
         "_seen_phi",
         "_seen_u",
         "_seen_valid",
@@ -122,6 +123,7 @@ class Detector:
         self.timing = FrameTiming(self.detection.timing)
         self.ready = self.touched = False
         self.fault: Fault | None = None
+        self._reported: set[Fault] = set()
         self.baseline = 0.0
         self._radius = max(sensor.frustum.radius1, sensor.frustum.radius2)
         self._above = self._below = self._quiet = 0
@@ -187,7 +189,7 @@ class Detector:
             longest: silence that is allowed [s].
 
         Returns:
-            a SkinFault, once per silence, or nothing.
+            a SkinFault, once until the sensor is ready again, or nothing.
         """
         age = self.timing.age(now)
         events: list[Event] = []
@@ -217,6 +219,7 @@ class Detector:
         self._quiet += 1
         if self._quiet >= detection.settle_frames:
             self.ready, self.fault = True, None
+            self._reported.clear()
         most = detection.drift_rate * self.timing.period
         self.baseline += most if level > most else -most if level < -most else level
         if abs(self.baseline) > detection.drift_limit:
@@ -264,8 +267,9 @@ class Detector:
     ) -> None:
         self._quiet = self._above = 0
         self.ready = False
-        if fault is not self.fault:
-            self.fault = fault
+        self.fault = fault
+        if fault not in self._reported:  # each once until the sensor is ready again, though they may alternate
+            self._reported.add(fault)
             events.append(SkinFault(self.sensor.name, now, clock_us, sequence, fault, detail))
 
     def _stands_still(self, frame: Frame) -> bool:

@@ -94,7 +94,7 @@ class Stream:
         return events
 
     def silence(self, now: float, longest: float) -> list[Event]:
-        """A fault for each sensor that has sent no valid frame for longer than allowed [s], once per silence."""
+        """A fault for each sensor that has sent no valid frame for longer than allowed [s], once."""
         events: list[Event] = []
         for detector in self.detectors:
             if detector.age(now) > longest:

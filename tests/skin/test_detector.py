@@ -1,0 +1,259 @@
+"""Touch or no touch, from true frames: latency, hysteresis, drift, lasting contacts, and every fault on the way."""
+
+import math
+
+import pytest
+
+from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.skin.circuit import Contact, Wiring
+from coneskin.skin.detector import Detection, Detector
+from coneskin.skin.diagnosis import Fault
+from coneskin.skin.events import Event, SkinFault, TouchBegan, TouchEnded, TouchMoved
+from coneskin.skin.faults import Faults
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.virtual import Imperfections, ScriptedTouch, VirtualSkin
+from coneskin.skin.wire import Decoder
+
+from .bench_top import UR10, measured
+
+SENSOR = Sensor(UR10, name="forearm")
+FIRM = [Contact(0.2, 1.0, 1e-3)]
+
+
+class Bench:
+    """A detector that is fed one frame a millisecond."""
+
+    def __init__(self, detection: Detection | None = None) -> None:
+        self.detector = Detector(SENSOR, detection)
+        self.count = 0
+
+    def feed(self, contacts=(), times: int = 1, **changes) -> list[Event]:
+        frame = measured(SENSOR, contacts)
+        events = []
+        for _ in range(times):
+            stamp = {"sequence": self.count & 0xFFFF, "clock_us": self.count * 1000 & 0xFFFFFFFF}
+            events += self.detector.feed(frame._replace(**{**stamp, **changes}), self.count * 1e-3)
+            self.count += 1
+        return events
+
+
+def play(skin: VirtualSkin, detection: Detection | None = None) -> tuple[list[Event], Detector]:
+    """Everything that a detector says about a virtual skin's bytes, silence beyond 20 ms included."""
+    detector, decoder = Detector(skin.sensors[0], detection), Decoder()
+    events: list[Event] = []
+    try:
+        for time, data in skin.packets():
+            for frame in decoder.feed(data):
+                events += detector.feed(frame, time)
+            events += detector.silence(time, 0.02) if time > 0.02 else []
+    except SkinConnectionError:
+        pass
+    return events, detector
+
+
+def faults_of(events: list[Event]) -> list[Fault]:
+    return [event.fault for event in events if isinstance(event, SkinFault)]
+
+
+def test_not_ready_until_a_run_of_untouched_frames():
+    bench = Bench(Detection(settle_frames=20))
+    assert not bench.detector.ready
+    assert bench.feed(times=19) == []
+    assert not bench.detector.ready
+    bench.feed()
+    assert bench.detector.ready
+
+
+def test_touched_from_the_start_is_a_touch_and_never_ready():
+    bench = Bench()
+    events = bench.feed(FIRM, times=1000)
+    assert [type(event) for event in events] == [TouchBegan, TouchMoved]
+    assert bench.detector.touched
+    assert not bench.detector.ready
+    bench.feed(times=60)
+    assert bench.detector.ready
+
+
+@pytest.mark.parametrize(("confirm", "late"), [(1, 0), (2, 1)])
+def test_a_touch_begins_on_its_first_frame_or_one_later(confirm, late):
+    bench = Bench(Detection(confirm_frames=confirm))
+    bench.feed(times=100)
+    events = [event for _ in range(5) for event in bench.feed(FIRM)]
+    assert isinstance(events[0], TouchBegan)
+    assert events[0].sequence == 100 + late
+    assert events[0].time == (100 + late) * 1e-3
+
+
+def test_one_frame_of_noise_does_not_confirm():
+    bench = Bench(Detection(confirm_frames=2))
+    bench.feed(times=100)
+    assert bench.feed(FIRM) + bench.feed() + bench.feed(FIRM) + bench.feed() == []
+
+
+def test_the_place_is_certain_once_two_frames_agree():
+    bench = Bench()
+    bench.feed(times=100)
+    (began,) = bench.feed(FIRM)
+    assert isinstance(began, TouchBegan)
+    assert not began.location_valid
+    (moved,) = bench.feed(FIRM)
+    assert isinstance(moved, TouchMoved)
+    assert moved.location_valid
+    assert (moved.u, moved.phi) == (pytest.approx(0.2, abs=2e-4), pytest.approx(1.0, abs=3e-3))
+    assert bench.feed(FIRM, times=100) == []
+
+
+def test_hysteresis_between_the_thresholds():
+    bench = Bench()
+    bench.feed(times=100)
+    between = [Contact(0.2, 1.0, 1.5e-5)]  # level 0.07
+    assert bench.feed(between, times=100) == []
+    bench.feed(FIRM)
+    assert not any(isinstance(event, TouchEnded) for event in bench.feed(between, times=100))
+    assert bench.detector.touched
+    (ended,) = bench.feed(times=10)
+    assert isinstance(ended, TouchEnded)
+    assert ended.sequence == 303  # the third frame below the release threshold, counted from 301
+
+
+def test_movement_is_reported_in_steps():
+    bench = Bench(Detection(move_distance=0.005))
+    bench.feed(times=100)
+    bench.feed(FIRM, times=5)
+    events = []
+    for k in range(100):  # 20 mm in 100 frames
+        events += bench.feed([Contact(0.2 + 0.0002 * k, 1.0, 1e-3)])
+    assert 3 <= len(events) <= 4
+    assert all(isinstance(event, TouchMoved) and event.location_valid for event in events)
+
+
+def test_a_lasting_contact_is_never_zeroed_away():
+    skin = VirtualSkin(SENSOR, [ScriptedTouch(0.2, math.inf, 0.2, 1.0, force=0.6)], rate_hz=20, duration=3600.0)
+    events, detector = play(skin, Detection(settle_frames=3, lasting_touch=30.0))
+    assert detector.touched  # an hour of 0.1 N above the paper's threshold
+    assert not any(isinstance(event, TouchEnded) for event in events)
+    assert Fault.LAYERS_CLOSED in faults_of(events)
+    lasting = next(event for event in events if isinstance(event, SkinFault) and event.fault is Fault.LAYERS_CLOSED)
+    assert lasting.time == pytest.approx(30.2, abs=0.2)
+
+
+def test_slow_drift_is_followed_while_untouched_and_frozen_while_touched():
+    damp = Imperfections(leak_drift=2.5e-8)  # level 0.025 after 100 s, 1/8 of the fastest drift that is followed
+    skin = VirtualSkin(SENSOR, [ScriptedTouch(60, 70, 0.2, 1.0)], rate_hz=50, duration=100.0, imperfections=damp)
+    events, detector = play(skin, Detection(settle_frames=10))
+    assert faults_of(events) == []
+    assert [type(e) for e in events if not isinstance(e, TouchMoved)] == [TouchBegan, TouchEnded]
+    assert detector.baseline == pytest.approx(0.0125, abs=0.001)
+    before, _ = play(VirtualSkin(SENSOR, rate_hz=50, duration=60.0, imperfections=damp), Detection(settle_frames=10))
+    assert before == []
+
+
+def test_a_slow_press_is_not_taken_for_drift():
+    # a leak that grows for ever: the followed part is bounded, so it ends as a fault and then as a touch
+    skin = VirtualSkin(SENSOR, rate_hz=20, duration=400.0, imperfections=Imperfections(leak_drift=1e-7))
+    events, detector = play(skin, Detection(settle_frames=5))
+    assert Fault.DRIFT in faults_of(events)
+    assert detector.touched
+    began = next(event for event in events if isinstance(event, TouchBegan))
+    conductance = began.time * 1e-7
+    level = 5e3 * conductance / (1 + 5e3 * conductance)
+    assert level < SENSOR.thresholds.touch_level + Detection().drift_limit + 0.01
+
+
+def test_the_same_bytes_give_the_same_events_bit_by_bit():
+    def run() -> list[Event]:
+        faults = Faults(drop_every=97, corrupt_every=61, clock_jump_after=700)
+        skin = VirtualSkin(SENSOR, [ScriptedTouch(0.2, 0.5, 0.1, 2.0)], seed=11, faults=faults, duration=1.0)
+        return play(skin)[0]
+
+    first, second = run(), run()
+    assert first == second
+    assert [repr(event) for event in first] == [repr(event) for event in second]
+    assert len(first) > 3
+
+
+ONE_FAULT = {
+    "stall": (Faults(stall_after=300), Fault.SILENT),
+    "missing": (Faults(stall_after=300, stall_frames=10), Fault.GAP),
+    "every third lost": (Faults(drop_every=3), Fault.GAP),
+    "twice": (Faults(duplicate_every=100), Fault.REPLAYED),
+    "out of order": (Faults(swap_every=100), Fault.REPLAYED),
+    "replayed": (Faults(replay_after=300), Fault.REPLAYED),
+    "restart": (Faults(restart_after=300), Fault.RESTARTED),
+    "clock jump": (Faults(clock_jump_after=300), Fault.CLOCK_JUMP),
+    "clock back": (Faults(clock_jump_after=300, clock_jump_us=-50_000), Fault.REPLAYED),
+    "stuck": (Faults(stuck_after=300), Fault.STUCK),
+    "one channel stuck": (Faults(stuck_after=300, stuck_channel="radial_current"), Fault.STUCK),
+    "supply": (Faults(saturate_after=300, stuck_channel="supply", saturate_count=0), Fault.SUPPLY),
+    "full scale": (Faults(saturate_after=300, stuck_channel="radial_d", saturate_count=4095), Fault.SATURATED),
+    "status": (Faults(status_after=300), Fault.DEVICE),
+    "open": (Faults(wiring_after=300, wiring=Wiring(opened=("C",))), Fault.OPEN_LOWER),
+    "short": (Faults(wiring_after=300, wiring=Wiring(shorts=(("A", "B"),))), Fault.SHORT_UPPER),
+}
+
+
+@pytest.mark.parametrize("name", ONE_FAULT)
+def test_every_fault_of_the_twin_is_noticed_and_never_looks_untouched(name):
+    faults, expected = ONE_FAULT[name]
+    skin = VirtualSkin(SENSOR, seed=2, faults=faults, duration=0.6)
+    events, detector = play(skin, Detection(settle_frames=20, stuck_frames=25))
+    found = faults_of(events)
+    assert found[0] is expected
+    assert not any(isinstance(event, TouchBegan) for event in events)
+    lasting = name in {"stall", "every third lost", "stuck", "one channel stuck", "supply", "full scale", "status"}
+    if lasting or name in {"open", "short"}:
+        assert not detector.ready
+        assert detector.fault is not None
+        assert len(found) <= 3  # reported, not repeated with each frame
+    first = next(event for event in events if isinstance(event, SkinFault))
+    assert first.message.startswith(f"forearm: {expected.value}")
+
+
+def test_a_good_line_with_noise_has_no_fault_in_a_minute():
+    skin = VirtualSkin(SENSOR, rate_hz=1000, duration=60.0, seed=8)
+    events, detector = play(skin, Detection(stuck_frames=200))
+    assert events == []
+    assert detector.ready
+
+
+def test_a_fault_does_not_end_a_touch_and_a_touch_is_seen_during_a_gap():
+    bench = Bench()
+    bench.feed(times=100)
+    bench.feed(FIRM, times=5)
+    assert faults_of(bench.feed(FIRM, status=8)) == [Fault.DEVICE]
+    assert bench.detector.touched
+    bench.feed(times=200)
+    assert bench.detector.ready
+    bench.count += 10
+    events = bench.feed(FIRM)
+    assert [type(event) for event in events] == [SkinFault, TouchBegan]
+
+
+def test_silence_is_reported_once_and_ends_with_untouched_frames():
+    bench = Bench()
+    assert bench.detector.silence(0.0, 0.02)[0].detail == "none at all"
+    bench.feed(times=100)
+    assert bench.detector.ready
+    assert bench.detector.age(0.110) == pytest.approx(0.011)
+    assert bench.detector.silence(0.110, 0.02) == []
+    (event,) = bench.detector.silence(0.130, 0.02)
+    assert isinstance(event, SkinFault)
+    assert event.fault is Fault.SILENT
+    assert "31.0 ms" in event.message
+    assert bench.detector.silence(0.140, 0.02) == []
+    assert not bench.detector.ready
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"confirm_frames": 3}, "confirm_frames must be 1 or 2, got 3"),
+        ({"settle_frames": 0}, "settle_frames must be at least 1, got 0"),
+        ({"move_distance": 0.0}, "move_distance must be above 0, got 0.0"),
+        ({"drift_rate": math.nan}, "drift_rate must be finite"),
+        ({"drift_limit": 0.05}, "drift_limit must be below thresholds.release_level"),
+    ],
+)
+def test_a_detector_that_cannot_be_is_refused(changes, words):
+    with pytest.raises(SensorError, match=words):
+        Detector(SENSOR, Detection(**changes))

@@ -1,0 +1,198 @@
+"""What one frame says: level, place, and every fault that a frame alone can show."""
+
+import math
+import random
+
+import pytest
+
+from coneskin.skin.circuit import Contact, Wiring
+from coneskin.skin.diagnosis import Fault
+from coneskin.skin.electronics import Electronics, Polarity
+from coneskin.skin.reading import read
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import Status
+
+from .bench_top import CONE, UR10, measured
+
+SENSOR = Sensor(UR10)
+PLACES = [
+    Contact(u * UR10.slant, p * UR10.wrap, 1e-3) for u, p in [(0.5, 0.5), (0.03, 0.02), (0.97, 0.98), (0.03, 0.98)]
+]
+
+
+@pytest.mark.parametrize("polarity", [Polarity(), Polarity("A", "C"), Polarity("B", "D"), Polarity("A", "D")])
+@pytest.mark.parametrize("cone", [UR10, CONE])
+def test_a_place_is_read_to_half_a_count(cone, polarity):
+    sensor = Sensor(cone, polarity=polarity)
+    rng = random.Random(6)
+    supply = sensor.electronics.count_volts(2.5)
+    for _ in range(100):
+        u, phi = rng.uniform(0, cone.slant), rng.uniform(0, cone.wrap)
+        reading = read(sensor, measured(sensor, [Contact(u, phi, 10 ** rng.uniform(-4, -1))]))
+        assert reading.fault is None
+        assert reading.location_valid
+        # guide, supply and current are each rounded to half a count: at most 1.5 counts, plus the small terms of the
+        # load correction, through the sensitivity at the place
+        slope = abs(sensor.radial_sensitivity(u)) / 2.5 * supply
+        assert abs(reading.u - u) < 1.7 / slope
+        assert abs(reading.phi - phi) < 1.7 * cone.wrap / supply
+
+
+def test_fine_converter_leaves_only_the_model():
+    sensor = Sensor(CONE, electronics=Electronics(adc_bits=16))
+    reading = read(sensor, measured(sensor, [Contact(0.05, 2.0, 3e-4)]))
+    # 16 bits: half a count is 0.5/49648 of 153 mm = 1.6 um; the linear load correction leaves less
+    assert reading.u == pytest.approx(0.05, abs=5e-6)
+    assert reading.phi == pytest.approx(2.0, abs=2e-4)
+
+
+def test_leads_are_taken_off():
+    # 50 ohm in every lead would be 3 % of the scale, 13 mm, if nobody corrected it
+    sensor = Sensor(UR10, electronics=Electronics(adc_bits=16, lead_ohms=50.0))
+    reading = read(sensor, measured(sensor, [Contact(0.02, 0.1, 1e-3)]))
+    assert reading.u == pytest.approx(0.02, abs=2e-5)
+    assert reading.phi == pytest.approx(0.1, abs=2e-4)
+
+
+def test_level_rises_with_conductance_and_hardly_depends_on_the_place():
+    last = [0.0] * len(PLACES)
+    for conductance in (1e-6, 1e-5, 3e-5, 1e-4, 1e-3, 1e-2, 1.0):
+        levels = [read(SENSOR, measured(SENSOR, [c._replace(conductance=conductance)])).level for c in PLACES]
+        assert all(now > before for now, before in zip(levels, last, strict=True))
+        last = levels
+        assert max(levels) - min(levels) < 0.06  # the sheets' own resistance against the pull-downs: 0.5 of 5 kohm
+    assert 0.9 < min(last) <= max(last) < 1.0
+
+
+def test_untouched_is_valid_and_level_zero():
+    reading = read(SENSOR, measured(SENSOR))
+    assert reading == (SENSOR, 0, 0, 0.0, 0.0, 0.0, False, None)
+
+
+def test_a_light_touch_is_certain_before_its_place_is():
+    reading = read(SENSOR, measured(SENSOR, [Contact(0.2, 1.0, 3e-5)]))
+    assert SENSOR.thresholds.touch_level < reading.level < SENSOR.thresholds.location_level
+    assert reading.fault is None
+    assert not reading.location_valid
+    assert reading.u == pytest.approx(0.2, abs=1e-3)
+
+
+def test_two_touches_are_a_touch_with_an_ambiguous_place_not_a_fault():
+    # at opposite corners the lower sheet carries a current, so C and D differ
+    reading = read(SENSOR, measured(SENSOR, [Contact(0.05, 1.0, 1e-2), Contact(0.4, 5.0, 1e-2)]))
+    assert reading.level > 0.9
+    assert reading.fault is None
+    assert not reading.location_valid
+
+
+BROKEN = {
+    Wiring(opened=("A",)): (Fault.OPEN_UPPER, Fault.OPEN_A),
+    Wiring(opened=("B",)): (Fault.OPEN_UPPER, Fault.OPEN_B),
+    Wiring(opened=("C",)): (Fault.OPEN_LOWER, Fault.OPEN_C),
+    Wiring(opened=("D",)): (Fault.OPEN_LOWER, Fault.OPEN_D),
+    Wiring(opened=("A", "B", "C", "D")): (Fault.OPEN_UPPER, Fault.OPEN_UPPER),
+    Wiring(shorts=(("A", "B"),)): (Fault.SHORT_UPPER, Fault.SHORT_UPPER),
+    Wiring(shorts=(("C", "D"),)): (Fault.SHORT_LOWER, Fault.SHORT_LOWER),
+    Wiring(shorts=(("B", "ground"),)): (Fault.SHORT_UPPER, Fault.SHORT_UPPER),
+    Wiring(shorts=(("C", "ground"),)): (Fault.SHORT_LOWER, Fault.SHORT_LOWER),
+    Wiring(shorts=(("A", "ground"),)): (Fault.LEAK, Fault.LEAK),
+    Wiring(shorts=(("D", "rail"),)): (Fault.SHORT_LOWER, Fault.SHORT_LOWER),
+    Wiring(shorts=(("A", "rail"),)): (Fault.SHORT_UPPER, Fault.SHORT_UPPER),
+    Wiring(shorts=(("B", "rail"),)): (Fault.GUIDE_DRIVEN, Fault.GUIDES_DISAGREE),
+}
+
+
+@pytest.mark.parametrize("polarity", [Polarity(), Polarity("A", "D")])
+@pytest.mark.parametrize("wiring", BROKEN, ids=lambda w: f"{'open ' * bool(w.opened)}{w.opened or w.shorts}")
+def test_what_is_broken_is_named_touched_or_not(wiring, polarity):
+    if polarity.radial == "A":  # the same break on the mirrored sensor
+        swap = str.maketrans("ABCD", "BADC")
+        wiring_here = Wiring(
+            tuple(name.translate(swap) for name in wiring.opened),
+            tuple((a.translate(swap), b.translate(swap) if len(b) == 1 else b) for a, b in wiring.shorts),
+        )
+    else:
+        wiring_here = wiring
+    sensor = Sensor(UR10, polarity=polarity)
+    untouched, touched = BROKEN[wiring]
+    found = read(sensor, measured(sensor, [], wiring_here)).fault
+    assert found is untouched
+    found = read(sensor, measured(sensor, PLACES[:1], wiring_here)).fault
+    names = (
+        {touched.name}
+        if polarity.radial == "B"
+        else {touched.name, touched.name.translate(str.maketrans("ABCD", "BADC"))}
+    )
+    assert found is not None
+    assert found.name in names
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("rail", ["ground", "supply", "rail"])
+@pytest.mark.parametrize("electrode", "ABCD")
+def test_no_short_hides_a_touch(electrode, rail, place):
+    # D at ground cannot be seen before the touch (docs/wire-format.md); the touch must then be seen, or be a fault
+    reading = read(SENSOR, measured(SENSOR, [place], Wiring(shorts=((electrode, rail),))))
+    assert reading.fault is not None or reading.level >= SENSOR.thresholds.touch_level
+
+
+@pytest.mark.parametrize("pair", [("A", "C"), ("A", "D"), ("B", "C"), ("B", "D")])
+def test_layers_shorted_at_an_edge_are_a_touch(pair):
+    reading = read(SENSOR, measured(SENSOR, [], Wiring(shorts=(pair,))))
+    assert reading.level > 0.9
+
+
+@pytest.mark.parametrize(
+    ("contacts", "changes", "fault"),
+    [
+        ([], {"supply": 0}, Fault.SUPPLY),
+        ([], {"supply": 4095}, Fault.SUPPLY),
+        ([], {"supply": 2500}, Fault.SUPPLY),
+        ([], {"status": Status.ADC}, Fault.DEVICE),
+        ([], {"status": Status.RESERVED}, Fault.DEVICE),
+        ([], {"supply": 0, "status": Status.SUPPLY}, Fault.DEVICE),
+        ([], {"radial_current": 0}, Fault.OPEN_UPPER),
+        ([], {"angular_current": 4095}, Fault.SHORT_LOWER),
+        ([], {"radial_c": 4095}, Fault.SATURATED),
+        ([], {"radial_c": 65535}, Fault.SATURATED),
+        (PLACES[:1], {"touch_c": 0}, Fault.LEAK),
+        (PLACES[:1], {"touch_c": 0, "touch_d": 0}, Fault.LEAK),
+        (PLACES[:1], {"touch_current": 0}, Fault.LEAK),
+        ([], {"touch_c": 1500}, Fault.LEAK),
+        ([], {"touch_c": 600, "touch_d": 0, "touch_current": 10}, Fault.GUIDES_DISAGREE),
+        ([], {"radial_c": 3000, "radial_d": 3000}, Fault.GUIDE_DRIVEN),
+        (PLACES[:1], {"angular_a": 3103, "angular_b": 3103, "radial_c": 3500, "radial_d": 3500}, Fault.GUIDE_DRIVEN),
+        (PLACES[:1], {"angular_a": 0}, Fault.GUIDES_DISAGREE),
+        (PLACES[:1], {"radial_d": 3000}, Fault.GUIDES_DISAGREE),
+        (PLACES[:1], {"radial_c": 3230, "radial_d": 3230}, Fault.OUT_OF_RANGE),
+    ],
+)
+def test_a_frame_that_cannot_be_is_a_fault(contacts, changes, fault):
+    good = measured(SENSOR, contacts)
+    assert read(SENSOR, good).fault is None
+    reading = read(SENSOR, good._replace(**changes))
+    assert reading.fault is fault
+    assert not reading.location_valid
+
+
+@pytest.mark.parametrize("status", [Status.RESTARTED, Status.TOUCH])
+def test_bits_that_are_only_news_are_no_fault(status):
+    assert read(SENSOR, measured(SENSOR, status=status)).fault is None
+
+
+def test_any_counts_give_finite_values_and_never_raise():
+    rng = random.Random(9)
+    good = measured(SENSOR, PLACES[:1])
+    names = good._fields[6:]
+    for _ in range(5000):
+        changes = {rng.choice(names): rng.choice([0, 1, 4094, 4095, 65535, rng.randrange(65536)]) for _ in range(4)}
+        reading = read(SENSOR, good._replace(**changes))
+        assert math.isfinite(reading.level)
+        assert 0.0 <= reading.u <= UR10.slant * (1 + 1e-12)
+        assert 0.0 <= reading.phi <= UR10.wrap * (1 + 1e-12)
+
+
+def test_every_fault_has_a_sentence_of_its_own():
+    sentences = [fault.value for fault in Fault]
+    assert len(set(sentences)) == len(sentences)
+    assert all(len(sentence) > 20 and not sentence.endswith(".") for sentence in sentences)
