@@ -361,9 +361,10 @@ class Builtins:
 
     # safety and payload
 
-    def protective_stop(self) -> None:
-        """Stop the arm as if it had hit something."""
+    def protective_stop(self) -> Wait:
+        """Stop the arm as if it had hit something; the program goes on after it only when a person lets it."""
         self._c.protective_stop(f"protective_stop() in {self._program.name}")
+        yield
 
     def set_payload(self, m: float, cog: Any = None, inertia: Any = None) -> None:
         """What the arm carries; kept for the clients, without an effect."""
