@@ -15,8 +15,8 @@ Every peer returns the same thing: the 3 x 3 matrix G of the energies of three f
     mode 1: C at 1 V, the other electrodes at 0;
     mode 2: C and D at 1 V, A and B at 0,
 
-that is G[i, j] = current that the electrodes of mode j deliver when mode i is applied. The fourth field is a constant and
-has no energy. `ports` turns G into what the electronics see. Row 2 is the current through the contacts, so a peer
+that is G[i, j] = current that the electrodes of mode j deliver when mode i is applied. The fourth field is a constant
+and has no energy. `ports` turns G into what the electronics see. Row 2 is the current through the contacts, so a peer
 can compute it there without the cancellation that the difference of two electrode currents suffers.
 """
 
@@ -47,6 +47,24 @@ class Disc:
 
 
 @dataclass(frozen=True, slots=True)
+class Patch:
+    """A rectangle or an ellipse of contact: centre, two half-axes [m], the first turned from e_r by `turn` [rad]."""
+
+    shape: str
+    r: float
+    theta: float
+    along: float
+    across: float
+    turn: float
+    conductance: float
+
+    @property
+    def radius(self) -> float:
+        """Of the circle around it [m]."""
+        return math.hypot(self.along, self.across) if self.shape == "rectangle" else max(self.along, self.across)
+
+
+@dataclass(frozen=True, slots=True)
 class Problem:
     """One sensor with its contacts; the guide electrodes see `load` [ohm] to ground, inf when they float."""
 
@@ -58,6 +76,13 @@ class Problem:
     lower: float
     discs: tuple[Disc, ...]
     load: float = math.inf
+    patches: tuple[Patch, ...] = ()
+
+    @property
+    def contacts(self) -> list[tuple[str, Disc | Patch]]:
+        """Discs and patches with the names that meshes give them."""
+        discs: list[tuple[str, Disc | Patch]] = [(f"disc{i}", d) for i, d in enumerate(self.discs)]
+        return discs + [(f"patch{i}", p) for i, p in enumerate(self.patches)]
 
     @property
     def inner(self) -> float:
@@ -72,15 +97,15 @@ class Problem:
     @property
     def perfect(self) -> bool:
         """Whether any contact is a perfect bond."""
-        return any(math.isinf(d.conductance) for d in self.discs)
+        return any(math.isinf(c.conductance) for _, c in self.contacts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ports:
     """What the electronics see, electrodes in the order A, B, C, D.
 
-    `admittance` [S] has shape (4, 4). `voltages` [V] and `currents` [A, into the sensor] have shape (2, 4): row 0 is the
-    radial phase (B at 1 V, A at 0, guides C and D), row 1 the angular phase (C at 1 V, D at 0, guides A and B).
+    `admittance` [S] has shape (4, 4). `voltages` [V] and `currents` [A, into the sensor] have shape (2, 4): row 0 is
+    the radial phase (B at 1 V, A at 0, guides C and D), row 1 the angular one (C at 1 V, D at 0, guides A and B).
     """
 
     admittance: Array
@@ -139,14 +164,14 @@ def standard() -> list[Problem]:
 
 
 def hard_problems() -> list[Problem]:
-    """Sensors where a multipole series or a mesh has to work: narrow gaps, a slit ring, a speck, a thick boundary layer."""
+    """Sensors where a multipole series or a mesh has to work: narrow gaps, a slit ring, a speck, a thin layer."""
 
     def one(name: str, lower: float, *discs: tuple[float, float, float, float], **changes: float) -> Problem:
         shape = {"r1": 0.1, "r2": 0.2, "theta0": 1.5} | changes
         contacts = tuple(
             Disc(r, t, a, math.inf if math.isinf(ka) else (ka / a) ** 2 / (1000.0 + lower)) for r, t, a, ka in discs
         )
-        return Problem(name, upper=1000.0, lower=lower, discs=contacts, **shape)
+        return Problem(name, shape["r1"], shape["r2"], shape["theta0"], 1000.0, lower, contacts)
 
     a = 0.012
     problems = [
@@ -170,6 +195,38 @@ def hard_problems() -> list[Problem]:
     problems.append(one("sheets 1e-4", 0.1, (0.14, 0.6, a, 3.0)))
     problems.append(one("width 0.01 r1", 2000.0, (0.1005, 0.02, 3e-4, 3.0), r2=0.101, theta0=0.05))
     return problems
+
+
+def general_problems() -> list[Problem]:
+    """Contacts that are no whole discs: the multipole solution does not apply, the general method must.
+
+    The first three measure its error against run time; the others cut a disc at each edge and in a corner.
+    """
+
+    def patch(name: str, *shape: float, lower: float, ka: float = 3.0) -> Problem:
+        r, theta, along, across, turn = shape
+        conductance = (ka / across) ** 2 / (1000.0 + lower)
+        made = Patch(name, r, theta, along, across, turn, conductance)
+        return Problem(f"{name}, Rl/Ru {lower / 1000:g}", 0.1, 0.2, 1.5, 1000.0, lower, (), patches=(made,))
+
+    places = {
+        "B": (0.104, 0.7, 0.012),
+        "A": (0.197, 0.7, 0.012),
+        "D": (0.15, 0.03, 0.015),
+        "C": (0.14, 1.5, 0.01),
+        "corner of A and C": (0.195, 1.46, 0.015),
+    }
+    clipped = [
+        Problem(f"clipped by {edge}, Rl/Ru {lower / 1000:g}", 0.1, 0.2, 1.5, 1000.0, lower, (disc,))
+        for edge, (r, t, a) in places.items()
+        for lower in (1000.0, 4000.0)
+        for disc in (Disc(r, t, a, (3 / a) ** 2 / (1000.0 + lower)),)
+    ]
+    shapes = [
+        patch("rectangle", 0.15, 0.6, 0.015, 0.010, 0.4, lower=2000.0),
+        patch("ellipse", 0.15, 0.6, 0.020, 0.010, 1.0, lower=2000.0),
+    ]
+    return [*shapes, clipped[1], clipped[0], *clipped[2:]]
 
 
 def random_problems(count: int = 120, seed: int = 20) -> Iterator[Problem]:
@@ -206,7 +263,8 @@ def random_problems(count: int = 120, seed: int = 20) -> Iterator[Problem]:
             ka = math.exp(draw.uniform(math.log(0.1), math.log(10.0)))
             conductance = (ka / radius) ** 2 / (upper + lower) if kind != 5 else math.inf
             discs.append(Disc(r, theta, radius, conductance))
-        load = math.exp(draw.uniform(math.log(1e3), math.log(1e7))) if index % 2 else math.inf
+        loaded = (index + index // 10) % 2 == 1
+        load = math.exp(draw.uniform(math.log(1e3), math.log(1e7))) if loaded else math.inf
         yield Problem(f"random-{index:03d}", *radii, theta0, upper, lower, tuple(discs), load)
 
 

@@ -20,9 +20,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
-from field_problems import Array, Disc, Ports, Problem, hard_problems, ports, random_problems, standard
+from field_problems import (
+    Array,
+    Disc,
+    Patch,
+    Ports,
+    Problem,
+    general_problems,
+    hard_problems,
+    ports,
+    random_problems,
+    standard,
+)
 
 PATH = Path(__file__).parent / "data" / "field_reference.json"
 
@@ -31,9 +40,9 @@ PATH = Path(__file__).parent / "data" / "field_reference.json"
 class Reference:
     """One problem and its reference solution.
 
-    `energies` as in field_problems; `potentials` at `points` (r [m], theta [rad]), shape (2 phases, points, 2 sheets) [V];
-    `estimate`: largest difference between two meshes and orders of the electrodes' voltages (at 1 V of drive) and of
-    their currents (in units of the drive current); `field_estimate`: that of the potentials at the points [V].
+    `energies` as in field_problems; `potentials` [V] at `points` (r [m], theta [rad]) for both phases, shape
+    (2, points, 2 sheets); `estimate`: largest difference between two meshes and orders of the electrodes' voltages (at
+    1 V of drive) and currents (in units of the drive current); `field_estimate`: that of the potentials [V].
     """
 
     problem: Problem
@@ -57,20 +66,31 @@ def phases(problem: Problem, energies: Array, modes: Array) -> Array:
 
 
 def sample_points(problem: Problem) -> Array:
-    """The centre of the first disc, a point inside it and one outside every disc: (r, theta)."""
-    disc = problem.discs[0]
-    inside = disc.r * np.exp(1j * disc.theta) + 0.6 * disc.radius * np.exp(0.7j)
-    outside = disc.r * np.exp(1j * disc.theta)
-    for r in np.linspace(0.25, 0.75, 5) * (problem.outer - problem.inner) + problem.inner:
-        for theta in np.linspace(0.2, 0.8, 5) * problem.theta0:
-            z = r * np.exp(1j * theta)
-            clear = [abs(z - d.r * np.exp(1j * d.theta)) > 1.3 * d.radius for d in problem.discs]
-            if all(clear):
-                outside = z
-    turn = [np.angle(z * np.exp(-1j * disc.theta)) + disc.theta for z in (inside, outside)]
-    return np.array(
-        [(disc.r, disc.theta), (abs(inside), turn[0]), (abs(outside), turn[1] % (2 * math.pi))], dtype=float
-    )
+    """Two points of the sheet inside the first disc and one outside every disc: (r, theta), shape (3, 2)."""
+    disc = problem.contacts[0][1]
+
+    def clear(r: float, theta: float) -> float:
+        """Distance to the nearest rim in units of its radius, negative inside a disc."""
+        z = r * np.exp(1j * theta)
+        return min(float(abs(z - c.r * np.exp(1j * c.theta))) / c.radius - 1 for _, c in problem.contacts)
+
+    inside = []
+    for rho in (0.0, 0.3, 0.6):
+        for step in range(8):
+            z = disc.r + rho * disc.radius * np.exp(1j * (0.7 + step * math.pi / 4))
+            r, theta = float(abs(z)), disc.theta + float(np.angle(z))
+            margin = 0.05 * disc.radius
+            radial = problem.inner + margin < r < problem.outer - margin
+            if radial and margin < r * theta < r * problem.theta0 - margin:
+                inside.append((r, theta))
+    width = problem.outer - problem.inner
+    grid = [
+        (problem.inner + f * width, g * problem.theta0)
+        for f in np.linspace(0.25, 0.75, 5).tolist()
+        for g in np.linspace(0.2, 0.8, 5).tolist()
+    ]
+    outside = next((point for point in grid if clear(*point) > 0.3), max(grid, key=lambda point: clear(*point)))
+    return np.array([inside[0], inside[-1], outside])
 
 
 def reference(problem: Problem) -> Reference:
@@ -78,9 +98,9 @@ def reference(problem: Problem) -> Reference:
     from peers_ngsolve import solve
 
     points = sample_points(problem)
-    widths = [d.radius * math.sqrt(d.conductance * (problem.upper + problem.lower)) for d in problem.discs]
+    widths = [c.radius * math.sqrt(c.conductance * (problem.upper + problem.lower)) for _, c in problem.contacts]
     # Resolve the layer of width 1/k along the rims: the potentials there converge less fast than the ports.
-    finer = min(1.0, *(4 / w for w in widths if math.isfinite(w) and w > 0), 1.0)
+    finer = min(1.0, *(3 / w for w in widths if math.isfinite(w) and w > 0), 1.0)
     found = []
     for order, size, inside in ((12, 0.5, 0.7), (10, 0.4, 0.5)):
         solved = solve(problem, order, size, inside * finer, points=points)
@@ -116,7 +136,7 @@ def write(path: Path = PATH, progress: Callable[[str], None] = print) -> None:
     ngsolve.SetNumThreads(1)
     start = time.perf_counter()
     references = []
-    for problem in [*standard(), *hard_problems(), *random_problems()]:
+    for problem in [*standard(), *hard_problems(), *general_problems(), *random_problems()]:
         references.append(reference(problem))
         last = references[-1]
         progress(f"{problem.name}: ports agree to {last.estimate:.1e}, potentials to {last.field_estimate:.1e}")
@@ -146,6 +166,7 @@ def _encode(r: Reference) -> dict[str, Any]:
     problem["discs"] = [
         [d.r, d.theta, d.radius, None if math.isinf(d.conductance) else d.conductance] for d in r.problem.discs
     ]
+    problem["patches"] = [list(asdict(p).values()) for p in r.problem.patches]
     return {
         "problem": problem,
         "energies": r.energies[np.triu_indices(3)].tolist(),
@@ -159,6 +180,7 @@ def _encode(r: Reference) -> dict[str, Any]:
 def _decode(entry: dict[str, Any]) -> Reference:
     raw = dict(entry["problem"])
     raw["discs"] = tuple(Disc(d[0], d[1], d[2], math.inf if d[3] is None else d[3]) for d in raw["discs"])
+    raw["patches"] = tuple(Patch(*p) for p in raw["patches"])
     raw["load"] = math.inf if raw["load"] is None else raw["load"]
     energies = np.zeros((3, 3))
     energies[np.triu_indices(3)] = entry["energies"]

@@ -10,10 +10,11 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from field_problems import Array, Problem
+from field_problems import Array, Disc, Problem
 
 NAME = "NGSolve"
 LIMITS = (
@@ -49,6 +50,8 @@ def make_mesh(problem: Problem, size: float, inside: float, order: int) -> Any:
         inside: longest edge in and around a disc, in units of its radius.
         order: polynomial degree of the curved edges.
     """
+    if problem.patches or any(overhangs(problem, disc) for disc in problem.discs):
+        return _clipped_mesh(problem, size, inside, order)
     from netgen.geom2d import SplineGeometry
     from netgen.meshing import MeshingParameters
     from ngsolve import Mesh
@@ -69,7 +72,7 @@ def make_mesh(problem: Problem, size: float, inside: float, order: int) -> Any:
         # Netgen's rational quadratic splines are exact arcs when the control point is where the tangents meet.
         count = max(1, math.ceil(abs(stop - start) / (math.pi / 3)))
         angles = np.linspace(start, stop, count + 1).tolist()
-        for a, b in zip(angles[:-1], angles[1:], strict=True):
+        for a, b in pairwise(angles):
             far = radius / math.cos((b - a) / 2)
             control = geometry.AddPoint(far * math.cos((a + b) / 2), far * math.sin((a + b) / 2))
             geometry.Append(
@@ -106,6 +109,70 @@ def make_mesh(problem: Problem, size: float, inside: float, order: int) -> Any:
     return mesh
 
 
+def _clipped_mesh(problem: Problem, size: float, inside: float, order: int, layers: int = 3) -> Any:
+    """The same for patches and for discs that overhang the edges: solid modelling cuts them, and layers of small
+    triangles surround the corners of rims and edges, because the potentials are not smooth there."""
+    from netgen.occ import Axes, Glue, OCCGeometry, Pnt, Vec, WorkPlane
+    from ngsolve import Mesh
+
+    inner, outer, theta0 = problem.inner, problem.outer, problem.theta0
+    if theta0 >= math.pi:
+        raise NotImplementedError("clipped discs are meshed on sectors below half a turn only")
+    ring = WorkPlane().Circle(0, 0, outer).Face() - WorkPlane().Circle(0, 0, inner).Face()
+    far = 3 * outer
+    path = WorkPlane().MoveTo(0, 0).LineTo(far, 0)
+    for angle in np.linspace(0, theta0, 1 + math.ceil(theta0 / 0.8))[1:].tolist():
+        path = path.LineTo(far * math.cos(angle), far * math.sin(angle))
+    sector = ring * path.LineTo(0, 0).Face()
+    bare, faces = sector, []
+    for name, contact in problem.contacts:
+        x, y = contact.r * math.cos(contact.theta), contact.r * math.sin(contact.theta)
+        if isinstance(contact, Disc):
+            whole = WorkPlane().Circle(x, y, contact.radius).Face()
+        else:
+            turn = contact.theta + contact.turn
+            plane = WorkPlane(Axes(Pnt(x, y, 0), n=Vec(0, 0, 1), h=Vec(math.cos(turn), math.sin(turn), 0)))
+            if contact.shape == "rectangle":
+                whole = plane.RectangleC(2 * contact.along, 2 * contact.across).Face()
+            else:
+                whole = plane.Ellipse(contact.along, contact.across).Face()
+        face = whole * sector
+        bare = bare - face
+        face.name = name
+        face.maxh = inside * contact.radius
+        faces.append(face)
+    bare.name = "bare"
+    shape = Glue([bare, *faces])
+    small = 1e-9 * outer
+    meets: dict[tuple[float, float], set[str]] = {}
+    for edge in shape.edges:
+        start, stop = edge.parameter_interval
+        middle = edge.Value((start + stop) / 2)
+        r, theta = math.hypot(middle.x, middle.y), math.atan2(middle.y, middle.x)
+        found = {"B": r - problem.r1, "A": r - problem.r2, "D": r * theta, "C": r * (theta - theta0)}
+        edge.name = next((name for name, distance in found.items() if abs(distance) < small), "rim")
+        for point in (edge.start, edge.end):
+            meets.setdefault((round(point.x, 9), round(point.y, 9)), set()).add(edge.name)
+    for vertex in shape.vertices:
+        x, y = vertex.p.x, vertex.p.y
+        touched = any(
+            math.hypot(x - c.r * math.cos(c.theta), y - c.r * math.sin(c.theta)) < c.radius + small
+            for _, c in problem.contacts
+        )
+        if touched and (problem.patches or len(meets[round(x, 9), round(y, 9)]) > 1):
+            vertex.hpref = 1
+    mesh = Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=size * (outer - inner)))
+    mesh.RefineHP(layers, factor=0.15)
+    mesh.Curve(order)
+    return mesh
+
+
+def overhangs(problem: Problem, disc: Disc) -> bool:
+    """Whether a disc reaches across an edge of the sheet."""
+    straight = min(disc.r * math.sin(min(t, math.pi / 2)) for t in (disc.theta, problem.theta0 - disc.theta))
+    return disc.radius > min(disc.r - problem.inner, problem.outer - disc.r, straight)
+
+
 def narrow_gaps(problem: Problem) -> Iterator[tuple[float, float, float]]:
     """Points (x, y) of the rims nearer than a fifth of the radius to an edge or another rim, and that distance [m]."""
     angles = np.linspace(-math.pi, math.pi, 4001)
@@ -127,7 +194,7 @@ def solve(
     """Solve the three modes at polynomial degree `order`.
 
     The coupled system of (u, v) is condensed to the element boundaries and factorised once for the three
-    right-hand sides. A perfect bond is a Lagrange multiplier (the current density j itself) that makes u = v.
+    right-hand sides. In a perfect bond the two sheets share their unknowns, without condensation.
 
     Args:
         problem: the sensor and its contacts.
@@ -146,62 +213,48 @@ def solve(
     seconds["mesh"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    bonded = [f"disc{i}" for i, d in enumerate(problem.discs) if math.isinf(d.conductance)]
-    spaces = [ng.H1(mesh, order=order, dirichlet="A|B"), ng.H1(mesh, order=order, dirichlet="C|D")]
-    if bonded:
-        spaces.append(ng.H1(mesh, order=order, definedon=mesh.Materials("|".join(bonded))))
-    space = ng.FESpace(spaces)
-    trial, test = space.TnT()
-    conductance = {f"disc{i}": 0.0 if math.isinf(d.conductance) else d.conductance for i, d in enumerate(problem.discs)}
-    form = ng.BilinearForm(space, symmetric=True, condense=True)
-    form += (1 / problem.upper) * ng.grad(trial[0]) * ng.grad(test[0]) * ng.dx
-    form += (1 / problem.lower) * ng.grad(trial[1]) * ng.grad(test[1]) * ng.dx
-    jump, test_jump = trial[0] - trial[1], test[0] - test[1]
-    for name, g in conductance.items():
-        if g > 0:
-            form += g * jump * test_jump * ng.dx(name)
-    if bonded:
-        # The multiplier in units of j; the jump's own penalty changes nothing where u = v but conditions the factors.
-        area = ng.dx("|".join(bonded))
-        penalty = (1 / problem.upper + 1 / problem.lower) / min(d.radius for d in problem.discs) ** 2
-        form += penalty * (trial[2] * test_jump + test[2] * jump + jump * test_jump) * area
-    form.Assemble()
+    bonded = [name for name, contact in problem.contacts if math.isinf(contact.conductance)]
+    upper = ng.H1(mesh, order=order, dirichlet="A|B")
+    space = upper * ng.H1(mesh, order=order, dirichlet="C|D")
+    (u, v), (u_test, v_test) = space.TnT()
+    form = ng.BilinearForm(space, symmetric=not bonded, condense=not bonded)
+    form += (1 / problem.upper) * ng.grad(u) * ng.grad(u_test) * ng.dx
+    form += (1 / problem.lower) * ng.grad(v) * ng.grad(v_test) * ng.dx
     # Current through the contacts, from the upper to the lower sheet.
     through = ng.LinearForm(space)
-    for name, g in conductance.items():
-        if g > 0:
-            through += g * test_jump * ng.dx(name)
-    if bonded:
-        through += penalty * test[2] * area
+    for name, contact in problem.contacts:
+        if name not in bonded and contact.conductance > 0:
+            form += contact.conductance * (u - v) * (u_test - v_test) * ng.dx(name)
+            through += contact.conductance * (u_test - v_test) * ng.dx(name)
+    form.Assemble()
     through.Assemble()
+    matrix, free = form.mat, space.FreeDofs(coupling=not bonded)
+    if bonded:
+        kept = np.flatnonzero(list(upper.GetDofs(mesh.Materials("|".join(bonded)))))
+        matrix, free = _merge(ng, matrix, free, kept, kept + upper.ndof)
     seconds["assemble"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    free = space.FreeDofs(coupling=True)
-    inverse = form.mat.Inverse(free, inverse="umfpack" if bonded else "sparsecholesky")
+    inverse = matrix.Inverse(free, inverse="sparsecholesky")
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
     fields = []
-    for upper, lower in (({"B": 1.0}, {}), ({}, {"C": 1.0}), ({}, {"C": 1.0, "D": 1.0})):
+    for values in ({"B": 1.0}, {"C": 1.0}, {"C": 1.0, "D": 1.0}):
         field = ng.GridFunction(space)
-        for part, values in ((0, upper), (1, lower)):
-            if values:
-                field.components[part].Set(mesh.BoundaryCF(values, default=0.0), ng.BND)
-        # A second pass refines the indefinite factors of a perfect bond, whose pivoting loses digits.
-        for _ in range(2 if bonded else 1):
-            residual = (form.mat * field.vec).Evaluate()
-            field.vec.data -= inverse * residual
+        field.components[0 if "B" in values else 1].Set(mesh.BoundaryCF(values, default=0.0), ng.BND)
+        residual = (matrix * field.vec).Evaluate()
+        field.vec.data -= inverse * residual
         fields.append(field)
-    energies = np.zeros((3, 3))
-    for j in range(3):
-        image = (form.mat * fields[j].vec).Evaluate()
-        for i in range(2):
-            energies[i, j] = ng.InnerProduct(fields[i].vec, image)
+    images = [(matrix * field.vec).Evaluate() for field in fields]
+    energies = np.array([[ng.InnerProduct(field.vec, image) for image in images] for field in fields])
     for field in fields:
-        field.vec.data += form.harmonic_extension * field.vec
-    for j in range(3):
-        energies[2, j] = energies[j, 2] = -ng.InnerProduct(through.vec, fields[j].vec)
+        if bonded:
+            field.vec.FV().NumPy()[kept + upper.ndof] = field.vec.FV().NumPy()[kept]
+        else:
+            field.vec.data += form.harmonic_extension * field.vec
+    if not bonded:
+        energies[2] = energies[:, 2] = [-ng.InnerProduct(through.vec, field.vec) for field in fields]
     seconds["solve"] = time.perf_counter() - start
 
     potentials = None
@@ -209,3 +262,21 @@ def solve(
         at = [mesh(r * math.cos(t), r * math.sin(t)) for r, t in points]
         potentials = np.array([[[f.components[s](p) for s in (0, 1)] for p in at] for f in fields])
     return Solved(energies, seconds, int(space.ndof), potentials)
+
+
+def _merge(ng: Any, matrix: Any, free: Any, kept: Any, gone: Any) -> tuple[Any, Any]:
+    """The matrix with the unknowns `gone` identified with `kept`, and the free ones left."""
+    from scipy.sparse import coo_matrix
+
+    rows, columns, values = (np.array(part) for part in matrix.COO())
+    name = np.arange(matrix.height)
+    name[gone] = kept
+    # The merged unknowns keep their places, empty, so that vectors need no renumbering.
+    merged = coo_matrix((values, (name[rows], name[columns])), shape=(matrix.height, matrix.width)).tocsr().tocoo()
+    left = ng.BitArray(free)
+    for unknown in gone.tolist():
+        left.Clear(unknown)
+    made = ng.la.SparseMatrixd.CreateFromCOO(
+        merged.row.tolist(), merged.col.tolist(), merged.data.tolist(), matrix.height, matrix.width
+    )
+    return made, left
