@@ -64,19 +64,29 @@ def least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float,
     return 0.5 * f / math.hypot(1.0, slope), 0.5 * (top + bottom), slope
 
 
-def longest_from(z: Floats, high: Floats, low: Floats, tolerance: float) -> list[int]:
-    """For each slice, the end (one past the last) of the longest good interval that begins there."""
-    count = len(z)
-    # no slope helps a slice whose own spread is too large; 0 marks holes through the slice
-    usable = (low > 0.0) & np.isfinite(high)
+def longest_from(z: Floats, high: Floats, low: Floats, tolerance: float, shortest: int = 2) -> list[int]:
+    """For each slice, the end (one past the last) of the longest good interval that begins there; itself if none does.
+
+    Intervals begin with the shortest that counts: fewer slices do not know the slope, by which the distance across a
+    steep side is smaller than that across the axis.
+    """
+    usable = (low > 0.0) & np.isfinite(high)  # 0 marks a hole through the slice
+
+    def good(first: int, end: int) -> bool:
+        window = slice(first, end)
+        if end > len(z) or not usable[window].all():
+            return False
+        return least_deviation(z[window], high[window], low[window])[0] <= tolerance
+
     ends: list[int] = []
     stop = 0
-    for first in range(count):
-        stop = max(stop, first)
-        while stop < count and usable[stop]:
-            window = slice(first, stop + 1)
-            if least_deviation(z[window], high[window], low[window])[0] > tolerance:
-                break
+    for first in range(len(z)):
+        if stop < first + shortest:
+            if not good(first, first + shortest):
+                ends.append(first)
+                continue
+            stop = first + shortest
+        while stop < len(z) and good(first, stop + 1):
             stop += 1
         ends.append(stop)
     return ends
@@ -93,13 +103,13 @@ def choose_intervals(
         low: smallest radii [m], 0 where a slice has a hole, shape (k,).
         tolerance: largest distance from the side [m].
         most: number of intervals at most.
-        shortest: slices that an interval must have.
+        shortest: slices that an interval must have, at least 2.
         gain: slices that a further interval must add to the cover.
 
     Returns:
         the intervals, in order; empty where none is long enough.
     """
-    ends = longest_from(z, high, low, tolerance)
+    ends = longest_from(z, high, low, tolerance, shortest)
     count = len(z)
     starts = np.zeros(count + 1, dtype=int)  # earliest good start for every end
     first = 0
