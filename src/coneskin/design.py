@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from .errors import GeometryError
@@ -13,6 +13,7 @@ from .geometry.cut_sheet import CutSheet, FaceUp, cut_sheets
 from .geometry.electrodes import ElectrodePlan, Layout, lay_out
 from .geometry.forecast import Converter, Forecast, forecast
 from .geometry.frustum import Frustum
+from .geometry.pen import Side
 from .geometry.placed import PlacedFrustum
 from .geometry.pose import Pose
 from .geometry.stack import PAPER_STACK, Stack, parallel
@@ -33,6 +34,8 @@ class Choices:
     Attributes:
         stack: the five layers.
         plan: electrodes, tabs, holes.
+        wires: the side where the wires leave, for all sheets; None for end 1, and end 2 of the last of several, so that
+            tabs do not run into the neighbour.
         converter: what reads the potentials.
         seam_gap: how far the innermost face stays open at the narrow end of a full wrap.
         overlap: width of a flap on the upper substrate that closes the seam.
@@ -44,6 +47,7 @@ class Choices:
 
     stack: Stack = PAPER_STACK
     plan: ElectrodePlan = field(default_factory=ElectrodePlan)
+    wires: Side | None = None
     converter: Converter = field(default_factory=Converter)
     seam_gap: float = 0.0
     overlap: float = 0.0
@@ -121,7 +125,8 @@ def design_sheets(
         name = f"sheet {i + 1}"
         try:
             place = _seam_opened(_trimmed(link, cuts[i], cuts[i + 1]), choices.seam_gap)
-            layout = lay_out(place.frustum, choices.plan)
+            auto: Side = "end2" if 0 < i == len(links) - 1 else "end1"
+            layout = lay_out(place.frustum, replace(choices.plan, wires=choices.wires or auto))
             drawn = cut_sheets(
                 layout,
                 choices.stack,

@@ -102,7 +102,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         default = getattr(plan, name) * 1e3
         add(f"--{name}-mm", type=float, default=default, help=f"{text} (default {default:g})")
-    add("--wires", choices=get_args(Side), default=plan.wires, help="side where all four wires leave (default end1)")
+    add(
+        "--wires",
+        choices=get_args(Side),
+        help="side where all four wires leave (default end1; end2 for the last of several sheets)",
+    )
     add("--seam-gap-mm", type=float, default=0.0, help="how far the seam stays open (default 0)")
     add("--overlap-mm", type=float, default=0.0, help="flap of the upper substrate over the seam (default 0)")
     add("--sheet-gap-mm", type=float, default=1.0, help="least distance of neighbouring sheets (default 1)")
@@ -186,13 +190,14 @@ def _choices(args: argparse.Namespace) -> Choices:
             a, b, c, d, e = (replace(layer, **{name: v}) for layer, v in zip(layers, values, strict=True))
             layers = (a, b, c, d, e)
     widths = ("margin", "electrode", "setback", "lead", "clearance", "tab", "hole")
-    plan = ElectrodePlan(**{name: getattr(args, f"{name}_mm") * 1e-3 for name in widths}, wires=args.wires)
+    plan = ElectrodePlan(**{name: getattr(args, f"{name}_mm") * 1e-3 for name in widths})
     tolerance = args.cut_tolerance_mm * 1e-3
     if not (math.isfinite(tolerance) and tolerance > 0.0):
         raise GeometryError(f"--cut-tolerance-mm must be finite and above 0 mm, got {args.cut_tolerance_mm!r}")
     return Choices(
         stack=Stack(layers, args.assembly),
         plan=plan,
+        wires=args.wires,
         converter=Converter(args.adc_bits, args.adc_v, args.supply_v),
         seam_gap=args.seam_gap_mm * 1e-3,
         overlap=args.overlap_mm * 1e-3,
@@ -267,7 +272,7 @@ def _print(designs: tuple[SheetDesign, ...], fit: Fit | None) -> None:
         side, share = design.place.frustum, design.layout.active_share
         line = (
             f"{design.name}: radius {side.radius1 * 1e3:.3f} to {side.radius2 * 1e3:.3f} mm, height "
-            f"{side.height * 1e3:.2f} mm, half angle {math.degrees(side.half_angle):.3f} deg, wrap "
+            f"{side.height * 1e3:.2f} mm, half angle {math.degrees(side.half_angle):z.3f} deg, wrap "
             f"{math.degrees(side.wrap):.1f} deg, active {share:.1%}"
         )
         if design.fit is not None:

@@ -12,6 +12,7 @@ from .errors import MissingExtra
 from .geometry.outline import Outline
 from .geometry.pen import Corner, draw, draw_circle, flat_point
 from .geometry.sector import unroll
+from .geometry.stack import parallel
 
 if TYPE_CHECKING:
     from .geometry.mesh import Mesh
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 __all__ = ["draw_pictures"]
 
 _INK, _FOIL, _ACTIVE, _SHEET = "#222222", "#c27c0e", "#9fd3c7", ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
-_VIEW = (20.0, -60.0)  # elevation and azimuth [deg]
 _MOST_FACES = 12000  # drawn by matplotlib in a second
 
 
@@ -53,13 +53,17 @@ def draw_pictures(
     done: list[tuple[str, str]] = []
 
     def save(figure: Any, name: str, caption: str) -> None:
-        figure.savefig(folder / "pictures" / name, dpi=130)
+        figure.savefig(folder / "pictures" / name, dpi=130, bbox_inches="tight", pad_inches=0.15)
         done.append((caption, f"pictures/{name}"))
 
     progress("drawing the link")
     figure = Figure(figsize=(8, 6.5), layout="constrained")
     _draw_link(figure, designs, mesh)
-    save(figure, "link.png", "The link with its sheets: outer faces, electrodes and where the wires leave.")
+    save(
+        figure,
+        "link.png",
+        "The link with its sheets: outer faces, the lines of the electrodes, and in black the edges.",
+    )
     for design in designs:
         progress(f"{design.name}: drawing the layout")
         figure = Figure(figsize=(9, 7), layout="constrained")
@@ -91,7 +95,7 @@ def _draw_layout(figure: Any, design: SheetDesign) -> None:
     """All that is on a sheet, on the cone of its upper conductive layer, with dimensions."""
     axes = figure.add_subplot()
     layout = design.layout
-    cone = design.choices.stack.surface(layout.sheet, 3)
+    cone = design.cuts[4].surface
     box = layout.active
     active = tuple(
         Corner(u, p) for u, p in ((box.u1, box.phi1), (box.u1, box.phi2), (box.u2, box.phi2), (box.u2, box.phi1))
@@ -105,6 +109,7 @@ def _draw_layout(figure: Any, design: SheetDesign) -> None:
     for u, phi in layout.holes:
         axes.fill(*_xy(draw_circle(cone, u, phi, layout.plan.hole)), facecolor="white", edgecolor=_INK, lw=0.8)
     _dimensions(axes, design, cone)
+    axes.margins(0.08)
     axes.set_aspect("equal")
     axes.axis("off")
 
@@ -123,10 +128,11 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
     far = 1.5e3 * lift
     bottom, right = y0 * 1e3 - far - 12.0 * bool(layout.plan.wires == "end1"), x1 * 1e3 + far
     arrow = {"arrowstyle": "<->", "color": _INK, "lw": 0.7, "shrinkA": 0, "shrinkB": 0}
+    axes.plot([x0 * 1e3, x1 * 1e3, right], [bottom - 0.6e3 * lift, bottom, bottom], lw=0.0)  # arrows make no room
     axes.annotate("", (x0 * 1e3, bottom), (x1 * 1e3, bottom), arrowprops=arrow)
-    axes.text(500.0 * (x0 + x1), bottom - 0.4e3 * lift, f"{(x1 - x0) * 1e3:.2f}", **style)
+    axes.text(500.0 * (x0 + x1), bottom, f"{(x1 - x0) * 1e3:.2f}", **style, backgroundcolor="white")
     axes.annotate("", (right, y0 * 1e3), (right, y1 * 1e3), arrowprops=arrow)
-    axes.text(right + 0.4e3 * lift, 500.0 * (y0 + y1), f"{(y1 - y0) * 1e3:.2f}", rotation=90, **style)
+    axes.text(right, 500.0 * (y0 + y1), f"{(y1 - y0) * 1e3:.2f}", rotation=90, **style, backgroundcolor="white")
     flat = unroll(cone)
     lines = [
         f"{design.name}, upper conductive layer",
@@ -150,49 +156,88 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
 
 
 def _draw_link(figure: Any, designs: Sequence[SheetDesign], mesh: Mesh | None) -> None:
-    """The mesh in grey and the outer faces of the sheets in colour."""
+    """The mesh in grey, the outer faces of the sheets in colour, the electrodes as lines on them."""
     import numpy as np
+    from matplotlib.colors import to_rgb
+    from matplotlib.ticker import MaxNLocator
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
-    from .geometry.stack import parallel
-
-    axes = figure.add_subplot(projection="3d", computed_zorder=False)
-    light = np.array([0.4, -0.7, 0.6]) / math.sqrt(0.4**2 + 0.7**2 + 0.6**2)
+    axes = figure.add_subplot(projection="3d", computed_zorder=False, proj_type="ortho")
+    first = designs[0].place.link_frustum
+    # from where the seam is seen, a little from the side and from above
+    view = np.array(first.rotate((0.80, 0.45, 0.35)))
+    view /= np.linalg.norm(view)
+    light = np.array(first.rotate((0.85, -0.3, 0.45)))
     shown, colours = [], []
 
-    def add(triangles: Any, colour: tuple[float, float, float]) -> None:
+    def add(triangles: Any, colour: str) -> None:
         a, b, c = triangles.transpose(1, 0, 2)
         normal = np.cross(b - a, c - a)
         size = np.linalg.norm(normal, axis=1)
-        bright = 0.45 + 0.55 * np.abs(normal @ light) / np.where(size > 0.0, size, 1.0)
+        bright = 0.4 + 0.6 * np.abs(normal @ light) / np.where(size > 0.0, size, 1.0)
         shown.append(triangles)
-        colours.append(np.column_stack([np.outer(bright, colour), np.ones(len(bright))]))
-
-    from matplotlib.colors import to_rgb
+        colours.append(np.outer(np.minimum(bright, 1.0), to_rgb(colour)))
 
     if mesh is not None:
-        add(_coarser(mesh) * 1e3, to_rgb("#b8bcc2"))
+        add(_coarser(mesh) * 1e3, "#c4c8ce")
     for index, design in enumerate(designs):
-        stack, place = design.choices.stack, design.place
-        turn, shift = np.array(place.link_frustum.rotation), np.array(place.link_frustum.translation)
-        side = parallel(place.frustum, stack.thickness)
-        low = -stack.thickness * side.sin_half_angle
-        u, phi = np.linspace(0.0, side.slant, 25), np.linspace(0.0, side.wrap, 121)
-        grid = (side.points(u[:, None], phi[None, :]) + (0.0, 0.0, low)) @ turn.T + shift
+        grid = _outer_face(design, np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 121))
         corners = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
         p, q, r, s = (corner.reshape(-1, 3) for corner in corners)
-        add(1e3 * np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)]), to_rgb(_SHEET[index % 4]))
+        add(np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)]), _SHEET[index % 4])
     triangles = np.concatenate(shown)
-    up, turn_view = math.radians(_VIEW[0]), math.radians(_VIEW[1])
-    view = np.array([math.cos(up) * math.cos(turn_view), math.cos(up) * math.sin(turn_view), math.sin(up)])
     order = np.argsort(triangles.mean(axis=1) @ view)
-    collection = Poly3DCollection(triangles[order], facecolors=np.concatenate(colours)[order], edgecolors="none")
-    axes.add_collection3d(collection)
-    low_corner, high_corner = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-    limits = dict(zip(("xlim", "ylim", "zlim"), zip(low_corner, high_corner, strict=True), strict=True))
-    axes.set(**limits, xlabel="x mm", ylabel="y mm", zlabel="z mm")
-    axes.set_box_aspect(high_corner - low_corner)
-    axes.view_init(*_VIEW)
+    paint = np.concatenate(colours)[order]
+    axes.add_collection3d(Poly3DCollection(triangles[order], facecolors=paint, edgecolors=paint, linewidths=0.3))
+    for design in designs:
+        _draw_electrodes(axes, design, view)
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    limits = dict(zip(("xlim", "ylim", "zlim"), zip(low, high, strict=True), strict=True))
+    axes.set(**limits, xlabel="x mm", ylabel="y mm")
+    axes.set_zlabel("z mm", labelpad=12)
+    axes.tick_params("z", pad=6)
+    for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), high - low, strict=True):
+        axis.set_major_locator(MaxNLocator(max(2, round(8 * span / (high - low).max()))))
+    axes.set_box_aspect(high - low, zoom=0.9)
+    axes.view_init(math.degrees(math.asin(view[2])), math.degrees(math.atan2(view[1], view[0])))
+
+
+def _outer_face(design: SheetDesign, u: Any, phi: Any) -> Any:
+    """Points of the outer face [mm] at fractions of slant and wrap, shape (k, p, 3)."""
+    import numpy as np
+
+    thickness, place = design.choices.stack.thickness, design.place
+    side = parallel(place.frustum, thickness)
+    points = side.points(np.asarray(u)[:, None] * side.slant, np.asarray(phi)[None, :] * side.wrap)
+    points[..., 2] -= thickness * side.sin_half_angle
+    pose = place.link_frustum
+    return 1e3 * (points @ np.array(pose.rotation).T + np.array(pose.translation))
+
+
+def _draw_electrodes(axes: Any, design: SheetDesign, view: Any) -> None:
+    """Middle lines of the electrodes and the two edges, as far as they face the viewer."""
+    import numpy as np
+
+    side, box, plan = design.place.frustum, design.layout.field, design.layout.plan
+    half = 0.5 * plan.electrode
+    turn = half / min(side.radius1, side.radius2)
+    along, around = np.linspace(0.0, 1.0, 2), np.linspace(0.0, 1.0, 121)
+    rotation = np.array(design.place.link_frustum.rotation)
+    for name, u, phi, colour in (
+        ("B", [(box.u1 - half) / side.slant], around, _FOIL),
+        ("A", [(box.u2 + half) / side.slant], around, _FOIL),
+        ("D", along, [(box.phi1 - turn) / side.wrap], _FOIL),
+        ("C", along, [(box.phi2 + turn) / side.wrap], _FOIL),
+        ("", along, [0.0], _INK),
+        ("", along, [1.0], _INK),
+    ):
+        points = _outer_face(design, u, phi).reshape(-1, 3)
+        facing = side.normals(np.broadcast_to(phi, points.shape[:1]) * side.wrap) @ rotation.T @ view > 0.02
+        points[~facing] = np.nan
+        axes.plot(*points.T, color=colour, lw=2.0 if name else 1.0)
+        if facing.any() and name:
+            middle = points[facing][facing.sum() // 3] if len(points) > 2 else points.mean(axis=0)
+            axes.text(*middle, name, color="white", fontweight="bold", ha="center", va="center")
 
 
 def _coarser(mesh: Mesh) -> Any:
@@ -200,7 +245,8 @@ def _coarser(mesh: Mesh) -> Any:
     import numpy as np
 
     faces, vertices = mesh.faces, mesh.vertices
-    cell = float(np.ptp(vertices, axis=0).max()) / 120.0
+    size = float(np.ptp(vertices, axis=0).max())
+    cell = size / 120.0
     while len(faces) > _MOST_FACES:
         keys = np.round(vertices / cell).astype(np.int64)
         _, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
@@ -208,7 +254,18 @@ def _coarser(mesh: Mesh) -> Any:
         faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
         faces = faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
         cell *= 1.3
-    return vertices[faces]
+    triangles = vertices[faces]
+    for _ in range(8):  # halve long triangles: painted from back to front, they would cover what is before them
+        edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+        long = edges.max(axis=1) > size / 20.0
+        if not long.any() or len(triangles) > 4 * _MOST_FACES:
+            break
+        turned = np.stack([np.roll(t, -k, axis=0) for t, k in zip(triangles[long], edges[long].argmax(1), strict=True)])
+        a, b, c = turned.transpose(1, 0, 2)
+        middle = 0.5 * (a + b)
+        halves = np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
+        triangles = np.concatenate([triangles[~long], *halves])
+    return triangles
 
 
 def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: float) -> None:

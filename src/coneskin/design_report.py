@@ -77,7 +77,7 @@ def _sheet(design: SheetDesign, folder: str) -> Iterator[str]:
     rows = [
         ["radius at end 1, end 2", f"{cone['radius1_mm']:.3f}, {cone['radius2_mm']:.3f} mm"],
         ["height, slant", f"{cone['height_mm']:.3f}, {cone['slant_mm']:.3f} mm"],
-        ["half angle", f"{cone['half_angle_deg']:.4f} deg"],
+        ["half angle", f"{cone['half_angle_deg']:z.4f} deg"],
         ["wrap", f"{cone['wrap_deg']:.3f} deg"],
         ["flat sector of the bare link", _sector(cone)],
         ["end 1 in the mesh's frame", _vector(cone["xyz_mm"], "mm")],
@@ -131,6 +131,8 @@ def _sheet(design: SheetDesign, folder: str) -> Iterator[str]:
         f"{width} at the narrow end."
     )
     yield f"* All four wires leave at {plan.wires}."
+    if plan.wires == "end2" and design.next_seam is not None:
+        yield "* The tabs run into the next sheet there: bend them up, or let the wires leave on another side."
     yield (
         f"* Active: u {patch['u1_mm']:.2f} to {patch['u2_mm']:.2f} mm, phi {patch['phi1_deg']:.2f} to "
         f"{patch['phi2_deg']:.2f} deg of the sheet: {share}."
@@ -183,14 +185,14 @@ def _making(design: SheetDesign) -> Iterator[str]:
 
 
 def _sector(shape: dict[str, Any]) -> str:
-    if shape["r1_mm"] is None:
+    if shape["r1_mm"] is None or shape["r1_mm"] > 1e7:  # 10 km: within 1 um of a rectangle
         width = math.radians(shape["wrap_deg"]) * shape["radius1_mm"]
         return f"rectangle {width:.3f} x {shape['slant_mm']:.3f} mm"
     return f"r1 {shape['r1_mm']:.3f} mm, r2 {shape['r2_mm']:.3f} mm, theta0 {shape['theta0_deg']:.4f} deg"
 
 
 def _vector(values: list[float], unit: str) -> str:
-    return ", ".join(f"{value + 0.0:.3f}" for value in values) + f" {unit}"
+    return ", ".join(f"{value:z.3f}" for value in values) + f" {unit}"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:

@@ -139,8 +139,8 @@ def _shape(cone: Frustum) -> dict[str, Any]:
 def _pose(placed: PlacedFrustum) -> dict[str, list[float]]:
     pose = placed.link_frustum
     return {
-        "xyz_mm": [1e3 * value for value in pose.translation],
-        "rpy_deg": [math.degrees(value) for value in pose.rpy],
+        "xyz_mm": [1e3 * value + 0.0 for value in pose.translation],
+        "rpy_deg": [math.degrees(value) + 0.0 for value in pose.rpy],
     }
 
 
