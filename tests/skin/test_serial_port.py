@@ -35,9 +35,8 @@ def test_a_busy_port_says_so():
     master, slave, path = open_raw_terminal()
     try:
         second = SerialPort(path)
-        with SerialPort(path):
-            with pytest.raises(SkinConnectionError, match="busy, another program has it open"):
-                second.open()
+        with SerialPort(path), pytest.raises(SkinConnectionError, match="busy, another program has it open"):
+            second.open()
         with second:
             assert second.fileno() is not None
     finally:

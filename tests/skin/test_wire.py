@@ -1,6 +1,8 @@
 """Frames on the wire: the layout, the checksum, and finding frames in anything."""
 
 import random
+import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -42,6 +44,13 @@ def test_layout_byte_by_byte():
     )
     assert encode(frame) == sealed(by_hand)
     assert len(encode(frame)) == FRAME_LENGTH == 36
+
+
+def test_the_documented_bytes_are_the_encoded_ones():
+    text = (Path(__file__).parents[2] / "docs" / "wire-format.md").read_text(encoding="utf-8")
+    shown = bytes.fromhex("".join(re.findall(r"^    ((?:[0-9A-F]{2}[ ]*)+)$", text, re.MULTILINE)))
+    frame = Frame(1, 0x1234, 5, 0x40, 0x0A0B, 0x01020304, *(0x0100 + k for k in range(10)))
+    assert shown == encode(frame)
 
 
 @given(frames)
