@@ -131,6 +131,14 @@ def _square(z: Complex) -> Floats:
     return z.real * z.real + z.imag * z.imag
 
 
+def _blurred(squared: Floats, blur: Floats | None) -> Floats:
+    """A squared distance that tends to the size of the cells where it vanishes."""
+    if blur is None:
+        return squared
+    size = np.sqrt(blur[:, :, None] * blur[:, None, :])
+    return squared + size / (1.0 + (squared / (4.0 * size)) ** 2)
+
+
 def kernel(
     strip: Strip,
     first: Points,
@@ -139,6 +147,7 @@ def kernel(
     resistance_b: float,
     singular: Floats | None = None,
     diagonal: Floats | None = None,
+    blur: Floats | None = None,
 ) -> Floats:
     """Ra G_a + Rb G_b between every pair of points, without its linear part, shape (n, N, N').
 
@@ -150,6 +159,8 @@ def kernel(
         resistance_b: of the other sheet.
         singular: |z - z'|^2/a^2 of the pairs, divided out of A1, shape (N, N); its diagonal must not be zero.
         diagonal: A1 of each point with itself, after that division, shape (n, N).
+        blur: squared size of the cell around each point, where points stand for cells that may touch their own images,
+            shape (n, N).
     """
     equal = resistance_a == resistance_b
     terms = strip.terms
@@ -164,7 +175,7 @@ def kernel(
         direct /= singular
         index = np.arange(singular.shape[0])
         direct[:, index, index] = diagonal
-    corner = _square(n1 + n2 - n1 * n2)
+    corner = _blurred(_square(n1 + n2 - n1 * n2), blur)
     if terms:
         direct *= _square(np.asarray(_theta(q * (f1 * x2 + x1 * f2), q2, terms)))
         corner *= _square(np.asarray(_theta(f1 * f2 + q2 * (x1 * x2), q2, terms)))
@@ -173,8 +184,8 @@ def kernel(
     if equal:
         return out
     x2c, f2c, n2c = x2.conj(), f2.conj(), n2.conj()
-    end = _square(n1 + n2c - n1 * n2c)
-    edge = _square(first.folded[:, :, None] - second.folded.conj()[:, None, :])
+    end = _blurred(_square(n1 + n2c - n1 * n2c), blur)
+    edge = _blurred(_square(first.folded[:, :, None] - second.folded.conj()[:, None, :]), blur)
     if terms:
         end *= _square(np.asarray(_theta(f1 * f2c + q2 * (x1 * x2c), q2, terms)))
         edge *= _square(np.asarray(_theta(q * (f1 * x2c + x1 * f2c), q2, terms)))

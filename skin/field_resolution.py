@@ -70,7 +70,7 @@ def resolution(
             near |= pair < 1.0
             slowest = np.minimum(slowest, pair)
     if order is None:
-        wanted = np.where(slowest < 0.3, 0.75, 0.52) * math.log(1.0 / tolerance) / np.maximum(slowest, 1e-3)
+        wanted = np.where(slowest < 0.45, 0.75, 0.56) * math.log(1.0 / tolerance) / np.maximum(slowest, 1e-3)
         ladder = np.array(LADDER)
         orders = ladder[np.searchsorted(ladder, np.minimum(1.0 + np.ceil(wanted), LADDER[-1]))]
     else:

@@ -173,6 +173,18 @@ class SectorSheet:
         y, rest = self.across(phi)
         return np.stack([u, self.width - u, to_edge(y), to_edge(rest)], axis=-1)
 
+    def offsets(self, local: NDArray[np.complex128], u: float) -> NDArray[np.complex128]:
+        """Offsets x + i y in the rectangle of flat offsets along (e_u, e_phi) from a point at slant distance u [m]."""
+        stretch = float(self.stretch(u))
+        if self.curvature == 0.0:
+            return local / stretch
+        bent = local * (self.curvature / stretch)
+        # numpy's complex log1p loses digits near zero; the two real functions do not.
+        out = np.empty_like(local)
+        np.multiply(0.5 * np.log1p(2.0 * bent.real + bent.real**2 + bent.imag**2), 1.0 / self.curvature, out=out.real)
+        np.multiply(np.arctan2(bent.imag, 1.0 + bent.real), 1.0 / self.curvature, out=out.imag)
+        return out
+
     def flat(self, u: ArrayLike, phi: ArrayLike, at: tuple[float, float]) -> NDArray[np.complex128]:
         """Flat coordinates along (e_u, e_phi) of the point `at`, measured from it [m], complex."""
         x, _ = self.along(u)
