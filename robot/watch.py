@@ -14,6 +14,8 @@ class Watch:
     Attributes:
         skin_silence: longest age of a sensor's newest valid frame [s].
         skin_late: longest time that frames may lag behind the device's clock [s].
+        stuck_frames: frames in which the drive currents or the supply show no noise at all, from which on the device
+            counts as stuck; 0 where its readings truly have no noise.
         arm_silence: longest age of the controller's newest state [s].
         escalate: without slowdown for this long after a stop, the next way to stop is taken [s].
         standstill: joint speed below which the arm stands [rad/s].
@@ -22,6 +24,7 @@ class Watch:
 
     skin_silence: float = 0.05
     skin_late: float = 0.05
+    stuck_frames: int = 1000
     arm_silence: float = 0.05
     escalate: float = 0.025
     standstill: float = 0.01

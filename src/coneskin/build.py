@@ -33,7 +33,7 @@ def build_core(scene: Scene) -> GuardCore:
     from .skin.timing import TimingLimits
 
     watch = scene.watch or Watch()
-    detection = Detection(timing=TimingLimits(late=watch.skin_late))
+    detection = Detection(stuck_frames=watch.stuck_frames, timing=TimingLimits(late=watch.skin_late))
     stream = Stream([item.sensor for item in scene.sensors], detection)
     sensors = [GuardedSensor(item.name, item.link_name, item.link, item.place) for item in place_on_arm(scene)]
     return GuardCore(stream, sensors, watch, _arm(scene, watch) if scene.arm else None)

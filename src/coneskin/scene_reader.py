@@ -62,6 +62,7 @@ _REACTION = (
 _WATCH = (
     Key("skin_silence_ms", low=2.0, high=1000.0),
     Key("skin_late_ms", low=2.0, high=1000.0),
+    Key("stuck_frames", int, low=0, high=1_000_000),
     Key("arm_silence_ms", low=4.0, high=1000.0),
     Key("escalate_ms", low=4.0, high=500.0),
     Key("standstill_rad_s", low=1e-4, high=0.1),
