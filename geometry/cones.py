@@ -157,8 +157,9 @@ def find_cones(
             raise GeometryError(f"{name} must be above 0 m, got {value!r}")
     if max_sheets < 1:
         raise GeometryError(f"max_sheets must be at least 1, got {max_sheets!r}")
-    if wrap is not None and not 0.0 < wrap <= TURN:
-        raise GeometryError(f"wrap must be above 0 and at most a full turn (2 pi rad), got {wrap!r} rad")
+    for name, angle in (("wrap", TURN if wrap is None else wrap), ("narrowest", narrowest)):
+        if not 0.0 < angle <= TURN:
+            raise GeometryError(f"{name} must be above 0 and at most a full turn (2 pi rad), got {angle!r} rad")
     say = progress or (lambda _: None)
     rules = Rules(tolerance, max_sheets, wrap, shortest, narrowest, bridge, np.asarray(seam, float))
     say("sampling the hull")
