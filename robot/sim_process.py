@@ -24,7 +24,29 @@ from typing import Any
 
 from coneskin.errors import RobotConnectionError, RobotTimeout
 
-__all__ = ["SimulatedController"]
+from .sim_server import PORTS
+
+__all__ = ["SimulatedController", "free_host"]
+
+
+def free_host() -> str:
+    """A loopback address on which no other simulated controller listens, so that tests can run side by side.
+
+    Linux answers on all of 127.0.0.0/8; elsewhere there may be 127.0.0.1 alone.
+    """
+    if not sys.platform.startswith("linux"):
+        return "127.0.0.1"
+    start = os.getpid() * 7
+    for number in range(start, start + 500):
+        host = f"127.{1 + number // 62500 % 250}.{number // 250 % 250}.{1 + number % 250}"
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((host, PORTS["RTDE"]))
+            except OSError:
+                continue
+            return host
+    raise RobotConnectionError("no loopback address is free for a simulated controller: 500 were tried")
 
 
 class SimulatedController:

@@ -1,0 +1,48 @@
+"""Run calls of the real ur_rtde wheel where they can do no harm: in a child process with a hard time limit.
+
+The wheel can block for 301 s, abort, or crash the process, so no test may call it in its own. The calls are the
+functions of `wheel_calls`; what they return comes back as JSON, and the child leaves without the wheel's destructors.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+_CHILD = (
+    "import json, os, sys; from tests.robot import wheel_calls as calls; "
+    "result = getattr(calls, sys.argv[1])(*json.loads(sys.argv[2])); "
+    "print(); print('RESULT ' + json.dumps(result), flush=True); os._exit(0)"
+)
+
+
+def start(call: str, *arguments: Any) -> subprocess.Popen[str]:
+    """Begin a call; the caller ends the process."""
+    return subprocess.Popen(
+        [sys.executable, "-c", _CHILD, call, json.dumps(arguments)],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def run(call: str, *arguments: Any, limit: float = 20.0) -> Any:
+    """The result of a function of `wheel_calls`; an AssertionError if it crashed or took longer than the limit [s]."""
+    process = start(call, *arguments)
+    try:
+        said, _ = process.communicate(timeout=limit)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        said, _ = process.communicate()
+        raise AssertionError(f"{call} took longer than {limit} s; it said: {said}") from None
+    lines = [line for line in said.splitlines() if line.startswith("RESULT ")]
+    assert process.returncode == 0, f"{call} ended with {process.returncode}; it said: {said}"
+    assert lines, f"{call} has no result; it said: {said}"
+    return json.loads(lines[-1].removeprefix("RESULT "))

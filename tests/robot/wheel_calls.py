@@ -1,0 +1,432 @@
+"""What the tests do with the real wheel: each function runs alone in a child process (see `wheel`), returns JSON."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import dashboard_client
+import rtde_control
+import rtde_io
+import rtde_receive
+
+Joints = list[float]
+
+
+def _until(condition: Callable[[], bool], limit: float = 5.0) -> bool:
+    deadline = time.monotonic() + limit
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.002)
+    return True
+
+
+def _dashboard(host: str) -> Any:
+    client = dashboard_client.DashboardClient(host)
+    client.connect()
+    return client
+
+
+def _lead(values: Joints) -> float:
+    return max(abs(value) for value in values)
+
+
+def _refusal(call: Callable[..., Any], *arguments: Any) -> str:
+    try:
+        call(*arguments)
+    except Exception as exc:
+        return str(exc)
+    return ""
+
+
+def receive_everything(host: str) -> dict[str, Any]:
+    """All getters of the default list of variables."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    other = (
+        "getDigitalInState",
+        "getDigitalOutState",
+        "getOutputIntRegister",
+        "getOutputDoubleRegister",
+        "getRobotStatus",
+    )
+    names = [name for name in dir(receive) if name.startswith("get") and name not in other]
+    got = {name: getattr(receive, name)() for name in names}
+    first = receive.getTimestamp()
+    time.sleep(0.3)
+    got["elapsed"] = receive.getTimestamp() - first
+    got["register"] = receive.getOutputIntRegister(12) + receive.getOutputDoubleRegister(12)
+    return got
+
+
+def moves(host: str) -> dict[str, Any]:
+    """Every kind of move, one after the other; how far from the target each ends."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    home = receive.getActualQ()
+    away = [q + 0.3 for q in home]
+    out: dict[str, Any] = {}
+
+    def joints_off(target: Joints) -> float:
+        return _lead([a - b for a, b in zip(receive.getActualQ(), target, strict=True)])
+
+    def pose_off(target: Joints) -> float:
+        return _lead([a - b for a, b in zip(receive.getActualTCPPose(), target, strict=True)])
+
+    begin = time.monotonic()
+    out["moveJ"] = (control.moveJ(away, 2.0, 10.0), joints_off(away))
+    out["moveJ_time"] = time.monotonic() - begin
+    pose = receive.getActualTCPPose()
+    pose[2] += 0.05
+    pose[0] += 0.05
+    out["moveL"] = (control.moveL(pose, 0.5, 3.0), pose_off(pose))
+    out["moveL_FK"] = (control.moveL_FK(away, 1.0, 3.0), joints_off(away))
+    out["moveJ_IK"] = (control.moveJ_IK(pose, 2.0, 10.0), pose_off(pose))
+    path = [[*away, 2.0, 10.0, 0.0], [*home, 2.0, 10.0, 0.0]]
+    out["path"] = (control.moveJ(path), joints_off(home))
+    poses = [[*pose, 0.5, 3.0, 0.0]]
+    out["tool_path"] = (control.moveL(poses), pose_off(pose))
+
+    before = control.getAsyncOperationProgressEx().operationId()
+    out["async"] = [control.moveJ(home, 1.0, 5.0, True)]
+
+    def running() -> bool:
+        return bool(control.getAsyncOperationProgressEx().isAsyncOperationRunning())
+
+    out["async"] += [_until(running), control.getAsyncOperationProgress()]
+    out["async"] += [_until(lambda: not running()), joints_off(home)]
+    out["async_id"] = (control.getAsyncOperationProgressEx().operationId() - before) % 128
+    return out
+
+
+def stops(host: str) -> dict[str, Any]:
+    """Every stop on the motion that it can stop: how long it took, and what moved after it."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    out: dict[str, Any] = {}
+    home = receive.getActualQ()
+    far = [home[0] + 2.0, *home[1:]]
+    twist = [0.0, 0.1, 0.0, 0.0, 0.0, 0.0]
+
+    def move() -> None:
+        control.moveJ(far, 1.0, 10.0, True)
+
+    def speed_joints() -> None:
+        control.speedJ([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
+
+    def speed_tool() -> None:
+        control.speedL(twist, 1.0, 0.0)
+
+    def servo() -> None:
+        q = receive.getActualQ()
+        control.servoJ([q[0] + 1.5, *q[1:]], 0.0, 0.0, 0.002, 0.2, 100)
+
+    cases: list[tuple[str, Callable[[], None], Callable[[], Any]]] = [
+        ("stopJ after moveJ", move, lambda: control.stopJ(5.0)),
+        ("speedStop after speedJ", speed_joints, lambda: control.speedStop(5.0)),
+        ("speedStop after speedL", speed_tool, lambda: control.speedStop(2.0)),
+        ("servoStop after servoJ", servo, lambda: control.servoStop(5.0)),
+        ("stopL async after moveJ", move, lambda: control.stopL(5.0, True)),
+    ]
+    for name, begin, stop in cases:
+        begin()
+        time.sleep(0.2)
+        fast = _lead(receive.getActualQd())
+        speed = receive.getActualTCPSpeed()
+        start = time.monotonic()
+        stop()
+        taken = time.monotonic() - start
+        _until(lambda: _lead(receive.getActualQd()) == 0.0)
+        out[name] = (fast, speed, taken, time.monotonic() - start, control.isProgramRunning())
+    control.moveJ(home, 3.0, 20.0)
+    return out
+
+
+def questions(host: str, q: Joints, tool: Joints) -> dict[str, Any]:
+    """Kinematics and the other questions that move nothing."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    out: dict[str, Any] = {"q": receive.getActualQ()}
+    out["fk_tool"] = control.getForwardKinematics(q, tool)
+    out["setTcp"] = control.setTcp(tool)
+    out["tcp_offset"] = control.getTCPOffset()
+    out["fk_here"] = control.getForwardKinematics()
+    out["pose"] = receive.getActualTCPPose()
+    out["ik"] = control.getInverseKinematics(out["pose"])
+    out["ik_near"] = control.getInverseKinematics(out["fk_tool"], q)
+    out["has"] = [control.getInverseKinematicsHasSolution(p) for p in (out["pose"], [3.0, 0, 0, 0, 0, 0])]
+    out["jacobian"] = control.getJacobian()
+    out["trans"] = control.poseTrans([1, 2, 3, 0, 0, 1.0], [0.1, 0, 0, 0.5, 0, 0])
+    out["steady"] = control.isSteady()
+    out["pose_within"] = [control.isPoseWithinSafetyLimits(p) for p in (out["pose"], [3.0, 0, 0, 0, 0, 0])]
+    out["q_within"] = [control.isJointsWithinSafetyLimits(p) for p in (out["q"], [7.0, 0, 0, 0, 0, 0])]
+    for _ in range(3):  # the first answers are stale: see the quirks
+        out["step"] = control.getStepTime()
+        time.sleep(0.01)
+    for _ in range(3):
+        out["flange"] = control.getActualToolFlangePose()
+        time.sleep(0.01)
+    control.setPayload(1.5, [0.0, 0.0, 0.1])
+    _until(lambda: receive.getPayload() == 1.5)
+    out["payload"] = (receive.getPayload(), receive.getPayloadCog())
+    control.setTcp([0.0] * 6)
+    return out
+
+
+def inputs_and_outputs(host: str) -> dict[str, Any]:
+    """Slider, digital and analog outputs, registers."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    io = rtde_io.RTDEIOInterface(host)
+    io.setStandardDigitalOut(3, True)
+    io.setConfigurableDigitalOut(1, True)
+    io.setToolDigitalOut(0, True)
+    io.setAnalogOutputVoltage(0, 0.5)
+    wanted = 1 << 3 | 1 << 9 | 1 << 16
+    out: dict[str, Any] = {"bits": _until(lambda: receive.getActualDigitalOutputBits() == wanted)}
+    io.setStandardDigitalOut(3, False)
+    out["off"] = _until(lambda: not receive.getDigitalOutState(3))
+    out["analog"] = receive.getStandardAnalogOutput0()
+    home = receive.getActualQ()
+    control.moveJ([home[0] + 2.0, *home[1:]], 1.0, 10.0, True)
+    time.sleep(0.25)
+    out["full"] = _lead(receive.getActualQd())
+    io.setSpeedSlider(0.5)
+    time.sleep(0.2)
+    out["half"] = (_lead(receive.getActualQd()), receive.getTargetSpeedFraction())
+    io.setSpeedSlider(0.0)
+    time.sleep(0.2)
+    out["none"] = _lead(receive.getActualQd())
+    io.setSpeedSlider(1.0)
+    time.sleep(0.2)
+    out["again"] = _lead(receive.getActualQd())
+    control.stopJ(10.0)
+    control.moveJ(home, 3.0, 20.0)
+    return out
+
+
+def protective_stop(host: str) -> dict[str, Any]:
+    """Protective stop in the middle of a move, unlock too early, unlock, play: the move goes on to its end."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    dashboard = _dashboard(host)
+    home = receive.getActualQ()
+    target = [home[0] + 0.6, *home[1:]]
+    control.moveJ(target, 1.0, 5.0, True)
+    time.sleep(0.3)
+    out: dict[str, Any] = {"returned": control.triggerProtectiveStop()}
+    _until(lambda: _lead(receive.getActualQd()) == 0.0)
+    out["state"] = (receive.isProtectiveStopped(), receive.getSafetyMode(), receive.getSafetyStatusBits())
+    out["runtime"] = receive.getRuntimeState()
+    out["safety"] = (dashboard.safetymode(), dashboard.safetystatus())
+    out["before"] = receive.getActualQ()[0] - home[0]
+    out["early"] = _refusal(dashboard.unlockProtectiveStop)
+    out["play"] = _refusal(dashboard.play)
+    out["unlocked"] = _until(lambda: not _refusal(dashboard.unlockProtectiveStop))
+    time.sleep(0.1)
+    out["still"] = _lead(receive.getActualQd())
+    dashboard.play()
+    out["arrives"] = _until(lambda: _lead([a - b for a, b in zip(receive.getActualQ(), target, strict=True)]) == 0.0)
+    control.moveJ(home, 3.0, 20.0)
+    return out
+
+
+def scripts(host: str) -> dict[str, Any]:
+    """Stop, upload again, a script of one's own, pause and play."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    dashboard = _dashboard(host)
+    home = receive.getActualQ()
+    control.stopScript()
+    out: dict[str, Any] = {"stopped": control.isProgramRunning(), "refused": control.moveJ(home)}
+    control.reuploadScript()
+    out["again"] = (_until(control.isProgramRunning), control.moveJ(home))
+    out["custom"] = control.sendCustomScriptFunction("mine", "movej([0.1, -1.5, 1.5, -1.5, -1.5, 0], a=20, v=3)")
+    out["custom_q"] = receive.getActualQ()
+    control.moveJ([home[0] + 1.0, *home[1:]], 1.0, 10.0, True)
+    time.sleep(0.2)
+    dashboard.pause()
+    out["paused"] = _until(lambda: _lead(receive.getActualQd()) == 0.0)
+    out["paused_state"] = (dashboard.programState(), receive.getRuntimeState(), dashboard.running())
+    dashboard.play()
+    out["played"] = _until(lambda: _lead(receive.getActualQd()) == 1.0)
+    dashboard.stop()
+    out["ended"] = _until(lambda: _lead(receive.getActualQd()) == 0.0)
+    out["ended_state"] = (dashboard.programState(), receive.getRuntimeState())
+    return out
+
+
+def dashboard_lines(host: str) -> dict[str, Any]:
+    """All commands of the wheel's dashboard client."""
+    client = _dashboard(host)
+    out: dict[str, Any] = {}
+    for name in ("polyscopeVersion", "getSerialNumber", "isInRemoteControl", "running", "programState", "robotmode"):
+        out[name] = getattr(client, name)()
+    for name in ("safetymode", "safetystatus", "isProgramSaved", "getRobotModel", "getLoadedProgram"):
+        out[name] = getattr(client, name)()
+    client.loadURP("a.urp")
+    client.popup("hello")
+    client.addToLog("hello")
+    for name in ("closePopup", "closeSafetyPopup", "stop", "unlockProtectiveStop", "powerOff"):
+        getattr(client, name)()
+    out["off"] = client.robotmode()
+    client.powerOn()
+    client.brakeRelease()
+    client.restartSafety()
+    out["on"] = client.robotmode()
+    out["play"] = _refusal(client.play)
+    out["pause"] = _refusal(client.pause)
+    client.quit()
+    return out
+
+
+def second_control(host: str) -> dict[str, Any]:
+    """A second client that wants to control is refused, and the first goes on."""
+    control = rtde_control.RTDEControlInterface(host)
+    home = rtde_receive.RTDEReceiveInterface(host).getActualQ()
+    refusal = _refusal(rtde_control.RTDEControlInterface, host)
+    unknown = _refusal(rtde_receive.RTDEReceiveInterface, host, -1.0, ["timestamp", "actual_qqq"])
+    return {"refusal": refusal, "unknown": unknown, "first": control.moveJ([home[0] + 0.05, *home[1:]], 3.0, 20.0)}
+
+
+def watchdog(host: str) -> dict[str, Any]:
+    """Fed, the program runs; not fed, it ends and the arm stops."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    control.setWatchdog(10.0)
+    for _ in range(10):
+        control.kickWatchdog()
+        time.sleep(0.03)
+    out: dict[str, Any] = {"fed": control.isProgramRunning()}
+    control.speedJ([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
+    out["moved"] = _until(lambda: receive.getActualQd()[0] == 0.5)
+    out["ended"] = _until(lambda: not control.isProgramRunning())
+    out["stands"] = _until(lambda: receive.getActualQd()[0] == 0.0)
+    return out
+
+
+def speed_for_ever(host: str) -> None:
+    """Start a speed under a watchdog and never come back: the test kills this process."""
+    control = rtde_control.RTDEControlInterface(host)
+    control.setWatchdog(20.0)
+    while True:
+        control.speedJ([0.3, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
+        time.sleep(0.01)
+
+
+def sync_move_ignores_stops(host: str) -> dict[str, Any]:
+    """While a synchronous move runs, a stop from another thread is lost; the dashboard's is not."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    dashboard = _dashboard(host)
+    home = receive.getActualQ()
+    out: dict[str, Any] = {}
+    far = [home[0] + 0.5, *home[1:]]
+    mover = threading.Thread(target=control.moveJ, args=(far, 1.0, 10.0))
+    mover.start()
+    time.sleep(0.2)
+    stopper = threading.Thread(target=control.stopJ, args=(10.0,))
+    stopper.start()
+    time.sleep(0.15)
+    out["after_stopJ"] = _lead(receive.getActualQd())
+    stopper.join()
+    mover.join()
+    out["arrived"] = receive.getActualQ()[0] - home[0]
+    mover = threading.Thread(target=control.moveJ, args=(home, 1.0, 10.0), daemon=True)
+    mover.start()
+    time.sleep(0.2)
+    dashboard.stop()
+    out["after_dashboard"] = _until(lambda: _lead(receive.getActualQd()) == 0.0, 0.3)
+    out["left"] = receive.getActualQ()[0] - home[0]
+    return out
+
+
+def stop_in_speed_mode(host: str) -> dict[str, Any]:
+    """stopJ while the speed thread runs."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    control.speedJ([0.2, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
+    _until(lambda: receive.getActualQd()[0] == 0.2)
+    control.stopJ(2.0)
+    stands = _until(lambda: receive.getActualQd()[0] == 0.0)
+    time.sleep(0.05)
+    return {"running": control.isProgramRunning(), "stands": stands, "moves": control.moveJ(receive.getActualQ())}
+
+
+def stop_types(host: str) -> dict[str, Any]:
+    """How long stopJ(2.0) takes before and after one asynchronous stopL. The tool moves, and does not turn."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    home = receive.getActualQ()
+    taken = []
+    for _ in range(2):
+        control.moveJ([*home[:2], home[2] + 1.0, home[3] - 1.0, *home[4:]], 1.0, 20.0, True)
+        _until(lambda: _lead(receive.getActualQd()) == 1.0)
+        begin = time.monotonic()
+        control.stopJ(2.0)
+        taken.append(time.monotonic() - begin)
+        control.moveJ(home, 3.0, 20.0)
+        control.stopL(10.0, True)
+        time.sleep(0.02)
+    return {"taken": taken}
+
+
+def latched_speed(host: str) -> dict[str, Any]:
+    """After a dashboard stop in speed mode the command is still in its register: a new upload starts the arm."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    dashboard = _dashboard(host)
+    control.speedJ([0.2, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
+    _until(lambda: receive.getActualQd()[0] == 0.2)
+    dashboard.stop()
+    out = {"stands": _until(lambda: receive.getActualQd()[0] == 0.0)}
+    control.reuploadScript()
+    out["moves"] = _until(lambda: receive.getActualQd()[0] == 0.2, 1.0)
+    control.speedStop(10.0)
+    return out
+
+
+def stale_forward_kinematics(host: str, q: Joints) -> dict[str, Any]:
+    """getForwardKinematics(q) without a tool, after a command that used the same registers."""
+    control = rtde_control.RTDEControlInterface(host)
+    here = rtde_receive.RTDEReceiveInterface(host).getActualQ()
+    control.moveJ(here, 1.0, 1.0)
+    return {"fk": control.getForwardKinematics(q)}
+
+
+def connect_and_move(host: str) -> dict[str, Any]:
+    """The least that any version must do."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    control = rtde_control.RTDEControlInterface(host)
+    target = receive.getActualQ()
+    target[0] += 0.1
+    moved = control.moveJ(target, 3.0, 20.0)
+    return {"moved": moved, "off": _lead([a - b for a, b in zip(receive.getActualQ(), target, strict=True)])}
+
+
+def notice_silence(host: str, pid: int) -> dict[str, Any]:
+    """Freeze the controller: when the wheel notices."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    os.kill(pid, 19)  # SIGSTOP
+    begin = time.monotonic()
+    noticed = _until(lambda: not receive.isConnected(), 5.0)
+    taken = time.monotonic() - begin
+    os.kill(pid, 18)  # SIGCONT
+    return {"noticed": noticed, "taken": taken, "again": receive.reconnect(), "q": receive.getActualQ()}
+
+
+def notice_close(host: str) -> dict[str, Any]:
+    """Wait for the test to close the RTDE connections."""
+    receive = rtde_receive.RTDEReceiveInterface(host)
+    print("CONNECTED", flush=True)
+    return {"noticed": _until(lambda: not receive.isConnected(), 5.0)}
+
+
+def silent_dashboard(host: str) -> dict[str, Any]:
+    """A dashboard that answers nothing: an error, not a hang."""
+    begin = time.monotonic()
+    refusal = _refusal(_dashboard, host)
+    return {"refusal": refusal, "taken": time.monotonic() - begin}
