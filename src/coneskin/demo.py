@@ -76,14 +76,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the run (default runs/demo-TIME)")
     parser.add_argument("--reaction", choices=("stop", "retreat"), default="retreat", help="(default retreat)")
-    parser.add_argument("--host", default="127.0.0.1", help="loopback address of the simulated controller")
+    parser.add_argument("--host", help="loopback address for the simulated controller (default: a free one)")
     parser.add_argument("--json", action="store_true", help="print one JSON object at the end")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo."""
     from .replay import read_run, replay
-    from .robot.sim_process import SimulatedController
+    from .robot.sim_process import SimulatedController, free_host
     from .scene_reader import parse_scene
 
     folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
@@ -91,7 +91,8 @@ def run(args: argparse.Namespace) -> int:
         folder.mkdir(parents=True)
     except OSError as exc:
         raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
-    text = SCENE.format(host=args.host, reaction=args.reaction)
+    host = args.host or free_host()
+    text = SCENE.format(host=host, reaction=args.reaction)
     (folder / "scene.toml").write_text(text, encoding="utf-8")
     scene = parse_scene(text, "scene.toml", folder)
 
@@ -101,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
     say("coneskin demo: a simulated UR5e with a virtual skin on its forearm. Not a safety-rated device.")
     start_q = [math.radians(q) for q in _FROM_DEG]
-    with SimulatedController(model="UR5e", host=args.host, start_q=start_q):
+    with SimulatedController(model="UR5e", host=host, start_q=start_q):
         touched = _collide(scene, folder, say)
     recorded = read_run(folder)
     again = replay(recorded)

@@ -1,0 +1,239 @@
+"""The whole chain with the unmodified wheel: virtual skin -> pseudo-terminal -> pyserial -> guard -> ur_rtde -> arm.
+
+The arm is a simulated controller in a process of its own; what it measures decides. Every wait has an end.
+"""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from coneskin.errors import Collision, RobotConnectionError, RobotRefused, SkinConnectionError
+from coneskin.replay import read_run, replay
+from coneskin.scene_reader import parse_scene
+from coneskin.session import guard
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
+pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
+
+from coneskin.robot.sim_process import SimulatedController, free_host  # noqa: E402
+
+START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
+GOAL = [math.radians(60.0), *START[1:]]
+# long silences: the machine that runs the tests may stall a pseudo-terminal; the limits themselves are tested in
+# virtual time (test_guard_core)
+SCENE = """\
+[arm]
+model = "UR5e"
+host = "{host}"
+[[link]]
+name = "forearm"
+[[link.sensor]]
+radius1_mm = 37.6
+radius2_mm = 37.2
+height_mm = 260
+xyz_mm = [0, 0, 80]
+[source]
+kind = "virtual"
+[reaction]
+kind = "retreat"
+distance_mm = 30
+[watch]
+skin_silence_ms = 400
+skin_late_ms = 400
+arm_silence_ms = 300
+"""
+
+
+@pytest.fixture
+def controller():
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+        yield simulated
+
+
+def scene_for(simulated, **changes):
+    text = SCENE.format(host=simulated.host)
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    return parse_scene(text)
+
+
+def moving(session):
+    """Start the long move from a thread; what it raised is in the list that is returned."""
+    raised = []
+
+    def move():
+        try:
+            session.arm.move_j(GOAL, speed=1.0, acceleration=4.0)
+            raised.append(None)
+        except Exception as exc:
+            raised.append(exc)
+
+    thread = threading.Thread(target=move)
+    thread.start()
+    return thread, raised
+
+
+def until(what, seconds=10.0):
+    end = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.005)
+
+
+def fast(simulated):
+    return max(map(abs, simulated.state()["qd"])) > 0.9
+
+
+def run_until_moving(simulated, session):
+    thread, raised = moving(session)
+    until(lambda: fast(simulated))
+    return thread, raised
+
+
+def assert_stopped_on_the_way(simulated):
+    state = simulated.wait_standing()
+    assert state["q"][0] < GOAL[0] - 0.1, "the arm went on to its goal"
+
+
+def test_the_demo(tmp_path):
+    command = [sys.executable, "-m", "coneskin", "demo", "--json", "-o", str(tmp_path / "run")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=90)
+    assert done.returncode == 0, done.stdout + done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["contacts"] == 1
+    assert facts["same_in_replay"] is True
+    assert 0.0 < facts["frame_ms"] <= facts["command_ms"] < facts["slower_ms"] < facts["standstill_ms"]
+    assert facts["retreat_mm"] == pytest.approx(50.0, abs=1.0)  # 0.5 mm are left for braking
+    assert facts["u_mm"] == pytest.approx(130.0, abs=2.0)  # 12 bits and 0.7 counts of noise: 0.1 mm
+    assert {p.name for p in (tmp_path / "run").iterdir()} >= {"run.rec", "scene.toml", "summary.json"}
+
+
+def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tmp_path):
+    path = tmp_path / "run.rec"
+    with guard(scene_for(controller), recording=path) as session:
+        thread, raised = run_until_moving(controller, session)
+        session.touch(0.13, 1.55, duration=0.2)
+        thread.join(20)
+        assert isinstance(raised[0], Collision)
+        assert_stopped_on_the_way(controller)
+        with pytest.raises(Collision):
+            session.arm.move_j(GOAL)
+        session.reset()
+        session.arm.move_j(START, speed=1.0, acceleration=4.0)
+        assert controller.state()["q"] == pytest.approx(START, abs=1e-3)
+    run = read_run(path)
+    assert run.missing == ""
+    assert replay(run).same
+
+
+def kill(session, name, number=signal.SIGKILL):
+    os.kill(session._children[name].pid, number)
+
+
+def test_the_guard_killed_the_owner_stops_the_arm(controller, tmp_path):
+    path = tmp_path / "run.rec"
+    with guard(scene_for(controller), recording=path) as session:
+        thread, raised = run_until_moving(controller, session)
+        kill(session, "guard")
+        thread.join(20)
+        assert isinstance(raised[0], RobotConnectionError)
+        assert_stopped_on_the_way(controller)
+    assert replay(read_run(path)).same  # up to the last that it sent
+
+
+def test_the_owner_killed_the_guard_stops_the_arm(controller):
+    with guard(scene_for(controller)) as session:
+        thread, raised = run_until_moving(controller, session)
+        kill(session, "owner")
+        thread.join(20)
+        assert isinstance(raised[0], RobotRefused | RobotConnectionError)
+        assert_stopped_on_the_way(controller)
+        latched = session.wait_for(("latched",), 5.0)
+        assert "the process that owns ur_rtde has ended" in latched.details["why"]
+
+
+def test_the_owner_frozen_another_way_stops_the_arm(controller):
+    with guard(scene_for(controller)) as session:
+        thread, raised = run_until_moving(controller, session)
+        kill(session, "owner", signal.SIGSTOP)
+        session.touch(0.13, 1.55)
+        thread.join(20)
+        assert isinstance(raised[0], Collision)
+        assert_stopped_on_the_way(controller)
+        assert session.wait_for(("escalated",), 1.0).details["way"] == "script"
+        kill(session, "owner", signal.SIGKILL)
+
+
+def test_the_skin_unplugged_stops_the_arm(controller):
+    with guard(scene_for(controller)) as session:
+        thread, raised = run_until_moving(controller, session)
+        kill(session, "skin")
+        thread.join(20)
+        assert isinstance(raised[0], RobotRefused)
+        assert_stopped_on_the_way(controller)
+
+
+def test_a_frozen_controller_is_a_fault_and_stops_when_it_wakes(controller):
+    with guard(scene_for(controller)) as session:
+        thread, raised = run_until_moving(controller, session)
+        controller.freeze()
+        fault = session.wait_for(("fault",), 5.0)
+        controller.thaw()
+        assert "has sent no state" in fault.details["what"]
+        assert_stopped_on_the_way(controller)
+        thread.join(20)
+        assert isinstance(raised[0], RobotRefused)
+
+
+def test_the_program_killed_the_arm_stops(controller, tmp_path):
+    """Program and supervisor in one process, killed with SIGKILL: guard and owner see their channels end."""
+    (tmp_path / "scene.toml").write_text(SCENE.format(host=controller.host))
+    code = (
+        "import sys\nfrom coneskin.session import guard\n"
+        "with guard(sys.argv[1]) as g:\n"
+        f"    g.arm.move_j({GOAL}, 1.0, 4.0)\n"
+    )
+    program = subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "scene.toml")])
+    try:
+        until(lambda: fast(controller), 30.0)
+    finally:
+        program.kill()
+        program.wait()
+    assert_stopped_on_the_way(controller)
+
+
+def test_a_protective_stop_is_never_unlocked(controller):
+    with guard(scene_for(controller)) as session:
+        thread, raised = run_until_moving(controller, session)
+        controller.call("protective stop")
+        thread.join(20)
+        assert isinstance(raised[0], RobotRefused)
+        assert_stopped_on_the_way(controller)
+        with pytest.raises(RobotRefused, match="the controller's own safety system holds the arm"):
+            session.reset()
+
+
+def test_a_controller_that_is_not_there_is_one_clear_line():
+    scene = parse_scene(SCENE.format(host=free_host()))
+    with pytest.raises(RobotConnectionError, match=r"cannot reach the controller 127\..*Connection refused"):
+        guard(scene, start_timeout=10.0).__enter__()
+
+
+def test_a_port_that_is_not_there_is_one_clear_line(controller):
+    scene = scene_for(controller, **{'kind = "virtual"': 'kind = "serial"\nport = "/dev/ttyNOWHERE"'})
+    with pytest.raises(SkinConnectionError, match="/dev/ttyNOWHERE"):
+        guard(scene, start_timeout=10.0).__enter__()
+
+
+def test_a_touched_skin_does_not_arm(controller):
+    touched = "[source.touch]]\nstart_s = 0\nend_s = 100\nu_mm = 100\nphi_deg = 10\n[reaction]"
+    scene = scene_for(controller, **{"[reaction]": "[" + touched})
+    with pytest.raises(RobotRefused, match="it is touched"):
+        guard(scene, start_timeout=3.0).__enter__()
