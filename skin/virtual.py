@@ -217,10 +217,9 @@ class VirtualSkin:
             cone = sensor.frustum
             contacts.append(Contact(0.5 * cone.slant, 0.5 * cone.wrap, leak))
         for touch in self._touches[sensor.name]:
-            if touch.start < time < touch.end:
-                conductance = real.conductance(touch.force_at(time))
-                if conductance > 0.0:
-                    contacts.append(Contact(touch.u, touch.phi, conductance, touch.radius))
+            conductance = real.conductance(touch.force_at(time))
+            if conductance > 0.0:
+                contacts.append(Contact(touch.u, touch.phi, conductance, touch.radius))
         key = tuple(contacts)
         known = self._cache.get(sensor.name)
         if known is None or known[0] != key:

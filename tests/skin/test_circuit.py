@@ -37,6 +37,15 @@ def test_no_contact_leaves_two_separate_resistors():
     assert y[0][2] == y[0][3] == y[1][2] == y[1][3] == 0.0
 
 
+def test_contacts_at_one_place_or_on_an_edge_add_up():
+    places = [(0.05, 1.0), (0.0, 0.0), (CONE.slant, CONE.wrap)]
+    for u, phi in places:
+        one = Ladder().admittance(SENSOR, [Contact(u, phi, 2e-3)])
+        two = Ladder().admittance(SENSOR, [Contact(u, phi, 1e-3), Contact(u, phi, 1e-3)])
+        for row, other in zip(one, two, strict=True):
+            assert row == pytest.approx(other, rel=1e-5, abs=1e-8)  # nodes are at least 1e-6 of a sheet apart
+
+
 def test_one_contact_by_hand():
     # B = 2.5 V, A = 0, the contact at a quarter of the upper sheet from B: the guides read the divider's potential,
     # loaded by two 10 Mohm resistors behind divider, contact and half the lower sheet each

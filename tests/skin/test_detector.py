@@ -103,6 +103,41 @@ def test_the_place_is_certain_once_two_frames_agree():
     assert bench.feed(FIRM, times=100) == []
 
 
+def test_the_two_frames_must_follow_each_other():
+    bench = Bench()
+    bench.feed(times=100)
+    bench.feed(FIRM)
+    bench.feed(FIRM, status=8)
+    assert not any(isinstance(event, TouchMoved) for event in bench.feed(FIRM))
+    (moved,) = bench.feed(FIRM)
+    assert isinstance(moved, TouchMoved)
+    assert moved.location_valid
+
+
+def test_an_uncertain_place_does_not_replace_a_certain_one():
+    bench = Bench()
+    bench.feed(times=100)
+    bench.feed(FIRM, times=5)
+    (moved,) = bench.feed([Contact(0.3, 5.0, 3e-5)])  # light and elsewhere
+    assert isinstance(moved, TouchMoved)
+    assert not moved.location_valid
+    assert (moved.u, moved.phi) == (pytest.approx(0.2, abs=2e-4), pytest.approx(1.0, abs=3e-3))
+    (ended,) = bench.feed(times=10)
+    assert isinstance(ended, TouchEnded)
+    assert (ended.u, ended.location_valid) == (moved.u, True)
+
+
+def test_a_frame_from_the_past_neither_begins_nor_ends_a_touch():
+    bench = Bench()
+    bench.feed(times=100)
+    old = {"sequence": 50, "clock_us": 50_000}
+    assert faults_of(bench.feed(FIRM, times=10, **old)) == [Fault.REPLAYED]
+    assert not bench.detector.touched
+    bench.feed(FIRM)
+    bench.feed(times=10, **old)
+    assert bench.detector.touched
+
+
 def test_hysteresis_between_the_thresholds():
     bench = Bench()
     bench.feed(times=100)
@@ -128,9 +163,9 @@ def test_movement_is_reported_in_steps():
 
 
 def test_a_lasting_contact_is_never_zeroed_away():
-    skin = VirtualSkin(SENSOR, [ScriptedTouch(0.2, math.inf, 0.2, 1.0, force=0.6)], rate_hz=20, duration=3600.0)
+    skin = VirtualSkin(SENSOR, [ScriptedTouch(0.2, math.inf, 0.2, 1.0, force=0.6)], rate_hz=20, duration=1200.0)
     events, detector = play(skin, Detection(settle_frames=3, lasting_touch=30.0))
-    assert detector.touched  # an hour of 0.1 N above the paper's threshold
+    assert detector.touched  # 20 minutes of 0.1 N above the paper's threshold
     assert not any(isinstance(event, TouchEnded) for event in events)
     assert Fault.LAYERS_CLOSED in faults_of(events)
     lasting = next(event for event in events if isinstance(event, SkinFault) and event.fault is Fault.LAYERS_CLOSED)

@@ -85,6 +85,48 @@ def test_two_touches_are_a_touch_with_an_ambiguous_place_not_a_fault():
     assert not reading.location_valid
 
 
+@pytest.mark.parametrize("polarity", [Polarity(), Polarity("A", "C"), Polarity("B", "D"), Polarity("A", "D")])
+def test_the_potential_at_the_contact_is_between_the_guides(polarity):
+    # physics: V1 = Vd + (Vc - Vd) phi/wrap, V2 = Vb + (Va - Vb) x; here solved for the guides of a known place
+    sensor = Sensor(CONE, polarity=polarity, electronics=Electronics(adc_bits=16, input_ohms=1e12, lead_ohms=1e-6))
+    u, phi, spread = 0.04, 1.2, 5000
+    good = measured(sensor, [Contact(u, phi, 1e-2)])
+    x = sensor._from_end1.fraction(u)
+    g = phi / CONE.wrap
+    sign = 1 if sensor.b_positive == sensor.c_positive else -1
+    other = -sign * round(spread * good.angular_current / good.radial_current)  # by reciprocity
+    frame = good._replace(
+        radial_c=round(good.radial_c + spread * (1 - g)),
+        radial_d=round(good.radial_d - spread * g),
+        angular_a=round(good.angular_a + other * (1 - x)),
+        angular_b=round(good.angular_b - other * x),
+    )
+    reading = read(sensor, frame)
+    assert reading.fault is None
+    assert reading.location_valid
+    # what two passes leave is of second order in the spread (0.1 of the supply); without any correction u would be 4 mm off
+    assert reading.u == pytest.approx(u, abs=1e-4)
+    assert reading.phi == pytest.approx(phi, abs=4e-3)
+
+
+@pytest.mark.parametrize("wide", ["radial", "angular"])
+def test_either_pair_of_guides_can_make_the_place_ambiguous(wide):
+    good = measured(SENSOR, PLACES[:1])
+    supply = good.supply
+    ratio = good.angular_current / good.radial_current  # 1.6: a spread in the lower sheet is larger in the upper
+    upper = 0.17 * supply if wide == "angular" else -0.2 * supply * ratio
+    lower = -upper / ratio
+    frame = good._replace(
+        radial_c=round(good.radial_c + lower / 2),
+        radial_d=round(good.radial_d - lower / 2),
+        angular_a=round(good.angular_a + upper / 2),
+        angular_b=round(good.angular_b - upper / 2),
+    )
+    reading = read(SENSOR, frame)
+    assert reading.fault is None
+    assert not reading.location_valid
+
+
 BROKEN = {
     Wiring(opened=("A",)): (Fault.OPEN_UPPER, Fault.OPEN_A),
     Wiring(opened=("B",)): (Fault.OPEN_UPPER, Fault.OPEN_B),

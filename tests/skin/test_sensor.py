@@ -12,6 +12,7 @@ from coneskin.skin.electronics import Electronics, Polarity, Thresholds
 from coneskin.skin.sensor import Sensor
 
 # The sector that fits the paper's simulations: r from 100 to 200 mm, theta0 = 90 deg, U0 = 2 V (section 3.1).
+CONE = Frustum(0.04, 0.07, 0.15)
 PAPER = Frustum(0.05, 0.025, 0.1 * math.sqrt(15) / 4)  # rho = r/4 for 90 deg on a full wrap, slant 100 mm
 WIDE = Electronics(adc_bits=16, current_full_scale=0.2)  # suits any shape drawn here
 TWO_VOLTS = Electronics(supply_volts=2.0)
@@ -99,6 +100,14 @@ def test_disc_near_apex_and_cylinder_are_ordinary(cone):
         )
     r, theta = sensor.polar(*sensor.potentials(0.01, 0.5))
     assert (r, theta) == (pytest.approx(cone.polar(0.01, 0.5)[0], rel=1e-13), pytest.approx(cone.polar(0.01, 0.5)[1]))
+
+
+def test_polar_coordinates_with_the_other_polarity():
+    plain = Sensor(CONE)
+    swapped = Sensor(CONE, polarity=Polarity("A", "D"))
+    expected = CONE.polar(0.05, 1.0)
+    assert plain.polar(*plain.potentials(0.05, 1.0)) == pytest.approx(expected, rel=1e-13)
+    assert swapped.polar(*swapped.potentials(0.05, 1.0)) == pytest.approx(expected, rel=1e-13)
 
 
 def test_readings_beyond_the_driven_range_give_the_end():

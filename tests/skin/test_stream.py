@@ -1,6 +1,8 @@
 """All sensors on one stream: who is who, and what belongs to nobody."""
 
+import gc
 import random
+import sys
 
 import pytest
 
@@ -103,6 +105,23 @@ def test_one_damaged_frame_in_a_hundred_is_lived_with():
     events = play(stream, VirtualSkin(LOWER, duration=5.0, faults=Faults(corrupt_every=100), seed=4))
     assert faults_of(events) == []
     assert stream.decoder.crc_errors + stream.detectors[0].timing.missing >= 50
+
+
+@pytest.mark.parametrize("touches", [[], [ScriptedTouch(0.5, 100.0, 0.05, 2.0)]], ids=["untouched", "touched"])
+def test_no_allocation_outlives_a_frame(touches):
+    packets = [data for _, data in VirtualSkin(LOWER, touches, duration=6.0).packets()]
+    stream = Stream([LOWER])
+
+    def play_packets(first: int, last: int) -> int:
+        for k in range(first, last):
+            stream.feed(packets[k], k * 1e-3)
+        return sys.getallocatedblocks()
+
+    play_packets(0, 1000)
+    gc.collect()
+    before = play_packets(1000, 1001)
+    after = play_packets(1001, 6000)
+    assert after - before < 50  # in 4999 frames: numbers that were cached become numbers that are not
 
 
 @pytest.mark.parametrize(

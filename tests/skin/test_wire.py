@@ -98,6 +98,15 @@ def test_a_frame_in_noise_is_found_at_the_latest_with_the_next(noise, first, sec
     assert found[-3:] == [first, second, third]
 
 
+@pytest.mark.parametrize(("length", "at_once"), [(36, True), (64, False), (65, True), (255, True)])
+def test_only_a_length_that_can_be_holds_a_frame_back(length, at_once):
+    frame = Frame(1, 7, 1, 0, 5, 123456, *range(1000, 1010))
+    decoder = Decoder()
+    found = decoder.feed(SYNC + bytes((2, length)) + encode(frame))
+    assert found == ([frame] if at_once else [])
+    assert found + decoder.feed(encode(frame)) == [frame, frame]
+
+
 def test_noise_never_raises_and_gives_nothing():
     rng = random.Random(5)
     decoder = Decoder()
