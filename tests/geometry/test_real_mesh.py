@@ -16,6 +16,7 @@ from coneskin.geometry.placed import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.rays import Rays
 from coneskin.geometry.sector import unroll
+from coneskin.skin.sensor import Sensor
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 
@@ -57,6 +58,29 @@ def test_upper_arm_sees_a_shift_of_a_fifth_of_a_millimetre() -> None:
     mesh = link("ur/ur10/collision/upperarm.stl")
     moved = PlacedFrustum(UPPER_ARM.frustum, Pose(translation=(2e-4, 0.0, 0.0)) @ UPPER_ARM.link_frustum)
     assert worst(mesh, moved) > 1e-4
+
+
+def test_touches_on_the_mesh_come_back_through_the_sensor() -> None:
+    """A touch on the mesh: potentials, 12-bit counts, decode, map; the result lies on the mesh where it was touched."""
+    mesh = link("ur/ur10/collision/upperarm.stl")
+    rays = Rays(mesh)
+    sensor = Sensor(UPPER_ARM.frustum)
+    parts = sensor.electronics
+    rng = np.random.default_rng(6)
+    step_u = UPPER_ARM.frustum.slant / parts.count_volts(parts.supply_volts)
+    step_phi = UPPER_ARM.frustum.wrap / parts.count_volts(parts.supply_volts)
+    for height, azimuth in rng.uniform((0.13, 0.0), (0.51, 2.0 * math.pi), (200, 2)):
+        inward = -np.array([[math.cos(azimuth), math.sin(azimuth), 0.0]])
+        start = np.array([[0.0, -0.045, height]]) - 0.2 * inward
+        touched = (start + rays.cast(start, inward)[0][:, None] * inward)[0]
+        u, phi, above = UPPER_ARM.locate((float(touched[0]), float(touched[1]), float(touched[2])))
+        assert abs(above) < 1e-4
+        radial, angular = (parts.volts(parts.count_volts(v)) / parts.supply_volts for v in sensor.potentials(u, phi))
+        u2, phi2 = sensor.place(radial, angular)
+        assert abs(u2 - u) <= step_u  # half a count is rounding, the other half that of the full scale
+        assert abs(phi2 - phi) <= step_phi
+        assert abs(height_above_mesh(mesh, UPPER_ARM, u2, phi2)) < 1e-4
+        assert math.dist(UPPER_ARM.point(u2, phi2), touched) < math.hypot(step_u, 0.054 * step_phi, 1e-4)
 
 
 def test_fit_finds_the_tube_of_the_upper_arm() -> None:
