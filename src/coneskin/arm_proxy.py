@@ -18,10 +18,10 @@ class ArmProxy:
 
     Args:
         channel: to the owner.
-        check: raises what has stopped the arm, if anything has.
+        check: raises what has stopped the arm, if anything has; True tells it that something surely has.
     """
 
-    def __init__(self, channel: Channel, check: Callable[[], None]) -> None:
+    def __init__(self, channel: Channel, check: Callable[[bool], None]) -> None:
         self.channel = channel
         self._check = check
         self._waiting = False
@@ -58,7 +58,7 @@ class ArmProxy:
         self._do(do="stop", acceleration=deceleration)
 
     def _do(self, **request: Any) -> None:
-        self._check()
+        self._check(False)
         self.channel.receive()  # an answer that nobody waited for any more
         self.channel.send(encode_json(request))
         while True:
@@ -66,11 +66,11 @@ class ArmProxy:
             for message in self.channel.receive():
                 answer = decode_json(message)
                 if answer["ok"]:
-                    self._check()
+                    self._check(False)
                     return
                 if answer["stopped"]:
-                    self._check()
+                    self._check(True)
                 raise RobotRefused(f"{request['do']}: {answer['why']}")
-            self._check()
+            self._check(False)
             if self.channel.closed:
                 raise RobotConnectionError("the process that owns ur_rtde has ended")

@@ -191,31 +191,32 @@ class Session:
                 if left <= 0.0 or self._trouble is not None or not self._changed.wait(left):
                     return None
 
-    def check(self) -> None:
+    def check(self, stopped: bool = False) -> None:
         """Raise what has happened: a collision, a fault, or the end of a process.
+
+        Args:
+            stopped: the owner has said that the guard stopped the arm; the guard's own word may be a moment behind.
 
         Raises:
             Collision: the skin was touched and the arm has reacted.
             RobotRefused: a fault has stopped the arm.
             RobotConnectionError: a process is gone.
         """
-        with self._changed:
-            trouble, events = self._trouble, list(self.events)
-        if trouble is not None:
-            raise trouble
-        since = max((i for i, event in enumerate(events) if event.name == "armed"), default=-1) + 1
-        stopped = next((event for event in events[since:] if event.name == "stopping"), None)
-        if stopped is None:
+        since = max((i for i, event in enumerate(self.events) if event.name == "armed"), default=-1) + 1
+        stop = self.wait_for(("stopping",), 1.0 if stopped else 0.0, after=since)
+        if self._trouble is not None:
+            raise self._trouble
+        if stop is None:
             return
         self.wait_for(("latched",), _END, after=since)
-        contact = next((event for event in events[since:] if event.name == "contact"), None)
-        if contact is not None and stopped.details["why"] == "touch":
+        contact = self.wait_for(("contact",), 0.0, after=since)
+        if contact is not None and stop.details["why"] == "touch":
             where = contact.details
             raise Collision(
                 f"{where['sensor']} on the {where['link']} was touched at u = {1e3 * where['u']:.1f} mm, "
                 f"phi = {where['phi']:.3f} rad; the arm has stopped until a person resets the guard"
             )
-        raise RobotRefused(f"the guard has stopped the arm: {stopped.details['why']}")
+        raise RobotRefused(f"the guard has stopped the arm: {stop.details['why']}")
 
     # ---- how it starts
 
