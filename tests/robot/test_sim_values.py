@@ -1,0 +1,61 @@
+"""Rotation vectors and the lists of URScript."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coneskin.robot.sim_values import Array, PoseValue, ScriptError, copy, pose_of, rotation_of, rotvec_of, values_of
+
+LAW = settings(deadline=None, derandomize=True, max_examples=300)
+ANGLE = st.floats(0.0, math.pi)
+PART = st.floats(-1.0, 1.0)
+
+
+@LAW
+@given(st.tuples(PART, PART, PART), ANGLE)
+def test_a_rotation_vector_survives_its_matrix(axis: tuple[float, float, float], angle: float) -> None:
+    length = math.hypot(*axis)
+    if length < 1e-3:
+        return
+    x, y, z = (angle * part / length for part in axis)
+    matrix = rotation_of((x, y, z))
+    again = rotation_of(rotvec_of(matrix))
+    # near a half turn the axis is known to the square root of rounding at worst, its matrix to rounding
+    for row, other in zip(matrix, again, strict=True):
+        assert row == pytest.approx(other, abs=1e-11)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-13, 1e-9, 1e-5, 1.0, math.pi - 1e-5, math.pi - 1e-9])
+def test_small_and_almost_half_turns(angle: float) -> None:
+    vector = (angle / math.sqrt(3.0),) * 3
+    # 1e-8: the sine of a turn that is 1e-9 short of a half one has eight digits less than the angle
+    assert rotvec_of(rotation_of(vector)) == pytest.approx(vector, abs=1e-8)
+
+
+def test_a_quarter_turn_about_z_is_what_it_is_called() -> None:
+    assert rotation_of((0.0, 0.0, math.pi / 2))[1] == pytest.approx((1.0, 0.0, 0.0))
+
+
+def test_poses_go_both_ways() -> None:
+    values = PoseValue((0.1, 0.2, 0.3, 0.4, -0.5, 0.6))
+    assert values_of(pose_of(values)) == pytest.approx(values)
+    assert isinstance(values_of(pose_of(values)), PoseValue)
+
+
+def test_lists_add_element_by_element_and_copy_by_value() -> None:
+    first, second = Array((1, 2)), Array((3, 5))
+    assert first + second == [4, 7]
+    assert second - first == [2, 3]
+    assert first * 2 == 2 * first == [2, 4]
+    assert -first == [-1, -2]
+    assert second / 2 == [1.5, 2.5]
+    other = copy(first)
+    other[0] = 9
+    assert first == [1, 2]
+    assert isinstance(copy(PoseValue((0,) * 6)), PoseValue)
+    with pytest.raises(ScriptError, match="needs another of the same length"):
+        first + Array((1, 2, 3))
