@@ -111,7 +111,7 @@ def _convert(key: Key, value: Any, where: str, complain: Callable[[str], None]) 
     """The value in SI, or None with a complaint."""
     if key.kind is list:
         if not isinstance(value, list) or (key.length is not None and len(value) != key.length):
-            complain(f"{where} must be a list of {key.length or 'some'} numbers, got {value!r}")
+            complain(f"{where} must be a list of {key.length or 'some'} numbers, got {_show(value)}")
             return None
         numbers = [_number(key, item, f"{where}[{i}]", complain) for i, item in enumerate(value)]
         return None if None in numbers else tuple(numbers)
@@ -119,19 +119,19 @@ def _convert(key: Key, value: Any, where: str, complain: Callable[[str], None]) 
         return _number(key, value, where, complain)
     if key.kind is int:
         if isinstance(value, bool) or not isinstance(value, int) or not key.low <= value <= key.high:
-            complain(f"{where} must be a whole number {_range(key, '')}, got {value!r}")
+            complain(f"{where} must be a whole number {_range(key, '')}, got {_show(value)}")
             return None
         return value
     if key.kind is dict:
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            complain(f"{where} must be a list of tables, got {value!r}")
+            complain(f"{where} must be a list of tables, in double brackets, got {_show(value)}")
             return None
         return value
     if not isinstance(value, key.kind):
-        complain(f"{where} must be {'text' if key.kind is str else 'true or false'}, got {value!r}")
+        complain(f"{where} must be {'text' if key.kind is str else 'true or false'}, got {_show(value)}")
         return None
     if key.choices and value not in key.choices:
-        complain(f"{where} must be one of {', '.join(key.choices)}, got {value!r}")
+        complain(f"{where} must be one of {', '.join(key.choices)}, got {_show(value)}")
         return None
     return value
 
@@ -139,16 +139,30 @@ def _convert(key: Key, value: Any, where: str, complain: Callable[[str], None]) 
 def _number(key: Key, value: Any, where: str, complain: Callable[[str], None]) -> float | None:
     factor, unit = _UNITS.get(key.suffix, (1.0, ""))
     if isinstance(value, bool) or not isinstance(value, int | float):
-        complain(f"{where} must be a number{f' [{unit}]' if unit else ''}, got {value!r}")
+        complain(f"{where} must be a number{f' [{unit}]' if unit else ''}, got {_show(value)}")
+        return None
+    try:
+        value = float(value)
+    except OverflowError:  # TOML's whole numbers have no largest
+        complain(f"{where} must be {_range(key, unit)}, got {_show(value)}")
         return None
     inside = math.isfinite(value) and key.low <= value <= key.high and not (key.above and value == key.low)
     if not inside:
         hint = ""
         if unit in ("mm", "mm/s") and math.isfinite(value) and key.low <= 1e3 * value <= key.high:
             hint = f": is that in metres? Then write {1e3 * value:g}"
-        complain(f"{where} must be {_range(key, unit)}, got {value!r}{f' {unit}' if unit else ''}{hint}")
+        complain(f"{where} must be {_range(key, unit)}, got {_show(value)}{f' {unit}' if unit else ''}{hint}")
         return None
-    return float(value) * factor if factor != math.pi / 180.0 else math.radians(value)
+    return value * factor if factor != math.pi / 180.0 else math.radians(value)
+
+
+def _show(value: Any) -> str:
+    """A value as it stands in a message: whoever wrote it shall recognise it, not read all of it."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # Python does not print whole numbers of more than 4300 digits
+        return "something too large to print"
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _range(key: Key, unit: str) -> str:
