@@ -1,8 +1,15 @@
-"""Whether the links of a scene are links of its arm, and its sensors fit on them."""
+"""Whether the links of a scene are links of its arm, its sensors fit on them, and the arm can make its motion."""
 
 from __future__ import annotations
 
-from .scene import LinkScene, Scene
+import math
+from typing import TYPE_CHECKING
+
+from .errors import KinematicsError
+from .scene import LinkScene, MotionScene, Scene
+
+if TYPE_CHECKING:
+    from .robot.ur_models import ArmModel
 
 __all__ = ["check_links"]
 
@@ -10,18 +17,35 @@ _TUBES = {"upper_arm": 1, "forearm": 2}  # link name -> index of the DH length t
 
 
 def check_links(scene: Scene, problems: list[str]) -> None:
-    """Add what is wrong to problems: a link that the arm does not have, a sensor longer than its link."""
-    from .robot.link_frames import LINK_INDEX
+    """Add what is wrong to problems: a link that no arm has, a sensor longer than its link, a joint beyond its limit.
+
+    Lengths and limits need an arm that is known; names are the same for all of them.
+    """
+    from .robot.link_frames import LINK_INDEX, link_index
     from .robot.ur_models import model
 
-    if scene.arm is None:
-        return
-    arm = model(scene.arm.model)
+    arm = None if scene.arm is None else model(scene.arm.model)
+    names = {index: name for name, index in LINK_INDEX.items()}
     for link in scene.links:
-        if link.name not in LINK_INDEX:
-            problems.append(f"link {link.name}: the arm {arm.name} has no such link; it has {', '.join(LINK_INDEX)}")
-        elif link.name in _TUBES:
-            _check_length(link, abs(arm.a[_TUBES[link.name]]), arm.name, problems)
+        try:
+            name = names[link_index(link.name)]  # "upperarm" and "upper_arm_link" are the same link
+        except KinematicsError:
+            problems.append(f"link {link.name}: an arm has no such link; it has {', '.join(LINK_INDEX)}")
+            continue
+        if arm is not None and name in _TUBES:
+            _check_length(link, abs(arm.a[_TUBES[name]]), arm.name, problems)
+    if arm is not None and scene.motion is not None:
+        _check_limits(scene.motion, arm, problems)
+
+
+def _check_limits(motion: MotionScene, arm: ArmModel, problems: list[str]) -> None:
+    for number, point in enumerate(motion.waypoints, 1):
+        for joint, (q, low, high) in enumerate(zip(point, arm.joint_lower, arm.joint_upper, strict=False), 1):
+            if not low <= q <= high:
+                problems.append(
+                    f"motion.waypoints_deg[{number}]: joint {joint} of the {arm.name} must be from "
+                    f"{math.degrees(low):g} to {math.degrees(high):g} deg, got {math.degrees(q):g} deg"
+                )
 
 
 def _check_length(link: LinkScene, length: float, arm: str, problems: list[str]) -> None:

@@ -128,7 +128,7 @@ class Scene:
 
     Attributes:
         name: of the file, for messages.
-        text: the file itself, so that a recording can carry it.
+        text: the file itself, with the sensor files that it names written out, so that a recording is whole.
         folder: relative paths start here.
     """
 

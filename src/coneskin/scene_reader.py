@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import scene as s
 from .errors import ConeSkinError, SceneError
+from .link_tables import count_sensors, read_links, write_out
 from .schema import Key, check
-from .sensor_table import build_sensor
 
 if TYPE_CHECKING:
     from .robot.commands import Reaction
     from .robot.watch import Watch
+    from .skin.sensor import Sensor
     from .skin.virtual import ScriptedTouch
 
 __all__ = ["parse_scene", "read_scene"]
@@ -26,12 +27,6 @@ _ARM = (
     Key("model", str),
     Key("host", str),
     Key("watchdog_hz", float, 4.0, low=1.0, high=100.0),
-)
-_LINK = (
-    Key("name", str),
-    Key("frame", str, "mesh", choices=("mesh", "dh")),
-    Key("mesh", str, None),
-    Key("sensor", dict, ()),
 )
 _SOURCE = (
     Key("kind", str, choices=("serial", "virtual")),
@@ -85,40 +80,42 @@ def read_scene(path: Path) -> s.Scene:
         SceneError: the file cannot be read, or has mistakes.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as exc:
+        text = path.read_text(encoding="utf-8-sig")  # some editors put a mark in front
+    except (OSError, ValueError) as exc:
         why = getattr(exc, "strerror", None) or exc
         raise SceneError([f"the file cannot be read: {why}"], str(path)) from exc
     return parse_scene(text, path.name, path.parent)
 
 
-def parse_scene(text: str, name: str = "scene", folder: Path = Path()) -> s.Scene:
+def parse_scene(text: str, name: str = "scene", folder: Path = Path(), *, recorded: bool = False) -> s.Scene:
     """Read a scene from its text.
 
     Args:
         text: TOML.
         name: for the messages.
         folder: where relative paths start.
+        recorded: the text comes from a recording, so that the files it names need not be there any more.
 
     Raises:
         SceneError: with every mistake.
     """
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as exc:
+    except (ValueError, RecursionError) as exc:  # a whole number of 5000 digits is a plain ValueError
         raise SceneError([f"not TOML: {exc}"], name) from exc
-    problems: list[str] = []
-    problems += [f"unknown table [{t}]; known: {', '.join(_TOP)}" for t in tables if t not in _TOP]
+    named = frozenset(tables)
+    problems = [f"unknown table [{t}]; known: {', '.join(_TOP)}" for t in tables if t not in _TOP]
     for table in ("arm", "source", "reaction", "watch", "recording", "motion"):
         if table in tables and not isinstance(tables[table], dict):
-            problems.append(f"{table} must be a table: write [{table}]")
+            problems.append(f"{table} must be one table: write [{table}], once, got {type(tables[table]).__name__}")
             del tables[table]
+    text = write_out(tables, folder, problems) or text
     scene = s.Scene(
         name=name,
         text=text,
         folder=folder,
         arm=_arm(tables, problems),
-        links=_links(tables, folder, problems),
+        links=read_links(tables, None if recorded else folder, problems),
         source=None,
         reaction=_reaction(tables, problems),
         watch=_watch(tables, problems),
@@ -126,7 +123,7 @@ def parse_scene(text: str, name: str = "scene", folder: Path = Path()) -> s.Scen
         motion=_motion(tables, problems),
     )
     scene = replace(scene, source=_source(scene, tables, problems))
-    _check_together(scene, tables, problems)
+    _check_together(scene, named, tables, problems)
     if problems:
         raise SceneError(problems, name)
     return scene
@@ -168,27 +165,10 @@ def _arm(tables: Mapping[str, Any], problems: list[str]) -> s.ArmScene | None:
             values["model"] = model(values["model"]).name
         except ConeSkinError as exc:
             problems.append(f"arm.model: {exc}")
+            del values["model"]
     if not values.get("host", "?").strip():
         problems.append("arm.host must name the controller, got an empty text")
     return s.ArmScene(values["model"], values["host"], values["watchdog"]) if len(values) == len(_ARM) else None
-
-
-def _links(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> tuple[s.LinkScene, ...]:
-    listed = check({"link": tables.get("link", [])}, (Key("link", dict, ()),), "scene", problems)["link"]
-    links: list[s.LinkScene] = []
-    for number, table in enumerate(listed, 1):
-        where = f"link {table.get('name', number)}"
-        values = check(table, _LINK, where, problems)
-        sensors = []
-        for index, item in enumerate(values["sensor"], 1):
-            built = build_sensor(item, f"{where}, sensor {item.get('id', index)}", folder, problems)
-            if built is not None:
-                sensors.append(s.PlacedSensor(*built))
-        mesh = folder / values["mesh"] if values["mesh"] else None
-        if mesh is not None and not mesh.is_file():
-            problems.append(f"{where}.mesh: there is no file {mesh}")
-        links.append(s.LinkScene(values.get("name", str(number)), values["frame"], mesh, tuple(sensors)))
-    return tuple(links)
 
 
 def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s.SourceScene | None:
@@ -196,6 +176,8 @@ def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s
         return None
     values = check(tables["source"], _SOURCE, "source", problems)
     kind = values.get("kind")
+    built = [item.sensor for item in scene.sensors]
+    sensors = [*built, *[None] * (count_sensors(tables) - len(built))]
     if kind == "serial" and not values["port"]:
         problems.append("source.port is missing: a device such as /dev/ttyUSB0, COM3 or hwgrep://0403:6001")
     for key in ("rate_hz", "seed", "touch") if kind == "serial" else ("port", "baud"):
@@ -204,33 +186,38 @@ def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s
     touches = [
         touch
         for number, table in enumerate(values["touch"], 1)
-        if (touch := _touch(scene, table, f"source.touch {number}", problems)) is not None
+        if (touch := _touch(sensors, table, f"source.touch {number}", problems)) is not None
     ]
     if kind is None:
         return None
     return s.SourceScene(kind, values["port"], values["baud"], values["rate"], values["seed"], tuple(touches))
 
 
-def _touch(scene: s.Scene, table: Mapping[str, Any], where: str, problems: list[str]) -> ScriptedTouch | None:
+def _touch(
+    sensors: Sequence[Sensor | None], table: Mapping[str, Any], where: str, problems: list[str]
+) -> ScriptedTouch | None:
+    """A touch of the script; None stands among the sensors for each that has a mistake."""
     from .skin.virtual import ScriptedTouch
 
     before = len(problems)
     values = check(table, _TOUCH, where, problems)
-    if len(problems) > before:
-        return None
+    start, end = values.get("start", -math.inf), values.get("end", math.inf)
+    if not start < end:
+        problems.append(f"{where}: start_s must be before end_s, got {start:g} s and {end:g} s")
     wanted = values.pop("sensor")
-    sensor = next((p.sensor for p in scene.sensors if wanted in (None, p.sensor.sensor_id)), None)
+    known = () if wanted is None and None in sensors else sensors  # the first of them may be one with a mistake
+    sensor = next((one for one in known if one is not None and wanted in (None, one.sensor_id)), None)
     if sensor is None:
-        problems.append(f"{where}: there is no sensor {wanted}")
+        if None not in sensors:  # otherwise it may be that one
+            problems.append(f"{where}: there is no sensor {'to touch' if wanted is None else f'with the id {wanted}'}")
         return None
     cone = sensor.frustum
-    if values["u"] > cone.slant or values["phi"] > cone.wrap + 1e-9:
+    u, phi = values.get("u", 0.0), values.get("phi", 0.0)
+    if u > cone.slant or phi > cone.wrap:
         problems.append(
             f"{where} is off {sensor.name}, whose u_mm ends at {1e3 * cone.slant:g} and phi_deg at "
-            f"{math.degrees(cone.wrap):g}: got {1e3 * values['u']:g} mm and {math.degrees(values['phi']):g} deg"
+            f"{math.degrees(cone.wrap):g}: got {1e3 * u:g} mm and {math.degrees(phi):g} deg"
         )
-    if not values["start"] < values["end"]:
-        problems.append(f"{where}: start_s must be before end_s")
     return ScriptedTouch(**values, sensor=sensor.name) if len(problems) == before else None
 
 
@@ -248,8 +235,10 @@ def _motion(tables: Mapping[str, Any], problems: list[str]) -> s.MotionScene | N
     points = []
     if isinstance(rows, list):
         for number, row in enumerate(rows, 1):
-            point = check({"q_deg": row}, _WAYPOINT, f"motion.waypoints_deg {number}", problems)
-            points.append(point.get("q", ()))
+            where = f"motion.waypoints_deg[{number}]"
+            lines: list[str] = []
+            points.append(check({"q_deg": row}, _WAYPOINT, where, lines).get("q", ()))
+            problems += [line.replace(f"{where}.q_deg", where) for line in lines]
         if len(rows) < 2:
             problems.append(f"motion.waypoints_deg needs at least 2 waypoints, got {len(rows)}")
     table = {key: value for key, value in tables["motion"].items() if key != "waypoints_deg"}
@@ -259,24 +248,28 @@ def _motion(tables: Mapping[str, Any], problems: list[str]) -> s.MotionScene | N
     return s.MotionScene(tuple(points), **values) if len(values) == len(_MOTION) - 1 else None
 
 
-def _check_together(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> None:
+def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, Any], problems: list[str]) -> None:
     """What only the tables together can show."""
-    seen: dict[tuple[int, int], str] = {}
+    seen: dict[tuple[int, int] | str, str] = {}
     for link in scene.links:
         for item in link.sensors:
-            ident = (item.sensor.device_id, item.sensor.sensor_id)
+            sensor = item.sensor
+            ident = (sensor.device_id, sensor.sensor_id)
             if ident in seen:
                 problems.append(
-                    f"link {link.name}: sensor {ident[1]} of device {ident[0]} is already on link {seen[ident]}"
+                    f"link {link.name}: sensor {ident[1]} of device {ident[0]} is already on link {seen[ident]}; give "
+                    "each sensor its own id"
                 )
-            seen[ident] = link.name
-    if "reaction" in tables and "arm" not in tables:
+            elif sensor.name in seen:
+                problems.append(f"link {link.name}: the name {sensor.name} is already on link {seen[sensor.name]}")
+            seen[ident] = seen[sensor.name] = link.name
+    if "reaction" in named and "arm" not in named:
         problems.append("[reaction] needs an [arm] that can react")
-    if "motion" in tables and "arm" not in tables:
+    if "motion" in named and "arm" not in named:
         problems.append("[motion] needs an [arm] that can move")
-    if "source" in tables and not tables.get("link"):
+    if "source" in named and isinstance(tables.get("link", []), list) and not count_sensors(tables):
         problems.append("[source] needs a [[link]] with a [[link.sensor]] that its bytes come from")
-    if scene.arm is not None:
+    if "arm" in named:
         from .link_check import check_links
 
         check_links(scene, problems)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .geometry.placed import PlacedFrustum
     from .skin.sensor import Sensor
 
-__all__ = ["SENSOR_KEYS", "build_sensor"]
+__all__ = ["SENSOR_KEYS", "build_sensor", "with_file"]
 
 _SHAPE = (
     Key("radius1_mm", float, low=1.0, high=5000.0),
@@ -50,31 +50,41 @@ _SHEETS = (
 )
 _THRESHOLDS = (
     Key("touch_level", float, 0.10, low=0.0, high=1.0, above=True),
-    Key("release_level", float, 0.05, low=0.0, high=1.0, above=True),
+    Key("release_level", float, 0.05, low=0.03, high=1.0, above=True),  # above the drift that a detector follows
     Key("location_level", float, 0.20, low=0.0, high=1.0, above=True),
 )
 SENSOR_KEYS = (*_SHAPE, *_PLACE, *_WIRE, *_POLARITY, *_ELECTRONICS, *_SHEETS, *_THRESHOLDS)
 
 
-def build_sensor(
-    table: Mapping[str, Any], where: str, folder: Path, problems: list[str]
-) -> tuple[Sensor, PlacedFrustum] | None:
+def with_file(table: Mapping[str, Any], where: str, folder: Path, problems: list[str]) -> dict[str, Any]:
+    """A sensor's table with the keys of the ``file`` that it names; its own keys win over those.
+
+    Args:
+        table: of the scene.
+        where: the table's name, for the messages.
+        folder: where a relative ``file`` starts.
+        problems: every mistake is added here.
+    """
+    own = dict(table)
+    if "file" not in own:
+        return own
+    (name,) = check({"file": own.pop("file")}, (Key("file", str, ""),), where, problems).values()
+    return {**(_from_file(folder / name, where, problems) if name else {}), **own}
+
+
+def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> tuple[Sensor, PlacedFrustum] | None:
     """The sensor that a table describes, and its place.
 
     Args:
-        table: its keys are SENSOR_KEYS; ``file`` may name a file with more of them, which the table overrides.
+        table: its keys are SENSOR_KEYS.
         where: the table's name, for the messages.
-        folder: where a relative ``file`` starts.
         problems: every mistake is added here.
 
     Returns:
         the sensor and its placed frustum, or None where a mistake forbids it.
     """
     before = len(problems)
-    keys = dict(table)
-    if "file" in keys:
-        keys = {**_from_file(folder / str(keys.pop("file")), where, problems), **keys}
-    values = check(keys, SENSOR_KEYS, where, problems)
+    values = check(table, SENSOR_KEYS, where, problems)
     if len(problems) > before:
         return None
     from .geometry.frustum import Frustum
@@ -112,9 +122,9 @@ def build_sensor(
 
 def _from_file(path: Path, where: str, problems: list[str]) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as exc:
         problems.append(f"{where}.file: {path} cannot be read: {exc.strerror or exc}")
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as exc:
+    except (ValueError, RecursionError) as exc:  # not TOML, not UTF-8, or a whole number of 5000 digits
         problems.append(f"{where}.file: {path} is not TOML: {exc}")
     return {}
