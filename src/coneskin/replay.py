@@ -16,6 +16,9 @@ from .skin.recording import Block, read_recording
 __all__ = ["Replay", "Run", "read_run", "replay"]
 
 
+_HEADER = {"scene": str, "name": str, "folder": str, "clocks": dict}
+
+
 @dataclass(frozen=True, slots=True)
 class Run:
     """A recorded run.
@@ -43,7 +46,7 @@ class Run:
         """
         from .scene_reader import parse_scene
 
-        return parse_scene(self.header["scene"], self.header["name"], Path(self.header["folder"]))
+        return parse_scene(self.header["scene"], self.header["name"], Path(self.header["folder"]), recorded=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +86,12 @@ def read_run(path: Path) -> Run:
     recording = read_recording(path)
     if not recording.blocks or recording.blocks[0].kind != Kind.HEADER:
         raise RecordingError(f"{path} has no header: the run ended before it began")
-    header = json.loads(recording.blocks[0].payload)
+    try:
+        header = json.loads(recording.blocks[0].payload)
+        if wrong := [key for key, kind in _HEADER.items() if not isinstance(header[key], kind)]:
+            raise ValueError(f"{', '.join(wrong)} of another kind")
+    except (ValueError, TypeError, KeyError) as exc:
+        raise RecordingError(f"{path} has a header that this coneskin cannot read: {exc}") from exc
     return Run(header, recording.blocks[1:], recording.missing)
 
 
@@ -105,11 +113,9 @@ def replay(run: Run, scene: Scene | None = None) -> Replay:
         if block.kind in INPUTS:
             events += [output for output in core.take(block) if isinstance(output, GuardEvent)]
     recorded = run.events
-    # a run that was cut off may lack the events of its last inputs, or have them without knowing more
     again = [_plain(event) for event in events]
-    then = [_plain(event) for event in recorded]
-    if run.missing:
-        then = then[: len(again)]
+    then = [_plain(event) for event in recorded if event.name != "died"]  # said of the guard, not by it
+    if run.missing:  # an input is recorded before its events, so a run that was cut off may lack the last of these
         again = again[: len(then)]
     differences = list(_differences(again, then))
     frames = sum(len(block.payload) for block in run.blocks if block.kind == Kind.SKIN)
