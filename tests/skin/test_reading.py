@@ -104,7 +104,7 @@ def test_the_potential_at_the_contact_is_between_the_guides(polarity):
     reading = read(sensor, frame)
     assert reading.fault is None
     assert reading.location_valid
-    # what two passes leave is of second order in the spread (0.1 of the supply); without any correction u would be 4 mm off
+    # what two passes leave is of second order in the spread (0.1 of the supply); uncorrected, u is 4 mm off
     assert reading.u == pytest.approx(u, abs=1e-4)
     assert reading.phi == pytest.approx(phi, abs=4e-3)
 
