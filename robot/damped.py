@@ -66,7 +66,7 @@ def damped_speeds(columns: Sequence[Vector], velocity: Vector) -> list[float]:
 def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[list[float], float]:
     """Joint speeds [rad/s] that move several points at once, none of them against its own wanted velocity.
 
-    Minimises the mean of |J_k qd - v_k|^2, damped, under v_k . J_k qd >= 0 for each k.
+    Minimises the sum of |J_k qd - v_k|^2, damped, under v_k . J_k qd >= 0 for each k.
 
     Args:
         points: for each point its Jacobian columns for the joints that may move (the same joints for all, zero columns
@@ -79,11 +79,10 @@ def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[l
     joints = range(len(points[0][0]))
     if not joints:
         return [], FLOOR
-    share = 1.0 / len(points)
     damping = max(damping_squared([c for c in columns if any(c)] or [(0.0, 0.0, 0.0)]) for columns, _ in points)
-    normal = [[share * sum(_dot(c[i], c[j]) for c, _ in points) + damping * (i == j) for j in joints] for i in joints]
+    normal = [[sum(_dot(c[i], c[j]) for c, _ in points) + damping * (i == j) for j in joints] for i in joints]
     along = [[_dot(column, v) for column in columns] for columns, v in points]
-    wanted = [share * sum(row[i] for row in along) for i in joints]
+    wanted = [sum(row[i] for row in along) for i in joints]
     free = speeds = _solve(normal, wanted)
     held: list[list[float]] = []  # rows along which the point is held, because it would go back
     for _ in points:
@@ -100,8 +99,8 @@ def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[l
 
 
 def _tiny(row: Sequence[float], speeds: Sequence[float]) -> float:
-    """What rounding may leave of an inner product that is zero."""
-    return 1e-9 * sum(abs(a * b) for a, b in zip(row, speeds, strict=True))
+    """What rounding may leave of an inner product that is zero; below 1 pm/s nothing moves."""
+    return 1e-12 + 1e-9 * sum(abs(a * b) for a, b in zip(row, speeds, strict=True))
 
 
 def _gram(columns: Sequence[Vector], extra: float) -> list[list[float]]:
