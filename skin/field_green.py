@@ -157,7 +157,7 @@ def kernel(
         second: source points, shape (n, N').
         resistance_a: of the sheet with electrodes across the shorter side.
         resistance_b: of the other sheet.
-        singular: |z - z'|^2/a^2 of the pairs, divided out of A1, shape (N, N); its diagonal must not be zero.
+        singular: |z - z'|^2/a^2 of the pairs, divided out of A1, shape (N, N'); nowhere zero.
         diagonal: A1 of each point with itself, after that division, shape (n, N).
         blur: squared size of the cell around each point, where points stand for cells that may touch their own images,
             shape (n, N).
@@ -171,9 +171,10 @@ def kernel(
     n1, n2 = first.near[:, :, None], second.near[:, None, :]
 
     direct = _square(first.direct[:, :, None] - second.direct[:, None, :])
-    if singular is not None and diagonal is not None:
+    if singular is not None:
         direct /= singular
-        index = np.arange(singular.shape[0])
+    if diagonal is not None:
+        index = np.arange(diagonal.shape[1])
         direct[:, index, index] = diagonal
     corner = _blurred(_square(n1 + n2 - n1 * n2), blur)
     if terms:

@@ -1,0 +1,182 @@
+"""Pictures of the field: potentials with their lines, error maps, error over contact size. Needs matplotlib."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.errors import MissingExtra
+
+from .field_map import FieldMap
+from .field_paper import ErrorMap
+from .field_sheet import SectorSheet
+
+__all__ = ["draw_curves", "draw_error", "draw_potential"]
+
+Floats = NDArray[np.float64]
+
+
+def _figure(width: float, height: float) -> tuple[Any, Any]:
+    """A figure without any window; the only place that imports matplotlib."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingExtra("matplotlib", "drawing the field", "pictures") from error
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.add_subplot()
+
+
+def _plane(sheet: SectorSheet, u: Floats, phi: Floats) -> tuple[Floats, Floats]:
+    """Flat coordinates with the apex at the origin [mm]."""
+    r, theta = sheet.polar(u, phi)
+    return r * np.cos(theta) * 1e3, r * np.sin(theta) * 1e3
+
+
+def _outline(axes: Any, sheet: SectorSheet, names: dict[str, str]) -> None:
+    """The four edges with the electrodes' names."""
+    one = np.linspace(0.0, 1.0, 100)
+    edges = {
+        "B": (0.0 * one, one * sheet.wrap),
+        "A": (0.0 * one + sheet.width, one * sheet.wrap),
+        "D": (one * sheet.width, 0.0 * one),
+        "C": (one * sheet.width, 0.0 * one + sheet.wrap),
+    }
+    for name, (u, phi) in edges.items():
+        x, y = _plane(sheet, u, phi)
+        live = name in names
+        axes.plot(x, y, color="black", lw=2.6 if live else 0.8, solid_capstyle="round", zorder=4)
+        if live:
+            inside = {"B": (0.0, -1.0), "A": (0.0, 1.0), "D": (-1.0, 0.0), "C": (1.0, 0.0)}[name]
+            middle_u = sheet.width * 0.5 * (1.0 + inside[1])
+            middle_phi = sheet.wrap * 0.5 * (1.0 + inside[0])
+            r, theta = (float(v) for v in sheet.polar(middle_u, middle_phi))
+            gap = 0.05 * (float(sheet.polar(sheet.width, 0.0)[0]))
+            r, along = r + inside[1] * gap, inside[0] * gap
+            x0 = (r * math.cos(theta) - along * math.sin(theta)) * 1e3
+            y0 = (r * math.sin(theta) + along * math.cos(theta)) * 1e3
+            axes.text(x0, y0, names[name], ha="center", va="center", fontsize=9)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [mm]")
+    axes.set_ylabel("y [mm]")
+    x, y = (np.concatenate([_plane(sheet, *edge)[i] for edge in edges.values()]) for i in (0, 1))
+    pad = 0.1 * max(float(np.ptp(x)), float(np.ptp(y)))
+    axes.set_xlim(float(x.min()) - pad, float(x.max()) + pad)
+    axes.set_ylim(float(y.min()) - pad, float(y.max()) + pad)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def draw_potential(
+    path: Path, field: FieldMap, upper: bool, title: str, names: dict[str, str], filled: bool = True
+) -> None:
+    """One sheet's potential, its equipotential lines and the field lines through them.
+
+    Args:
+        path: of the PNG.
+        field: what to draw; a sector, not a cylinder.
+        upper: the upper sheet; otherwise the lower one.
+        title: of the picture.
+        names: electrode letter -> text, for the electrodes of this sheet.
+        filled: colour the potential; otherwise only lines, as the paper's figures 4 and 6.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    sheet = field.model.sheet
+    u, phi = np.meshgrid(np.linspace(0.0, sheet.width, 121), np.linspace(0.0, sheet.wrap, 121), indexing="ij")
+    volts = field.potentials(u, phi)[0 if upper else 1]
+    x, y = _plane(sheet, u, phi)
+    figure, axes = _figure(5.6, 4.9)
+    if filled:
+        picture = axes.contourf(x, y, volts, 40, cmap="viridis")
+        figure.colorbar(picture, ax=axes, label="potential [V]", shrink=0.85)
+    lines = axes.contour(x, y, volts, 11, colors="white" if filled else "tab:blue", linewidths=0.9)
+    axes.clabel(lines, fontsize=7, fmt="%.2g")
+    _field_lines(axes, field, upper)
+    _outline(axes, sheet, names)
+    axes.set_title(title, fontsize=10)
+    figure.savefig(path, dpi=130)
+
+
+def _field_lines(axes: Any, field: FieldMap, upper: bool) -> None:
+    """Lines of current, followed through the rectangle by the midpoint rule from one driven electrode to the other."""
+    sheet = field.model.sheet
+    steps = 160
+    start: Floats = (np.arange(13) + 0.5) / 13.0
+    length, breadth = sheet.length, sheet.breadth
+    x: Floats
+    y: Floats
+    x, y = (0.0 * start + 1e-3 * length, start * breadth) if upper else (start * length, 0.0 * start + 1e-3 * breadth)
+    step = (length if upper else breadth) / steps
+    track: list[tuple[Floats, Floats]] = [(x.copy(), y.copy())]
+
+    def direction(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        u, phi = sheet.locate(np.clip(x, 0.0, length), np.clip(y, 0.0, breadth))
+        j = field.currents(np.clip(u, 0.0, sheet.width), np.clip(phi, 0.0, sheet.wrap))
+        east, north = (j[0], j[1]) if upper else (j[2], j[3])
+        size = np.maximum(np.hypot(east, north), 1e-300)
+        sense = np.sign(east if upper else north)
+        return sense * east / size, sense * north / size
+
+    for _ in range(steps + steps // 4):
+        east, north = direction(x, y)
+        east, north = direction(x + 0.5 * step * east, y + 0.5 * step * north)
+        x, y = np.clip(x + step * east, 0.0, length), np.clip(y + step * north, 0.0, breadth)
+        track.append((x.copy(), y.copy()))
+    xs, ys = np.stack([t[0] for t in track]), np.stack([t[1] for t in track])
+    u, phi = sheet.locate(xs, ys)
+    px, py = _plane(sheet, np.clip(u, 0.0, sheet.width), np.clip(phi, 0.0, sheet.wrap))
+    axes.plot(px, py, color="black", lw=0.7, zorder=3)
+
+
+def draw_error(path: Path, model_sheet: SectorSheet, grid: ErrorMap, radial: bool, title: str) -> None:
+    """An error map on the sector; blank where the disc would not fit.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    theta, r = np.meshgrid(np.radians(grid.theta_deg), grid.r_mm)
+    error = grid.r_error_mm if radial else grid.theta_error_deg
+    figure, axes = _figure(5.6, 4.9)
+    limit = float(np.nanmax(np.abs(error)))
+    picture = axes.pcolormesh(
+        r * np.cos(theta), r * np.sin(theta), error, cmap="RdBu_r", vmin=-limit, vmax=limit, shading="nearest"
+    )
+    label = "decoded minus true " + ("r [mm]" if radial else "theta [deg]")
+    figure.colorbar(picture, ax=axes, label=label, shrink=0.85)
+    _outline(axes, model_sheet, {})
+    axes.set_title(f"{title}\nlargest {limit:.3g} {'mm' if radial else 'deg'}", fontsize=10)
+    figure.savefig(path, dpi=130)
+
+
+def draw_curves(
+    path: Path, x: Floats, curves: Sequence[tuple[str, Floats, str]], labels: tuple[str, str], title: str
+) -> None:
+    """Curves over one axis.
+
+    Args:
+        path: of the PNG.
+        x: abscissa.
+        curves: (label, ordinate, matplotlib format).
+        labels: of the axes.
+        title: of the picture.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    figure, axes = _figure(5.6, 4.0)
+    for label, y, style in curves:
+        axes.plot(x, y, style, label=label, lw=1.4)
+    axes.set_xlabel(labels[0])
+    axes.set_ylabel(labels[1])
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    axes.set_title(title, fontsize=10)
+    figure.savefig(path, dpi=130)
