@@ -180,7 +180,8 @@ class StateReader:
     def _ask(self, request: bytes, kind: rtde.PacketKind) -> bytes:
         assert self._sock is not None
         self._sock.sendall(request)
-        while True:
+        end = self._clock() + self._timeout
+        while self._clock() < end:
             data = self._sock.recv(1 << 16)
             if not data:
                 raise RobotConnectionError(f"the controller {self.host} has closed the connection during set-up")
@@ -188,3 +189,4 @@ class StateReader:
             for packet in packets:
                 if packet.kind is kind:
                     return packet.payload
+        raise TimeoutError

@@ -171,6 +171,18 @@ def test_the_owner_frozen_another_way_stops_the_arm(controller):
         kill(session, "owner", signal.SIGKILL)
 
 
+def test_guard_and_owner_dead_the_controller_stops_itself(controller):
+    """Nobody is left to send a stop: the watchdog that the owner has set ends the program."""
+    with guard(scene_for(controller)) as session:
+        thread, raised = run_until_moving(controller, session)
+        kill(session, "guard", signal.SIGSTOP)
+        kill(session, "owner")
+        assert_stopped_on_the_way(controller)
+        kill(session, "guard")
+        thread.join(20)
+        assert isinstance(raised[0], RobotRefused | RobotConnectionError)
+
+
 def test_the_skin_unplugged_stops_the_arm(controller):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
