@@ -65,9 +65,9 @@ class Builtins:
             yield
             if motion.done:
                 return
+            self._program.drive()  # refuses if another thread has taken the arm
             if self._arm.motion is not motion:
                 raise ScriptError("the motion was ended by the safety system")
-            self._program.drive()
 
     def _joints(self, target: Sequence[float]) -> list[float]:
         return self.get_inverse_kin(target) if isinstance(target, PoseValue) else [float(angle) for angle in target]
@@ -92,9 +92,9 @@ class Builtins:
             cycles -= 1
             if cycles <= 0 and (t > 0.0 or getattr(motion, "reached", True)):
                 return
+            self._program.drive()
             if self._arm.motion is not motion:
                 raise ScriptError("the motion was ended by the safety system")
-            self._program.drive()
 
     def speedj(self, qd: Any, a: float = 1.4, t: float = 0.0) -> Wait:
         """Joint speeds; returns after t, or, without t, when the speed is reached."""
