@@ -14,6 +14,7 @@ from coneskin.geometry.stack import PAPER_STACK, Layer, Stack, parallel, snap_to
 from .sheet_cases import SHEETS
 
 LINK = Frustum(0.050, 0.050, 0.200)
+lengths, positive = st.floats(0.02, 0.3), st.floats(0.0, 0.4)
 
 
 def stack(
