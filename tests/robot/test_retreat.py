@@ -234,6 +234,23 @@ def test_the_shoulder_cannot_move_away_from_a_touch_on_its_side() -> None:
     assert "0 % of the speed wanted" in plan.reason
 
 
+@pytest.mark.parametrize(("degrees", "begun"), [(0.0, True), (59.0, True), (61.0, False), (90.0, False)])
+def test_a_retreat_is_begun_up_to_60_degrees_off_its_direction(degrees: float, begun: bool) -> None:
+    """A point that one joint moves on a circle, touched at an angle to it: the squared cosine must be a quarter."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    plan = planned(UR10E, Q, [ContactOnLink(1, (0.5, 0.0, 0.0), (-s, 0.0, -c))])  # joint 1 turns about its y axis
+    assert isinstance(plan, RetreatPlan) == begun
+
+
+def test_a_step_near_a_singularity_says_so() -> None:
+    q: Joints = (*Q[:2], 0.1, *Q[3:])  # the elbow nearly straight
+    plan = planned(UR10E, q, [ContactOnLink(3, (0.3, 0.06, 0.0), (0.0, 1.0, 0.0))])
+    assert isinstance(plan, RetreatPlan)
+    step = retreat_step(plan, ArmState(0.0, q))
+    assert isinstance(step, JointVelocity)
+    assert "singularity" in step.clipped_by
+
+
 def test_between_two_opposite_touches_the_arm_stands() -> None:
     other = ContactOnLink(3, (0.3, 0.0, -0.06), (0.0, 0.0, -1.0))
     plan = planned(UR10E, Q, [FOREARM, other])
