@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -180,7 +181,8 @@ def find_cones(
         for factor in (2.0, 4.0, 8.0, 16.0):
             looser = best_plan(mesh, rays, hull, candidates, replace(rules, tolerance=factor * tolerance))
             if looser.sides:
-                best = _sheet(looser, looser.sides[0], hull, factor * tolerance)
+                widest = max(looser.sides, key=partial(Side.area, profile=looser.profile))
+                best = _sheet(looser, widest, hull, factor * tolerance)
             if looser.sides and not (hulled and looser.area < worth):
                 break
         plan = Plan(plan.profile, [])

@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 
 TURN = 2.0 * math.pi
 PARTIAL_GAIN = 1.25  #: a partial wrap must cover that much more than full wraps to be preferred
+SHEET_GAIN = 0.08  #: of the link's length, that a further sheet must add: fillets are not worth one
 _COARSE, _FINE = (120, 53), (512, 149)  #: slices and rays in each; odd numbers, so that facets are not hit in step
 
 
@@ -102,7 +103,7 @@ def _plan(
     rows = max(2, math.ceil(rules.shortest / profile.step))
     full, partial = Plan(profile, []), Plan(profile, [])
     if rules.wrap is None or rules.wrap == TURN:
-        gain = max(1, round(0.03 * len(profile.z)))
+        gain = max(1, round(SHEET_GAIN * len(profile.z)))
         chosen = choose_intervals(profile.z, *profile.bounds(), rules.tolerance, rules.max_sheets, rows, gain)
         sides = [fit_side(profile, a, b, 0, around, rules.tolerance, rise) for a, b in chosen]
         full = Plan(profile, [side for side in sides if side.end - side.first >= rows])

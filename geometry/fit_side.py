@@ -62,8 +62,9 @@ def fit_side(
 ) -> Side:
     """Fit a straight side to a region and cut the region to where it holds.
 
-    A robust mean line follows the body rather than the fillets at the ends of an interval; where that line would lose
-    more than a thirtieth of the length (a barrel), the line of least deviation is taken.
+    A robust mean line follows the body rather than the fillets at the ends of an interval. The line of least deviation
+    would cover a little more of a tube by leaning into them; it is taken only where the body itself is curved (a
+    barrel), so that the mean line is far from it and would lose more than a thirtieth of the length.
 
     Args:
         profile: the hull about the axis.
@@ -86,7 +87,8 @@ def fit_side(
     limit = tolerance * math.hypot(1.0, slope)
     line = start + slope * z
     run = _longest_run((high <= line + limit) & (low >= line - limit))
-    if run[1] - run[0] >= 0.97 * (end - first):
+    straight = float(np.median(np.abs(means + offset * math.hypot(1.0, slope) - line))) < 0.15 * limit
+    if run[1] > run[0] and (straight or run[1] - run[0] >= 0.97 * (end - first)):
         return Side(first + run[0], first + run[1], column, columns, start, slope, offset)
     _, start, slope = least_deviation(z, high, low)
     return Side(first, end, column, columns, start, slope)
