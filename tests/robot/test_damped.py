@@ -8,6 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coneskin.robot.damped import FLOOR, MOST, NEAR, damped_speeds, damping_squared, stacked_speeds
+from coneskin.robot.retreat import LEAST_PROGRESS
 
 from .arms import units
 
@@ -86,11 +87,11 @@ def test_several_points_do_as_well_as_the_quadratic_program() -> None:
     """The same problem solved exactly, through its dual by scipy's nnls, for points that nearly block each other."""
     nnls = pytest.importorskip("scipy.optimize", reason="solves the dual").nnls
     source = np.random.default_rng(7)
-    stood = 0
+    stood = begun = 0
     for _ in range(500):
-        joints, count = source.integers(1, 7), source.integers(2, 5)
+        joints, count = int(source.integers(1, 7)), int(source.integers(2, 5))
         base = source.uniform(-1.0, 1.0, (joints, 3))
-        points = []
+        points: list[tuple[list[Vector], Vector]] = []
         for k in range(count):
             columns = base * source.choice([1.0, 0.3]) + source.choice([0.0, 1e-9, 0.2]) * source.normal(
                 size=(joints, 3)
@@ -107,11 +108,15 @@ def test_several_points_do_as_well_as_the_quadratic_program() -> None:
         free = np.linalg.solve(root, along.sum(axis=0))
         forces, _ = nnls(np.linalg.solve(root, along.T), -free)
         best = np.linalg.solve(root.T, np.linalg.solve(root, along.T) @ forces + free)
-        # the way found adds touches to hold one by one and lets none go: at most a little slower than the best
-        assert np.mean(along @ speeds) >= np.mean(along @ best) - 0.05
-        assert np.min(along @ speeds) >= -1e-8
+        # Touches are held one by one and none is let go: a little slower than the best, where the best is fast enough
+        # for a retreat to be begun at all.
+        if np.mean(along @ best) >= LEAST_PROGRESS:
+            assert np.mean(along @ speeds) >= np.mean(along @ best) - 0.05
+            begun += 1
+        assert np.min(along @ speeds) >= -1e-7  # 1e-9 of terms that sum to some 10 m/s
         stood += not any(speeds)
-    assert 5 < stood < 250  # some of them are clamped
+    assert stood > 20  # clamped
+    assert begun > 100
 
 
 def test_two_points_that_both_can_get_away_do() -> None:

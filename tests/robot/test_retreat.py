@@ -84,7 +84,7 @@ def test_a_step_keeps_all_limits_and_never_moves_towards_an_obstacle(
         normal = link_pose(arm, q, contact.link).rotate(contact.normal)
         towards = float(np.array(normal) @ rows @ np.array(step.qd))
         away.append(-towards)
-        assert towards <= 1e-8 * reaction.speed
+        assert towards <= 1e-7 * reaction.speed  # rounding of several touches that nearly block each other
         if len(contacts) == 1:  # by least squares the point is never faster than wanted
             assert np.linalg.norm(rows @ np.array(step.qd)) <= reaction.speed * (1 + 1e-9)
     assert step.away == pytest.approx(sum(away) / len(away), abs=1e-7)
