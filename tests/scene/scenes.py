@@ -1,0 +1,72 @@
+"""Scenes and runs that several tests use; no hardware and no process."""
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from coneskin.build import build_core
+from coneskin.robot import rtde_codec as rtde
+from coneskin.robot.journal import GuardEvent, Kind
+from coneskin.robot.owner_messages import Note
+from coneskin.scene import Scene
+from coneskin.scene_reader import parse_scene
+from coneskin.skin.recording import Block, Recorder
+from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "scene.md"
+SKIN_ONLY, SERIAL_RETREAT, DOUBLE_CONE = re.findall(
+    r"```toml\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL
+)
+FULL = (
+    DOUBLE_CONE
+    + """
+[watch]
+settle_ms = 50
+
+[recording]
+folder = "runs"
+"""
+)
+Q = (-0.7, -1.6, 1.6, -1.6, -1.6, 0.0)
+
+
+def arm_payload(time: float, speed: float = 0.0) -> bytes:
+    """What a controller sends while joint 1 turns at this speed [rad/s]."""
+    names = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
+    still = (0.0,) * 5
+    return rtde.Recipe(names).pack([time, Q, (speed, *still), 7, 1, 2])
+
+
+def inputs(scene: Scene, touch: ScriptedTouch, end: float = 1.5) -> Iterator[Block]:
+    """Everything that goes into a guard in a run: skin, arm and owner; the arm stops 50 ms after the touch."""
+    assert scene.source is not None
+    skin = VirtualSkin([item.sensor for item in scene.sensors], [touch], rate_hz=scene.source.rate_hz, seed=7)
+    start = 1000.0
+    yield Block(Kind.OWNER, start, Note("ready").encode())
+    due = 0.0
+    for time, data in skin.packets():
+        if time > end:
+            return
+        while scene.arm is not None and due <= time:
+            since = max(0.0, due - touch.start - 0.005)
+            yield Block(Kind.ARM, start + due, arm_payload(due, max(0.0, 0.5 - 10.0 * since)))
+            due += 0.002
+        yield Block(Kind.SKIN, start + time, data)
+
+
+def record(path: Path, text: str = FULL, touch: ScriptedTouch | None = None) -> list[GuardEvent]:
+    """Record a run of a scene as a session does; what happened."""
+    scene = parse_scene(text, "scene.toml", path.parent)
+    touch = touch or ScriptedTouch(0.6, 0.8, 0.07, math.pi / 2, sensor=scene.sensors[-1].sensor.name)
+    core, events = build_core(scene), []
+    header = {"scene": scene.text, "name": scene.name, "folder": str(path.parent), "clocks": {"monotonic": 1000.0}}
+    with Recorder(path) as recorder:
+        recorder.write(Block(Kind.HEADER, 1000.0, json.dumps(header).encode()))
+        for block in inputs(scene, touch):
+            outputs = core.take(block)
+            happened = [output for output in outputs if isinstance(output, GuardEvent)]
+            recorder.write(block, *(event.block() for event in happened))
+            events += happened
+    return events

@@ -1,0 +1,146 @@
+"""docs/scene.md against the code: every key with its unit, range and default, no other key, and examples that load."""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coneskin import link_tables, scene_reader, schema, sensor_table
+from coneskin.robot.commands import Reaction
+from coneskin.robot.watch import Watch
+from coneskin.scene_reader import parse_scene
+from coneskin.schema import Key
+from coneskin.skin.electronics import Electronics, Polarity, Thresholds
+from coneskin.skin.sensor import Sensor
+
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"```toml\n(.*?)```", DOCUMENT, re.DOTALL)
+SECTIONS: dict[str, tuple[Key, ...]] = {
+    "[arm]": scene_reader._ARM,
+    "[[link]]": link_tables.LINK_KEYS,
+    "[[link.sensor]]": (Key("file", str, None), *sensor_table.SENSOR_KEYS),
+    "[source]": scene_reader._SOURCE,
+    "[[source.touch]]": scene_reader._TOUCH,
+    "[reaction]": scene_reader._REACTION,
+    "[watch]": scene_reader._WATCH,
+    "[recording]": scene_reader._RECORDING,
+    "[motion]": scene_reader._MOTION,
+}
+#: what the document says in words, because the code says None, nothing, or works it out
+IN_WORDS = {
+    ("[[link]]", "mesh"): "none",
+    ("[[link]]", "sensor"): "none",
+    ("[[link.sensor]]", "file"): "none",
+    ("[[link.sensor]]", "name"): "from its numbers",
+    ("[source]", "port"): "- with serial",
+    ("[source]", "touch"): "none",
+    ("[[source.touch]]", "sensor"): "the first",
+}
+
+
+def rows(section: str) -> dict[str, list[str]]:
+    """Key -> unit, range, default, meaning."""
+    body = DOCUMENT.split(f"\n## `{section}`\n", 1)[1].split("\n## ", 1)[0]
+    found: dict[str, list[str]] = {}
+    for line in body.splitlines():
+        if match := re.match(r"\| `(\w+)` \| (.*) \|$", line):
+            assert match[1] not in found, f"{section} has {match[1]} twice"
+            found[match[1]] = [cell.strip() for cell in match[2].split("|")]
+    return found
+
+
+def default_in_si(section: str, key: Key) -> Any:
+    """The default that counts: the key's own, or that of the value that the table is for."""
+    settings = {"[reaction]": Reaction, "[watch]": Watch}.get(section)
+    if settings is not None and key.kind in (float, int):
+        return next(field.default for field in fields(settings) if field.name == key.plain)
+    return key.default
+
+
+def default_text(section: str, key: Key) -> str:
+    if (section, key.name) in IN_WORDS:
+        return IN_WORDS[section, key.name]
+    value = default_in_si(section, key)
+    if value is ...:
+        return "-"
+    factor = schema._UNITS.get(key.suffix, (1.0, ""))[0]
+    if key.kind is list:
+        return "[" + ", ".join(f"{number / factor:g}" for number in value) + "]"
+    return f"{value / factor:g}" if key.kind is float else str(value)
+
+
+def all_keys() -> Iterator[tuple[str, Key]]:
+    for section, keys in SECTIONS.items():
+        for key in keys:
+            yield section, key
+
+
+def test_the_document_has_a_section_for_each_table() -> None:
+    assert re.findall(r"^## `(.*)`$", DOCUMENT, re.MULTILINE) == list(SECTIONS)
+    assert {name.strip("[]").split(".")[0] for name in SECTIONS} == set(scene_reader._TOP)
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_the_document_names_each_key_and_no_other(section: str) -> None:
+    assert list(rows(section)) == [key.name for key in SECTIONS[section]]
+
+
+@pytest.mark.parametrize(("section", "key"), list(all_keys()), ids=lambda item: getattr(item, "name", item))
+def test_unit_range_and_default(section: str, key: Key) -> None:
+    unit, bounds, default, meaning = rows(section)[key.name]
+    assert default == default_text(section, key)
+    assert meaning
+    if key.suffix:
+        assert unit.split(",")[0] == schema._UNITS[key.suffix][1]
+    elif key.kind is int:
+        assert unit == "whole number"
+    if key.name == "waypoints_deg":
+        key = scene_reader._WAYPOINT[0]
+    if key.choices:
+        assert bounds == ", ".join(key.choices)
+    elif math.isfinite(key.low) and math.isfinite(key.high):
+        start = f"above {key.low:g}" if key.above else f"{key.low:g}"
+        end = f"{key.high}" if key.kind is int else f"{key.high:g}"
+        assert bounds == f"{start} to {end}"
+    elif math.isfinite(key.low):
+        assert bounds == f"at least {key.low:g}"
+    else:
+        assert bounds == ""
+
+
+def test_the_defaults_of_a_sensor_are_those_of_its_parts() -> None:
+    """The table and the classes say the same, so that a sensor of a program and one of a scene are the same sensor."""
+    text = '[[link]]\nname = "a"\n[[link.sensor]]\nradius1_mm = 54\nradius2_mm = 54\nheight_mm = 434\n'
+    (item,) = parse_scene(text).sensors
+    assert item.sensor == Sensor(item.sensor.frustum)
+    assert (item.sensor.electronics, item.sensor.polarity, item.sensor.thresholds) == (
+        Electronics(),
+        Polarity(),
+        Thresholds(),
+    )
+
+
+def test_there_are_three_examples() -> None:
+    assert len(EXAMPLES) == 3
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_the_examples_load(number: int) -> None:
+    scene = parse_scene(EXAMPLES[number], f"example {number}")
+    assert [len(link.sensors) for link in scene.links] == [[1], [1], [2]][number]
+    assert [scene.arm.model if scene.arm else None, scene.reaction.kind if scene.reaction else None] == [
+        [None, None],
+        ["UR10e", "retreat"],
+        ["UR5e", "stop"],
+    ][number]
+
+
+def test_the_two_sensors_of_the_double_cone_share_their_belt() -> None:
+    (first, second) = parse_scene(EXAMPLES[2]).sensors
+    for phi in (0.0, 1.0, 5.0):
+        end = first.placed.point(first.sensor.frustum.slant, phi)
+        assert end == pytest.approx(second.placed.point(0.0, phi), abs=1e-15)  # metres: one rounding of a sum
