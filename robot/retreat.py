@@ -118,7 +118,7 @@ def plan_retreat(
         tracks.append(_Track(contact.link, contact.point, away, (x, y, z), link.drive, link.place))
     limits = JointLimits.of(model, reaction.acceleration)
     plan = RetreatPlan(tuple(tracks), reaction, limits, state.time)
-    first = retreat_step(plan, state)
+    first = retreat_step(plan, ArmState(state.time, state.q))  # from a standstill: the arm stops first
     return first if isinstance(first, Done) else plan
 
 

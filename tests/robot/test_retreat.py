@@ -70,8 +70,11 @@ def test_a_step_keeps_all_limits_and_never_moves_towards_an_obstacle(
     assume(isinstance(plan, RetreatPlan))
     assert isinstance(plan, RetreatPlan)
     step = retreat_step(plan, ArmState(time, q, qd))
-    assert isinstance(step, JointVelocity)
     assert step == retreat_step(plan, ArmState(time, q, qd))  # nothing but its arguments counts
+    if isinstance(step, Done):  # begun from a standstill, but joints that run at their limits are taken out
+        assert "at its limit" in step.reason
+        assert any(qd)
+        return
     assert step.qd[max(c.link for c in contacts) :] == (0.0,) * (6 - max(c.link for c in contacts))
     assert all(abs(v) <= most * (1 + 1e-12) for v, most in zip(step.qd, arm.joint_speed, strict=True))
     assert step.acceleration == reaction.acceleration
@@ -185,6 +188,19 @@ def test_a_joint_before_its_limit_is_locked_and_the_others_do_it() -> None:
     assert step.qd[2] == 0.0
     assert "joint 3 limit" in step.clipped_by
     assert step.away > 0.0
+
+
+def test_a_joint_that_still_runs_at_its_limit_when_touched_does_not_forbid_the_plan() -> None:
+    """The arm stops before it retreats; what counts is whether it could retreat from there."""
+    edge = elbow_limited(Q[2] - 1.0, Q[2] + MARGIN + 0.03)  # 30 mrad: enough for 0.05 rad/s, not for 2 rad/s
+    plan = planned(edge, Q, [FOREARM], qd=(0.0, 0.0, 2.0, 0.0, 0.0, 0.0))
+    assert isinstance(plan, RetreatPlan)
+    running = retreat_step(plan, ArmState(0.1, Q, (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)))
+    still = retreat_step(plan, ArmState(0.1, Q))
+    assert isinstance(running, JointVelocity)
+    assert isinstance(still, JointVelocity)
+    assert running.qd[2] == 0.0
+    assert still.qd[2] > 0.0
 
 
 def test_with_the_joint_that_it_needs_at_its_limit_it_stands() -> None:
