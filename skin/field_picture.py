@@ -109,7 +109,7 @@ def _field_lines(axes: Any, field: FieldMap, upper: bool) -> None:
     """Lines of current, followed through the rectangle by the midpoint rule from one driven electrode to the other."""
     sheet = field.model.sheet
     steps = 160
-    start: Floats = (np.arange(13) + 0.5) / 13.0
+    start = np.asarray((np.arange(13) + 0.5) / 13.0, dtype=np.float64)
     length, breadth = sheet.length, sheet.breadth
     x: Floats
     y: Floats
@@ -136,19 +136,23 @@ def _field_lines(axes: Any, field: FieldMap, upper: bool) -> None:
     axes.plot(px, py, color="black", lw=0.7, zorder=3)
 
 
+def _cell_edges(middles: Floats) -> Floats:
+    """Edges of the cells around increasing middles; the outermost end there, so that nothing leaves the sheet."""
+    return np.concatenate([middles[:1], 0.5 * (middles[1:] + middles[:-1]), middles[-1:]])
+
+
 def draw_error(path: Path, model_sheet: SectorSheet, grid: ErrorMap, radial: bool, title: str) -> None:
     """An error map on the sector; blank where the disc would not fit.
 
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    theta, r = np.meshgrid(np.radians(grid.theta_deg), grid.r_mm)
+    theta, r = np.meshgrid(np.radians(_cell_edges(grid.theta_deg)), _cell_edges(grid.r_mm))
     error = grid.r_error_mm if radial else grid.theta_error_deg
     figure, axes = _figure(5.6, 4.9)
     limit = float(np.nanmax(np.abs(error)))
-    picture = axes.pcolormesh(
-        r * np.cos(theta), r * np.sin(theta), error, cmap="RdBu_r", vmin=-limit, vmax=limit, shading="nearest"
-    )
+    x, y = r * np.cos(theta), r * np.sin(theta)
+    picture = axes.pcolormesh(x, y, error, cmap="RdBu_r", vmin=-limit, vmax=limit)
     label = "decoded minus true " + ("r [mm]" if radial else "theta [deg]")
     figure.colorbar(picture, ax=axes, label=label, shrink=0.85)
     _outline(axes, model_sheet, {})

@@ -29,7 +29,7 @@ def guide_volts(model: FieldModel, coupling) -> np.ndarray:
     )
 
 
-def finite_differences(model: FieldModel, u, phi, radius, conductance, cells=160) -> np.ndarray:
+def finite_differences(model: FieldModel, u, phi, radius, conductance, cells=110) -> np.ndarray:
     """The same eight potentials from a five-point scheme on the rectangle: nothing of the multipole solver is in it."""
     sheet = model.sheet
     nx = ny = cells

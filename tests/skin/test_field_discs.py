@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -26,10 +27,11 @@ def test_finite_differences_agree(name: str, lower: float) -> None:
     u, phi, radius = 0.4 * sheet.width, 0.3 * sheet.wrap, 0.11 * min(sheet.width, sheet.breadth)
     g = (3.0 / radius) ** 2 / (1.0 + lower)
     ours = guide_volts(model, model.contacts(u, phi, radius, g))[0]
-    # 160 cells: the scheme and the sampled rim leave 1e-5 to 4e-5; the area effect itself is above 2e-3.
-    assert np.abs(ours - finite_differences(model, u, phi, radius, g)).max() < 1e-4
+    reference = finite_differences(model, u, phi, radius, g)
+    # 110 cells: the scheme and the sampled rim leave 2e-5 to 8e-5; the area effect itself is above 2e-3.
+    assert np.abs(ours - reference).max() < 1.5e-4
     shifted = guide_volts(model, model.contacts(u * 1.02, phi, radius, g))[0]
-    assert np.abs(shifted - finite_differences(model, u, phi, radius, g)).max() > 1e-3  # 2 % away would be seen
+    assert np.abs(shifted - reference).max() > 1e-3  # 2 % away would be seen
 
 
 @pytest.mark.parametrize("name", list(SHEETS))
@@ -42,7 +44,7 @@ def test_error_falls_geometrically_with_the_order(name: str, lower: float) -> No
     volts = [guide_volts(model, model.contacts(u, phi, radius, order=m))[0] for m in (1, 3, 5, 7, 9, 40)]
     error = [float(np.abs(v - volts[-1]).max()) for v in volts[:-1]]
     assert error[0] > 1e-8
-    for before, after in zip(error, error[1:], strict=False):
+    for before, after in itertools.pairwise(error):
         assert after < max(0.2 * before, 1e-14)  # exp(-4 rate) with rate = acosh(2) or ln(r/a) > 0.4
 
 
