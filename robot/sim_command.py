@@ -13,7 +13,8 @@ from pathlib import Path
 
 from coneskin.errors import ConeSkinError, RobotRefused
 
-from .sim_controller import START_Q, Controller, Options, Version
+from .sim_controller import Controller
+from .sim_options import START_Q, Options, Version
 from .sim_server import PORTS, Server
 from .ur_models import MODEL_NAMES
 

@@ -9,56 +9,26 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import IO, Any, Literal
+from typing import IO, Any
 
 from coneskin.errors import RobotRefused
 
 from . import ur_models
 from .rtde_codec import VARIABLES, Value
 from .sim_arm import CYCLE, Arm
+from .sim_options import Options
 from .sim_program import Program
 from .sim_safety import RobotMode, Runtime, SafetyMode
 from .sim_urscript import Translation
-from .sim_values import ScriptError, pose_of, values_of
+from .sim_values import ScriptError, values_of
 
-__all__ = ["Controller", "Options", "Version"]
+__all__ = ["Controller"]
 
-Version = tuple[int, int]
-
-#: Joint positions at which the arm starts: clear of every singular position [rad].
-START_Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 HISTORY = 500  #: cycles that get_actual_joint_positions_history remembers
 _COMMAND_REGISTERS = ("input_int_register_0", "input_int_register_24")
 _GET_FORWARD_KINEMATICS = 44
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """What kind of controller, and what is wrong with it.
-
-    Attributes:
-        model: the arm.
-        version: of PolyScope, major and minor.
-        start_q: joint positions at the start [rad].
-        quirks: "real": the program of ur_rtde runs as it is; "fixed": with the mistakes of docs/sim-ur.md mended.
-        wrong_size: what to do with a data packet that is longer than its recipe; unknown of the real controller.
-        start_delay: from a program's last byte to its first cycle [s].
-        unlock_after: time that must pass before a protective stop can be unlocked [s].
-        after_protective_stop: whether the program is paused (e-Series) or ended by one.
-        program: URScript that the dashboard's ``play`` starts.
-    """
-
-    model: str = "ur10e"
-    version: Version = (5, 25)
-    start_q: Sequence[float] = START_Q
-    quirks: Literal["real", "fixed"] = "real"
-    wrong_size: Literal["truncate", "drop"] = "truncate"
-    start_delay: float = 0.010
-    unlock_after: float = 5.0
-    after_protective_stop: Literal["pause", "stop"] = "pause"
-    program: str = ""
 
 
 @dataclass(slots=True)
@@ -325,10 +295,6 @@ class Controller:
             "slider": self.slider,
             "digital_outputs": self.digital_outputs,
         }
-
-    def set_tool(self, values: Sequence[float]) -> None:
-        """The tool centre point in the flange frame: x, y, z [m], rx, ry, rz [rad]."""
-        self.arm.tcp = pose_of(values)
 
 
 def _plain(value: object) -> object:

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from .rtde_codec import VARIABLES, Value
-from .sim_controller import Controller, Version
+from .sim_controller import Controller
+from .sim_options import Version
 from .sim_safety import Runtime, SafetyMode, robot_bits, safety_bits
 from .sim_values import values_of
 

@@ -5,6 +5,7 @@ One thread and `select`: its timeout is exact to microseconds, that of epoll is 
 
 from __future__ import annotations
 
+import gc
 import os
 import selectors
 import socket
@@ -118,6 +119,9 @@ class Server:
 
     def run(self, alive: Callable[[], bool] = lambda: True) -> None:
         """Keep the cycle until `stop`, or until alive(), asked five times a second, says no."""
+        gc.collect()
+        gc.freeze()  # what is there now stays: no collection in the cycle need look at it again
+        asked = 0
         due = time.monotonic() + CYCLE
         while not self._stopping:
             wait = due - time.monotonic()
@@ -131,8 +135,10 @@ class Server:
                 self._cycle()
                 due += CYCLE
             self._publish()
-            if self.controller.cycle % 100 == 0 and not alive():
-                return
+            if self.controller.cycle >= asked + 100:
+                asked = self.controller.cycle
+                if not alive():
+                    return
 
     def _poll(self, timeout: float) -> None:
         for key, _ in self._selector.select(timeout):

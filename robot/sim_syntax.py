@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from .sim_values import ScriptError
 
-__all__ = ["Function", "Parser", "numbered_lines"]
+__all__ = ["Function", "Parser"]
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<string>\"[^\"]*\"|'[^']*')|(?P<pose>p(?=\[))"
@@ -20,40 +20,6 @@ _TOKEN = re.compile(
 )
 _BINARY = ({"or": "or", "xor": "^"}, {"and": "and"})
 _COMPARE = {"==", "!=", "<", ">", "<=", ">="}
-
-
-def numbered_lines(text: str) -> list[tuple[int, str]]:
-    """Numbered lines without comments and blanks; an unfinished one takes what it lacks from the next.
-
-    ur_rtde writes the value of ``global offset =`` at the start of the next line, before that line's own statement.
-    """
-    lines: list[tuple[int, str]] = []
-    for number, raw in enumerate(text.splitlines(), 1):
-        line = (raw if "#" not in raw else _without_comment(raw)).strip()
-        if not line:
-            continue
-        if lines and lines[-1][1].endswith("=") and (value := re.match(r"[-+]?[\d.eE]+", line)):
-            lines[-1] = (lines[-1][0], f"{lines[-1][1]} {value[0]}")
-            line = line[value.end() :].strip()
-            if not line:
-                continue
-        elif lines and lines[-1][1].endswith((",", "(", "[")):
-            lines[-1] = (lines[-1][0], f"{lines[-1][1]} {line}")
-            continue
-        lines.append((number, line))
-    return lines
-
-
-def _without_comment(line: str) -> str:
-    quote = ""
-    for position, letter in enumerate(line):
-        if quote:
-            quote = "" if letter == quote else quote
-        elif letter in "\"'":
-            quote = letter
-        elif letter == "#":
-            return line[:position]
-    return line
 
 
 @dataclass(slots=True)
@@ -71,6 +37,8 @@ class Function:
 
 class Parser:
     """Statements by line, expressions by precedence climbing; expressions come out as Python text.
+
+    Takes numbered lines without comments and blanks, as `sim_urscript` cuts them.
 
     Attributes:
         functions: what has been defined, by name.

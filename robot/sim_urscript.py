@@ -18,7 +18,7 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from types import CodeType
 
-from .sim_syntax import Function, Parser, numbered_lines
+from .sim_syntax import Function, Parser
 from .sim_values import ScriptError
 
 __all__ = ["Translation", "complete_programs", "translate"]
@@ -76,19 +76,53 @@ def translate(
     Raises:
         ScriptError: the text is not URScript as described above; the message gives the line.
     """
-    lines = numbered_lines(text)
+    lines = _numbered_lines(text)
     if not lines or not re.match(r"(def|sec)\b", lines[0][1]):
         lines = [(0, "def unnamed():"), *lines, (0, "end")]
     parser = Parser(lines)
     program = parser.program()
     for name, definition in (replace or {}).items():
         if name in parser.functions:
-            other = Parser(numbered_lines(definition))
+            other = Parser(_numbered_lines(definition))
             other.program()
             parser.functions |= other.functions
             parser.globals |= other.globals
     source = _Writer(program, parser, builtins, blocking).module()
     return Translation(program.name, program.kind == "sec", compile(source, f"<{program.name}>", "exec"))
+
+
+def _numbered_lines(text: str) -> list[tuple[int, str]]:
+    """Numbered lines without comments and blanks; an unfinished one takes what it lacks from the next.
+
+    ur_rtde writes the value of ``global offset =`` at the start of the next line, before that line's own statement.
+    """
+    lines: list[tuple[int, str]] = []
+    for number, raw in enumerate(text.splitlines(), 1):
+        line = (raw if "#" not in raw else _without_comment(raw)).strip()
+        if not line:
+            continue
+        if lines and lines[-1][1].endswith("=") and (value := re.match(r"[-+]?[\d.eE]+", line)):
+            lines[-1] = (lines[-1][0], f"{lines[-1][1]} {value[0]}")
+            line = line[value.end() :].strip()
+            if not line:
+                continue
+        elif lines and lines[-1][1].endswith((",", "(", "[")):
+            lines[-1] = (lines[-1][0], f"{lines[-1][1]} {line}")
+            continue
+        lines.append((number, line))
+    return lines
+
+
+def _without_comment(line: str) -> str:
+    quote = ""
+    for position, letter in enumerate(line):
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        elif letter == "#":
+            return line[:position]
+    return line
 
 
 class _Writer:

@@ -17,6 +17,7 @@ __all__ = [
     "ScriptError",
     "copy",
     "interpolate",
+    "numbers",
     "pose_of",
     "rotation_of",
     "rotvec_between",
@@ -65,6 +66,19 @@ def _same(values: Sequence[Any], other: Any) -> Sequence[Any]:
 def copy(value: Any) -> Any:
     """URScript assigns lists by value."""
     return type(value)(value) if isinstance(value, list) else value
+
+
+def numbers(values: Any, count: int, name: str) -> list[float]:
+    """A list of finite numbers of a program.
+
+    Raises:
+        ScriptError: there are more or fewer, or one is not a finite number.
+    """
+    if not isinstance(values, list) or len(values) != count or not all(isinstance(v, int | float) for v in values):
+        raise ScriptError(f"{name} must be {count} numbers, got {values!r}")
+    if not all(math.isfinite(value) for value in values):
+        raise ScriptError(f"{name} must be finite, got {values!r}")
+    return [float(value) for value in values]
 
 
 def rotation_of(rotvec: Sequence[float]) -> _Rotation:

@@ -10,8 +10,9 @@ import pytest
 
 from coneskin.errors import KinematicsError, RobotRefused
 from coneskin.robot.sim_builtins import Builtins
-from coneskin.robot.sim_controller import Controller, Options
+from coneskin.robot.sim_controller import Controller
 from coneskin.robot.sim_dashboard import answer
+from coneskin.robot.sim_options import Options
 from coneskin.robot.sim_urscript import translate
 
 FAR = "[1.5, -1.5708, 1.5708, -1.5708, -1.5708, 0]"
@@ -230,3 +231,30 @@ def test_a_start_beyond_the_limits_and_an_unknown_arm_are_refused() -> None:
         Controller(Options(start_q=(0, 0, 4.0, 0, 0, 0)))
     with pytest.raises(KinematicsError, match="UR10e"):
         Controller(Options(model="ur99"))
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("speedj([0, 0, 0, 0, 0], 1)", "joint speeds must be 6 numbers"),
+        ("write_output_integer_register(0, 2^40)", "an integer register holds 32 bits"),
+        ("set_payload(1, [0, 0])", "a centre of gravity must be 3 numbers"),
+        ("movel(p[9, 0, 0, 0, 0, 0])", "cannot bring its flange"),
+        ("x = 1 / 0", "ZeroDivisionError"),
+        ("movej([1, 2])", "joint positions must be 6 numbers"),
+        ("x = [1, 2]\n  y = x[5]", "IndexError"),
+    ],
+)
+def test_a_mistake_ends_the_program_and_not_the_controller(bench: Bench, line: str, reason: str) -> None:
+    bench.send(f"def p():\n  {line}\nend\n")
+    bench.step(20)
+    assert reason in bench.events("abort")[0]["reason"]
+    assert bench.controller.runtime.name == "STOPPED"
+
+
+def test_a_speed_that_is_not_a_number_does_not_reach_the_arm(bench: Bench) -> None:
+    bench.send("def p():\n  speedj([read_input_float_register(0), 0, 0, 0, 0, 0], 1)\nend\n")
+    bench.controller.received({"input_double_register_0": float("nan")})
+    bench.step(20)
+    assert "joint speeds must be finite" in bench.events("abort")[0]["reason"]
+    assert not bench.controller.arm.moving

@@ -8,7 +8,8 @@ import struct
 import pytest
 
 from coneskin.robot.rtde_codec import PacketKind, Recipe, pack, pack_inputs_request, pack_outputs_request, split
-from coneskin.robot.sim_controller import Controller, Options
+from coneskin.robot.sim_controller import Controller
+from coneskin.robot.sim_options import Options
 from coneskin.robot.sim_outputs import Outputs
 from coneskin.robot.sim_rtde import RtdeSession
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import socket
 
 from coneskin.robot.rtde_codec import Packet, PacketKind, Recipe, pack_outputs_request, pack_start_request, split
-from coneskin.robot.sim_controller import Controller, Options
+from coneskin.robot.sim_controller import Controller
+from coneskin.robot.sim_options import Options
 from coneskin.robot.sim_process import free_host
 from coneskin.robot.sim_server import PORTS, Server
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from coneskin.robot.sim_builtins import Builtins
-from coneskin.robot.sim_controller import Controller, Options
+from coneskin.robot.sim_controller import Controller
+from coneskin.robot.sim_options import Options
 from coneskin.robot.sim_urscript import Translation, complete_programs, translate
 from coneskin.robot.sim_values import ScriptError
 

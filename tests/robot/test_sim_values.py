@@ -8,7 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.sim_values import Array, PoseValue, ScriptError, copy, pose_of, rotation_of, rotvec_of, values_of
+from coneskin.robot.sim_values import (
+    Array,
+    PoseValue,
+    ScriptError,
+    copy,
+    numbers,
+    pose_of,
+    rotation_of,
+    rotvec_of,
+    values_of,
+)
 
 LAW = settings(deadline=None, derandomize=True, max_examples=300)
 ANGLE = st.floats(0.0, math.pi)
@@ -59,3 +69,9 @@ def test_lists_add_element_by_element_and_copy_by_value() -> None:
     assert isinstance(copy(PoseValue((0,) * 6)), PoseValue)
     with pytest.raises(ScriptError, match="needs another of the same length"):
         first + Array((1, 2, 3))
+
+
+@pytest.mark.parametrize("values", [[1, 2], [1, 2, math.nan], [1, 2, math.inf], [1, 2, "x"], 3])
+def test_what_is_not_a_list_of_finite_numbers_is_refused(values: object) -> None:
+    with pytest.raises(ScriptError, match="joint positions must be"):
+        numbers(values, 3, "joint positions")
