@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from enum import Enum
-from typing import Any
+from typing import Any, Protocol
 
 from .commands import ArmState, ContactOnLink, Done, Reaction
 from .journal import GuardEvent
@@ -24,10 +24,19 @@ from .stop_watch import StopWatch, Way
 from .ur_models import ArmModel
 from .watch import Watch
 
-__all__ = ["ArmReaction", "Command", "Output", "Phase"]
+__all__ = ["ArmReaction", "Command", "Output", "Outputs", "Phase"]
 
 Command = Stop | Speed | Halt | Clear | Way
 Output = Command | GuardEvent
+
+
+class Outputs(Protocol):
+    """Takes what comes out, in order: a list, or something that sends a command as soon as it is there."""
+
+    def append(self, output: Output, /) -> None:
+        """Take one."""
+
+
 _STREAM_EVERY = 0.004  # s between two targets of a retreat: every second controller cycle, so that none queues
 _SLACK = 4.0  # of the patience: what a stop may take besides v / a before every way is used
 
@@ -69,11 +78,12 @@ class ArmReaction:
         self._stop: StopWatch | None = None
         self._touch_state: ArmState | None = None
         self._touch_contacts: Sequence[ContactOnLink] = ()
+        self._may_retreat = False
         self._plan: RetreatPlan | None = None
         self._sent = -math.inf
         self._why = ""
 
-    def arm(self, out: list[Output]) -> None:
+    def arm(self, out: Outputs) -> None:
         """Let the program move the arm, and react from now on."""
         self.phase = Phase.ARMED
         out.append(Clear())
@@ -82,28 +92,26 @@ class ArmReaction:
         """Leave LATCHED, because a person says so."""
         self.phase = Phase.STARTING
 
-    def react(self, now: float, contacts: Sequence[ContactOnLink], why: str, out: list[Output]) -> None:
-        """Stop; then retreat from the contacts, if that is the reaction and there are any.
+    def react(self, now: float, why: str, fault: bool, out: Outputs) -> None:
+        """Stop; a retreat follows a touch, not a fault.
 
-        Does nothing where the arm is already stopped or stopping, save that a fault takes a retreat away.
+        Does nothing where the arm is already stopped or stopping, save that a fault takes the retreat away.
         """
         if self.phase is Phase.ARMED:
-            self._why = why
-            self._touch_contacts = contacts
-            self._touch_state = _measured(self.state)
             self._begin(now, Phase.STOPPING, Stop(self._reaction.deceleration), out)
+            self._why, self._may_retreat = why, not fault
+            self._touch_contacts, self._touch_state = (), _measured(self.state)
             _tell(out, "stopping", now, why=why)
         elif self.phase is Phase.RETREATING:
-            self._why = why
             self._begin(now, Phase.HALTING, Halt(self._reaction.deceleration), out)
-            _tell(out, "stopping", now, why=why)
-        elif self.phase is Phase.STOPPING and not contacts:
             self._why = why
-            self._touch_contacts = ()
+            _tell(out, "stopping", now, why=why)
+        elif self.phase is Phase.STOPPING and fault:
+            self._why, self._may_retreat = why, False
 
-    def refine(self, contacts: Sequence[ContactOnLink]) -> None:
-        """Say better where the touch is, while the arm stops."""
-        if self.phase is Phase.STOPPING and self._touch_contacts:
+    def locate(self, contacts: Sequence[ContactOnLink]) -> None:
+        """Say where the touches are, while the arm stops."""
+        if self.phase is Phase.STOPPING:
             self._touch_contacts = contacts
 
     def hurry(self, now: float) -> None:
@@ -111,7 +119,7 @@ class ArmReaction:
         if self._stop is not None:
             self._stop.hurry(now)
 
-    def sample(self, state: ControllerState, out: list[Output]) -> None:
+    def sample(self, state: ControllerState, out: Outputs) -> None:
         """Take a measured state."""
         self.state = state
         if self._stop is not None:
@@ -119,7 +127,7 @@ class ArmReaction:
         elif self.phase is Phase.RETREATING:
             self._retreat(state, out)
 
-    def look(self, now: float, out: list[Output]) -> None:
+    def look(self, now: float, out: Outputs) -> None:
         """What only the passing of time shows."""
         if self._stop is None:
             return
@@ -150,7 +158,7 @@ class ArmReaction:
                 wrong.append(f"joint {number} must be within {low:.3f} to {high:.3f} rad, it is at {q:.3f} rad")
         return wrong
 
-    def _begin(self, now: float, phase: Phase, command: Stop | Halt, out: list[Output]) -> None:
+    def _begin(self, now: float, phase: Phase, command: Stop | Halt, out: Outputs) -> None:
         first = self._ways[0]
         out.append(command if first is Way.OWNER else first)
         state, watch = self.state, self._watch
@@ -159,7 +167,7 @@ class ArmReaction:
         self._stop = StopWatch(now, speed, self._ways, watch.escalate, budget, watch.standstill)
         self.phase = phase
 
-    def _follow(self, stop: StopWatch, state: ControllerState, out: list[Output]) -> None:
+    def _follow(self, stop: StopWatch, state: ControllerState, out: Outputs) -> None:
         before = stop.slowed_at
         stop.sample(state.time, state.speed)
         if before is None and stop.slowed_at is not None:
@@ -168,14 +176,14 @@ class ArmReaction:
             return
         _tell(out, "standstill", state.time, speed=state.speed, ways=[way.value for way in stop.used])
         self._stop = None
-        if self.phase is Phase.HALTING or not self._touch_contacts:
+        if self.phase is Phase.HALTING or not (self._may_retreat and self._touch_contacts):
             self._latch(state.time, self._why, out)
         elif not stop.by_owner_alone:
             self._latch(state.time, f"{self._why}; no retreat: ur_rtde did not stop the arm", out)
         else:
             self._begin_retreat(state, out)
 
-    def _begin_retreat(self, state: ControllerState, out: list[Output]) -> None:
+    def _begin_retreat(self, state: ControllerState, out: Outputs) -> None:
         at_touch = self._touch_state or _measured(state)
         assert at_touch is not None
         decision = react(self._model, at_touch, self._touch_contacts, self._reaction)
@@ -188,7 +196,7 @@ class ArmReaction:
         _tell(out, "retreating", state.time)
         self._retreat(state, out)
 
-    def _retreat(self, state: ControllerState, out: list[Output]) -> None:
+    def _retreat(self, state: ControllerState, out: Outputs) -> None:
         assert self._plan is not None
         step = retreat_step(self._plan, ArmState(state.time, state.q, state.qd))
         if isinstance(step, Done):
@@ -201,7 +209,7 @@ class ArmReaction:
                 _tell(out, "clipped", state.time, by=list(step.clipped_by))
             self._sent = state.time
 
-    def _latch(self, now: float, why: str, out: list[Output]) -> None:
+    def _latch(self, now: float, why: str, out: Outputs) -> None:
         self.phase, self._plan, self._touch_contacts = Phase.LATCHED, None, ()
         _tell(out, "latched", now, why=why)
 
@@ -210,5 +218,5 @@ def _measured(state: ControllerState | None) -> ArmState | None:
     return None if state is None else ArmState(state.time, state.q, state.qd)
 
 
-def _tell(out: list[Output], name: str, time: float, **details: Any) -> None:
+def _tell(out: Outputs, name: str, time: float, **details: Any) -> None:
     out.append(GuardEvent(name, time, details))

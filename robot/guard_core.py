@@ -17,7 +17,7 @@ from coneskin.skin.events import Event, SkinFault, Touch, TouchBegan, TouchEnded
 from coneskin.skin.recording import Block
 from coneskin.skin.stream import Stream
 
-from .arm_reaction import ArmReaction, Output, Phase
+from .arm_reaction import ArmReaction, Outputs, Phase
 from .commands import ContactOnLink
 from .journal import GuardEvent, Kind
 from .owner_messages import Note
@@ -80,7 +80,7 @@ class GuardCore:
         self._lost: dict[str, str] = {}  # what is gone for good
         self._sound_since: float | None = None
         self._told: float | None = None
-        self._takers: Mapping[int, Callable[[Block, list[Output]], None]] = {
+        self._takers: Mapping[int, Callable[[Block, Outputs], None]] = {
             Kind.SKIN: self._take_skin,
             Kind.ARM: self._take_arm,
             Kind.OWNER: self._take_owner,
@@ -93,21 +93,18 @@ class GuardCore:
         """Where the guard is."""
         return self._phase if self._arm is None else self._arm.phase
 
-    def take(self, block: Block) -> list[Output]:
+    def take(self, block: Block, out: Outputs) -> None:
         """Take one input.
 
         Args:
             block: of a kind in ``journal.INPUTS``; its time is the host's clock.
-
-        Returns:
-            what to send and what happened; a command stands before the event that explains it.
+            out: takes what to send and what happened, as soon as it is decided; a command comes before the event that
+                explains it, and before anything is computed that it does not need.
         """
-        out: list[Output] = []
         taker = self._takers.get(block.kind)
         if taker is not None:
             taker(block, out)
         self._look(block.time, out)
-        return out
 
     def unsound(self, now: float) -> list[str]:
         """Why the guard cannot arm, one line each; empty where it can."""
@@ -124,11 +121,11 @@ class GuardCore:
 
     # ---- what comes in
 
-    def _take_skin(self, block: Block, out: list[Output]) -> None:
+    def _take_skin(self, block: Block, out: Outputs) -> None:
         for event in self._stream.feed(block.payload, block.time):
             self._skin_event(event, out)
 
-    def _skin_event(self, event: Event, out: list[Output]) -> None:
+    def _skin_event(self, event: Event, out: Outputs) -> None:
         if isinstance(event, SkinFault):
             if self.phase is not Phase.STARTING or not event.sensor:  # until then ``unsound`` says it, and no longer
                 self._fault(event.time, event.message, out)
@@ -138,19 +135,19 @@ class GuardCore:
             self._contacts.pop(event.sensor, None)
             _tell(out, "touch_ended", event.time, sensor=event.sensor)
             return
+        began = isinstance(event, TouchBegan)
+        if began and self._arm is not None:
+            self._arm.react(event.time, "touch", False, out)
         where, before = self._sensors[event.sensor], self._contacts.get(event.sensor)
         contact = self._contacts[event.sensor] = _Contact(event, where, *where.place(event.u, event.phi))
-        contacts = [item.on_link() for item in self._contacts.values()]
-        if isinstance(event, TouchBegan):
-            if self._arm is not None:
-                self._arm.react(event.time, contacts, "touch", out)
+        if self._arm is not None:
+            self._arm.locate([item.on_link() for item in self._contacts.values()])
+        if began:
             _tell(out, "contact", event.time, **_describe(contact))
         elif event.location_valid and not (before and before.touch.location_valid):
             _tell(out, "contact_placed", event.time, **_describe(contact))
-        if self._arm is not None:
-            self._arm.refine(contacts)
 
-    def _take_arm(self, block: Block, out: list[Output]) -> None:
+    def _take_arm(self, block: Block, out: Outputs) -> None:
         if self._arm is None:
             return
         try:
@@ -162,7 +159,7 @@ class GuardCore:
         if state.stopped_by_safety and self.phase in (Phase.ARMED, Phase.RETREATING):
             self._fault(block.time, "the controller's own safety system has stopped the arm", out)
 
-    def _take_owner(self, block: Block, out: list[Output]) -> None:
+    def _take_owner(self, block: Block, out: Outputs) -> None:
         if self._arm is None:
             return
         note = Note.decode(block.payload)
@@ -172,7 +169,7 @@ class GuardCore:
             self._arm.hurry(block.time)
             self._fault(block.time, f"ur_rtde: {note.text}", out)
 
-    def _take_lost(self, block: Block, out: list[Output]) -> None:
+    def _take_lost(self, block: Block, out: Outputs) -> None:
         what, _, why = block.payload.decode("utf-8", "replace").partition("\n")
         self._lost[what] = why
         if self._arm is not None and what == "owner":
@@ -181,7 +178,7 @@ class GuardCore:
         self._react(block.time, why, out)
         _tell(out, "ending" if what == "supervisor" else "fault", block.time, what=why)
 
-    def _take_reset(self, block: Block, out: list[Output]) -> None:
+    def _take_reset(self, block: Block, out: Outputs) -> None:
         if self.phase is not Phase.LATCHED or self._arm is None:
             _tell(out, "message", block.time, what=f"nothing to reset: the guard is {self.phase.value}")
             return
@@ -195,7 +192,7 @@ class GuardCore:
 
     # ---- what is decided
 
-    def _look(self, now: float, out: list[Output]) -> None:
+    def _look(self, now: float, out: Outputs) -> None:
         """What only the passing of time shows."""
         for event in self._stream.silence(now, self._watch.skin_silence):
             self._skin_event(event, out)
@@ -207,7 +204,7 @@ class GuardCore:
         if self.phase is Phase.STARTING:
             self._start(now, out)
 
-    def _start(self, now: float, out: list[Output]) -> None:
+    def _start(self, now: float, out: Outputs) -> None:
         if wrong := self.unsound(now):
             self._sound_since = None
             if self._told is None:
@@ -224,16 +221,16 @@ class GuardCore:
                 self._arm.arm(out)
             _tell(out, "armed", now)
 
-    def _fault(self, now: float, what: str, out: list[Output]) -> None:
+    def _fault(self, now: float, what: str, out: Outputs) -> None:
         if what in self._faults:
             return
         self._faults[what] = what
         self._react(now, what, out)
         _tell(out, "fault", now, what=what)
 
-    def _react(self, now: float, why: str, out: list[Output]) -> None:
+    def _react(self, now: float, why: str, out: Outputs) -> None:
         if self._arm is not None:
-            self._arm.react(now, (), why, out)
+            self._arm.react(now, why, True, out)
 
 
 def _describe(contact: _Contact) -> dict[str, Any]:
@@ -252,5 +249,5 @@ def _describe(contact: _Contact) -> dict[str, Any]:
     }
 
 
-def _tell(out: list[Output], name: str, time: float, **details: Any) -> None:
+def _tell(out: Outputs, name: str, time: float, **details: Any) -> None:
     out.append(GuardEvent(name, time, details))

@@ -18,12 +18,11 @@ from coneskin.errors import ConeSkinError, SkinTimeout
 from coneskin.skin.recording import Block, encode_block
 from coneskin.skin.source import Source
 
-from .arm_reaction import Command, Phase
+from .arm_reaction import Output, Phase
 from .channel import Channel
 from .foreign import ForeignStops
 from .guard_core import GuardCore
 from .journal import GuardEvent, Kind
-from .owner_messages import Clear, Halt, Speed, Stop
 from .state_reader import StateReader
 from .stop_watch import Way
 
@@ -32,7 +31,6 @@ __all__ = ["GuardLoop", "GuardPorts"]
 _TICK = 0.002  # s between two looks at the clocks where nothing else happens
 _OVERRUN = 0.02  # s between two rounds from which on the loop says that it was held up
 _ENDING = 3.0  # s that the arm has to stand when the guard is told to end
-_COMMANDS = (Stop, Speed, Halt, Clear, Way)
 
 
 @dataclass(slots=True)
@@ -56,6 +54,30 @@ class GuardPorts:
     deceleration: float = 10.0
 
 
+class _Outbox:
+    """Sends a command as soon as the core has decided it, and keeps the rest for the recorder."""
+
+    __slots__ = ("_ports", "events", "sent")
+
+    def __init__(self, ports: GuardPorts) -> None:
+        self._ports = ports
+        self.sent: list[bytes] = []
+        self.events: list[GuardEvent] = []
+
+    def append(self, output: Output, /) -> None:
+        """Take what comes out of the core."""
+        ports = self._ports
+        if isinstance(output, GuardEvent):
+            self.events.append(output)
+        elif isinstance(output, Way):
+            taken = ports.foreign is not None and ports.foreign.use(output, ports.deceleration)
+            self.sent.append(f"{output.value}\n{'sent' if taken else 'not sent'}".encode())
+        else:
+            message = output.encode()
+            taken = ports.owner is not None and ports.owner.send(message)
+            self.sent.append((b"owner\n" if taken else b"owner, not sent\n") + message)
+
+
 class GuardLoop:
     """Runs a core on its ports.
 
@@ -72,6 +94,7 @@ class GuardLoop:
         self._selector = selectors.DefaultSelector()
         self._quit = False
         self._out: list[bytes] = []
+        self._outbox = _Outbox(ports)
 
     def stop(self) -> None:
         """End: stop the arm, see it stand, and leave ``run``. May be called from a signal handler."""
@@ -79,14 +102,7 @@ class GuardLoop:
 
     def run(self) -> None:
         """Serve until told to end, or until the supervisor is gone; the arm is stopped before this returns."""
-        ports = self._ports
-        for item in (ports.supervisor, ports.owner, ports.reader):
-            if item is not None:
-                self._selector.register(item, selectors.EVENT_READ)
-        if ports.source is not None and (descriptor := ports.source.fileno()) is not None:
-            self._selector.register(descriptor, selectors.EVENT_READ, "skin")
-        for sock in ports.foreign.sockets() if ports.foreign else ():
-            self._selector.register(sock, selectors.EVENT_READ, "foreign")
+        self._open()
         gc.collect()
         gc.freeze()
         gc.disable()  # nothing here lives longer than a frame
@@ -101,7 +117,20 @@ class GuardLoop:
             self._end()
         finally:
             gc.enable()
-            self._selector.close()
+            self._close()
+
+    def _open(self) -> None:
+        ports = self._ports
+        for item in (ports.supervisor, ports.owner, ports.reader):
+            if item is not None:
+                self._selector.register(item, selectors.EVENT_READ)
+        if ports.source is not None and (descriptor := ports.source.fileno()) is not None:
+            self._selector.register(descriptor, selectors.EVENT_READ, "skin")
+        for sock in ports.foreign.sockets() if ports.foreign else ():
+            self._selector.register(sock, selectors.EVENT_READ, "foreign")
+
+    def _close(self) -> None:
+        self._selector.close()
 
     def step(self, timeout: float) -> None:
         """Wait for input, or for the timeout [s], and serve it."""
@@ -158,28 +187,19 @@ class GuardLoop:
                 self._take(Kind.LOST, b"a way to stop\nthe controller has closed a connection that a stop may need")
 
     def _take(self, kind: Kind, payload: bytes) -> None:
-        """Feed the core, send what it commands, and note both for the recorder: in this order."""
+        """Feed the core, which sends its commands at once; then note all of it for the recorder."""
         block = Block(kind, self._clock(), payload)
-        outputs = self._core.take(block)
-        sent = [self._send(output) for output in outputs if isinstance(output, _COMMANDS)]
+        outbox = self._outbox
+        self._core.take(block, outbox)
         self._record(block)
-        if outputs:
+        if outbox.sent or outbox.events:
             done = self._clock()
-            for line in sent:
+            for line in outbox.sent:
                 self._record(Block(Kind.COMMAND, done, line))
-            for output in outputs:
-                if isinstance(output, GuardEvent):
-                    self._record(output.block())
-
-    def _send(self, command: Command) -> bytes:
-        """Send one command; what to record of it."""
-        ports = self._ports
-        if isinstance(command, Way):
-            taken = ports.foreign is not None and ports.foreign.use(command, ports.deceleration)
-            return f"{command.value}\n{'sent' if taken else 'not sent'}".encode()
-        message = command.encode()
-        taken = ports.owner is not None and ports.owner.send(message)
-        return (b"owner\n" if taken else b"owner, not sent\n") + message
+            for event in outbox.events:
+                self._record(event.block())
+            outbox.sent.clear()
+            outbox.events.clear()
 
     def _record(self, block: Block) -> None:
         self._out.append(encode_block(block))

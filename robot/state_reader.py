@@ -18,11 +18,12 @@ from coneskin.errors import RobotConnectionError, RobotTimeout
 from . import rtde_codec as rtde
 from .ur_models import Joints
 
-__all__ = ["ControllerState", "StateReader", "decode_state"]
+__all__ = ["RECIPE", "ControllerState", "StateReader", "decode_state"]
 
 PORT = 30004
 _NAMES = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
-_RECIPE = rtde.Recipe(_NAMES)
+#: what the reader asks for
+RECIPE = rtde.Recipe(_NAMES)
 _SAFETY_STOPS = 0b11111110100  # protective, safeguard, emergency, violation, fault, stopped: bits 2 and 4 to 10
 _PLAYING = 2
 _ROBOT_RUNNING = 7
@@ -80,7 +81,7 @@ def decode_state(time: float, payload: bytes) -> ControllerState:
     Raises:
         RobotConnectionError: the payload has another length.
     """
-    return ControllerState(time, *_RECIPE.unpack(payload))  # type: ignore[arg-type]
+    return ControllerState(time, *RECIPE.unpack(payload))  # type: ignore[arg-type]
 
 
 class StateReader:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import RecordingError
+from .robot.arm_reaction import Output
 from .robot.journal import INPUTS, GuardEvent, Kind, decode_event
 from .scene import Scene
 from .skin.recording import Block, read_recording
@@ -108,10 +109,11 @@ def replay(run: Run, scene: Scene | None = None) -> Replay:
     from .build import build_core
 
     core = build_core(scene or run.scene())
-    events: list[GuardEvent] = []
+    outputs: list[Output] = []
     for block in run.blocks:
         if block.kind in INPUTS:
-            events += [output for output in core.take(block) if isinstance(output, GuardEvent)]
+            core.take(block, outputs)
+    events = [output for output in outputs if isinstance(output, GuardEvent)]
     recorded = run.events
     again = [_plain(event) for event in events]
     then = [_plain(event) for event in recorded if event.name != "died"]  # said of the guard, not by it

@@ -3,12 +3,10 @@
 from dataclasses import dataclass, field
 
 from coneskin.robot.owner_messages import Clear, Halt, Speed, Stop
-from coneskin.robot.rtde_codec import Recipe
-from coneskin.robot.state_reader import _NAMES
+from coneskin.robot.state_reader import RECIPE
 from coneskin.robot.stop_watch import Way
 
 CYCLE = 0.002
-RECIPE = Recipe(_NAMES)
 
 
 @dataclass

@@ -69,14 +69,15 @@ class Rig:
         """Give the core one input now; its commands go to the arm."""
         block = Block(kind, self.now, payload)
         self.blocks.append(block)
-        out = self.core.take(block)
+        out: list[object] = []
+        self.core.take(block, out)
         for output in out:
             if isinstance(output, GuardEvent):
                 self.events.append(output)
             else:
                 self.arm.take(output)
         self.outputs += out
-        return list(out)
+        return out
 
     def run(self, seconds: float) -> "Rig":
         """Let time pass."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from coneskin.build import build_core
 from coneskin.robot import rtde_codec as rtde
+from coneskin.robot.arm_reaction import Output
 from coneskin.robot.journal import GuardEvent, Kind
 from coneskin.robot.owner_messages import Note
 from coneskin.scene import Scene
@@ -65,7 +66,8 @@ def record(path: Path, text: str = FULL, touch: ScriptedTouch | None = None) -> 
     with Recorder(path) as recorder:
         recorder.write(Block(Kind.HEADER, 1000.0, json.dumps(header).encode()))
         for block in inputs(scene, touch):
-            outputs = core.take(block)
+            outputs: list[Output] = []
+            core.take(block, outputs)
             happened = [output for output in outputs if isinstance(output, GuardEvent)]
             recorder.write(block, *(event.block() for event in happened))
             events += happened
