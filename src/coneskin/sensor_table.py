@@ -68,8 +68,8 @@ def with_file(table: Mapping[str, Any], where: str, folder: Path, problems: list
     own = dict(table)
     if "file" not in own:
         return own
-    (name,) = check({"file": own.pop("file")}, (Key("file", str, ""),), where, problems).values()
-    return {**(_from_file(folder / name, where, problems) if name else {}), **own}
+    (name,) = check({"file": own.pop("file")}, (Key("file", str, None),), where, problems).values()
+    return {**(_from_file(folder / name, where, problems) if name is not None else {}), **own}
 
 
 def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> tuple[Sensor, PlacedFrustum] | None:
