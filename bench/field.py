@@ -67,8 +67,9 @@ def machine(peers: list[Any]) -> str:
     if info.exists():
         lines = (line for line in info.read_text().splitlines() if line.startswith("model name"))
         model = next(lines, model).split(":")[-1].strip()
-    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
-    commit = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
+    commit = _git("rev-parse", "--short", "HEAD") or "unknown"
+    if _git("status", "--porcelain", "--untracked-files=no", "--", "skin", "bench"):
+        commit += " with changes in skin or bench"
     versions = {"numpy": np.__version__}
     for module in peers:
         versions |= module.versions()
@@ -78,6 +79,11 @@ def machine(peers: list[Any]) -> str:
         f"{model}, {os.cpu_count()} cores{busy}, one thread used; {platform.system()},"
         f" Python {platform.python_version()}, {listed}\ncommit {commit}, {time.strftime('%Y-%m-%d')}"
     )
+
+
+def _git(*arguments: str) -> str:
+    command = ["git", "-C", str(Path(__file__).parent.parent), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
 
 
 def repeat(solve: Callable[[], Any], budget: float, least: int = 3) -> tuple[float, Any]:

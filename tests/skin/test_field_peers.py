@@ -19,6 +19,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from coneskin.skin.field_disc import Disc
+from coneskin.skin.field_fourport import angular_phase, radial_phase
+from coneskin.skin.field_map import FieldMap
+
 BENCH = Path(__file__).parents[2] / "bench"
 
 
@@ -32,19 +36,22 @@ def bench() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def references(bench: Any) -> list[Any]:
-    return bench("field_reference").load()
+    found: list[Any] = bench("field_reference").load()
+    return found
 
 
 @pytest.fixture(scope="module")
 def ours(bench: Any) -> ModuleType:
-    return bench("field_ours")
+    module: ModuleType = bench("field_ours")
+    return module
 
 
 def peer(bench: Any, name: str, package: str) -> ModuleType:
     pytest.importorskip(package, reason=f"{package} is not installed; pip install 'coneskin[bench]' asks it live")
     if package != "ngsolve":
         pytest.importorskip("ngsolve", reason="NGSolve is not installed, and its mesh generator serves every peer")
-    return bench(name)
+    module: ModuleType = bench(name)
+    return module
 
 
 def disagreement(ours: Any, theirs: Any) -> tuple[float, float, float]:
@@ -164,6 +171,39 @@ class TestCommittedReference:
         r = references[1]
         wrong = replace(r.problem, lower=r.problem.lower * (1 + 1e-9))
         assert max(disagreement(ours.solve(wrong), r.ports)) > 1e-11
+
+
+def worst_potential(ours: ModuleType, r: Any) -> float:
+    """Largest difference of a potential at the reference's points, beyond what the reference itself leaves open."""
+    problem = r.problem
+    sensor = ours.model(problem)
+    discs = [Disc(abs(d.r - problem.r1), d.theta, d.radius, d.conductance) for d in problem.discs]
+    worst = 0.0
+    for row, phase in enumerate((radial_phase(adc=problem.load), angular_phase(adc=problem.load))):
+        sheets = FieldMap.of(sensor, discs, phase).potentials(np.abs(r.points[:, 0] - problem.r1), r.points[:, 1])
+        for sheet, values in enumerate(sheets):
+            worst = max(worst, float(np.abs(values - r.potentials[row, :, sheet]).max()))
+    return worst - 2 * float(r.field_estimate)
+
+
+class TestPotentials:
+    """At two points inside the first disc and one outside all; pointwise the elements are good to 1e-10 at worst."""
+
+    def test_random_sensors(self, references: list[Any], ours: ModuleType) -> None:
+        sensors = [r for r in references if r.problem.name.startswith("random")]
+        assert sum(r.field_estimate < 1e-11 for r in sensors) >= 100
+        bad = {r.problem.name: value for r in sensors if not (value := worst_potential(ours, r)) < 1e-11}
+        assert not bad
+
+    @pytest.mark.xfail(
+        strict=True,
+        reason="between equal sheets the map's order leaves out the edges' images, which cancel only in the sum of both"
+        " sheets: off by up to 3e-8 of U0 inside a disc 0.01 radius from an edge",
+    )
+    def test_close_to_an_edge_between_equal_sheets(self, references: list[Any], ours: ModuleType) -> None:
+        near = [r for r in references if "gap" in r.problem.name and r.problem.upper == r.problem.lower]
+        assert len(near) == 8
+        assert max(worst_potential(ours, r) for r in near) < 1e-11
 
 
 class TestLivePeers:
