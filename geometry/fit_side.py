@@ -124,8 +124,10 @@ def _longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:
 def facet_offset(mesh: Mesh, samples: Samples, cone: Cone, tolerance: float) -> float:
     """How far the corners of the facets lie outside of the facets, on average [m].
 
-    A mesh of a tube has its corners on the tube and its flats inside; what is fitted to the flats comes out small by
-    two thirds of the sagitta (0.034 mm for 72 facets round 54 mm).
+    A tube cut into facets has its corners on the tube and its flats inside; what is fitted to the flats comes out small
+    by two thirds of the sagitta (0.034 mm for 72 facets round 54 mm). A mesh that was thinned out has corners on both
+    sides (UR5's collision bodies) and its flats are the better guess, so the answer is 0 unless the corners agree to a
+    fifth of the rise.
 
     Args:
         mesh: the link.
@@ -141,7 +143,15 @@ def facet_offset(mesh: Mesh, samples: Samples, cone: Cone, tolerance: float) -> 
     corners = cone.distances(mesh.vertices[faces.ravel()]).reshape(-1, 3)
     rise = corners.mean(axis=1) - cone.distances(points)
     sound = np.abs(corners).max(axis=1) < 2.0 * tolerance
-    return float(rise[sound].mean()) if int(sound.sum()) >= 24 else 0.0
+    if int(sound.sum()) < 24:
+        return 0.0
+    mean, off = float(rise[sound].mean()), corners[sound].ravel()
+    # the sagitta grows with the radius, so corners of a steep cone are on a line, not at one distance
+    heights = cone.cylindrical(mesh.vertices[faces[sound].ravel()])[1]
+    if np.ptp(heights) > tolerance:
+        off = off - np.polynomial.Polynomial.fit(heights, off, 1)(heights)
+    spread = float(np.median(np.abs(off))) * 1.4826  # as a standard deviation
+    return mean if spread <= 0.2 * abs(mean) else 0.0
 
 
 def under(profile: Profile, side: Side, hull: Samples, tolerance: float) -> NDArray[np.bool_]:

@@ -78,6 +78,15 @@ def test_corners_lie_above_the_flats_by_two_thirds_of_the_sagitta(segments: int)
     assert rise == pytest.approx(2.0 / 3.0 * sagitta, rel=0.03)
 
 
+def test_corners_of_a_thinned_mesh_say_nothing() -> None:
+    """Flats that straddle the tube: corners between 0.1 mm inside and 0.6 mm outside."""
+    corners, faces = frustum(0.05, 0.05, 0.3, segments=25, rings=1)
+    out = np.where(np.arange(len(corners)) < 50, np.random.default_rng(1).uniform(-1e-4, 6e-4, len(corners)), 0.0)
+    mesh = make_mesh(corners * (1.0 + out / 0.05)[:, None] ** [1, 1, 0], faces)
+    samples = surface_samples(mesh, Rays(mesh))
+    assert facet_offset(mesh, samples, Cone(np.zeros(3), Z, 0.05, 0.0), 0.001) == 0.0
+
+
 def test_no_rise_without_samples() -> None:
     mesh = make_mesh(*frustum(0.05, 0.05, 0.3))
     samples = surface_samples(mesh, Rays(mesh))
