@@ -1,0 +1,73 @@
+"""Every event has a line for people."""
+
+import ast
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coneskin.robot.journal import GuardEvent
+from coneskin.timeline import describe
+
+ROOT = Path(__file__).parents[2]
+TOUCH = {"sensor": "skin", "link": "forearm", "u": 0.0701, "phi": 1.5708, "level": 0.6, "location_valid": True}
+#: details as the guard gives them, and what a person reads
+LINES: dict[str, tuple[dict[str, Any], str]] = {
+    "waiting": ({"reasons": ["a is silent", "b is touched"]}, "waiting: a is silent; b is touched"),
+    "armed": ({}, "armed"),
+    "contact": (TOUCH, "touch on skin (forearm): u = 70.1 mm, phi = 90.0 deg, level 0.60"),
+    "contact_placed": (TOUCH, "the touch on skin (forearm): u = 70.1 mm, phi = 90.0 deg, level 0.60"),
+    "touch_ended": ({"sensor": "skin"}, "touch on skin ended"),
+    "fault": ({"what": "skin: silent (51 ms)"}, "fault: skin: silent (51 ms)"),
+    "stopping": ({"why": "touch"}, "stop: touch"),
+    "slower": ({"speed": 0.81234}, "joint speed falling: 0.812 rad/s"),
+    "standstill": ({"speed": 0.001, "ways": ["owner", "dashboard"]}, "standing: 0.0010 rad/s, by owner, dashboard"),
+    "escalated": ({"way": "dashboard"}, "no slowdown: next way to stop, dashboard"),
+    "retreating": ({}, "retreating"),
+    "clipped": ({"by": ["joint speed", "singularity"]}, "retreat slower than set, because of joint speed, singularity"),
+    "retreated": ({"progress": 0.05, "complete": True, "why": "distance"}, "retreated 50.0 mm: distance"),
+    "latched": ({"why": "touch"}, "latched until a person resets: touch"),
+    "refused": ({"what": "reset", "reasons": ["it is touched", "x"]}, "reset refused: it is touched; x"),
+    "reset": ({}, "reset"),
+    "message": ({"what": "recording ended"}, "message: recording ended"),
+    "ending": ({"what": "told to end"}, "ending: told to end"),
+    "died": ({"what": "no port"}, "died: no port"),
+}
+
+
+def names_in_the_code() -> set[str]:
+    """Every name with which a GuardEvent is made, read from the source."""
+    found: set[str] = set()
+    for path in [*ROOT.glob("robot/*.py"), *ROOT.glob("src/coneskin/*.py")]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+                continue
+            if node.func.id in ("_tell", "tell", "GuardEvent"):
+                arguments = node.args[1:2] if node.func.id != "GuardEvent" else node.args[:1]
+                words = [part for argument in arguments for part in _values(argument)]
+                found |= {
+                    part.value for part in words if isinstance(part, ast.Constant) and isinstance(part.value, str)
+                }
+    return found
+
+
+def _values(node: ast.expr) -> list[ast.expr]:
+    """An argument, or both sides of a conditional one."""
+    return [node.body, node.orelse] if isinstance(node, ast.IfExp) else [node]
+
+
+def test_every_event_that_the_code_makes_is_here() -> None:
+    documented = set(re.findall(r'"(\w+)"', (GuardEvent.__doc__ or "").split("time:")[0]))
+    assert names_in_the_code() == set(LINES) == documented
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_its_line(name: str) -> None:
+    details, words = LINES[name]
+    assert describe(GuardEvent(name, 1001.25, details), 1000.0) == f"   1.2500 s  {words}"
+
+
+def test_a_place_that_is_not_sure_says_so() -> None:
+    line = describe(GuardEvent("contact", 0.0, {**TOUCH, "location_valid": False}), 0.0)
+    assert line.endswith("(place not settled yet)")
