@@ -25,6 +25,25 @@ def _until(condition: Callable[[], bool], limit: float = 5.0) -> bool:
     return True
 
 
+#: The wheel's destructors take half a second each; the child leaves without them (see `wheel`).
+_KEPT: list[Any] = []
+
+
+def _receive(host: str) -> Any:
+    _KEPT.append(rtde_receive.RTDEReceiveInterface(host))
+    return _KEPT[-1]
+
+
+def _control(host: str) -> Any:
+    _KEPT.append(rtde_control.RTDEControlInterface(host))
+    return _KEPT[-1]
+
+
+def _io(host: str) -> Any:
+    _KEPT.append(rtde_io.RTDEIOInterface(host))
+    return _KEPT[-1]
+
+
 def _dashboard(host: str) -> Any:
     client = dashboard_client.DashboardClient(host)
     client.connect()
@@ -45,7 +64,7 @@ def _refusal(call: Callable[..., Any], *arguments: Any) -> str:
 
 def receive_everything(host: str) -> dict[str, Any]:
     """All getters of the default list of variables."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
+    receive = _receive(host)
     other = (
         "getDigitalInState",
         "getDigitalOutState",
@@ -56,7 +75,7 @@ def receive_everything(host: str) -> dict[str, Any]:
     names = [name for name in dir(receive) if name.startswith("get") and name not in other]
     got = {name: getattr(receive, name)() for name in names}
     first = receive.getTimestamp()
-    time.sleep(0.3)
+    time.sleep(0.05)
     got["elapsed"] = receive.getTimestamp() - first
     got["register"] = receive.getOutputIntRegister(12) + receive.getOutputDoubleRegister(12)
     return got
@@ -64,10 +83,10 @@ def receive_everything(host: str) -> dict[str, Any]:
 
 def moves(host: str) -> dict[str, Any]:
     """Every kind of move, one after the other; how far from the target each ends."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     home = receive.getActualQ()
-    away = [q + 0.3 for q in home]
+    away = [q + 0.15 for q in home]
     out: dict[str, Any] = {}
 
     def joints_off(target: Joints) -> float:
@@ -80,14 +99,14 @@ def moves(host: str) -> dict[str, Any]:
     out["moveJ"] = (control.moveJ(away, 2.0, 10.0), joints_off(away))
     out["moveJ_time"] = time.monotonic() - begin
     pose = receive.getActualTCPPose()
-    pose[2] += 0.05
-    pose[0] += 0.05
-    out["moveL"] = (control.moveL(pose, 0.5, 3.0), pose_off(pose))
-    out["moveL_FK"] = (control.moveL_FK(away, 1.0, 3.0), joints_off(away))
+    pose[2] += 0.03
+    pose[0] += 0.03
+    out["moveL"] = (control.moveL(pose, 1.0, 10.0), pose_off(pose))
+    out["moveL_FK"] = (control.moveL_FK(away, 1.0, 10.0), joints_off(away))
     out["moveJ_IK"] = (control.moveJ_IK(pose, 2.0, 10.0), pose_off(pose))
     path = [[*away, 2.0, 10.0, 0.0], [*home, 2.0, 10.0, 0.0]]
     out["path"] = (control.moveJ(path), joints_off(home))
-    poses = [[*pose, 0.5, 3.0, 0.0]]
+    poses = [[*pose, 1.0, 10.0, 0.0]]
     out["tool_path"] = (control.moveL(poses), pose_off(pose))
 
     before = control.getAsyncOperationProgressEx().operationId()
@@ -104,8 +123,8 @@ def moves(host: str) -> dict[str, Any]:
 
 def stops(host: str) -> dict[str, Any]:
     """Every stop on the motion that it can stop: how long it took, and what moved after it."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     out: dict[str, Any] = {}
     home = receive.getActualQ()
     far = [home[0] + 2.0, *home[1:]]
@@ -133,7 +152,7 @@ def stops(host: str) -> dict[str, Any]:
     ]
     for name, begin, stop in cases:
         begin()
-        time.sleep(0.2)
+        time.sleep(0.15)
         fast = _lead(receive.getActualQd())
         speed = receive.getActualTCPSpeed()
         start = time.monotonic()
@@ -147,8 +166,8 @@ def stops(host: str) -> dict[str, Any]:
 
 def questions(host: str, q: Joints, tool: Joints) -> dict[str, Any]:
     """Kinematics and the other questions that move nothing."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     out: dict[str, Any] = {"q": receive.getActualQ()}
     out["fk_tool"] = control.getForwardKinematics(q, tool)
     out["setTcp"] = control.setTcp(tool)
@@ -178,9 +197,9 @@ def questions(host: str, q: Joints, tool: Joints) -> dict[str, Any]:
 
 def inputs_and_outputs(host: str) -> dict[str, Any]:
     """Slider, digital and analog outputs, registers."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
-    io = rtde_io.RTDEIOInterface(host)
+    receive = _receive(host)
+    control = _control(host)
+    io = _io(host)
     io.setStandardDigitalOut(3, True)
     io.setConfigurableDigitalOut(1, True)
     io.setToolDigitalOut(0, True)
@@ -210,8 +229,8 @@ def inputs_and_outputs(host: str) -> dict[str, Any]:
 
 def protective_stop(host: str) -> dict[str, Any]:
     """Protective stop in the middle of a move, unlock too early, unlock, play: the move goes on to its end."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     dashboard = _dashboard(host)
     home = receive.getActualQ()
     target = [home[0] + 0.6, *home[1:]]
@@ -236,8 +255,8 @@ def protective_stop(host: str) -> dict[str, Any]:
 
 def scripts(host: str) -> dict[str, Any]:
     """Stop, upload again, a script of one's own, pause and play."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     dashboard = _dashboard(host)
     home = receive.getActualQ()
     control.stopScript()
@@ -285,8 +304,8 @@ def dashboard_lines(host: str) -> dict[str, Any]:
 
 def second_control(host: str) -> dict[str, Any]:
     """A second client that wants to control is refused, and the first goes on."""
-    control = rtde_control.RTDEControlInterface(host)
-    home = rtde_receive.RTDEReceiveInterface(host).getActualQ()
+    control = _control(host)
+    home = _receive(host).getActualQ()
     refusal = _refusal(rtde_control.RTDEControlInterface, host)
     unknown = _refusal(rtde_receive.RTDEReceiveInterface, host, -1.0, ["timestamp", "actual_qqq"])
     return {"refusal": refusal, "unknown": unknown, "first": control.moveJ([home[0] + 0.05, *home[1:]], 3.0, 20.0)}
@@ -294,8 +313,8 @@ def second_control(host: str) -> dict[str, Any]:
 
 def watchdog(host: str) -> dict[str, Any]:
     """Fed, the program runs; not fed, it ends and the arm stops."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     control.setWatchdog(10.0)
     for _ in range(10):
         control.kickWatchdog()
@@ -310,7 +329,7 @@ def watchdog(host: str) -> dict[str, Any]:
 
 def speed_for_ever(host: str) -> None:
     """Start a speed under a watchdog and never come back: the test kills this process."""
-    control = rtde_control.RTDEControlInterface(host)
+    control = _control(host)
     control.setWatchdog(20.0)
     while True:
         control.speedJ([0.3, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
@@ -319,8 +338,8 @@ def speed_for_ever(host: str) -> None:
 
 def sync_move_ignores_stops(host: str) -> dict[str, Any]:
     """While a synchronous move runs, a stop from another thread is lost; the dashboard's is not."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     dashboard = _dashboard(host)
     home = receive.getActualQ()
     out: dict[str, Any] = {}
@@ -346,8 +365,8 @@ def sync_move_ignores_stops(host: str) -> dict[str, Any]:
 
 def stop_in_speed_mode(host: str) -> dict[str, Any]:
     """stopJ while the speed thread runs."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     control.speedJ([0.2, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
     _until(lambda: receive.getActualQd()[0] == 0.2)
     control.stopJ(2.0)
@@ -358,8 +377,8 @@ def stop_in_speed_mode(host: str) -> dict[str, Any]:
 
 def stop_types(host: str) -> dict[str, Any]:
     """stopJ(2.0) before and after one asynchronous stopL. The tool moves, and does not turn."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     home = receive.getActualQ()
     for _ in range(2):
         control.moveJ([*home[:2], home[2] + 1.0, home[3] - 1.0, *home[4:]], 1.0, 20.0, True)
@@ -373,8 +392,8 @@ def stop_types(host: str) -> dict[str, Any]:
 
 def latched_speed(host: str) -> dict[str, Any]:
     """After a dashboard stop in speed mode the command is still in its register: a new upload starts the arm."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     dashboard = _dashboard(host)
     control.speedJ([0.2, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
     _until(lambda: receive.getActualQd()[0] == 0.2)
@@ -388,16 +407,16 @@ def latched_speed(host: str) -> dict[str, Any]:
 
 def stale_forward_kinematics(host: str, q: Joints) -> dict[str, Any]:
     """getForwardKinematics(q) without a tool, after a command that used the same registers."""
-    control = rtde_control.RTDEControlInterface(host)
-    here = rtde_receive.RTDEReceiveInterface(host).getActualQ()
+    control = _control(host)
+    here = _receive(host).getActualQ()
     control.moveJ(here, 1.0, 1.0)
     return {"fk": control.getForwardKinematics(q)}
 
 
 def connect_and_move(host: str) -> dict[str, Any]:
     """The least that any version must do."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
-    control = rtde_control.RTDEControlInterface(host)
+    receive = _receive(host)
+    control = _control(host)
     target = receive.getActualQ()
     target[0] += 0.1
     moved = control.moveJ(target, 3.0, 20.0)
@@ -406,7 +425,7 @@ def connect_and_move(host: str) -> dict[str, Any]:
 
 def notice_silence(host: str, pid: int) -> dict[str, Any]:
     """Freeze the controller: when the wheel notices."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
+    receive = _receive(host)
     os.kill(pid, 19)  # SIGSTOP
     begin = time.monotonic()
     noticed = _until(lambda: not receive.isConnected(), 5.0)
@@ -417,7 +436,7 @@ def notice_silence(host: str, pid: int) -> dict[str, Any]:
 
 def notice_close(host: str) -> dict[str, Any]:
     """Wait for the test to close the RTDE connections."""
-    receive = rtde_receive.RTDEReceiveInterface(host)
+    receive = _receive(host)
     print("CONNECTED", flush=True)
     return {"noticed": _until(lambda: not receive.isConnected(), 5.0)}
 
