@@ -218,8 +218,12 @@ def drain(slave: int | None, wait: Callable[[float], bool]) -> None:
 
     if slave is None:
         return
+    empty = 0
     for _ in range(200):
-        if not int.from_bytes(fcntl.ioctl(slave, termios.FIONREAD, bytes(4)), sys.byteorder) or wait(0.005):
+        waiting = int.from_bytes(fcntl.ioctl(slave, termios.FIONREAD, bytes(4)), sys.byteorder)
+        empty = 0 if waiting else empty + 1
+        # the kernel hands bytes over when it gets to it, so "nothing there" must last a while to mean something
+        if empty >= 10 or wait(0.005):
             return
 
 
