@@ -11,9 +11,10 @@ from coneskin.geometry.fit_candidates import find_candidates
 from coneskin.geometry.fit_revolution import revolution_axis
 from coneskin.geometry.fit_samples import Samples, surface_samples
 from coneskin.geometry.fit_starts import cone_starts
+from coneskin.geometry.pose import Pose
 from coneskin.geometry.rays import Rays
 
-from .synthetic import TILTED, Floats, Indices, barrel, frustum, noisy, placed, revolve, rugby, shoulder
+from .synthetic import TILTED, Floats, Indices, barrel, frustum, joined, moved, noisy, placed, revolve, rugby, shoulder
 
 AXIS = np.array(TILTED.rotation)[:, 2]
 BASE = np.array(TILTED.translation)
@@ -72,6 +73,18 @@ def test_the_revolution_axis_needs_no_profile(body: tuple[Floats, Indices], tilt
     assert found[1] < shift
 
 
+def test_the_revolution_axis_bears_a_housing() -> None:
+    """A lump on one side, a tenth of the hull, has normals that miss the axis."""
+    lump = moved(
+        revolve([(-0.02, 0.03), (0.02, 0.03)], segments=4), Pose.from_xyz_rpy((0.06, 0.02, 0.2), (0.3, 0.2, 0.1))
+    )
+    line = revolution_axis(hull(joined(rugby(), lump)))
+    assert line is not None
+    tilt, shift = off(*line)
+    assert tilt < 0.02
+    assert shift < 0.25
+
+
 def test_the_revolution_axis_from_a_start() -> None:
     points = hull(noisy(rugby(), 5e-5))
     far = AXIS + 0.1 * np.array(TILTED.rotation)[:, 0]
@@ -102,8 +115,9 @@ def test_candidates_are_told_apart() -> None:
 
 def test_the_half_angle_follows_the_direction_of_the_axis() -> None:
     """A cone that narrows along the positive direction keeps a negative half angle, whichever way it was found."""
-    for ends, sign in (((0.05, 0.03), -1.0), ((0.03, 0.05), 1.0)):
-        cones = [c.cone for c in find_candidates(hull(frustum(*ends, 0.2)), 0.001) if c.cone is not None]
-        assert cones
-        angle = math.degrees(cones[0].half_angle)
-        assert angle == pytest.approx(sign * math.degrees(math.atan(0.1)), abs=0.01)
+    for radius in (0.025, 0.03, 0.035, 0.04):
+        for ends, sign in (((radius + 0.02, radius), -1.0), ((radius, radius + 0.02), 1.0)):
+            cones = [c.cone for c in find_candidates(hull(frustum(*ends, 0.2)), 0.001) if c.cone is not None]
+            assert cones
+            angle = math.degrees(cones[0].half_angle)
+            assert angle == pytest.approx(sign * math.degrees(math.atan(0.1)), abs=0.01)

@@ -90,6 +90,28 @@ def test_exact_cones_are_recovered(degrees: float) -> None:
     assert at_origin == pytest.approx(true.radius, abs=1e-8)
 
 
+def test_the_origin_of_the_start_may_be_far_along_the_axis() -> None:
+    true = Cone(np.zeros(3), unit(0.3, -0.4, 0.8), 0.08, math.radians(30.0))
+    far = Cone(true.origin + 0.1 * true.axis, true.axis, 0.08 + 0.1 * math.tan(true.half_angle), true.half_angle)
+    found = fit_cone(on_cone(true, 0.08), far, (0.002,))
+    assert found is not None
+    assert off_axis(true, found)[0] < 1e-5
+    assert abs(float((found.origin - true.origin) @ true.axis)) < 0.01  # amid the points
+    np.testing.assert_allclose(found.distances(on_cone(true, 0.08).points), 0.0, atol=1e-9)
+
+
+def test_points_near_the_gate_hardly_pull() -> None:
+    """A sixth of the side bulges by nine tenths of the gate: weight (1 - 0.81)^2 = 0.04."""
+    true = Cone(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.05, 0.0)
+    exact = on_cone(true, 0.2, 3000)
+    bulge = np.where(np.arctan2(exact.points[:, 1], exact.points[:, 0]) > 2.0 * math.pi / 3.0, 4.5e-4, 0.0)
+    found = fit_cone(
+        Samples(exact.points + bulge[:, None] * exact.normals, exact.normals, exact.faces, 1.0), true, (5e-4,)
+    )
+    assert found is not None
+    assert off_axis(true, found)[1] < 0.04  # three times that with equal weights
+
+
 def test_a_partial_cone_is_recovered() -> None:
     true = Cone(np.zeros(3), unit(0.0, 0.2, 1.0), 0.06, math.radians(4.0))
     samples = on_cone(true, 0.1, turn=math.radians(150.0))
@@ -100,17 +122,17 @@ def test_a_partial_cone_is_recovered() -> None:
 
 
 def test_points_off_the_cone_do_not_pull() -> None:
-    """Caps have other normals, a housing is outside of the gate."""
     true = Cone(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.05, 0.0)
     tube = on_cone(true, 0.2)
     rng = np.random.default_rng(3)
-    caps = np.stack([rng.uniform(-0.05, 0.05, 800), rng.uniform(-0.05, 0.05, 800), np.full(800, 0.1)], axis=1)
+    # half a flange, so near to the side that only its normals tell it, and a housing beside the tube
+    rho, phi = rng.uniform(0.0501, 0.0504, 3000), rng.uniform(0.0, math.pi, 3000)
+    flange = np.stack([rho * np.cos(phi), rho * np.sin(phi), np.full(3000, 0.1)], axis=1)
     housing = rng.normal(0.0, 0.02, (800, 3)) + [0.08, 0.0, 0.1]
-    sideways = np.tile([1.0, 0.0, 0.0], (800, 1))
     samples = Samples(
-        np.concatenate([tube.points, caps, housing]),
-        np.concatenate([tube.normals, np.tile([0.0, 0.0, 1.0], (800, 1)), sideways]),
-        np.zeros(3100, np.int64),
+        np.concatenate([tube.points, flange, housing]),
+        np.concatenate([tube.normals, np.tile([0.0, 0.0, 1.0], (3000, 1)), np.tile([1.0, 0.0, 0.0], (800, 1))]),
+        np.zeros(5300, np.int64),
         1.0,
     )
     begin = Cone(np.array([0.003, 0.0, 0.0]), unit(0.03, 0.0, 1.0), 0.052, 0.02)

@@ -58,8 +58,9 @@ def test_samples_lie_on_their_faces() -> None:
     np.testing.assert_allclose(off, 0.0, atol=1e-12)
 
 
-def test_an_open_sheet_looks_away_from_the_middle() -> None:
-    corners, faces = TUBE
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_an_open_sheet_looks_away_from_the_middle(share: float) -> None:
+    corners, faces = flipped(TUBE, share)
     quarter = faces[np.arctan2(*corners[faces].mean(axis=1)[:, 1::-1].T) > 2.3]
     mesh = make_mesh(corners, quarter)
     samples = surface_samples(mesh, Rays(mesh))

@@ -116,6 +116,7 @@ def test_collada_node_matrix_is_applied(tmp_path: Path) -> None:
     mesh = load_mesh(write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Z_UP</up_axis>", matrix))
     np.testing.assert_allclose(mesh.size, [0.1, 0.3, 0.1], atol=1e-7)
     assert mesh.vertices[:, 0].mean() == pytest.approx(0.5, abs=1e-3)
+    assert mesh.vertices[:, 1].min() == pytest.approx(-0.3, abs=1e-7)  # y is -z, not z
 
 
 def test_collada_up_axis_is_kept_and_said_or_applied(tmp_path: Path) -> None:
