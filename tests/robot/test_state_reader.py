@@ -30,7 +30,7 @@ def test_it_reads_what_the_controller_does(controller):
     assert not first.stopped_by_safety
     cycles = (second.controller_time - first.controller_time) / 0.002
     assert cycles == pytest.approx(round(cycles), abs=1e-6)
-    assert cycles >= 1.0
+    assert round(cycles) >= 1
     reader.close()
     with pytest.raises(RobotConnectionError, match="is not open"):
         reader.read()
