@@ -162,3 +162,9 @@ def test_a_trailing_comma_in_a_list_of_names_means_nothing() -> None:
 
 def test_the_header_counts_itself() -> None:
     assert struct.unpack(">HB", pack(PacketKind.PAUSE)) == (3, ord("P"))
+
+
+def test_the_bytes_of_a_data_packet_are_big_endian_in_the_order_of_the_recipe() -> None:
+    recipe = Recipe(("robot_mode", "timestamp", "standard_digital_output_mask"), ident=2)
+    # IEEE 754: 1.5 is 3ff8...
+    assert recipe.pack((7, 1.5, 255)) == bytes.fromhex("02 00000007 3ff8000000000000 ff")

@@ -46,6 +46,15 @@ def test_small_and_almost_half_turns(angle: float) -> None:
     assert rotvec_of(rotation_of(vector)) == pytest.approx(vector, abs=1e-8)
 
 
+@pytest.mark.parametrize("short", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
+@pytest.mark.parametrize("axis", [(0.3, -0.5, 0.8), (-0.9, 0.1, 0.2), (0.1, -0.9, -0.3)])
+def test_the_axis_is_not_lost_near_a_half_turn(axis: tuple[float, float, float], short: float) -> None:
+    angle = (math.pi - short) / math.hypot(*axis)
+    matrix = rotation_of((angle * axis[0], angle * axis[1], angle * axis[2]))
+    for row, other in zip(matrix, rotation_of(rotvec_of(matrix)), strict=True):
+        assert row == pytest.approx(other, abs=1e-14)  # from the sine alone it would be off by 1e-16 / short
+
+
 def test_a_quarter_turn_about_z_is_what_it_is_called() -> None:
     assert rotation_of((0.0, 0.0, math.pi / 2))[1] == pytest.approx((1.0, 0.0, 0.0))
 
