@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .errors import SceneError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from .geometry.placed import PlacedFrustum
-    from .geometry.pose import Vector
+    from .geometry.pose import Pose, Vector
     from .robot.arm_reaction import ArmReaction
     from .robot.guard_core import GuardCore
     from .robot.watch import Watch
     from .scene import Scene
 
 __all__ = ["OnArm", "build_core", "place_on_arm"]
+
+_BELOW = 0.012  # m that a mesh may lie below the sensor on it: five layers, and what the fit left over
 
 
 def build_core(scene: Scene) -> GuardCore:
@@ -64,16 +69,22 @@ class OnArm:
         link_name: of the link.
         link: index of the link's DH frame; 0 without an arm.
         frustum: in that frame; without an arm, in the frame that the scene gives.
+        surface: the link's mesh below the sensor, where the scene names one: (u [m], phi [rad]) -> point [m].
     """
 
     name: str
     link_name: str
     link: int
     frustum: PlacedFrustum
+    surface: Callable[[float, float], Vector] | None = None
 
     def place(self, u: float, phi: float) -> tuple[Vector, Vector]:
-        """Point [m] and outward unit normal at u [m] and phi [rad]."""
-        return self.frustum.point(u, phi), self.frustum.normal(phi)
+        """Point [m] and outward unit normal at u [m] and phi [rad].
+
+        The point is on the link's mesh where the scene names one, else on the frustum; the normal is the frustum's,
+        which is smooth where that of the facets jumps.
+        """
+        return (self.surface or self.frustum.point)(u, phi), self.frustum.normal(phi)
 
 
 def place_on_arm(scene: Scene) -> list[OnArm]:
@@ -83,15 +94,30 @@ def place_on_arm(scene: Scene) -> list[OnArm]:
 
     placed = []
     for link in scene.links:
-        index, dh_frame = 0, Pose()
+        index, dh_mesh_frame, dh_frame = 0, Pose(), Pose()
         if scene.arm is not None:
             from .robot.link_frames import dh_mesh, link_index
             from .robot.ur_models import model
 
             index = link_index(link.name)
+            dh_mesh_frame = dh_mesh(model(scene.arm.model), link.name)
             if link.frame == "mesh":
-                dh_frame = dh_mesh(model(scene.arm.model), link.name)
-        for item in link.sensors:
-            frustum = PlacedFrustum(item.placed.frustum, dh_frame @ item.placed.link_frustum)
-            placed.append(OnArm(item.sensor.name, link.name, index, frustum))
+                dh_frame = dh_mesh_frame
+        frusta = [PlacedFrustum(item.placed.frustum, dh_frame @ item.placed.link_frustum) for item in link.sensors]
+        surfaces = _surfaces(link.mesh, dh_mesh_frame, frusta) if link.mesh else [None] * len(frusta)
+        for item, frustum, surface in zip(link.sensors, frusta, surfaces, strict=True):
+            placed.append(OnArm(item.sensor.name, link.name, index, frustum, surface))
     return placed
+
+
+def _surfaces(
+    path: Path, dh_mesh_frame: Pose, frusta: list[PlacedFrustum]
+) -> Sequence[Callable[[float, float], Vector] | None]:
+    """The mesh below each sensor. A sensor has a thickness, so the mesh may be that much below it."""
+    from .geometry.displacement import measure_displacement
+    from .geometry.mesh import load_mesh
+    from .geometry.rays import Rays
+
+    mesh = load_mesh(path).moved(dh_mesh_frame)
+    rays = Rays(mesh)
+    return [measure_displacement(mesh, frustum, 64, 128, limit=_BELOW, rays=rays).point for frustum in frusta]
