@@ -1,0 +1,77 @@
+"""Every demo runs, as a person starts it, and what it prints is right."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DEMOS = Path(__file__).parents[1] / "demos"
+ARGUMENTS = {"04_guard_a_program.py": ["127.0.0.44" if sys.platform.startswith("linux") else "127.0.0.1"]}
+
+
+def play(name: str) -> str:
+    """What a demo prints; it must end well and complain of nothing."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(DEMOS / name), *ARGUMENTS.get(name, [])],
+        capture_output=True,
+        text=True,
+        timeout=90,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+def test_the_demos_are_numbered_and_all_are_tested_here() -> None:
+    names = sorted(path.name for path in DEMOS.glob("*.py"))
+    assert [name[:3] for name in names] == [f"{n:02}_" for n in range(1, len(names) + 1)]
+    source = Path(__file__).read_text(encoding="utf-8")
+    assert all(f'play("{name}")' in source for name in names)
+
+
+def test_unroll() -> None:
+    out = play("01_unroll.py")
+    # by hand: s = sqrt(30^2 + 150^2) = 152.971 mm, r1 = 40 s/30, theta0 = 270 deg * 30/s
+    assert "r1 203.961 mm, r2 356.931 mm, theta0 52.951 deg" in out
+    assert "radii 40.000 and 70.000 mm" in out
+
+
+def test_bytes_to_contact() -> None:
+    out = play("02_bytes_to_contact.py")
+    match = re.search(r"u = ([\d.]+) mm, phi = ([\d.]+) deg, fault: None", out)
+    assert match
+    assert float(match[1]) == pytest.approx(250.0, abs=0.5)  # one count of 12 bits is 0.13 mm, its noise 0.7 counts
+    assert float(match[2]) == pytest.approx(60.0, abs=0.5)
+    assert re.search(r"on the wire: c53a0124( [0-9a-f]{8}){8}\n", out)  # sync, version 1, 36 bytes
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
+def test_virtual_skin() -> None:
+    out = play("03_virtual_skin.py")
+    kinds = re.findall(r" s  (\w+)", out)
+    assert [kind for kind in kinds if kind != "SkinFault"] == ["TouchBegan", "TouchEnded"]  # a stall adds a fault
+    assert "at u = 200 mm" in out
+    assert "the end: SkinConnectionError" in out
+    frames, missing = map(int, re.findall(r"(\d+) (?:frames|missing)", out))
+    assert frames + missing <= 600  # 0.6 s at 1000 Hz
+    assert missing >= 600 // 97
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
+def test_guard_a_program() -> None:
+    pytest.importorskip("rtde_control", reason="ur-rtde is not installed")
+    out = play("04_guard_a_program.py")
+    assert out.startswith("Collision: sensor 0/0 on the forearm was touched at u = 13")
+    events = re.search(r"events: (.*)", out)
+    assert events
+    names = events[1].split(", ")
+    milestones = ("armed", "stopping", "contact", "slower", "standstill", "retreating", "retreated", "latched")
+    assert [name for name in dict.fromkeys(names) if name in milestones] == list(milestones)
+    assert out.endswith("reset, and back home\n")
+
+
+def test_replay_as_test() -> None:
+    out = play("05_replay_as_test.py")
+    assert "touch on sensor 0/0 (tube): u = 200.0 mm" in out
+    assert out.endswith("the same events, bit by bit\n")
