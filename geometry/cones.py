@@ -172,11 +172,15 @@ def find_cones(
     plan = best_plan(mesh, rays, hull, candidates, rules)
     reason, best = "", None
     worth = HULL_SHARE * len(hull) * hull.area
-    hulled = hull_note(mesh) if plan.area < worth else ""
+    # who asks for a wrap knows the shape; otherwise a convex body should be covered for the most part
+    hulled = hull_note(mesh, hull) if plan.area < worth and not (plan.sides and wrap) else ""
     if hulled or not plan.sides:
+        length = float(np.ptp(hull.points @ long_axis(hull)))
         reason = f"no cone holds within {tolerance * 1e3:g} mm over {shortest * 1e3:g} mm of length"
-        if hulled:
-            reason = f"{hulled} (within {tolerance * 1e3:g} mm a sheet would cover {_percent(plan, hull)} of it)"
+        if length < shortest:
+            reason = f"the link is {length * 1e3:.1f} mm long, a sheet must have {shortest * 1e3:g} mm at least"
+        elif hulled:
+            reason = f"{hulled} (a sheet within {tolerance * 1e3:g} mm would cover {_percent(plan, hull)} of it)"
         say("looking for the nearest thing")
         for factor in (2.0, 4.0, 8.0, 16.0):
             looser = best_plan(mesh, rays, hull, candidates, replace(rules, tolerance=factor * tolerance))

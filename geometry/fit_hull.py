@@ -7,28 +7,36 @@ import math
 import numpy as np
 
 from .fit_profile import Profile
+from .fit_samples import Samples
 from .fit_side import Side
 from .mesh import Mesh
 
 __all__ = ["bare_lengths", "hull_note"]
 
+MANY_FACES = 5000  #: a finer mesh that is convex is a smooth body, not a collision hull
 
-def hull_note(mesh: Mesh) -> str:
-    """A sentence where the mesh is a convex hull of few faces, as some collision meshes are; empty where it is not."""
+
+def hull_note(mesh: Mesh, samples: Samples) -> str:
+    """A sentence where the mesh is a convex hull of few faces, as some collision bodies are; empty where it is not.
+
+    Judged by where the samples lie, not by volume, which open and wrongly wound meshes do not have.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
+    if len(mesh.faces) > MANY_FACES:
+        return ""
     try:
         hull = ConvexHull(mesh.vertices)
     except QhullError:
         return ""
-    a, b, c = mesh.triangles.transpose(1, 0, 2) - mesh.vertices.mean(axis=0)
-    volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6.0
-    share = volume / hull.volume
-    if share < 0.98:
+    points = samples.points[:: max(1, len(samples) // 1000)]
+    depth = -(points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
+    share = float((depth < 0.002 * mesh.size.max()).mean())
+    if share < 0.95:
         return ""
     return (
-        f"the mesh fills {100.0 * min(share, 1.0):.0f} % of its convex hull, as simplified collision bodies do, and no "
-        "tube is left in it; take the visual mesh of the link"
+        f"{100.0 * share:.0f} % of the surface lies on the convex hull, as in simplified collision bodies, where tubes "
+        "are lost; take the visual mesh of the link"
     )
 
 

@@ -113,10 +113,9 @@ def _plan(
 
 
 def _partial(profile: Profile, cone: Cone, rows: int, rules: Rules, rise: float) -> list[Side]:
-    """The largest region, in length and angle, that lies near one cone."""
+    """The largest region, in length and angle, that lies near a cone about the frame's axis from the frame's origin."""
     slope = math.tan(cone.half_angle)
-    shift = float((profile.frame.origin - cone.origin) @ cone.axis)
-    line = cone.radius + slope * (profile.z + shift) + rise
+    line = cone.radius + slope * profile.z + rise
     limit = rules.tolerance * math.hypot(1.0, slope)
     above = profile.radius <= (line + limit)[:, None]
     good = above & (profile.bridged >= (line - limit)[:, None])

@@ -81,7 +81,8 @@ def fit_side(
     high, low = radius.max(axis=1), profile.bridged[first:end][:, across].min(axis=1)
     middle = np.median(radius, axis=1)
     typical = np.abs(radius - middle[:, None]) <= 2.0 * tolerance
-    means = (radius * typical).sum(axis=1) / typical.sum(axis=1)
+    count = typical.sum(axis=1)
+    means = np.where(count > 0, (radius * typical).sum(axis=1) / np.maximum(count, 1), middle)
     start, slope = _line(z, means, tolerance)
     start += offset * math.hypot(1.0, slope)
     limit = tolerance * math.hypot(1.0, slope)

@@ -203,10 +203,22 @@ def box(width: float, depth: float, height: float) -> tuple[Floats, Indices]:
 def test_a_box_is_refused_and_the_nearest_thing_shown() -> None:
     fit = find_cones(placed(box(0.1, 0.12, 0.3)))
     assert fit.sheets == ()
-    assert "fills 100 % of its convex hull" in fit.reason
+    assert "100 % of the surface lies on the convex hull" in fit.reason
     assert fit.best is not None
     assert fit.best.worst > 0.005
     assert [bare.reason for bare in fit.bare] == [fit.reason]
+
+
+def test_a_link_shorter_than_a_sheet_is_told_so() -> None:
+    fit = find_cones(placed(frustum(0.005, 0.005, 0.018)))
+    assert fit.reason == "the link is 18.0 mm long, a sheet must have 25 mm at least"
+    assert len(find_cones(placed(frustum(0.005, 0.005, 0.018)), shortest=0.01).sheets) == 1
+
+
+def test_a_narrow_wrap_asked_for_on_a_convex_body_is_given() -> None:
+    (sheet,) = find_cones(placed(frustum(0.05, 0.05, 0.3)), wrap=1.0).sheets
+    assert sheet.frustum.wrap == pytest.approx(1.0, abs=0.05)
+    assert sheet.frustum.height > 0.29
 
 
 def test_a_bent_thing_is_refused_without_blaming_a_hull() -> None:
