@@ -14,7 +14,7 @@ from typing import Literal
 
 from coneskin.errors import GeometryError
 
-from .electrodes import Layout
+from .electrodes import Layout, edge_room
 from .frustum import Frustum
 from .outline import Outline
 from .part_labels import Label, part_labels, strip_label
@@ -144,6 +144,11 @@ def cut_sheets(
             raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:.4g} mm")
     if overlap and layout.plan.wires == "edge1":
         raise GeometryError("an overlap at edge1 would cover the tabs there: let the wires leave on another side")
+    room = edge_room(layout.sheet)
+    if overlap >= room:
+        raise GeometryError(
+            f"an overlap of {overlap * 1e3:.4g} mm runs into the other edge of the flat pattern, {room * 1e3:.4g} mm away"
+        )
 
     def sheet(number: int, name: str, index: int, face: Face, foil: bool = False) -> CutSheet:
         face = face if face_up == "work" else face_up

@@ -25,7 +25,7 @@ from coneskin.errors import GeometryError
 from .frustum import Frustum
 from .pen import Corner, Shape, Side, Tab
 
-__all__ = ["ElectrodePlan", "Layout", "Patch", "lay_out"]
+__all__ = ["ElectrodePlan", "Layout", "Patch", "edge_room", "lay_out"]
 
 _WEB = 1e-3  # material that must stay around a hole [m]
 
@@ -70,7 +70,7 @@ class ElectrodePlan:
                 f"setback must be at most the margin ({self.margin * 1e3:.4g} mm), got {self.setback * 1e3:.4g} mm"
             )
         room = self.margin - self.setback - 2.0 * _WEB
-        if self.hole > room:
+        if self.hole and self.hole > room:
             raise GeometryError(
                 f"hole must be at most margin - setback - 2 mm = {max(room, 0.0) * 1e3:.4g} mm, "
                 f"got {self.hole * 1e3:.4g} mm: widen the margin, or hole 0 for none"
@@ -152,7 +152,13 @@ def lay_out(sheet: Frustum, plan: ElectrodePlan | None = None) -> Layout:
     p_all, q_all = (sheet.slant, sheet.wrap) if at_end else (sheet.wrap, sheet.slant)
     mp, ep, sp = plan.margin * p_unit, plan.electrode * p_unit, plan.setback * p_unit
     mq, eq, sq = plan.margin * q_unit, plan.electrode * q_unit, plan.setback * q_unit
-    lead, clear = plan.lead * q_unit, plan.clearance * q_unit
+    if plan.tab and not at_end and edge_room(sheet) < plan.tab + plan.clearance:
+        raise GeometryError(
+            f"tabs of {plan.tab * 1e3:.4g} mm at {plan.wires} run into the other edge of the flat pattern, "
+            f"{edge_room(sheet) * 1e3:.4g} mm away: let the wires leave at an end"
+        )
+    spread = _spread(sheet, plan, narrow) if at_end else 1.0
+    lead, clear = plan.lead * spread, plan.clearance * spread
     lead_q = max(mq, sq + lead + clear)  # beside the tab of the electrode that runs along the low side
     back = lead_q + lead + clear  # here the conductive sheet beside the lead begins
     low, far, high = max(mq + eq, back), p_all - mp - ep, q_all - mq - eq
@@ -171,9 +177,13 @@ def lay_out(sheet: Frustum, plan: ElectrodePlan | None = None) -> Layout:
         return tuple(corner(p, q) for p, q in corners)
 
     def tab(p: float, q: float) -> Shape:
-        foot = corner(p, q)
-        inside = p if at_end else p * sheet.radius_at(foot.u)
-        return (Tab(foot.u, foot.phi, plan.lead, inside + plan.tab, plan.wires),) if plan.tab else ()
+        """From an electrode at p to the rim, out, and back."""
+        foot = corner(0.0, q)
+        if not plan.tab:
+            return ()
+        out = Tab(foot.u, foot.phi, plan.lead, plan.tab, plan.wires)
+        after, before = q + 0.5 * lead, q - 0.5 * lead
+        return (*shape((p, after), (0.0, after)), out, *shape((0.0, before), (p, before)))
 
     def fold(q: float) -> Shape:
         rim = corner(0.0, q)
@@ -184,10 +194,8 @@ def lay_out(sheet: Frustum, plan: ElectrodePlan | None = None) -> Layout:
     across = shape((sp, back), (sp, end_q), (end_p, end_q), (end_p, sq), (far, sq), (far, back))
     along = shape((sp, sq), (sp, end_q), (end_p, end_q), (end_p, sq))
     near_foil = shape((mp + ep, back), (mp + ep, end_q), (mp, end_q)) + tab(mp, tab_q[0]) + shape((mp, back))
-    far_foil = (
-        shape((edge_p, lead_q), (edge_p, end_q), (far, end_q), (far, lead_q + lead), (0.0, lead_q + lead))
-        + tab(0.0, tab_q[1])
-        + shape((0.0, lead_q))
+    far_foil = shape((edge_p, lead_q), (edge_p, end_q), (far, end_q)) + (
+        tab(far, tab_q[1])[:-1] or shape((far, lead_q + lead), (0.0, lead_q + lead), (0.0, lead_q))
     )
     low_foil = (
         shape((end_p, mq), (end_p, mq + eq), (sp, mq + eq)) + tab(sp, tab_q[2]) + shape((sp, sq), (mp, sq), (mp, mq))
@@ -214,6 +222,26 @@ def lay_out(sheet: Frustum, plan: ElectrodePlan | None = None) -> Layout:
         folds={name: fold(q) for name, q in zip(names, tab_q, strict=True)} if plan.tab else {},
         holes=tuple((at.u, at.phi) for at in holes if isinstance(at, Corner)) if plan.hole else (),
     )
+
+
+def _spread(sheet: Frustum, plan: ElectrodePlan, narrow: float) -> float:
+    """Azimuth for a length along an end [rad/m], at the tips of the tabs where these lie further in."""
+    tip = sheet.radius_at(-plan.tab if plan.wires == "end1" else sheet.slant + plan.tab)
+    if tip < 2.0 * plan.lead:
+        raise GeometryError(
+            f"tabs of {plan.tab * 1e3:.4g} mm meet at the apex beyond {plan.wires}: make them shorter, or let the "
+            "wires leave on another side"
+        )
+    return 1.0 / min(narrow, tip)
+
+
+def edge_room(sheet: Frustum) -> float:
+    """How far something may stick out of an edge before it meets the other edge of the flat pattern [m]."""
+    taper = abs(sheet.sin_half_angle)
+    opening = 2.0 * math.pi - sheet.wrap * taper
+    if not taper or opening >= math.pi:
+        return math.inf
+    return min(sheet.radius1, sheet.radius2) / taper * math.sin(min(opening, 0.5 * math.pi))
 
 
 def _check_room(plan: ElectrodePlan, where: str, active: float, whole: float, unit: float) -> None:

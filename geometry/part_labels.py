@@ -100,11 +100,13 @@ def strip_label(layout: Layout, surface: Frustum, which: str, face: str) -> tupl
         "C": (0.5 * (field.u1 + field.u2), field.phi2 + half / narrow),
         "D": (0.5 * (field.u1 + field.u2), field.phi1 - half / narrow),
     }[which]
+    pad = 0.08 * plan.electrode
+    turn = pad / narrow
     strip = {
-        "A": Patch(field.u2, field.u2 + 2.0 * half, 0.0, surface.wrap),
-        "B": Patch(field.u1 - 2.0 * half, field.u1, 0.0, surface.wrap),
-        "C": Patch(0.0, surface.slant, field.phi2, field.phi2 + 2.0 * half / narrow),
-        "D": Patch(0.0, surface.slant, field.phi1 - 2.0 * half / narrow, field.phi1),
+        "A": Patch(field.u2 + pad, field.u2 + 2.0 * half - pad, 0.0, surface.wrap),
+        "B": Patch(field.u1 - 2.0 * half + pad, field.u1 - pad, 0.0, surface.wrap),
+        "C": Patch(0.0, surface.slant, field.phi2 + turn, field.phi2 + 2.0 * half / narrow - turn),
+        "D": Patch(0.0, surface.slant, field.phi1 - 2.0 * half / narrow + turn, field.phi1 - turn),
     }[which]
     for text in (f"{which} - {face.upper()} FACE UP", which):
         height = min(3e-3, 0.6 * plan.electrode)

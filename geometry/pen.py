@@ -22,6 +22,7 @@ __all__ = ["Corner", "Shape", "Side", "Step", "Tab", "draw", "draw_circle", "fla
 
 Side = Literal["end1", "end2", "edge0", "edge1"]
 _TOGETHER = 1e-9  # vertices closer than this are one [m]
+_SAME = 1e-12  # coordinates that differ by less are the same, but for rounding [m, rad]
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,9 +108,9 @@ def _edge(frustum: Frustum, a: Corner, b: Corner) -> list[Segment]:
     start, end = flat_point(frustum, a.u, a.phi), flat_point(frustum, b.u, b.phi)
     if a == b or start == end:
         return []
-    if a.phi == b.phi:
+    if abs(a.phi - b.phi) < _SAME:
         return [Segment(start, end)]
-    if a.u != b.u:
+    if abs(a.u - b.u) > _SAME:
         raise GeometryError(f"neighbours of a shape must share u or phi, got {a} and {b}")
     if frustum.radius_at(a.u) <= 0.0:
         raise GeometryError("a shape cannot reach beyond the apex of its cone")
