@@ -242,9 +242,12 @@ class Parser:
             return repr(text[1:-1])
         if kind == "pose":
             self._take("[")
-            return f"PoseValue(({self._items(']')}))"
+            parts = self._items("]")
+            if len(parts) == 1:  # not a pose, but an element of a variable that is called p
+                return f"v_p[{parts[0]}]"
+            return f"PoseValue(({_tuple(parts)}))"
         if text == "[":
-            return f"Array(({self._items(']')}))"
+            return f"Array(({_tuple(self._items(']'))}))"
         if text == "(":
             inner = self._binary(0)
             self._take(")")
@@ -256,15 +259,14 @@ class Parser:
         if text == "run":
             name = self._take()[1]
             self._take("(")
-            arguments = self._items(")")
-            return f"_run(f_{name}, ({arguments}))"
+            return f"_run(f_{name}, ({_tuple(self._items(')'))}))"
         if self._next_is("("):
             self._take()
             self._inside[-1].calls.add(text)
-            return f"\0{text}({self._items(')')})\1"  # the writer knows whether it blocks
+            return f"\0{text}({_tuple(self._items(')'))})\1"  # the writer knows whether it blocks
         return f"v_{text}"
 
-    def _items(self, close: str) -> str:
+    def _items(self, close: str) -> list[str]:
         parts = []
         while not self._next_is(close):
             if self._token + 1 < len(self._tokens) and self._tokens[self._token + 1][1] == "=":
@@ -274,4 +276,8 @@ class Parser:
             if not self._next_is(close):
                 self._take(",")
         self._take(close)
-        return "".join(part + ", " for part in parts)
+        return parts
+
+
+def _tuple(parts: list[str]) -> str:
+    return "".join(part + ", " for part in parts)

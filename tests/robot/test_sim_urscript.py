@@ -208,6 +208,16 @@ def test_programs_are_cut_out_of_the_stream() -> None:
         assert (first + second, end) == (programs, rest)
 
 
+def test_a_variable_called_p_is_not_a_pose() -> None:
+    body = """
+      def first(p):
+        p[0] = p[0] + 1
+        return p[0]
+      end
+      write_output_integer_register(0, first(p[4, 0, 0, 0, 0, 0]))"""
+    assert ints(program(body))[0] == 5
+
+
 def test_a_definition_can_be_replaced() -> None:
     text = program("def f():\n  return 1\nend\nwrite_output_integer_register(0, f())")
     mended = translate(text, Builtins.names(), Builtins.blocking(), {"f": "def f():\n  return 2\nend", "g": "broken"})

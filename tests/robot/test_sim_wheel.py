@@ -211,7 +211,22 @@ def test_the_watchdog_stops_an_arm_whose_client_was_killed(simulated: SimulatedC
     assert simulated.events("stopped")[-1]["reason"] == "watchdog of input_int_register_0"
 
 
-# the quirks of §4.1 of the wheel's own program, which runs as it is
+def test_no_other_call_ends_the_program_but_a_pose_out_of_reach_does(simulated: SimulatedController) -> None:
+    got = wheel.run("remaining_calls", simulated.host)
+    here = simulated.state()["tcp"]
+    assert got["waypoint"] == pytest.approx(here, abs=ROUNDING)
+    assert got["contact"] == [True, False, False]
+    assert (got["tool_contact"], got["history"], got["derivative"]) == (0, 6, 36)
+    assert got["mass"] == "nan"  # not simulated, and it says so
+    pairs = [got[name] for name in ("servoL", "jog", "teach", "force", "zero", "gravity", "payload")]
+    assert pairs == [True, [True, True], [True, True], [True, True], True, True, True]
+    assert got["freedrive"] == [True, 0, True]
+    assert got["running"]
+    assert (got["unreachable"], got["ended"]) == (False, True)
+    assert "cannot bring its flange to (3.0000" in simulated.events("abort")[-1]["reason"]
+
+
+# the quirks of the wheel's own program, which runs as it is
 
 
 def test_a_synchronous_move_swallows_a_stop_but_not_the_dashboards(simulated: SimulatedController) -> None:

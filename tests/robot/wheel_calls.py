@@ -446,3 +446,34 @@ def silent_dashboard(host: str) -> dict[str, Any]:
     begin = time.monotonic()
     refusal = _refusal(_dashboard, host)
     return {"refusal": refusal, "taken": time.monotonic() - begin}
+
+
+def remaining_calls(host: str) -> dict[str, Any]:
+    """Calls that the other functions leave out; none may end the control program.
+
+    Not servoC: the wheel takes it for a realtime command, its program does not, and what follows it may be lost.
+    """
+    receive = _receive(host)
+    control = _control(host)
+    pose = receive.getActualTCPPose()
+    out: dict[str, Any] = {}
+    out["servoL"] = control.servoL(pose, 0.0, 0.0, 0.002, 0.1, 300)
+    control.servoStop()
+    out["jog"] = (control.jogStart([0.0, 0.02, 0.0, 0.0, 0.0, 0.0], 0), control.jogStop())
+    out["contact"] = [control.startContactDetection(), control.readContactDetection(), control.stopContactDetection()]
+    out["tool_contact"] = control.toolContact([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    out["teach"] = (control.teachMode(), control.endTeachMode())
+    wrench = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    out["force"] = (control.forceMode([0.0] * 6, [0, 0, 1, 0, 0, 0], wrench, 2, [0.1] * 6), control.forceModeStop())
+    out["zero"] = control.zeroFtSensor()
+    out["freedrive"] = (control.freedriveMode(), control.getFreedriveStatus(), control.endFreedriveMode())
+    out["gravity"] = control.setGravity([0.0, 0.0, 9.82])
+    out["payload"] = control.setTargetPayload(1.0, [0.0, 0.0, 0.1], [0.1] * 6)
+    out["history"] = len(control.getActualJointPositionsHistory(3))
+    out["waypoint"] = control.getTargetWaypoint()
+    out["derivative"] = len(control.getJacobianTimeDerivative())
+    out["mass"] = str(control.getMassMatrix()[0])
+    out["running"] = control.isProgramRunning()
+    out["unreachable"] = control.moveL([3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.2, 1.0)
+    out["ended"] = not control.isProgramRunning()
+    return out
