@@ -25,6 +25,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}  #: metres in one un
 SUFFIXES = (".stl", ".obj", ".dae", ".ply")
 SHORTEST, LONGEST = 0.005, 5.0  #: a link's largest extent lies between these [m]
 THINNEST = 0.0005  #: and its smallest extent above this [m]
+TERMS = "{0}: the maker's terms for its drawings forbid physical models of {0} for commercial use"
 _UP = {  # rotations that bring the named up axis to z, as COLLADA 1.4.1 describes the three frames
     "X_UP": ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
     "Y_UP": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
@@ -124,7 +125,7 @@ def load_mesh(
         raise MeshError(f"{path}: a mesh is read from {', '.join(SUFFIXES)}, got {path.suffix or 'no suffix'}")
     if path.stat().st_size == 0:
         raise MeshError(f"{path}: the file is empty")
-    notes: list[str] = []
+    notes = [TERMS.format(part.upper()) for part in path.resolve().parts if part.lower() in ("ur20", "ur30")]
     metres = None if unit is None else UNITS[unit]
     turn = None
     if path.suffix.lower() == ".dae":

@@ -159,6 +159,14 @@ def test_arrays_are_read_only_and_the_pose_moves_points() -> None:
     np.testing.assert_allclose(moved.vertices[5], pose.apply(tuple(mesh.vertices[5])), atol=1e-12)
 
 
+def test_terms_of_ur20_and_ur30_are_told(tmp_path: Path) -> None:
+    """Design note, section 7: these meshes are not under the BSD licence of the others."""
+    for robot, told in (("ur20", True), ("UR30", True), ("ur10", False)):
+        (tmp_path / robot).mkdir()
+        notes = load_mesh(write_stl(tmp_path / robot / "arm.stl", TUBE)).notes
+        assert any("forbid physical models" in note for note in notes) == told
+
+
 def test_missing_collada_reader_gives_the_pip_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def no_reader(*_: object, **__: object) -> Mesh:
         raise ModuleNotFoundError("No module named 'collada'", name="collada")
