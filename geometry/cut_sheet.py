@@ -144,10 +144,10 @@ def cut_sheets(
             raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:.4g} mm")
     if overlap and layout.plan.wires == "edge1":
         raise GeometryError("an overlap at edge1 would cover the tabs there: let the wires leave on another side")
-    room = edge_room(layout.sheet)
-    if overlap >= room:
+    if overlap and overlap >= edge_room(layout.sheet):
         raise GeometryError(
-            f"an overlap of {overlap * 1e3:.4g} mm runs into the other edge of the flat pattern, {room * 1e3:.4g} mm away"
+            f"an overlap of {overlap * 1e3:.4g} mm runs into the other edge of the flat pattern, "
+            f"{edge_room(layout.sheet) * 1e3:.4g} mm away"
         )
 
     def sheet(number: int, name: str, index: int, face: Face, foil: bool = False) -> CutSheet:

@@ -67,7 +67,7 @@ def test_a_part_seen_from_inside_is_the_mirror_image():
                 assert distances(mirrored, dense(q.outline)).max() < 0.2e-3
             for p, q in zip(a.labels, b.labels, strict=True):
                 assert (p.x, p.y, p.angle) == pytest.approx((-q.x, q.y, -q.angle))
-                assert p.height == q.height
+                assert p.height == pytest.approx(q.height, rel=0.2)  # "outside" is longer than "inside"
 
 
 @pytest.mark.parametrize(

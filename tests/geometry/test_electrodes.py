@@ -209,7 +209,7 @@ def test_mistakes_are_said():
     with pytest.raises(GeometryError, match="tabs of 55 mm meet at the apex beyond end1"):
         lay_out(SHEETS["disc"], ElectrodePlan(tab=55e-3))
     with pytest.raises(GeometryError, match="four tabs of 4 mm do not fit on end1"):
-        lay_out(Frustum(0.0051, 0.0053, 1.0))
+        lay_out(Frustum(0.05, 0.05, 0.2, math.radians(35.0)))
 
 
 def test_shapes_must_follow_lines_and_arcs():
