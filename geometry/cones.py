@@ -15,7 +15,7 @@ from coneskin.errors import GeometryError
 
 from .fit_candidates import find_candidates
 from .fit_hull import bare_lengths, hull_note
-from .fit_plan import Plan, Rules, best_plan, long_axis
+from .fit_plan import Plan, Rules, best_plan, coarse_profiles
 from .fit_profile import Profile
 from .fit_samples import Samples, surface_samples
 from .fit_side import Side, columns_of, under
@@ -169,41 +169,43 @@ def find_cones(
     say("looking for axes")
     candidates = find_candidates(hull, tolerance)
     say("measuring profiles")
-    plan = best_plan(mesh, rays, hull, candidates, rules)
-    reason, best = "", None
-    worth = HULL_SHARE * len(hull) * hull.area
+    coarse = coarse_profiles(mesh, rays, candidates, rules)
+    plan = best_plan(mesh, rays, hull, coarse, rules)
+    area = plan.area if plan else 0.0
+    hull_area = len(hull) * hull.area
     # who asks for a wrap knows the shape; otherwise a convex body should be covered for the most part
-    hulled = hull_note(mesh, hull) if plan.area < worth and not (plan.sides and wrap) else ""
-    if hulled or not plan.sides:
-        length = float(np.ptp(hull.points @ long_axis(hull)))
+    hulled = "" if (plan and wrap) or area >= HULL_SHARE * hull_area else hull_note(mesh, hull)
+    best, reason = None, ""
+    length = _longest(hull)
+    if hulled or plan is None:
+        plan = None
         reason = f"no cone holds within {tolerance * 1e3:g} mm over {shortest * 1e3:g} mm of length"
         if length < shortest:
             reason = f"the link is {length * 1e3:.1f} mm long, a sheet must have {shortest * 1e3:g} mm at least"
         elif hulled:
-            reason = f"{hulled} (a sheet within {tolerance * 1e3:g} mm would cover {_percent(plan, hull)} of it)"
+            share = f"{100.0 * area / hull_area:.0f} %"
+            reason = f"{hulled} (a sheet within {tolerance * 1e3:g} mm would cover {share} of it)"
         say("looking for the nearest thing")
         for factor in (2.0, 4.0, 8.0, 16.0):
-            looser = best_plan(mesh, rays, hull, candidates, replace(rules, tolerance=factor * tolerance))
-            if looser.sides:
+            looser = best_plan(mesh, rays, hull, coarse, replace(rules, tolerance=factor * tolerance))
+            if looser is not None:
                 widest = max(looser.sides, key=partial(Side.area, profile=looser.profile))
                 best = _sheet(looser, widest, hull, factor * tolerance)
-            if looser.sides and not (hulled and looser.area < worth):
-                break
-        plan = Plan(plan.profile, [])
-    sheets = tuple(_sheet(plan, side, hull, tolerance) for side in plan.sides)
-    if sheets:
+                if not hulled or looser.area >= HULL_SHARE * hull_area:
+                    break
+    sheets: tuple[Sheet, ...] = ()
+    bare: tuple[Bare, ...] = (Bare(0.0, length, reason),)
+    if plan is not None:
         length = plan.profile.step * len(plan.profile.z)
+        sheets = tuple(_sheet(plan, side, hull, tolerance) for side in plan.sides)
         bare = tuple(Bare(*item) for item in bare_lengths(plan.profile, plan.sides, tolerance, shortest))
-    else:
-        length = float(np.ptp(hull.points @ long_axis(hull)))
-        bare = (Bare(0.0, length, reason),)
     return Fit(
         sheets=sheets,
         best=best,
         bare=bare,
         tolerance=tolerance,
         link_length=length,
-        hull_area=len(hull) * hull.area,
+        hull_area=hull_area,
         notes=mesh.notes,
         reason=reason,
         candidates=len(candidates),
@@ -211,8 +213,10 @@ def find_cones(
     )
 
 
-def _percent(plan: Plan, hull: Samples) -> str:
-    return f"{100.0 * plan.area / (len(hull) * hull.area):.0f} %"
+def _longest(hull: Samples) -> float:
+    """Length of the hull along its longest direction [m]."""
+    off = hull.points - hull.points.mean(axis=0)
+    return float(np.ptp(off @ np.linalg.eigh(off.T @ off)[1][:, 2]))
 
 
 def _ends(profile: Profile, sides: list[Side]) -> list[tuple[float, float]]:

@@ -19,9 +19,10 @@ from .fit_wraps import largest_region
 from .mesh import Mesh
 from .rays import Rays
 
-__all__ = ["Plan", "Rules", "best_plan", "long_axis"]
+__all__ = ["Coarse", "Plan", "Rules", "best_plan", "coarse_profiles"]
 
 Floats = NDArray[np.float64]
+Coarse = tuple[Profile, Cone | None]  #: a quick profile, and the cone that its axis belongs to
 
 TURN = 2.0 * math.pi
 PARTIAL_GAIN = 1.25  #: a partial wrap must cover that much more than full wraps to be preferred
@@ -60,52 +61,45 @@ class Plan:
         return sum(side.area(self.profile) for side in self.sides)
 
 
-def long_axis(hull: Samples) -> Floats:
-    """Direction in which the hull is longest, shape (3,)."""
-    off = hull.points - hull.points.mean(axis=0)
-    return np.asarray(np.linalg.eigh(off.T @ off)[1][:, 2])
+def coarse_profiles(mesh: Mesh, rays: Rays, candidates: list[Candidate], rules: Rules) -> list[Coarse]:
+    """A quick profile about every candidate, by which ``best_plan`` ranks them for any tolerance."""
+    frames = [AxisFrame.along(candidate.origin, candidate.axis, rules.seam) for candidate in candidates]
+    return [
+        (_profile(mesh, rays, frame, _COARSE, rules), candidate.cone)
+        for frame, candidate in zip(frames, candidates, strict=True)
+    ]
 
 
-def best_plan(mesh: Mesh, rays: Rays, hull: Samples, candidates: list[Candidate], rules: Rules) -> Plan:
-    """The axis whose sheets cover most, first on coarse profiles, then refined on a fine one."""
-    loose = replace(rules, tolerance=1.1 * rules.tolerance)
-    ranked: list[tuple[float, int, Candidate]] = []
-    for number, candidate in enumerate(candidates):
-        frame = AxisFrame.along(candidate.origin, candidate.axis, rules.seam)
-        plan = _plan(mesh, rays, frame, _COARSE, candidate.cone, loose)
-        ranked.append((plan.area, -number, candidate))
-    ranked.sort(key=lambda item: item[:2], reverse=True)
+def best_plan(mesh: Mesh, rays: Rays, hull: Samples, coarse: list[Coarse], rules: Rules) -> Plan | None:
+    """The axis whose sheets cover most: ranked on coarse profiles, refined on a fine one; None where nothing fits."""
+    loose = replace(rules, tolerance=1.1 * rules.tolerance, shortest=0.75 * rules.shortest)
+    areas = [_plan(profile, cone, loose).area for profile, cone in coarse]
     best: Plan | None = None
-    for _, _, candidate in ranked[:2]:
-        frame = AxisFrame.along(candidate.origin, candidate.axis, rules.seam)
-        plan = _refined(mesh, rays, hull, _plan(mesh, rays, frame, _FINE, candidate.cone, rules), rules)
-        if best is None or plan.area > 1.002 * best.area:
+    for number in sorted(range(len(coarse)), key=lambda n: -areas[n])[:2]:
+        if areas[number] == 0.0:
+            break
+        profile, cone = coarse[number]
+        fine = _plan(_profile(mesh, rays, profile.frame, _FINE, rules), cone, rules)
+        plan = _refined(mesh, rays, hull, fine, rules) if fine.sides else fine
+        if plan.sides and (best is None or plan.area > 1.002 * best.area):
             best = plan
-    if best is None:  # nothing to turn about: report the link along its own length
-        frame = AxisFrame.along(hull.points.mean(axis=0), long_axis(hull), rules.seam)
-        best = Plan(outer_profile(mesh, rays, frame, float(mesh.size.max()) / 120, 53), [])
     return best
 
 
-def _plan(
-    mesh: Mesh,
-    rays: Rays,
-    frame: AxisFrame,
-    grid: tuple[int, int],
-    cone: Cone | None,
-    rules: Rules,
-    rise: float = 0.0,
-) -> Plan:
-    """The sides about one axis that cover most."""
+def _profile(mesh: Mesh, rays: Rays, frame: AxisFrame, grid: tuple[int, int], rules: Rules) -> Profile:
     slices, around = grid
     length = float(np.ptp(frame.local(mesh.vertices)[:, 2]))
-    profile = outer_profile(mesh, rays, frame, max(length / slices, 0.0005), around, rules.bridge)
+    return outer_profile(mesh, rays, frame, max(length / slices, 0.0005), around, rules.bridge)
+
+
+def _plan(profile: Profile, cone: Cone | None, rules: Rules, rise: float = 0.0) -> Plan:
+    """The sides about one axis that cover most."""
     rows = max(2, math.ceil(rules.shortest / profile.step))
     full, partial = Plan(profile, []), Plan(profile, [])
     if rules.wrap is None or rules.wrap == TURN:
         gain = max(1, round(SHEET_GAIN * len(profile.z)))
         chosen = choose_intervals(profile.z, *profile.bounds(), rules.tolerance, rules.max_sheets, rows, gain)
-        sides = [fit_side(profile, a, b, 0, around, rules.tolerance, rise) for a, b in chosen]
+        sides = [fit_side(profile, a, b, 0, len(profile.phi), rules.tolerance, rise) for a, b in chosen]
         full = Plan(profile, [side for side in sides if side.end - side.first >= rows])
     if cone is not None and rules.wrap != TURN:
         partial = Plan(profile, _partial(profile, cone, rows, rules, rise))
@@ -131,8 +125,6 @@ def _partial(profile: Profile, cone: Cone, rows: int, rules: Rules, rise: float)
 
 def _refined(mesh: Mesh, rays: Rays, hull: Samples, plan: Plan, rules: Rules) -> Plan:
     """Fit the axis once more to the very region that the sheets cover, and raise the sides to the corners."""
-    if not plan.sides:
-        return plan
     frame, grid = plan.profile.frame, (len(plan.profile.z), len(plan.profile.phi))
     cone = None
     if all(side.columns == grid[1] for side in plan.sides):
@@ -149,5 +141,6 @@ def _refined(mesh: Mesh, rays: Rays, hull: Samples, plan: Plan, rules: Rules) ->
         near = cone or Cone(frame.origin, frame.axis, side.radius, math.atan(side.slope))
         rises.append(facet_offset(mesh, below, near, rules.tolerance))
         areas.append(side.area(plan.profile))
-    again = _plan(mesh, rays, frame, grid, cone, rules, float(np.average(rises, weights=areas)))
+    profile = _profile(mesh, rays, frame, grid, rules)
+    again = _plan(profile, cone, rules, float(np.average(rises, weights=areas)))
     return again if again.area > 0.99 * plan.area else plan
