@@ -111,8 +111,8 @@ class UrArm:
         """
         if self.mode is Mode.MOVE:  # a speed thread beside a live move thread would abort the program
             self.stop(acceleration)
-        # time = 0: with a longer one the script takes no new target before it is over
-        self._started(self._control.speedJ(list(qd), acceleration, 0.0), "speedJ", Mode.SPEED)
+        # one cycle: without a time URScript's speedj returns when the speed is reached, and takes no new target before
+        self._started(self._control.speedJ(list(qd), acceleration, 0.002), "speedJ", Mode.SPEED)
 
     def servo_j(self, q: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
         """Follow joint positions q [rad], one each control cycle.

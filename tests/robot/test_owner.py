@@ -60,7 +60,7 @@ class FakeWheel:
         return self._note("moveL", v, a)
 
     def speedJ(self, qd, a, t):
-        assert t == 0.0
+        assert t == 0.002  # a new target in the next cycle
         return self._note("speedJ", a)
 
     def servoJ(self, q, *rest):
