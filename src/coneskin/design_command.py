@@ -7,6 +7,7 @@ import json
 import math
 import sys
 import time
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +17,8 @@ from .design import Choices, SheetDesign, design_sheets
 from .design_files import FileOptions, new_folder, write_sheets
 from .design_link import LinkMesh, load_link
 from .design_report import report
-from .design_summary import summary
-from .errors import ConeSkinError, GeometryError
+from .design_summary import sensor_toml, summary
+from .errors import GeometryError
 from .geometry.dxf import Arcs
 from .geometry.electrodes import ElectrodePlan
 from .geometry.forecast import Converter
@@ -26,6 +27,7 @@ from .geometry.pdf import Page
 from .geometry.pen import Side
 from .geometry.placed import PlacedFrustum, double_cone
 from .geometry.stack import PAPER_STACK, Assembly, Stack
+from .sensor_table import build_sensor
 
 if TYPE_CHECKING:
     from .geometry.cones import Fit
@@ -125,20 +127,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; the exit code: 0, 1 for a mistake of the user, 3 where no cone fits the mesh."""
+    """Run the command; the exit code: 0, or 3 where no cone fits the mesh.
+
+    Raises:
+        ConeSkinError: a mistake of the user, in one line; no folder is left.
+    """
     began = time.perf_counter()
 
     def say(step: str) -> None:
         print(f"{time.perf_counter() - began:6.2f} s  {step}", file=sys.stderr, flush=True)
 
-    try:
-        return _design(args, say)
-    except ConeSkinError as exc:
-        print(f"coneskin design: {exc}", file=sys.stderr)
-        return 1
-
-
-def _design(args: argparse.Namespace, say: Callable[[str], None]) -> int:
     choices = _choices(args)
     options = FileOptions(args.arcs, args.cut_tolerance_mm * 1e-3, args.page)
     source: LinkMesh | None = None
@@ -159,6 +157,7 @@ def _design(args: argparse.Namespace, say: Callable[[str], None]) -> int:
     data["sheets"] = [summary(design) for design in designs]
     if fit is not None:
         data["bare"] = [{"start_mm": 1e3 * b.start, "end_mm": 1e3 * b.end, "reason": b.reason} for b in fit.bare]
+    _check_sensors(designs, frame)
     with new_folder(args.output, args.force) as folder:
         pictures: list[tuple[str, str]] = []
         if not args.no_pictures:
@@ -175,6 +174,15 @@ def _design(args: argparse.Namespace, say: Callable[[str], None]) -> int:
         _print(designs, fit)
         say(f"{len(files) + 1 + len(pictures)} files in {args.output}")
     return 0
+
+
+def _check_sensors(designs: tuple[SheetDesign, ...], frame: str) -> None:
+    """Refuse a design whose sensor file a scene would refuse."""
+    problems: list[str] = []
+    for index, design in enumerate(designs):
+        build_sensor(tomllib.loads(sensor_toml(design, index, frame)), f"{design.name}: sensor.toml", problems)
+    if problems:
+        raise GeometryError("; ".join(problems))
 
 
 def _choices(args: argparse.Namespace) -> Choices:

@@ -7,6 +7,7 @@ from typing import Any
 
 from .design import SheetDesign
 from .geometry.cut_sheet import CutSheet
+from .geometry.electrodes import Patch
 from .geometry.frustum import Frustum
 from .geometry.placed import PlacedFrustum
 from .geometry.sector import unroll
@@ -16,19 +17,15 @@ __all__ = ["materials", "sensor_toml", "summary"]
 
 def summary(design: SheetDesign) -> dict[str, Any]:
     """Everything about one sheet that a program may want; lengths in mm, angles in degrees, None for infinite."""
-    box, stack = design.layout.active, design.choices.stack
+    layout, stack = design.layout, design.choices.stack
     data: dict[str, Any] = {
         "name": design.name,
         "link_cone": _shape(design.place.frustum) | _pose(design.place),
         "active_cone": _shape(design.active.frustum) | _pose(design.active),
-        "active_share": round(design.layout.active_share, 6),
-        "active_area_cm2": _round(1e4 * box.area(design.place.frustum)),
-        "active_patch": {
-            "u1_mm": _round(1e3 * box.u1),
-            "u2_mm": _round(1e3 * box.u2),
-            "phi1_deg": _round(math.degrees(box.phi1)),
-            "phi2_deg": _round(math.degrees(box.phi2)),
-        },
+        "active_share": round(layout.active_share, 6),
+        "active_area_cm2": _round(1e4 * layout.active.area(design.place.frustum)),
+        "active_patch": _patch(layout.active),
+        "field_patch": _patch(layout.field),
         "layers": [
             {
                 "number": cut.number,
@@ -119,6 +116,15 @@ supply_v = {converter.supply_volts!r}
 adc_v = {converter.range_volts!r}
 adc_bits = {converter.bits}
 """
+
+
+def _patch(box: Patch) -> dict[str, float]:
+    return {
+        "u1_mm": _round(1e3 * box.u1),
+        "u2_mm": _round(1e3 * box.u2),
+        "phi1_deg": _round(math.degrees(box.phi1)),
+        "phi2_deg": _round(math.degrees(box.phi2)),
+    }
 
 
 def _shape(cone: Frustum) -> dict[str, Any]:
