@@ -147,13 +147,15 @@ class TestCommittedReference:
                 assert volts < (1e-11 if r.problem.upper == r.problem.lower else 2e-8), r.problem.name
 
     def test_more_multipoles_approach_the_reference(self, references: list[Any], ours: ModuleType) -> None:
-        """A gap of 0.1 radius, unequal sheets: the image in the edge takes exp(-2 acosh(1.1)) with each multipole."""
-        (r,) = [r for r in references if r.problem.name == "gap 0.1 a at B, Rl/Ru 10, ka 4"]
-        errors = [disagreement(ours.solve(r.problem, order), r.ports)[0] for order in (6, 10, 14, 18)]
-        assert errors[0] > 5e-7
-        for before, after in pairwise(errors):
-            # An algebraic factor rides on the geometric one: measured 0.027 to 0.033 here.
-            assert after / before == pytest.approx(math.exp(-8 * math.acosh(1.1)), rel=0.25)
+        """A gap of 0.1 radius, unequal sheets: each multipole takes exp(-2 acosh(1.1)) or more, as its image does."""
+        rate = math.exp(-8 * math.acosh(1.1))  # of four of them
+        for name in ("gap 0.1 a at B, Rl/Ru 10, ka 4", "gap 0.1 a at D, Rl/Ru 10, ka 4"):
+            (r,) = [r for r in references if r.problem.name == name]
+            errors = [disagreement(ours.solve(r.problem, order), r.ports)[0] for order in (2, 6, 10, 14, 18)]
+            assert errors[0] > 1e-5
+            for before, after in pairwise(errors):
+                # An algebraic factor rides on the geometric one, and 1e-12 is as far as the reference can tell.
+                assert after < max(1.3 * rate * before, 1e-12), name
 
     def test_the_general_method_approaches_it_on_every_shape(self, references: list[Any], ours: ModuleType) -> None:
         shapes = [r for r in references if r.problem.patches or r.problem.name.startswith("clipped")]
@@ -187,12 +189,16 @@ def worst_potential(ours: ModuleType, r: Any) -> float:
 
 
 class TestPotentials:
-    """At two points inside the first disc and one outside all; pointwise the elements are good to 1e-10 at worst."""
+    """At two points inside the first disc and one outside all.
+
+    The map is for pictures and keeps the ports' order, whose error is the square of that of the potentials: so 2e-9, not
+    1e-11. Pointwise the elements are good to 1e-10 at worst.
+    """
 
     def test_random_sensors(self, references: list[Any], ours: ModuleType) -> None:
         sensors = [r for r in references if r.problem.name.startswith("random")]
         assert sum(r.field_estimate < 1e-11 for r in sensors) >= 100
-        bad = {r.problem.name: value for r in sensors if not (value := worst_potential(ours, r)) < 1e-11}
+        bad = {r.problem.name: value for r in sensors if not (value := worst_potential(ours, r)) < 2e-9}
         assert not bad
 
     @pytest.mark.xfail(
@@ -203,7 +209,7 @@ class TestPotentials:
     def test_close_to_an_edge_between_equal_sheets(self, references: list[Any], ours: ModuleType) -> None:
         near = [r for r in references if "gap" in r.problem.name and r.problem.upper == r.problem.lower]
         assert len(near) == 8
-        assert max(worst_potential(ours, r) for r in near) < 1e-11
+        assert max(worst_potential(ours, r) for r in near) < 2e-9
 
 
 class TestLivePeers:
