@@ -1,55 +1,43 @@
-"""What the guard does with the arm: stop it, see it stand, retreat, and latch. Pure: states and time in, commands out.
+"""What the guard does with the arm: stop it, see it stand, move it away, latch. Pure: states and time in, commands out.
 
     ARMED --stop--> STOPPING --standing--> RETREATING --made, or over--> HALTING --standing--> LATCHED
-                        |                                                                       ^
-                        +-- standing, and no retreat is wanted or possible ---------------------+
+     |  ^              ^ |                                                                     |    ^
+     |  +-- free --+   | +-- standing, and no movement is wanted or possible ------------------|----+
+     +-- slow --> SLOWED --not slower, too long, a harder touch, a fault                       |
+                       +--------------------- something moves the arm again -------------------+
 
-A stop counts when measured joint speed says so. Nothing but a person's reset leaves LATCHED.
+A stop counts when measured joint speed says so. Nothing but a person's reset leaves LATCHED for good.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from enum import Enum
-from typing import Any, Protocol
 
+from coneskin.errors import RobotRefused
+
+from .arm_checks import arm_faults
 from .commands import ArmState, ContactOnLink, Done, Reaction
-from .journal import GuardEvent
-from .owner_messages import Clear, Halt, Speed, Stop
-from .reaction import react
-from .retreat import RetreatPlan, retreat_step
+from .controller_clock import ControllerClock
+from .leaving import Leaving
+from .movement import choose_movement
+from .outputs import Command, Output, Outputs, tell
+from .owner_messages import Clear, Halt, Stop
+from .phase import Phase
+from .retreat_program import RetreatProgram, retreat_program
+from .rules import Rule, Rules
+from .slowing import Slider, Slowing
 from .state_reader import ControllerState
-from .stop_watch import StopWatch, Way
+from .stop_watch import STEADY, StopWatch, Way
+from .table import Table
+from .trail import Trail
 from .ur_models import ArmModel
 from .watch import Watch
 
 __all__ = ["ArmReaction", "Command", "Output", "Outputs", "Phase"]
 
-Command = Stop | Speed | Halt | Clear | Way
-Output = Command | GuardEvent
-
-
-class Outputs(Protocol):
-    """Takes what comes out, in order: a list, or something that sends a command as soon as it is there."""
-
-    def append(self, output: Output, /) -> None:
-        """Take one."""
-
-
-_STREAM_EVERY = 0.004  # s between two targets of a retreat: every second controller cycle, so that none queues
 _SLACK = 4.0  # of the patience: what a stop may take besides v / a before every way is used
-
-
-class Phase(Enum):
-    """Where the guard is."""
-
-    STARTING = "starting"
-    ARMED = "armed"
-    STOPPING = "stopping"
-    RETREATING = "retreating"
-    HALTING = "halting"
-    LATCHED = "latched"
+_MOVES = 0.05  # rad/s; a latched arm that a program moves faster is stopped again
 
 
 class ArmReaction:
@@ -57,83 +45,153 @@ class ArmReaction:
 
     Args:
         model: the arm.
-        reaction: what it does when it is touched.
+        reaction: what it does when it is touched and no rule fits.
         watch: the limits.
         ways: the ways to stop that there are; the first is used for every stop, the others where it does not work.
+            Without OWNER, whoever moves the arm is not known here, and a retreat is a program of its own.
+        rules: reactions with conditions.
+        table: what the arm must not go below while it retreats.
 
     Attributes:
         phase: where it is.
         state: newest measured state, or None before the first.
         owner_ready: whether ur_rtde is ready.
+        slider: where the controller's speed slider is, or None.
+
+    Raises:
+        RobotRefused: comply without OWNER.
     """
 
-    def __init__(self, model: ArmModel, reaction: Reaction, watch: Watch, ways: tuple[Way, ...]) -> None:
+    def __init__(
+        self,
+        model: ArmModel,
+        reaction: Reaction,
+        watch: Watch,
+        ways: tuple[Way, ...],
+        rules: tuple[Rule, ...] = (),
+        table: Table | None = None,
+    ) -> None:
         self.phase = Phase.STARTING
         self.state: ControllerState | None = None
         self.owner_ready = False
+        self.slider: float | None = None
         self._model = model
-        self._reaction = reaction
+        self._rules = Rules(reaction, rules)
+        if Way.OWNER not in ways and "comply" in self._rules.kinds:
+            raise RobotRefused("comply needs the owner of ur_rtde: a program of its own cannot follow a push")
         self._watch = watch
         self._ways = ways
+        self._mover = Way.OWNER if Way.OWNER in ways else Way.SCRIPT
+        self._table = table
+        self._trail = Trail()
+        self._clock = ControllerClock()
         self._stop: StopWatch | None = None
-        self._touch_state: ArmState | None = None
-        self._touch_contacts: Sequence[ContactOnLink] = ()
-        self._may_retreat = False
-        self._plan: RetreatPlan | None = None
-        self._sent = -math.inf
-        self._why = ""
+        self._slowing: Slowing | None = None
+        self._leaving: Leaving | None = None
+        self._reaction = reaction  # the one that is under way
+        self._at_touch: ArmState | None = None
+        self._touch_speed = 0.0
+        self._levels: dict[int, float] = {}  # link -> firmest since the touch began
+        self._contacts: Sequence[ContactOnLink] = ()  # now
+        self._placed: Sequence[ContactOnLink] = ()  # as last seen while the arm stopped
+        self._may_move, self._again, self._why = False, 0, ""
+
+    # ---- what it is told
 
     def arm(self, out: Outputs) -> None:
         """Let the program move the arm, and react from now on."""
-        self.phase = Phase.ARMED
-        out.append(Clear())
+        self.phase, self._reaction = Phase.ARMED, self._rules.default
+        if Way.OWNER in self._ways:
+            out.append(Clear())
 
     def reset(self) -> None:
         """Leave LATCHED, because a person says so."""
         self.phase = Phase.STARTING
 
-    def react(self, now: float, why: str, fault: bool, out: Outputs) -> None:
-        """Stop; a retreat follows a touch, not a fault.
+    def touch(self, now: float, link: int, level: float, began: bool, out: Outputs) -> None:
+        """A touch has begun, or has changed.
 
-        Does nothing where the arm is already stopped or stopping, save that a fault takes the retreat away.
+        Args:
+            now: host time [s].
+            link: index of the touched link's DH frame.
+            level: how firm.
+            began: it has begun.
+            out: takes what comes of it.
         """
-        if self.phase is Phase.ARMED:
-            self._begin(now, Phase.STOPPING, Stop(self._reaction.deceleration), out)
-            self._why, self._may_retreat = why, not fault
-            self._touch_contacts, self._touch_state = (), _measured(self.state)
-            _tell(out, "stopping", now, why=why)
-        elif self.phase is Phase.RETREATING:
-            self._begin(now, Phase.HALTING, Halt(self._reaction.deceleration), out)
-            self._why = why
-            _tell(out, "stopping", now, why=why)
-        elif self.phase is Phase.STOPPING and fault:
-            self._why, self._may_retreat = why, False
+        phase = self.phase
+        if phase is Phase.ARMED:
+            state = self.state
+            self._touch_speed = math.inf if state is None else state.speed
+            self._levels = {link: level}
+            reaction = self._reaction = self._rules.choose(link, level, self._touch_speed)
+            if reaction.kind == "slow" and self.slider is not None:
+                self._slow(now, reaction, self.slider, out)
+            else:
+                self._stop_now(now, "touch", True, out)
+            return
+        self._levels[link] = max(level, self._levels.get(link, 0.0))
+        if phase is Phase.SLOWED or (phase is Phase.RETREATING and self._reaction.kind == "comply"):
+            reaction = self._rules.choose(link, level, self._touch_speed)
+            if reaction.kind in ("slow", self._reaction.kind):
+                return
+            self._reaction = reaction
+            if phase is Phase.SLOWED:
+                self._stop_now(now, "touch", True, out)
+            else:
+                self._halt(now, "touch", out)
+        elif phase is Phase.RETREATING and began:
+            self._halt(now, "touch", out)
 
     def locate(self, contacts: Sequence[ContactOnLink]) -> None:
-        """Say where the touches are, while the arm stops."""
-        if self.phase is Phase.STOPPING:
-            self._touch_contacts = contacts
+        """Say where the touches are that there are now."""
+        self._contacts = contacts
+        if contacts and self.phase is Phase.STOPPING:
+            self._placed = contacts
 
-    def hurry(self, now: float) -> None:
-        """The way that is in use is known to be broken: take the next one at once."""
+    def fault(self, now: float, why: str, out: Outputs) -> None:
+        """Something is wrong: stop, and do not move any more."""
+        if self.phase in (Phase.ARMED, Phase.SLOWED):
+            self._stop_now(now, why, False, out)
+        elif self.phase is Phase.RETREATING:
+            self._halt(now, why, out)
+        elif self.phase is Phase.STOPPING:
+            self._why, self._may_move = why, False
+
+    def lose(self, ways: frozenset[Way], now: float, for_good: bool = True) -> None:
+        """These ways to stop are gone, or this stop shall not count on them: take the next one at once."""
+        if for_good:
+            self._ways = tuple(way for way in self._ways if way not in ways)
         if self._stop is not None:
-            self._stop.hurry(now)
+            self._stop.forget(ways, now)
 
     def sample(self, state: ControllerState, out: Outputs) -> None:
         """Take a measured state."""
         self.state = state
+        measured_at = self._clock.measured_at(state.time, state.controller_time)
+        self._trail.note(measured_at, state.q)
         if self._stop is not None:
-            self._follow(self._stop, state, out)
-        elif self.phase is Phase.RETREATING:
-            self._retreat(state, out)
+            self._follow(self._stop, state, measured_at, out)
+        elif self._leaving is not None:
+            self._move(state, self._leaving, out)
+        elif self._slowing is not None:
+            self._slowing.sample(state.speed)
+        elif self.phase is Phase.LATCHED:
+            self._keep_standing(state, out)
 
     def look(self, now: float, out: Outputs) -> None:
         """What only the passing of time shows."""
-        if self._stop is None:
-            return
-        for way in self._stop.next_ways(now):
-            out.append(way)
-            _tell(out, "escalated", now, way=way.value)
+        if self._stop is not None:
+            for way in self._stop.next_ways(now):
+                out.append(way)
+                tell(out, "escalated", now, way=way.value)
+        elif (slowing := self._slowing) is not None:
+            slowing.touched(now, bool(self._contacts))
+            if why := slowing.trouble(now):
+                self._stop_now(now, why, False, out)
+            elif slowing.over(now):
+                self._slowing, self.phase = None, Phase.ARMED
+                out.append(Slider(slowing.before))
+                tell(out, "resumed", now, slider=slowing.before)
 
     def silent(self, now: float) -> bool:
         """Whether the controller's newest state is too old."""
@@ -144,79 +202,98 @@ class ArmReaction:
         wrong = []
         if Way.OWNER in self._ways and not self.owner_ready:
             wrong.append("ur_rtde is not ready")
-        state = self.state
-        if state is None or self.silent(now):
+        if "slow" in self._rules.kinds and self.slider is None:
+            wrong.append("where the controller's speed slider is, is not known")
+        if self.state is None or self.silent(now):
             return [*wrong, "the controller is silent"]
-        if state.stopped_by_safety:
-            wrong.append("the controller's own safety system holds the arm: see its screen")
-        if not state.running:
-            wrong.append("the arm is not powered, or its brakes are not released")
-        for number, (q, low, high) in enumerate(
-            zip(state.q, self._model.joint_lower, self._model.joint_upper, strict=True), 1
-        ):
-            if not low <= q <= high:
-                wrong.append(f"joint {number} must be within {low:.3f} to {high:.3f} rad, it is at {q:.3f} rad")
-        return wrong
+        return wrong + arm_faults(self._model, self.state)
+
+    # ---- what it does
+
+    def _slow(self, now: float, reaction: Reaction, slider: float, out: Outputs) -> None:
+        budget = self._touch_speed / reaction.deceleration + _SLACK * self._watch.escalate
+        slowing = Slowing(now, self._touch_speed, slider, reaction.slow_to, budget, reaction.time_budget)
+        out.append(Slider(slowing.fraction))
+        self._slowing, self.phase = slowing, Phase.SLOWED
+        tell(out, "slowing", now, slider=slowing.fraction, before=slider)
+
+    def _stop_now(self, now: float, why: str, may_move: bool, out: Outputs) -> None:
+        self._begin(now, Phase.STOPPING, Stop(self._reaction.deceleration), out)
+        self._why, self._may_move = why, may_move
+        state = self.state
+        self._placed, self._at_touch = (), None if state is None else ArmState(state.time, state.q, state.qd)
+        tell(out, "stopping", now, why=why)
+
+    def _halt(self, now: float, why: str, out: Outputs) -> None:
+        self._begin(now, Phase.HALTING, Halt(self._reaction.deceleration), out)
+        self._why = why
+        tell(out, "stopping", now, why=why)
 
     def _begin(self, now: float, phase: Phase, command: Stop | Halt, out: Outputs) -> None:
-        first = self._ways[0]
-        out.append(command if first is Way.OWNER else first)
+        if self._ways:
+            first = self._ways[0]
+            out.append(command if first is Way.OWNER else first)
         state, watch = self.state, self._watch
         speed = None if state is None or self.silent(now) else state.speed
-        budget = (speed or 0.0) / self._reaction.deceleration + _SLACK * watch.escalate
-        self._stop = StopWatch(now, speed, self._ways, watch.escalate, budget, watch.standstill)
+        budget = (speed or 0.0) / command.deceleration + _SLACK * watch.escalate
+        self._stop = StopWatch(now, speed, self._ways, watch.escalate, budget, watch.standstill, watch.arm_silence)
+        self._leaving = None
         self.phase = phase
 
-    def _follow(self, stop: StopWatch, state: ControllerState, out: Outputs) -> None:
+    def _follow(self, stop: StopWatch, state: ControllerState, measured_at: float, out: Outputs) -> None:
         before = stop.slowed_at
-        stop.sample(state.time, state.speed)
+        stop.sample(state.time, state.speed, measured_at)
         if before is None and stop.slowed_at is not None:
-            _tell(out, "slower", state.time, speed=state.speed)
+            tell(out, "slower", state.time, speed=state.speed)
         if stop.standing_at is None:
             return
-        _tell(out, "standstill", state.time, speed=state.speed, ways=[way.value for way in stop.used])
+        tell(out, "standstill", state.time, speed=state.speed, ways=[way.value for way in stop.used])
         self._stop = None
-        if self.phase is Phase.HALTING or not (self._may_retreat and self._touch_contacts):
+        if self.phase is Phase.HALTING or not (self._may_move and self._placed):
             self._latch(state.time, self._why, out)
-        elif not stop.by_owner_alone:
-            self._latch(state.time, f"{self._why}; no retreat: ur_rtde did not stop the arm", out)
-        else:
-            self._begin_retreat(state, out)
-
-    def _begin_retreat(self, state: ControllerState, out: Outputs) -> None:
-        at_touch = self._touch_state or _measured(state)
-        assert at_touch is not None
-        decision = react(self._model, at_touch, self._touch_contacts, self._reaction)
-        assert decision is not None  # there are contacts
-        stop, self._plan = decision
-        if self._plan is None:
-            self._latch(state.time, stop.reason, out)
             return
-        self._sent, self.phase = -math.inf, Phase.RETREATING
-        _tell(out, "retreating", state.time)
-        self._retreat(state, out)
+        self._reaction = self._rules.hardest(self._levels.items(), self._touch_speed)  # how firm it was shows by now
+        if self._reaction.kind in ("stop", "slow"):
+            self._latch(state.time, self._why, out)
+        elif stop.used != [self._mover]:
+            who = "ur_rtde" if self._mover is Way.OWNER else "a program"
+            self._latch(state.time, f"{self._why}; no retreat: {who} did not stop the arm", out)
+        else:
+            self._begin_movement(state, out)
 
-    def _retreat(self, state: ControllerState, out: Outputs) -> None:
-        assert self._plan is not None
-        step = retreat_step(self._plan, ArmState(state.time, state.q, state.qd))
-        if isinstance(step, Done):
-            self._why += f"; retreat {1e3 * step.progress:.1f} mm: {step.reason}"
+    def _begin_movement(self, state: ControllerState, out: Outputs) -> None:
+        here = ArmState(state.time, state.q, state.qd)
+        movement = choose_movement(
+            self._model, self._reaction, self._at_touch or here, here, self._placed, self._trail, self._table
+        )
+        if isinstance(movement, str):
+            self._latch(state.time, f"{self._why}; no retreat: {movement}", out)
+            return
+        program: RetreatProgram | Done | None = None
+        if self._mover is Way.SCRIPT:
+            program = retreat_program(movement, here, self._placed, self._reaction.deceleration)
+        if isinstance(program, Done):
+            self._latch(state.time, f"{self._why}; no retreat: {program.reason}", out)
+            return
+        self.phase, self._leaving = Phase.RETREATING, Leaving(movement, state.time, program, out)
+        self._move(state, self._leaving, out)
+
+    def _move(self, state: ControllerState, leaving: Leaving, out: Outputs) -> None:
+        over = leaving.step(state, self._contacts, out)
+        if over is not None:
+            self._why += f"; retreat {1e3 * over.progress:.1f} mm: {over.reason}"
             self._begin(state.time, Phase.HALTING, Halt(self._reaction.deceleration), out)
-            _tell(out, "retreated", state.time, progress=step.progress, complete=step.complete, why=step.reason)
-        elif state.time - self._sent >= _STREAM_EVERY - 1e-9:
-            out.append(Speed(step.qd, step.acceleration))
-            if step.clipped_by and self._sent == -math.inf:
-                _tell(out, "clipped", state.time, by=list(step.clipped_by))
-            self._sent = state.time
+            tell(out, "retreated", state.time, progress=over.progress, complete=over.complete, why=over.reason)
+
+    def _keep_standing(self, state: ControllerState, out: Outputs) -> None:
+        """A program that moves a latched arm is stopped; a person who pushes it, or jogs it, is not."""
+        self._again = self._again + 1 if state.playing and state.speed > _MOVES else 0
+        if self._again >= STEADY:
+            self._again = 0
+            self._stop_now(state.time, f"{self._why}; then something moved the arm", False, out)
 
     def _latch(self, now: float, why: str, out: Outputs) -> None:
-        self.phase, self._plan, self._touch_contacts = Phase.LATCHED, None, ()
-        _tell(out, "latched", now, why=why)
-
-
-def _measured(state: ControllerState | None) -> ArmState | None:
-    return None if state is None else ArmState(state.time, state.q, state.qd)
-
-
-def _tell(out: Outputs, name: str, time: float, **details: Any) -> None:
-    out.append(GuardEvent(name, time, details))
+        if self._slowing is not None:
+            out.append(Slider(self._slowing.before))
+        self.phase, self._leaving, self._slowing, self._why, self._again = Phase.LATCHED, None, None, why, 0
+        tell(out, "latched", now, why=why)

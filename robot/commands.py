@@ -10,8 +10,10 @@ from coneskin.geometry.pose import Vector
 
 from .ur_models import Joints
 
-__all__ = ["ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction", "Stop"]
+__all__ = ["KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction", "Stop"]
 
+#: what an arm can do when it is touched, gentlest first
+KINDS = ("slow", "comply", "retreat", "stop")
 STILL: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -40,6 +42,7 @@ class ContactOnLink:
         normal: outward unit normal of the skin there, in that frame; what touches is on its side.
         level: how strong, in the detector's unit.
         location_valid: False when it is known that there is a touch, but not where.
+        threshold: level from which the sensor is touched at all.
     """
 
     link: int
@@ -47,6 +50,7 @@ class ContactOnLink:
     normal: Vector
     level: float = 1.0
     location_valid: bool = True
+    threshold: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +58,18 @@ class Reaction:
     """How the arm reacts to a touch.
 
     Attributes:
-        kind: "stop", or "retreat" to stop and then move the touched point away.
+        kind: "stop"; "retreat" to stop and then move the touched point away; "comply" to stop and then give way as
+            firmly as it is pushed; "slow" to go on slowly while the touch lasts.
         deceleration: of the leading joint while stopping [rad/s^2].
-        distance: how far the touched point retreats [m].
-        speed: of the touched point [m/s].
+        distance: how far the touched point retreats, or gives way [m].
+        speed: of the touched point [m/s]; of comply, at ``full_level``.
         acceleration: of the leading joint while retreating [rad/s^2].
-        time_budget: after which the retreat ends wherever it is [s].
+        time_budget: after which the retreat ends wherever it is; a touch that slows for longer stops the arm [s].
         arm_speed: that no point of the bare arm exceeds while retreating [m/s]; a bound by the reach of each joint.
+        fallback: where no retreat along the normal is possible, "stop" stays there and "path" goes back the way that
+            the arm came.
+        full_level: level at which comply gives way with its full speed.
+        slow_to: the controller's speed slider while slow, 0..1.
 
     Raises:
         RobotRefused: a value is out of its range; nothing is armed with such settings.
@@ -73,10 +82,14 @@ class Reaction:
     acceleration: float = 4.0
     time_budget: float = 2.0
     arm_speed: float = 0.5
+    fallback: str = "stop"
+    full_level: float = 0.6
+    slow_to: float = 0.2
 
     def __post_init__(self) -> None:
-        if self.kind not in ("stop", "retreat"):
-            raise RobotRefused(f"reaction kind must be stop or retreat, got {self.kind!r}")
+        for name, choices in (("kind", KINDS), ("fallback", ("stop", "path"))):
+            if (word := getattr(self, name)) not in choices:
+                raise RobotRefused(f"reaction {name} must be one of {', '.join(choices)}, got {word!r}")
         # 40 rad/s^2 is the most that ur_rtde lets through; 1.5 m/s the fastest tool of the family
         for name, unit, most in (
             ("deceleration", "rad/s^2", 40.0),
@@ -85,6 +98,8 @@ class Reaction:
             ("acceleration", "rad/s^2", 40.0),
             ("time_budget", "s", 60.0),
             ("arm_speed", "m/s", 5.0),
+            ("full_level", "of 1", 1.0),
+            ("slow_to", "of 1", 0.9),
         ):
             value = getattr(self, name)
             if not (math.isfinite(value) and 0.0 < value <= most):
@@ -114,7 +129,7 @@ class JointVelocity:
         away: speed that the touched point will have away from the obstacle [m/s]; the mean over several touches.
         progress: how far it has got so far [m]; the farthest over several touches.
         clipped_by: what kept it from moving as set: "joint speed", "arm speed", "distance" (it brakes for the end),
-            "singularity", "joint 3 limit".
+            "singularity", "joint 3 limit"; of comply also "level" (pushed less than fully), "damping".
     """
 
     qd: Joints

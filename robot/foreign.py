@@ -32,13 +32,12 @@ class ForeignStops:
     def __init__(self, host: str, timeout: float = 2.0) -> None:
         self.host = host
         self._timeout = timeout
-        self._script: socket.socket | None = None
-        self._dashboard: socket.socket | None = None
+        self._open_ones: dict[str, socket.socket] = {}
 
     def __enter__(self) -> ForeignStops:
         try:
-            self._script = self._open(SCRIPT_PORT)
-            self._dashboard = self._open(DASHBOARD_PORT)
+            self._open_ones["script"] = self._open(SCRIPT_PORT)
+            self._open_ones["dashboard"] = self._open(DASHBOARD_PORT)
         except BaseException:
             self.close()
             raise
@@ -49,31 +48,34 @@ class ForeignStops:
 
     def close(self) -> None:
         """Close both; may be called again."""
-        for sock in (self._script, self._dashboard):
-            if sock is not None:
-                sock.close()
-        self._script = self._dashboard = None
+        for sock in self._open_ones.values():
+            sock.close()
+        self._open_ones = {}
 
-    def sockets(self) -> list[socket.socket]:
-        """Those that are open. The controller talks on both; ``drain`` what it says, or it closes them."""
-        return [sock for sock in (self._script, self._dashboard) if sock is not None]
+    def sockets(self) -> dict[str, socket.socket]:
+        """Those that are open, by name: "script" and "dashboard". The controller talks on both: ``drain`` them."""
+        return dict(self._open_ones)
 
-    def drain(self) -> None:
-        """Throw away what the controller has said; drops a socket that it has closed."""
-        for name in ("_script", "_dashboard"):
-            sock: socket.socket | None = getattr(self, name)
+    def drain(self) -> list[tuple[str, socket.socket]]:
+        """Throw away what the controller has said, at most 64 kB a call and socket. Never waits.
+
+        Returns:
+            the sockets that are of no use any more, for the caller to close: the controller has closed them, or the
+            system could not take a whole program, so that the next one would not be understood.
+        """
+        gone = []
+        for name, sock in self._open_ones.items():
             try:
-                while sock is not None and (data := sock.recv(1 << 16)) is not None:
-                    if not data:
-                        sock.close()
-                        setattr(self, name, None)
-                        break
+                if sock.recv(1 << 16):
+                    continue
             except BlockingIOError:
-                pass
+                continue
             except OSError:
-                assert sock is not None
-                sock.close()
-                setattr(self, name, None)
+                pass
+            gone.append((name, sock))
+        for name, _ in gone:
+            del self._open_ones[name]
+        return gone
 
     def use(self, way: Way, deceleration: float) -> bool:
         """Send one stop, without waiting.
@@ -86,16 +88,23 @@ class ForeignStops:
             whether the system took the bytes; what the arm does is measured, not assumed.
         """
         if way is Way.DASHBOARD:
-            return self._send(self._dashboard, b"stop\n")
+            return self._send("dashboard", b"stop\n")
         call = f"stopj({deceleration:.3f})" if way is Way.SCRIPT else "protective_stop()"
-        return self._send(self._script, f"def coneskin_stop():\n  {call}\nend\n".encode())
+        return self.run(f"def coneskin_stop():\n  {call}\nend\n")
 
-    @staticmethod
-    def _send(sock: socket.socket | None, data: bytes) -> bool:
+    def run(self, program: str) -> bool:
+        """Send a program, without waiting; it replaces the one that runs. Whether the system took it."""
+        return self._send("script", program.encode())
+
+    def _send(self, name: str, data: bytes) -> bool:
+        sock = self._open_ones.get(name)
         try:
-            return sock is not None and sock.send(data) == len(data)
+            if sock is None or sock.send(data) == len(data):
+                return sock is not None
+            sock.shutdown(socket.SHUT_RDWR)  # half a program: the next one would not be understood
         except OSError:
-            return False
+            pass
+        return False
 
     def _open(self, port: int) -> socket.socket:
         try:

@@ -17,15 +17,25 @@ from coneskin.skin.events import Event, SkinFault, Touch, TouchBegan, TouchEnded
 from coneskin.skin.recording import Block
 from coneskin.skin.stream import Stream
 
-from .arm_reaction import ArmReaction, Outputs, Phase
+from .arm_reaction import ArmReaction
 from .commands import ContactOnLink
-from .journal import GuardEvent, Kind
+from .journal import Kind
+from .outputs import Outputs, tell
 from .owner_messages import Note
+from .phase import Phase
+from .speed_slider import decode_fraction
 from .state_reader import decode_state
+from .stop_watch import Way
 from .watch import Watch
 
 __all__ = ["GuardCore", "GuardedSensor"]
 
+#: what can be lost -> the ways to stop that go with it
+_WAYS: Mapping[str, frozenset[Way]] = {
+    "owner": frozenset({Way.OWNER}),
+    "script": frozenset({Way.SCRIPT, Way.PROTECTIVE}),
+    "dashboard": frozenset({Way.DASHBOARD}),
+}
 _TELL_EVERY = 0.5  # s between two lists of what the guard waits for
 
 
@@ -38,12 +48,14 @@ class GuardedSensor:
         link_name: of the link, for people.
         link: index of the link's DH frame.
         place: (u [m], phi [rad]) -> point [m] and outward unit normal, in the link's DH frame.
+        threshold: level from which it is touched.
     """
 
     name: str
     link_name: str
     link: int
     place: Callable[[float, float], tuple[Vector, Vector]]
+    threshold: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +66,8 @@ class _Contact:
     normal: Vector
 
     def on_link(self) -> ContactOnLink:
-        return ContactOnLink(self.where.link, self.point, self.normal, self.touch.level, self.touch.location_valid)
+        touch, where = self.touch, self.where
+        return ContactOnLink(where.link, self.point, self.normal, touch.level, touch.location_valid, where.threshold)
 
 
 class GuardCore:
@@ -86,6 +99,7 @@ class GuardCore:
             Kind.OWNER: self._take_owner,
             Kind.RESET: self._take_reset,
             Kind.LOST: self._take_lost,
+            Kind.SLIDER: self._take_slider,
         }
 
     @property
@@ -133,19 +147,23 @@ class GuardCore:
         assert isinstance(event, Touch)
         if isinstance(event, TouchEnded):
             self._contacts.pop(event.sensor, None)
-            _tell(out, "touch_ended", event.time, sensor=event.sensor)
+            self._locate()
+            tell(out, "touch_ended", event.time, sensor=event.sensor)
             return
         began = isinstance(event, TouchBegan)
-        if began and self._arm is not None:
-            self._arm.react(event.time, "touch", False, out)
         where, before = self._sensors[event.sensor], self._contacts.get(event.sensor)
+        if self._arm is not None:
+            self._arm.touch(event.time, where.link, event.level, began, out)
         contact = self._contacts[event.sensor] = _Contact(event, where, *where.place(event.u, event.phi))
+        self._locate()
+        if began:
+            tell(out, "contact", event.time, **_describe(contact))
+        elif event.location_valid and not (before and before.touch.location_valid):
+            tell(out, "contact_placed", event.time, **_describe(contact))
+
+    def _locate(self) -> None:
         if self._arm is not None:
             self._arm.locate([item.on_link() for item in self._contacts.values()])
-        if began:
-            _tell(out, "contact", event.time, **_describe(contact))
-        elif event.location_valid and not (before and before.touch.location_valid):
-            _tell(out, "contact_placed", event.time, **_describe(contact))
 
     def _take_arm(self, block: Block, out: Outputs) -> None:
         if self._arm is None:
@@ -156,7 +174,7 @@ class GuardCore:
             self._fault(block.time, f"the controller's state cannot be read: {exc}", out)
             return
         self._arm.sample(state, out)
-        if state.stopped_by_safety and self.phase in (Phase.ARMED, Phase.RETREATING):
+        if state.stopped_by_safety and self.phase.watched:
             self._fault(block.time, "the controller's own safety system has stopped the arm", out)
 
     def _take_owner(self, block: Block, out: Outputs) -> None:
@@ -166,29 +184,37 @@ class GuardCore:
         if note.kind == "ready":
             self._arm.owner_ready = True
         elif note.kind == "error":
-            self._arm.hurry(block.time)
+            self._arm.lose(_WAYS["owner"], block.time, for_good=False)
             self._fault(block.time, f"ur_rtde: {note.text}", out)
 
     def _take_lost(self, block: Block, out: Outputs) -> None:
         what, _, why = block.payload.decode("utf-8", "replace").partition("\n")
         self._lost[what] = why
-        if self._arm is not None and what == "owner":
-            self._arm.owner_ready = False
-            self._arm.hurry(block.time)
+        if self._arm is not None:
+            self._arm.owner_ready &= what != "owner"
+            self._arm.lose(_WAYS.get(what, frozenset()), block.time)
         self._react(block.time, why, out)
-        _tell(out, "ending" if what == "supervisor" else "fault", block.time, what=why)
+        tell(out, "ending" if what == "supervisor" else "fault", block.time, what=why)
+
+    def _take_slider(self, block: Block, out: Outputs) -> None:
+        if self._arm is None:
+            return
+        try:
+            self._arm.slider = decode_fraction(block.payload)
+        except RobotConnectionError as exc:
+            self._fault(block.time, f"the speed slider cannot be read: {exc}", out)
 
     def _take_reset(self, block: Block, out: Outputs) -> None:
         if self.phase is not Phase.LATCHED or self._arm is None:
-            _tell(out, "message", block.time, what=f"nothing to reset: the guard is {self.phase.value}")
+            tell(out, "message", block.time, what=f"nothing to reset: the guard is {self.phase.value}")
             return
         self._faults.clear()
         if wrong := self.unsound(block.time):
-            _tell(out, "refused", block.time, what="reset", reasons=wrong)
+            tell(out, "refused", block.time, what="reset", reasons=wrong)
             return
         self._arm.reset()
         self._sound_since = None
-        _tell(out, "reset", block.time)
+        tell(out, "reset", block.time)
 
     # ---- what is decided
 
@@ -198,7 +224,7 @@ class GuardCore:
             self._skin_event(event, out)
         arm = self._arm
         if arm is not None:
-            if arm.phase in (Phase.ARMED, Phase.RETREATING) and arm.silent(now):
+            if arm.phase.watched and arm.silent(now):
                 self._fault(now, f"the controller has sent no state for {1e3 * self._watch.arm_silence:g} ms", out)
             arm.look(now, out)
         if self.phase is Phase.STARTING:
@@ -211,7 +237,7 @@ class GuardCore:
                 self._told = now
             elif now - self._told >= _TELL_EVERY:
                 self._told = now
-                _tell(out, "waiting", now, reasons=wrong)
+                tell(out, "waiting", now, reasons=wrong)
         elif self._sound_since is None:
             self._sound_since = now
         elif now - self._sound_since >= self._watch.settle:
@@ -219,18 +245,18 @@ class GuardCore:
                 self._phase = Phase.ARMED
             else:
                 self._arm.arm(out)
-            _tell(out, "armed", now)
+            tell(out, "armed", now)
 
     def _fault(self, now: float, what: str, out: Outputs) -> None:
         if what in self._faults:
             return
         self._faults[what] = what
         self._react(now, what, out)
-        _tell(out, "fault", now, what=what)
+        tell(out, "fault", now, what=what)
 
     def _react(self, now: float, why: str, out: Outputs) -> None:
         if self._arm is not None:
-            self._arm.react(now, why, True, out)
+            self._arm.fault(now, why, out)
 
 
 def _describe(contact: _Contact) -> dict[str, Any]:
@@ -247,7 +273,3 @@ def _describe(contact: _Contact) -> dict[str, Any]:
         "clock_us": touch.clock_us,
         "sequence": touch.sequence,
     }
-
-
-def _tell(out: Outputs, name: str, time: float, **details: Any) -> None:
-    out.append(GuardEvent(name, time, details))

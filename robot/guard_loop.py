@@ -18,11 +18,15 @@ from coneskin.errors import ConeSkinError, SkinTimeout
 from coneskin.skin.recording import Block, encode_block
 from coneskin.skin.source import Source
 
-from .arm_reaction import Output, Phase
 from .channel import Channel
 from .foreign import ForeignStops
 from .guard_core import GuardCore
 from .journal import GuardEvent, Kind
+from .outputs import Output
+from .phase import Phase
+from .retreat_program import RetreatProgram
+from .slowing import Slider
+from .speed_slider import SpeedSlider
 from .state_reader import StateReader
 from .stop_watch import Way
 
@@ -44,6 +48,7 @@ class GuardPorts:
         owner: of ur_rtde.
         foreign: stops that do not need ur_rtde, open.
         deceleration: of a stop by script [rad/s2].
+        slider: of the controller's speed, open.
     """
 
     supervisor: Channel
@@ -52,6 +57,7 @@ class GuardPorts:
     owner: Channel | None = None
     foreign: ForeignStops | None = None
     deceleration: float = 10.0
+    slider: SpeedSlider | None = None
 
 
 class _Outbox:
@@ -72,6 +78,12 @@ class _Outbox:
         elif isinstance(output, Way):
             taken = ports.foreign is not None and ports.foreign.use(output, ports.deceleration)
             self.sent.append(f"{output.value}\n{'sent' if taken else 'not sent'}".encode())
+        elif isinstance(output, RetreatProgram):
+            taken = ports.foreign is not None and ports.foreign.run(output.text)
+            self.sent.append(f"script{'' if taken else ', not sent'}\n{output.text}".encode())
+        elif isinstance(output, Slider):
+            taken = ports.slider is not None and ports.slider.set(output.fraction)
+            self.sent.append(f"slider{'' if taken else ', not sent'}\n{output.fraction}".encode())
         else:
             message = output.encode()
             taken = ports.owner is not None and ports.owner.send(message)
@@ -121,12 +133,12 @@ class GuardLoop:
 
     def _open(self) -> None:
         ports = self._ports
-        for item in (ports.supervisor, ports.owner, ports.reader):
+        for item in (ports.supervisor, ports.owner, ports.reader, ports.slider):
             if item is not None:
                 self._selector.register(item, selectors.EVENT_READ)
         if ports.source is not None and (descriptor := ports.source.fileno()) is not None:
             self._selector.register(descriptor, selectors.EVENT_READ, "skin")
-        for sock in ports.foreign.sockets() if ports.foreign else ():
+        for sock in ports.foreign.sockets().values() if ports.foreign else ():
             self._selector.register(sock, selectors.EVENT_READ, "foreign")
 
     def _close(self) -> None:
@@ -136,10 +148,15 @@ class GuardLoop:
         """Wait for input, or for the timeout [s], and serve it."""
         ports = self._ports
         ready = {key.data or key.fileobj for key, _ in self._selector.select(timeout)}
+        arm_first = self._core.phase.stopping  # states that wait may show that the stop under way works
+        if arm_first and ports.reader is not None and ports.reader in ready:
+            self._read_arm(ports.reader)
         if ports.source is not None and ("skin" in ready or ports.source.fileno() is None):
             self._read_skin(ports.source)
-        if ports.reader is not None and ports.reader in ready:
+        if not arm_first and ports.reader is not None and ports.reader in ready:
             self._read_arm(ports.reader)
+        if ports.slider is not None and ports.slider in ready:
+            self._read_slider(ports.slider)
         if ports.owner is not None and ports.owner in ready:
             for message in ports.owner.receive():
                 self._take(Kind.OWNER, message)
@@ -178,13 +195,19 @@ class GuardLoop:
         except ConeSkinError as exc:
             self._lose("controller", str(exc), reader)
 
+    def _read_slider(self, slider: SpeedSlider) -> None:
+        try:
+            for payload in slider.read():
+                self._take(Kind.SLIDER, payload)
+        except ConeSkinError as exc:
+            self._lose("slider", str(exc), slider)
+
     def _drain(self, foreign: ForeignStops) -> None:
-        before = foreign.sockets()
-        foreign.drain()
-        for sock in before:
-            if sock.fileno() < 0:
-                self._forget(sock)
-                self._take(Kind.LOST, b"a way to stop\nthe controller has closed a connection that a stop may need")
+        for name, sock in foreign.drain():
+            self._forget(sock)
+            sock.close()
+            why = f"the controller has closed the {name} connection, which a stop may need"
+            self._take(Kind.LOST, f"{name}\n{why}".encode())
 
     def _take(self, kind: Kind, payload: bytes) -> None:
         """Feed the core, which sends its commands at once; then note all of it for the recorder."""
@@ -210,6 +233,8 @@ class GuardLoop:
             self._ports.source = None
         elif what == "controller":
             self._ports.reader = None
+        elif what == "slider":
+            self._ports.slider = None
         else:
             self._ports.owner = None
         self._take(Kind.LOST, f"{what}\n{why}".encode())
@@ -222,6 +247,6 @@ class GuardLoop:
         """Stop the arm and see it stand."""
         self._take(Kind.LOST, b"supervisor\nthe guard was told to end")
         end = self._clock() + _ENDING
-        while self._core.phase in (Phase.STOPPING, Phase.HALTING, Phase.RETREATING) and self._clock() < end:
+        while (self._core.phase.stopping or self._core.phase is Phase.RETREATING) and self._clock() < end:
             self.step(_TICK)
         self._ports.supervisor.flush()

@@ -23,14 +23,15 @@ class Kind(IntEnum):
     TICK = 3  #: nothing: time has passed
     OWNER = 4  #: a note of the owner of ur_rtde
     RESET = 5  #: a person resets the guard
-    LOST = 6  #: a source is gone; the payload says which and why
+    LOST = 6  #: a source, or a way to stop, is gone; the payload says which and why
+    SLIDER = 7  #: payload of an RTDE data packet, for ``speed_slider.decode_fraction``
     EVENT = 10  #: a GuardEvent, JSON
     COMMAND = 11  #: a command as it was sent: to whom, a line feed, its bytes
     HEADER = 20  #: JSON: the scene and the versions
     OVERRUN = 21  #: JSON: how late the loop was
 
 
-INPUTS = frozenset({Kind.SKIN, Kind.ARM, Kind.TICK, Kind.OWNER, Kind.RESET, Kind.LOST})
+INPUTS = frozenset({Kind.SKIN, Kind.ARM, Kind.TICK, Kind.OWNER, Kind.RESET, Kind.LOST, Kind.SLIDER})
 
 
 class GuardEvent(NamedTuple):
@@ -38,8 +39,8 @@ class GuardEvent(NamedTuple):
 
     Attributes:
         name: "waiting", "armed", "contact", "contact_placed", "touch_ended", "fault", "stopping", "slower",
-            "standstill", "escalated", "retreating", "clipped", "retreated", "latched", "refused", "reset", "message",
-            "ending", "died".
+            "standstill", "escalated", "retreating", "going_back", "complying", "clipped", "retreated", "slowing",
+            "resumed", "latched", "refused", "reset", "message", "ending", "died".
         time: host clock [s].
         details: numbers and words that belong to it; SI and radians.
     """

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from .commands import ArmState, ContactOnLink, Done, JointVelocity, Reaction, Stop
 from .retreat import RetreatPlan, plan_retreat, retreat_step
+from .table import Table
 from .ur_models import ArmModel
 
 __all__ = [
@@ -23,7 +24,11 @@ __all__ = [
 
 
 def react(
-    model: ArmModel, state: ArmState, contacts: Sequence[ContactOnLink], reaction: Reaction
+    model: ArmModel,
+    state: ArmState,
+    contacts: Sequence[ContactOnLink],
+    reaction: Reaction,
+    table: Table | None = None,
 ) -> tuple[Stop, RetreatPlan | None] | None:
     """What to do now, and then.
 
@@ -32,6 +37,7 @@ def react(
         state: the arm as measured when the touch was seen.
         contacts: all touches of this frame.
         reaction: the settings.
+        table: what the arm must not go below while it retreats.
 
     Returns:
         None without a contact. Otherwise the stop to send at once, whatever else is true; and, for "retreat" and where
@@ -45,9 +51,9 @@ def react(
         return None
     links = sorted({contact.link for contact in contacts})
     touched = "touch on link " + ", ".join(str(link) for link in links)
-    if reaction.kind == "stop":
+    if reaction.kind != "retreat":
         return Stop(reaction.deceleration, touched), None
-    plan = plan_retreat(model, state, contacts, reaction)
+    plan = plan_retreat(model, state, contacts, reaction, table)
     if isinstance(plan, Done):
         return Stop(reaction.deceleration, f"{touched}; no retreat: {plan.reason}"), None
     return Stop(reaction.deceleration, touched), plan

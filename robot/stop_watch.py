@@ -1,4 +1,9 @@
-"""Whether a stop works, judged by measured joint speed, and what to try next while it does not. Pure."""
+"""Whether a stop works, judged by measured joint speed, and what to try next while it does not. Pure.
+
+A host that is held up reads states late, all at once. So time is what the samples themselves say (``ControllerClock``):
+a way to stop is called slow when samples measured so long after it show no slowdown, and not because nobody has looked.
+Only where no sample arrives at all does the host's clock count.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +34,7 @@ class StopWatch:
         patience: without slowdown for this long, the next way is taken [s].
         budget: time after which the arm should stand; beyond it every way is taken [s].
         standstill: joint speed below which the arm stands [rad/s].
+        silence: without any sample for this long, the host's clock counts [s].
 
     Attributes:
         slowed_at: when the measured speed first showed a slowdown, or None.
@@ -44,11 +50,14 @@ class StopWatch:
         patience: float,
         budget: float,
         standstill: float,
+        silence: float = 0.0,
     ) -> None:
         self._top = speed
         self._left = list(ways[1:])
         self._patience = patience
         self._standstill = standstill
+        self._silence = silence
+        self._began = self._newest = self._arrived = now
         self._next = now + patience
         self._deadline = now + budget
         self._steady = 0
@@ -56,8 +65,20 @@ class StopWatch:
         self.slowed_at: float | None = None
         self.standing_at: float | None = None
 
-    def sample(self, time: float, speed: float) -> None:
-        """Take a measured speed [rad/s] of a host time [s]."""
+    def sample(self, time: float, speed: float, measured_at: float | None = None) -> None:
+        """Take a measured speed.
+
+        Args:
+            time: host time at which it was read [s].
+            speed: largest joint speed [rad/s].
+            measured_at: host time at which it was measured [s]; by default when it was read. What was measured before
+                the stop was commanded says nothing about it.
+        """
+        self._arrived = time
+        measured_at = time if measured_at is None else measured_at
+        if measured_at < self._began:
+            return
+        self._newest = measured_at
         if self._top is None or (speed > self._top and self.slowed_at is None):
             self._top = speed  # it may still have been speeding up when the stop was commanded
         slower = self._top - speed >= min(_SLOWER, 0.1 * self._top)
@@ -71,17 +92,24 @@ class StopWatch:
 
     def hurry(self, now: float) -> None:
         """Take the next way at the next look, slowdown or not: the one in use is known to be broken."""
-        self._next = now
+        self._next = self._newest = now
         self.slowed_at = None
 
+    def forget(self, ways: frozenset[Way], now: float) -> None:
+        """These ways are gone; where one of them is in use, take the next at once."""
+        self._left = [way for way in self._left if way not in ways]
+        if self.used and self.used[-1] in ways:
+            self.hurry(now)
+
     def next_ways(self, now: float) -> list[Way]:
-        """The ways to take now; each is named once."""
+        """The ways to take now [s]; each is named once."""
         if self.standing_at is not None:
             return []
+        seen = now if now - self._arrived > self._silence else self._newest
         take: list[Way] = []
-        if now >= self._deadline:
+        if seen >= self._deadline:
             take, self._left = self._left, []
-        elif self.slowed_at is None and now >= self._next and self._left:
+        elif self.slowed_at is None and seen >= self._next and self._left:
             take = [self._left.pop(0)]
             self._next = now + self._patience
         self.used += take
@@ -93,6 +121,6 @@ class StopWatch:
         return not self._left
 
     @property
-    def by_owner_alone(self) -> bool:
-        """Whether no other way than the owner was needed, so that ur_rtde can still move the arm."""
-        return self.used == [Way.OWNER]
+    def by_first_alone(self) -> bool:
+        """Whether the first way was enough, so that what moves the arm for the guard can be trusted to do so."""
+        return len(self.used) == 1

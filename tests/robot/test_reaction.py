@@ -76,7 +76,7 @@ def test_the_same_gives_the_same() -> None:
 @pytest.mark.parametrize(
     ("setting", "words"),
     [
-        ({"kind": "flee"}, "reaction kind must be stop or retreat, got 'flee'"),
+        ({"kind": "flee"}, "reaction kind must be one of slow, comply, retreat, stop, got 'flee'"),
         ({"distance": 0.0}, "reaction distance must be above 0 and at most 0.5 m, got 0.0"),
         ({"distance": 50.0}, "reaction distance must be above 0 and at most 0.5 m, got 50.0"),
         ({"speed": -0.1}, "reaction speed must be above 0 and at most 1.5 m/s"),

@@ -1,0 +1,113 @@
+"""Give way as firmly as the skin is pushed: an admittance without a spring. Pure.
+
+    v_wanted = speed * min(1, (level - threshold) / (full_level - threshold))        along -n, of the touched point
+    v       += (v_wanted - v) * (1 - exp(-dt / DAMPING))                             so that it neither jumps nor rings
+
+Point and normal are taken anew in each cycle, where the touch is then. Each cycle is one step of a retreat
+(``retreat.py``) from where the arm is, so its limits are the same. It ends with the touch, or when the distance or the
+time is used up. The arm stands when it begins, and is stopped and latched when it ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from .commands import STILL, ArmState, ContactOnLink, Done, JointVelocity, Reaction
+from .retreat import CLOSE, RetreatPlan, plan_retreat, retreat_step
+from .table import Table
+from .ur_models import ArmModel
+
+__all__ = ["DAMPING", "Compliance", "begin_compliance", "comply_step", "wanted_speed"]
+
+DAMPING = 0.05  #: s; a person's push rises in 50 ms and more
+_LEAST = 1e-3  # m/s; slower than this is standing
+
+
+@dataclass(frozen=True, slots=True)
+class Compliance:
+    """Where a compliant motion is; each step makes the next.
+
+    Attributes:
+        model: the arm.
+        reaction: the settings.
+        table: what the arm must not go below, or None.
+        start_time: [s].
+        time: of the last step [s].
+        speed: of the touched point that was wanted then [m/s].
+        progress: how far touched points have given way so far [m].
+        plan: of the last step, whose tracks start where the touched points were then; None where nothing pushed.
+    """
+
+    model: ArmModel
+    reaction: Reaction
+    table: Table | None
+    start_time: float
+    time: float
+    speed: float = 0.0
+    progress: float = 0.0
+    plan: RetreatPlan | None = None
+
+
+def begin_compliance(model: ArmModel, state: ArmState, reaction: Reaction, table: Table | None = None) -> Compliance:
+    """Begin, with the arm standing as in ``state``."""
+    return Compliance(model, reaction, table, state.time, state.time)
+
+
+def wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> float:
+    """Speed at which the firmest of these touches is to be given way to [m/s]."""
+    most = 0.0
+    for contact in contacts:
+        span = reaction.full_level - contact.threshold
+        above = contact.level - contact.threshold
+        share = above / span if span > 0.0 else 1.0 if above > 0.0 else 0.0
+        most = max(most, min(1.0, share))
+    return reaction.speed * most
+
+
+def comply_step(
+    now: Compliance, state: ArmState, contacts: Sequence[ContactOnLink]
+) -> tuple[Compliance, JointVelocity | Done]:
+    """What to do in this control cycle, and where the motion is then; the same for the same arguments.
+
+    Args:
+        now: where it is.
+        state: the arm as measured.
+        contacts: the touches there are; without one it is over.
+    """
+    reaction = now.reaction
+    progress = now.progress
+    if now.plan is not None:
+        progress += max(0.0, _made(now.plan, state))
+    if not contacts:
+        return now, Done("the touch is over", progress, complete=True)
+    if not progress < reaction.distance - CLOSE:
+        return now, Done("the distance is made", progress)
+    if not state.time - now.start_time < reaction.time_budget:
+        return now, Done(f"the time of {reaction.time_budget} s is over", progress)
+    wanted = wanted_speed(reaction, contacts)
+    share = 1.0 - math.exp(-max(0.0, state.time - now.time) / DAMPING)
+    speed = now.speed + share * (wanted - now.speed)
+    if speed < _LEAST:
+        still = replace(now, time=state.time, speed=speed, progress=progress, plan=None)
+        return still, JointVelocity(STILL, reaction.acceleration, 0.0, progress, ("level",))
+    setting = replace(reaction, speed=speed, distance=reaction.distance - progress)
+    plan = plan_retreat(now.model, state, contacts, setting, now.table)
+    step = plan if isinstance(plan, Done) else retreat_step(plan, state)
+    if isinstance(plan, Done) or isinstance(step, Done):
+        assert isinstance(step, Done)
+        return now, Done(step.reason, progress)
+    clipped = step.clipped_by
+    if wanted < reaction.speed:
+        clipped += ("level",)
+    if speed < 0.99 * wanted:  # it gets there, but never quite
+        clipped += ("damping",)
+    after = replace(now, time=state.time, speed=speed, progress=progress, plan=plan)
+    return after, replace(step, progress=progress, clipped_by=clipped)
+
+
+def _made(plan: RetreatPlan, state: ArmState) -> float:
+    """How far the touched points of a plan have come since it was made [m]; the farthest."""
+    step = retreat_step(replace(plan, reaction=replace(plan.reaction, time_budget=60.0)), state)
+    return step.progress

@@ -1,0 +1,28 @@
+"""What comes out of a guard: commands and events, and who takes them."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from .journal import GuardEvent
+from .owner_messages import Clear, Halt, Speed, Stop
+from .retreat_program import RetreatProgram
+from .slowing import Slider
+from .stop_watch import Way
+
+__all__ = ["Command", "Output", "Outputs", "tell"]
+
+Command = Stop | Speed | Halt | Clear | Way | RetreatProgram | Slider
+Output = Command | GuardEvent
+
+
+class Outputs(Protocol):
+    """Takes what comes out, in order: a list, or something that sends a command as soon as it is there."""
+
+    def append(self, output: Output, /) -> None:
+        """Take one."""
+
+
+def tell(out: Outputs, name: str, time: float, **details: Any) -> None:
+    """Put an event out, of a host time [s]."""
+    out.append(GuardEvent(name, time, details))

@@ -1,0 +1,176 @@
+"""The way that the arm came, and going back along it. Pure.
+
+Where a retreat along the normal is not possible (the place of the touch is not known, a joint is at its limit, a
+singularity is near), the arm's own recent path is the one way on which it is known that nothing stood a moment ago. It
+is not known that nothing has come there since, which is why a scene has to ask for it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .commands import ArmState, Done, JointVelocity, Reaction
+from .limits import REACTION_TIME, JointLimits
+from .table import Table
+from .ur_models import ArmModel, Joints
+
+__all__ = ["PathBack", "Trail", "path_back", "path_back_step"]
+
+_SECONDS = 5.0  #: of path that are kept
+_APART = 0.002  #: rad by which some joint differs between two places
+_MOST = 2000  #: places that are kept
+_OFF = 0.05  #: rad by which a joint may be off the path before going back is given up
+_LEAST_WAY = 0.002  #: m; an arm that came less far has not come
+
+
+class Trail:
+    """Measured joint positions of the last seconds, some way apart."""
+
+    def __init__(self) -> None:
+        self._places: deque[tuple[float, Joints]] = deque(maxlen=_MOST)
+
+    def note(self, time: float, q: Joints) -> None:
+        """Take measured joint positions [rad] of a time [s]."""
+        places = self._places
+        if places:
+            a, b, c, d, e, f = places[-1][1]
+            u, v, w, x, y, z = q
+            if max(abs(u - a), abs(v - b), abs(w - c), abs(x - d), abs(y - e), abs(z - f)) < _APART:
+                return
+        places.append((time, q))
+
+    def since(self, time: float) -> list[Joints]:
+        """The places after a time [s], newest first."""
+        return [q for at, q in reversed(self._places) if at >= time]
+
+
+@dataclass(frozen=True, slots=True)
+class PathBack:
+    """What ``path_back_step`` needs to know.
+
+    Attributes:
+        places: joint positions to go through, in this order [rad]; the first is where it starts.
+        lengths: of the way up to each place, as the farthest that a point of the bare arm may have come on it [m].
+        reaction: the settings.
+        limits: of the joints.
+        model: the arm.
+        table: what the arm must not go below, or None.
+        start_time: [s].
+    """
+
+    places: tuple[Joints, ...]
+    lengths: tuple[float, ...]
+    reaction: Reaction
+    limits: JointLimits
+    model: ArmModel
+    table: Table | None
+    start_time: float
+
+
+def path_back(
+    model: ArmModel, state: ArmState, trail: Trail, reaction: Reaction, table: Table | None = None
+) -> PathBack | Done:
+    """Plan to go back the way the arm came, as far as the reaction's distance.
+
+    Args:
+        model: the arm.
+        state: the arm, standing.
+        trail: where it has been.
+        reaction: the settings.
+        table: what the arm must not go below.
+    """
+    limits = JointLimits.of(model, reaction.acceleration)
+    places, lengths = [state.q], [0.0]
+    for q in trail.since(state.time - _SECONDS):
+        step = _bound(limits, [b - a for a, b in zip(places[-1], q, strict=True)])
+        if step == 0.0:
+            continue
+        if lengths[-1] + step >= reaction.distance:
+            part = (reaction.distance - lengths[-1]) / step
+            a, b, c, d, e, f = (x + part * (y - x) for x, y in zip(places[-1], q, strict=True))
+            places.append((a, b, c, d, e, f))
+            lengths.append(reaction.distance)
+            break
+        places.append(q)
+        lengths.append(lengths[-1] + step)
+    if lengths[-1] < _LEAST_WAY:
+        return Done("the arm has not come from anywhere")
+    plan = PathBack(tuple(places), tuple(lengths), reaction, limits, model, table, state.time)
+    first = path_back_step(plan, ArmState(state.time, state.q))
+    return first if isinstance(first, Done) else plan
+
+
+def path_back_step(plan: PathBack, state: ArmState) -> JointVelocity | Done:
+    """What to do in this control cycle; the same for the same arguments.
+
+    Args:
+        plan: of this way back.
+        state: the arm as measured.
+    """
+    reaction, limits = plan.reaction, plan.limits
+    if not math.isfinite(sum(state.q)):
+        return Done(f"joint positions must be finite, got {state.q} rad")
+    segment, part, off = _nearest(plan.places, state.q)
+    made = plan.lengths[segment] + part * (plan.lengths[segment + 1] - plan.lengths[segment])
+    left = plan.lengths[-1] - made
+    if left < 1e-3:
+        return Done("the way back is made", made, complete=plan.lengths[-1] >= reaction.distance)
+    if off > _OFF:
+        return Done(f"the arm is {off:.3f} rad off the way that it came", made)
+    if not state.time - plan.start_time < reaction.time_budget:
+        return Done(f"the time of {reaction.time_budget} s is over", made)
+    target = _ahead(plan, made + min(left, 0.01))  # a centimetre ahead: corners are cut by less than that
+    way = [b - a for a, b in zip(state.q, target, strict=True)]
+    length = _bound(limits, way)
+    leading = max(map(abs, way))
+    speed = reaction.speed
+    clipped: tuple[str, ...] = ()
+    over = max(abs(value) / most for value, most in zip(way, limits.speed, strict=True)) / length
+    for most, why in ((1.0 / over, "joint speed"), (reaction.arm_speed, "arm speed")):
+        if speed > most:
+            speed, clipped = most, (*clipped, why)
+    # as in retreat.py: brake for the end, with what the leading joint can do
+    braking = limits.braking * length / leading
+    wait = braking * REACTION_TIME
+    ending = math.sqrt(wait * wait + 2.0 * braking * left) - wait
+    if speed > ending:
+        speed, clipped = ending, (*clipped, "distance")
+    wanted = [value * speed / length for value in way]
+    if blocked := limits.blocked(state.q, state.qd, wanted):
+        return Done(f"joint {blocked[0] + 1} is at its limit on the way back", made)
+    if plan.table is not None and plan.table.entered(plan.model, state.q, wanted, limits.braking):
+        return Done(f"the table at {1e3 * plan.table.height:g} mm is in the way", made)
+    a, b, c, d, e, f = wanted
+    return JointVelocity((a, b, c, d, e, f), reaction.acceleration, speed, made, clipped)
+
+
+def _bound(limits: JointLimits, way: Sequence[float]) -> float:
+    """An upper bound of how far a point of the bare arm moves when the joints turn by this [m]."""
+    return sum(abs(turn) * reach for turn, reach in zip(way, limits.reach, strict=True))
+
+
+def _nearest(places: Sequence[Joints], q: Joints) -> tuple[int, float, float]:
+    """Segment of the path nearest to q, the part of it that is behind, and the largest joint's distance [rad]."""
+    best = (math.inf, 0, 0.0, 0.0)
+    for i in range(len(places) - 1):
+        here, there = places[i], places[i + 1]
+        way = [b - a for a, b in zip(here, there, strict=True)]
+        square = sum(w * w for w in way)
+        part = sum(w * (x - a) for w, x, a in zip(way, q, here, strict=True)) / square
+        part = min(1.0, max(0.0, part))
+        gap = [x - a - part * w for x, a, w in zip(q, here, way, strict=True)]
+        distance = sum(g * g for g in gap)
+        if distance < best[0]:
+            best = (distance, i, part, max(map(abs, gap)))
+    return best[1], best[2], best[3]
+
+
+def _ahead(plan: PathBack, length: float) -> list[float]:
+    """The place so far along the path [m]."""
+    last = len(plan.places) - 2
+    i = next((i for i in range(last) if plan.lengths[i + 1] >= length), last)
+    part = min(1.0, (length - plan.lengths[i]) / (plan.lengths[i + 1] - plan.lengths[i]))
+    return [a + part * (b - a) for a, b in zip(plan.places[i], plan.places[i + 1], strict=True)]
