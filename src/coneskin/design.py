@@ -37,6 +37,9 @@ class Choices:
         wires: the side where the wires leave, for all sheets; None for end 1, and end 2 of the last of several, so that
             tabs do not run into the neighbour.
         converter: what reads the potentials.
+        upper_sheet_ohms: sheet resistance of the upper conductive layer [ohm per square], for the sensor file.
+        lower_sheet_ohms: the same of the lower one.
+        current_full_scale: drive current that the electronics read as their highest count [A], for the sensor file.
         seam_gap: how far the innermost face stays open at the narrow end of a full wrap.
         overlap: width of a flap on the upper substrate that closes the seam.
         sheet_gap: least distance between neighbouring sheets, along the axis.
@@ -49,6 +52,9 @@ class Choices:
     plan: ElectrodePlan = field(default_factory=ElectrodePlan)
     wires: Side | None = None
     converter: Converter = field(default_factory=Converter)
+    upper_sheet_ohms: float = 1000.0
+    lower_sheet_ohms: float = 1000.0
+    current_full_scale: float = 0.02
     seam_gap: float = 0.0
     overlap: float = 0.0
     sheet_gap: float = 1e-3

@@ -124,6 +124,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--adc-bits", type=int, default=12, help="resolution of the converter (default 12)")
     add("--adc-v", type=float, default=3.3, help="its range (default 3.3)")
     add("--supply-v", type=float, default=2.5, help="potential of the positive electrode (default 2.5)")
+    add("--current-full-scale-ma", type=float, default=20.0, help="drive current of the highest count (default 20)")
+    add("--upper-sheet-ohm", type=float, default=1000.0, help="ohm per square of the upper conductive layer (1000)")
+    add("--lower-sheet-ohm", type=float, default=1000.0, help="ohm per square of the lower conductive layer (1000)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -182,7 +185,7 @@ def _check_sensors(designs: tuple[SheetDesign, ...], frame: str) -> None:
     for index, design in enumerate(designs):
         build_sensor(tomllib.loads(sensor_toml(design, index, frame)), f"{design.name}: sensor.toml", problems)
     if problems:
-        raise GeometryError("; ".join(problems))
+        raise GeometryError("; ".join(problems) + " (the options of the group electronics set these)")
 
 
 def _choices(args: argparse.Namespace) -> Choices:
@@ -207,6 +210,9 @@ def _choices(args: argparse.Namespace) -> Choices:
         plan=plan,
         wires=args.wires,
         converter=Converter(args.adc_bits, args.adc_v, args.supply_v),
+        upper_sheet_ohms=args.upper_sheet_ohm,
+        lower_sheet_ohms=args.lower_sheet_ohm,
+        current_full_scale=args.current_full_scale_ma * 1e-3,
         seam_gap=args.seam_gap_mm * 1e-3,
         overlap=args.overlap_mm * 1e-3,
         sheet_gap=args.sheet_gap_mm * 1e-3,

@@ -192,6 +192,8 @@ def _draw_link(figure: Any, designs: Sequence[SheetDesign], mesh: Mesh | None) -
     for design in designs:
         _draw_electrodes(axes, design, view)
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    middle, least = 0.5 * (low + high), 0.1 * float((high - low).max())  # a flat link still needs a box
+    low, high = np.minimum(low, middle - 0.5 * least), np.maximum(high, middle + 0.5 * least)
     limits = dict(zip(("xlim", "ylim", "zlim"), zip(low, high, strict=True), strict=True))
     axes.set(**limits, xlabel="x mm", ylabel="y mm")
     axes.set_zlabel("z mm", labelpad=12)

@@ -84,8 +84,8 @@ def sensor_toml(design: SheetDesign, index: int, frame: str) -> str:
         index: its number on the wire.
         frame: what its pose refers to, in words.
     """
-    cone, converter = design.active.frustum, design.choices.converter
-    pose, stack = _pose(design.active), design.choices.stack
+    cone, choices = design.active.frustum, design.choices
+    pose, stack, converter = _pose(design.active), choices.stack, choices.converter
     height = _round(design.place.frustum.height * 1e3)
     cover = sum(layer.thickness for layer in stack.layers[4:]) + 0.5 * stack.layers[3].thickness
     radius1, radius2 = _shape(design.place.frustum)["radius1_mm"], _shape(design.place.frustum)["radius2_mm"]
@@ -115,6 +115,11 @@ angular_positive = "C"
 supply_v = {converter.supply_volts!r}
 adc_v = {converter.range_volts!r}
 adc_bits = {converter.bits}
+current_full_scale_ma = {1e3 * choices.current_full_scale!r}
+
+# of the conductive layers: measure yours, the normal drive currents follow from them
+upper_sheet_ohm = {choices.upper_sheet_ohms!r}
+lower_sheet_ohm = {choices.lower_sheet_ohms!r}
 """
 
 

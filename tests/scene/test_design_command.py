@@ -152,6 +152,7 @@ def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
         ([*CYLINDER, "--cut-tolerance-mm", "0"], "--cut-tolerance-mm must be finite and above 0 mm, got 0.0"),
         ([*CYLINDER, "--adc-bits", "0"], "bits of the converter must be from 1 to 32, got 0"),
         ([*CYLINDER, "--adc-bits", "20"], "sheet 1: sensor.toml.adc_bits must be a whole number"),
+        ([*CYLINDER, "--upper-sheet-ohm", "1"], "current_full_scale must suit the normal drive current of the radial"),
         ([*CYLINDER, "--supply-v", "3.3"], "electronics.supply_volts must be at most 95 % of adc_volts"),
         ([*CYLINDER, "--overlap-mm", "5", "--wires", "edge1"], "an overlap at edge1 would cover the tabs"),
         (["nowhere.stl"], "nowhere.stl"),
@@ -215,6 +216,7 @@ def test_missing_packages_are_named(tmp_path, monkeypatch, capsys):
 
 def test_numbers_of_the_report_are_those_of_the_drawings(tmp_path):
     words = [*CYLINDER, "--assembly", "bonded", "--adc-bits", "10", "--supply-v", "3.0", "--material", *"abcde"]
+    words += ["--upper-sheet-ohm", "500", "--lower-sheet-ohm", "2000", "--current-full-scale-ma", "30"]
     assert design(*words, "-o", str(tmp_path / "out")) == 0
     report = (tmp_path / "out" / "report.md").read_text()
     assert "Assembly: bonded" in report
@@ -222,6 +224,8 @@ def test_numbers_of_the_report_are_those_of_the_drawings(tmp_path):
     assert "One count of 10 bits over 3.3 V at a supply of 3 V" in report
     assert "| sheet 1 | 4-isolation | c 0.80 mm |" in report
     sensor, _ = sensor_of(tmp_path / "out")
+    assert (sensor.upper_sheet_ohms, sensor.lower_sheet_ohms) == (500.0, 2000.0)
+    assert sensor.electronics.current_full_scale == pytest.approx(0.03)
     assert sensor.electronics.adc_bits == 10
     assert sensor.electronics.supply_volts == 3.0
 
@@ -320,6 +324,21 @@ def test_a_real_link_with_pictures(tmp_path):
     cone = json.loads((tmp_path / "out" / "design.json").read_text())["sheets"][0]["link_cone"]
     assert abs(cone["half_angle_deg"]) == pytest.approx(0.65, abs=0.1)  # geometry study: 0.65 deg
     assert sorted([cone["radius1_mm"], cone["radius2_mm"]]) == pytest.approx([43.9, 45.0], abs=0.2)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--radius1-mm", "60", "--radius2-mm", "160", "--height-mm", "0", "--current-full-scale-ma", "50"],
+        ["--radius1-mm", "50", "--radius2-mm", "150", "--height-mm", "85", "--wires", "end2"],
+        [*BALL, "--wrap-deg", "200", "--wires", "edge1"],
+    ],
+)
+def test_pictures_of_discs_wide_sectors_and_partial_wraps(words, tmp_path):
+    assert main(["design", *words, "-o", str(tmp_path / "out")]) == 0
+    for path in (tmp_path / "out" / "pictures").iterdir():
+        assert path.stat().st_size > 10_000
+    assert (tmp_path / "out" / "pictures" / "link.png").is_file()
 
 
 @pytest.mark.skipif(not DATA.exists(), reason="the shared link meshes are not beside the repository")
