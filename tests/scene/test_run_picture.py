@@ -9,9 +9,11 @@ import pytest
 from coneskin.errors import MissingExtra
 from coneskin.replay import Run, read_run
 from coneskin.robot.journal import Kind
+from coneskin.robot.kinematics import link_pose
+from coneskin.robot.ur_models import model
 from coneskin.run_picture import draw_run
 
-from .scenes import SKIN_ONLY, record
+from .scenes import SKIN_ONLY, Q, record
 
 pytest.importorskip("matplotlib", reason="the extra coneskin[pictures] is not installed")
 
@@ -52,8 +54,10 @@ def test_a_collision_with_an_arm(run: Run, tmp_path: Path, figures: list[Any]) -
     assert levels["towards the elbow"] < 0.05 < 0.1 < levels["towards the wrist"]
     assert {"at the touch", "at the end", "touch and normal"} <= set(arm.get_legend_handles_labels()[1])
     (point,) = [c for c in arm.collections if c.get_label() == "touch and normal"]
-    x, y, z = (float(value[0]) for value in point._offsets3d)
-    assert (x * x + y * y + z * z) ** 0.5 < 0.95  # on the arm: the UR5e reaches 0.85 m
+    drawn = tuple(float(value[0]) for value in point._offsets3d)
+    placed = next(event for event in run.events if event.name == "contact_placed")
+    base_link = link_pose(model("UR5e"), Q, 3)  # the forearm's DH frame is the third
+    assert drawn == pytest.approx(base_link.apply(placed.details["point"]), abs=1e-12)
 
 
 def test_a_skin_without_an_arm(tmp_path: Path, figures: list[Any]) -> None:

@@ -101,6 +101,7 @@ def with_changes(text: str, *changes: tuple[str, str]) -> str:
         ('kind = "virtual"', 'kind = "serial"', "source.port is missing: a device such as /dev/ttyUSB0"),
         ("rate_hz = 500", "rate_khz = 5", "source: unknown key rate_khz; did you mean rate_hz?"),
         ("u_mm = 70", "u_mm = 200", "is off towards the wrist, whose u_mm ends at 140.357 and phi_deg at 360: got 200"),
+        ("height_mm = 140", "height_mm = 140\nwrap_deg = 80", "phi_deg at 80: got 70 mm and 90 deg"),
         ("sensor = 2", "sensor = 3", "source.touch 1: there is no sensor with the id 3"),
         ("end_s = 2.3", "end_s = 1", "source.touch 1: start_s must be before end_s, got 2 s and 1 s"),
         ('kind = "stop"', 'kind = "flee"', "reaction.kind must be one of stop, retreat, got 'flee'"),
