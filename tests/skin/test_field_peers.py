@@ -191,7 +191,7 @@ def worst_potential(ours: ModuleType, r: Any) -> float:
 class TestPotentials:
     """At two points inside the first disc and one outside all.
 
-    The map is for pictures and keeps the ports' order, whose error is the square of that of the potentials: so 2e-9, not
+    The map is for pictures and keeps the ports' order, whose error is the square of the potentials': so 2e-9, not
     1e-11. Pointwise the elements are good to 1e-10 at worst.
     """
 
