@@ -33,7 +33,8 @@ example:
 exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
 """
 
-#: the scene of the demo; the silences are long because a pseudo-terminal on a busy machine can stall for that long
+#: the scene of the demo: the tube of the UR5e's forearm as ``coneskin design`` finds it. The silences are
+#: long because a pseudo-terminal on a busy machine can stall for that long
 SCENE = """\
 [arm]
 model = "UR5e"
@@ -45,10 +46,10 @@ name = "forearm"
 [[link.sensor]]
 id = 1
 name = "forearm skin"
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
+radius1_mm = 37.62
+radius2_mm = 37.30
+height_mm = 240
+xyz_mm = [0, -0.4, 100]
 
 [source]
 kind = "virtual"
