@@ -96,7 +96,7 @@ def measure(case: Case) -> Result:
     )
     model = FieldModel(case.sheet, 1.0, case.lower)
     one = Discs(*(np.array([[v]]) for v in (case.u, case.phi, case.radius, case.g)))
-    coupling, _ = solve_discs(case.sheet, 1.0, case.lower, one, ORDER, POINTS)
+    coupling, _, _ = solve_discs(case.sheet, 1.0, case.lower, one, ORDER, POINTS)
     radial, angular = model.read(coupling, radial_phase()), model.read(coupling, angular_phase())
     volts = (*radial.electrodes[0, 2:], *angular.electrodes[0, :2])
 

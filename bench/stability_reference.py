@@ -67,6 +67,7 @@ def solve(
         while 2 * n * sigma < 2.4 * DIGITS:
             at_zero *= (1 - mp.exp(-2 * n * sigma)) ** 2
             n += 1
+        images = [] if ra == rb else _images(kappa, width, arc, u_, a, phi, sheet.wrap)
         green = mp.matrix(points, points)
         for i in range(points):
             for j in range(i + 1):
@@ -77,6 +78,10 @@ def solve(
                     end, edge = abs(_theta(p + mp.conj(q), sigma)), abs(_theta(p - mp.conj(q), sigma))
                     value += (ra - rb) * (mp.log(end) - mp.log(edge))
                 value = -value / (2 * mp.pi) - rb * mp.re(p) * mp.re(q) / (mp.pi * sigma)
+                for arc_edge, alpha, gamma in images:
+                    z, y = zeta[i], mp.conj(zeta[j])
+                    distance = abs(1 + alpha * z + mp.conj(alpha) * y + gamma * z * y)
+                    value -= (1 if arc_edge else -1) * (ru - rl) / (2 * mp.pi) * mp.log(distance)
                 green[i, j] = green[j, i] = value
         size = 2 * order + 1
         fourier = mp.matrix(size, points)
@@ -86,6 +91,8 @@ def solve(
                 fourier[2 * m - 1, j] = mp.re(zeta[(m * j) % points]) * 2 / points
                 fourier[2 * m, j] = mp.im(zeta[(m * j) % points]) * 2 / points
         k = fourier * green * fourier.T
+        for arc_edge, alpha, gamma in images:
+            k += (1 if arc_edge else -1) * (ru - rl) / (2 * mp.pi) * _coefficients(alpha, gamma, order)
         fx, fy = mp.matrix(size, 1), mp.matrix(size, 1)
         fx[0], fy[0] = xc / length, yc / breadth
         for m in range(1, order + 1):
@@ -116,6 +123,58 @@ def solve(
         return Exact(
             volts=volts, conductance=conductance, xx=xx, yy=yy, centre=(fx[0], fy[0]), condition=norm[0] * norm[1]
         )
+
+
+def _images(kappa, width, arc, u, a, phi, wrap) -> list[tuple[bool, mp.mpc, mp.mpf]]:
+    """(arc or straight, alpha, gamma) of the near edges, from their definitions."""
+    h, last = 1 + kappa * u, 1 + kappa * width
+    out = []
+    for edge, flat_gap in ((mp.mpf(1), u), (last, u - width)):
+        # h^2 (1 + q z)(1 + q z*) - edge^2 over (h^2 - edge^2)
+        gap = (h * h - edge * edge) / kappa if kappa else 2 * flat_gap
+        alpha = h * a / gap
+        out.append((True, mp.mpc(alpha), alpha * kappa * a / h))
+    y = arc * mp.mpf(phi) / mp.mpf(wrap)
+    for sign, rest in ((-1, y), (1, arc - y)):
+        turn = kappa * rest
+        distance = h * (mp.sin(turn) / kappa if kappa else rest)
+        if abs(turn) < mp.pi / 2:
+            out.append((False, sign * mp.mpc(0, 1) * a / (2 * distance) * mp.expj(-sign * turn), mp.mpf(0)))
+    return [image for image in out if abs(image[1]) > mp.mpf("0.1")]
+
+
+def _coefficients(alpha: mp.mpc, gamma: mp.mpf, order: int) -> mp.matrix:
+    """Fourier coefficients of ln|1 + alpha z + alpha* z'* + gamma z z'*| on the circles."""
+    conj, delta = mp.conj(alpha), abs(alpha) ** 2 - gamma
+    out = mp.matrix(2 * order + 1, 2 * order + 1)
+    for m in range(order + 1):
+        for n in range(order + 1):
+            if m == n == 0:
+                continue
+            if n == 0:
+                value = -((-alpha) ** m) / m
+            elif m == 0:
+                value = -((-conj) ** n) / n
+            else:
+                value = -sum(
+                    delta**k
+                    / k
+                    * mp.binomial(m - 1, k - 1)
+                    * mp.binomial(n - 1, k - 1)
+                    * (-alpha) ** (m - k)
+                    * (-conj) ** (n - k)
+                    for k in range(1, min(m, n) + 1)
+                )
+            real, imag = mp.re(value), mp.im(value)
+            c = [0 if i == 0 else 2 * i - 1 for i in (m, n)]
+            out[c[0], c[1]] = real
+            if n:
+                out[c[0], 2 * n] = imag
+            if m:
+                out[2 * m, c[1]] = -imag
+            if m and n:
+                out[2 * m, 2 * n] = real
+    return out
 
 
 def _disc(ka: mp.mpf, rs: mp.mpf, order: int) -> tuple[mp.mpf, list[mp.mpf]]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .field_disc import Discs
 from .field_green import Points, Strip, direct_features, kernel, mirrored
+from .field_image import EdgeImage, edge_images, image_coefficients, image_distance
 from .field_sheet import SectorSheet
 
 __all__ = ["Circles", "circle", "green_block", "make_circles"]
@@ -37,6 +38,7 @@ class Circles:
         p_far: centres from p = pi, shape (n, k).
         x: Fourier coefficients of x/L, shape (n, k, 2M+1).
         y: Fourier coefficients of y/T, shape (n, k, 2M+1).
+        images: near edges of each of the k discs, to be taken out of the samples.
     """
 
     order: int
@@ -48,6 +50,7 @@ class Circles:
     p_far: Floats
     x: Floats
     y: Floats
+    images: tuple[tuple[EdgeImage, ...], ...] = ()
 
 
 @lru_cache(maxsize=64)
@@ -68,8 +71,10 @@ def circle(order: int, points: int) -> tuple[Complex, Floats, Floats]:
     return zeta, squared, fourier
 
 
-def make_circles(sheet: SectorSheet, strip: Strip, discs: Discs, order: int, points: int) -> Circles:
-    """The circles of the discs, N points on each."""
+def make_circles(
+    sheet: SectorSheet, strip: Strip, discs: Discs, order: int, points: int, with_images: bool = False
+) -> Circles:
+    """The circles of the discs, N points on each; images are of use between unequal sheets."""
     zeta, _, _ = circle(order, points)
     stretch = sheet.stretch(discs.u)
     local = discs.radius / stretch  # a/h, the radius in the rectangle
@@ -97,7 +102,9 @@ def make_circles(sheet: SectorSheet, strip: Strip, discs: Discs, order: int, poi
     fy[:, :, 2::2] = series / sheet.breadth
     k = strip.scale
     s, s_far, p, p_far = (x, x_far, y, y_far) if strip.along_x else (y, y_far, x, x_far)
-    return Circles(order, offset * k, slope, s * k, s_far * k, p * k, p_far * k, fx, fy)
+    places = range(discs.u.shape[1]) if with_images else ()
+    images = tuple(tuple(edge_images(sheet, discs, place)) for place in places)
+    return Circles(order, offset * k, slope, s * k, s_far * k, p * k, p_far * k, fx, fy, images)
 
 
 def _pair(strip: Strip, circles: Circles, i: int, j: int, equal: bool) -> tuple[Points, Points, Floats, Floats, Floats]:
@@ -134,7 +141,8 @@ def green_block(strip: Strip, circles: Circles, i: int, j: int, resistance_a: fl
     first, second, weight_i, weight_j, centre = _pair(strip, circles, i, j, resistance_a == resistance_b)
     if i == j:
         slope = circles.slope[:, i] * np.abs(1.0 + first.direct)
-        values = kernel(strip, first, second, resistance_a, resistance_b, squared, slope * slope)
+        taken, put_back = _near_images(strip, circles, i)
+        values = kernel(strip, first, second, resistance_a, resistance_b, squared, slope * slope, taken=taken)
     else:
         values = kernel(strip, first, second, resistance_a, resistance_b)
     b = resistance_b / math.pi
@@ -144,4 +152,24 @@ def green_block(strip: Strip, circles: Circles, i: int, j: int, resistance_a: fl
     half = (values.reshape(-1, points) @ fourier.T).reshape(n, points, -1).transpose(0, 2, 1)
     block = (half.reshape(-1, points) @ fourier.T).reshape(n, fourier.shape[0], -1).transpose(0, 2, 1)
     block[:, 0, 0] += b * centre
+    if i == j and put_back is not None:
+        block -= (resistance_a - resistance_b) / (4.0 * math.pi) * put_back
     return block
+
+
+def _near_images(strip: Strip, circles: Circles, i: int) -> tuple[Floats | None, Floats | None]:
+    """What the near edges contribute to A2/A3 on disc i, and the Fourier coefficients of its logarithm."""
+    if not circles.images or not circles.images[i]:
+        return None, None
+    zeta, _, _ = circle(circles.order, circles.offset.shape[2])
+    taken: Floats | None = None
+    put_back: Floats | None = None
+    for image in circles.images[i]:
+        # A2 holds the images in the ends of the strip, A3 those in its long edges.
+        at_end = image.arc == strip.along_x
+        distance, logarithm = image_distance(image, zeta), image_coefficients(image, circles.order)
+        if not at_end:
+            distance, logarithm = 1.0 / distance, -logarithm
+        taken = distance if taken is None else taken * distance
+        put_back = logarithm if put_back is None else put_back + logarithm
+    return taken, put_back

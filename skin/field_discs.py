@@ -46,7 +46,8 @@ def solve_discs(
     order: int,
     points: int | None = None,
     with_moments: bool = False,
-) -> tuple[Coupling, Moments | None]:
+    estimate: bool = False,
+) -> tuple[Coupling, Moments | None, Floats]:
     """Solve n scenes of k discs at one order.
 
     Args:
@@ -57,22 +58,32 @@ def solve_discs(
         order: M, at least 1.
         points: N on each circle, above 2M; None takes 2M + 2.
         with_moments: return the moments too (they take memory).
+        estimate: estimate the error, from the change since half the order.
+
+    Returns:
+        the coupling, the moments if wanted, and an estimate of what the orders above M would still change: of X and Y,
+        and of the rest relative to the conductances beside it, shape (n,); 0 where none is wanted.
     """
     strip = Strip.of(sheet.length, sheet.breadth)
-    circles = make_circles(sheet, strip, discs, order, points or 2 * order + 2)
     n, k = discs.u.shape
     size = 2 * order + 1
     rs = upper_resistance + lower_resistance
     # The upper sheet has its electrodes across x.
     a, b = (lower_resistance, upper_resistance) if strip.along_x else (upper_resistance, lower_resistance)
+    circles = make_circles(sheet, strip, discs, order, points or 2 * order + 2, with_images=a != b)
     ka = np.sqrt(discs.conductance) * (math.sqrt(rs) * discs.radius)
     ratios = bessel_ratios(ka, order + 1)
     with np.errstate(divide="ignore"):
         d0 = 1.0 / (2.0 * math.pi * ka * ratios[:, :, 0])  # I_0/(ka I_1) / 2 pi, in units of rs
     root = np.sqrt(2.0 * math.pi * np.arange(1, order + 1) * ratios[:, :, :-1] * ratios[:, :, 1:])  # D_m^-1/2
+    # Resistances of the bare sheets in units of rs: they set what a change of the polarisability means.
+    aspect_u = upper_resistance / rs * sheet.length / sheet.breadth
+    aspect_l = lower_resistance / rs * sheet.breadth / sheet.length
     if k == 1:
         block = green_block(strip, circles, 0, 0, a / rs, b / rs)
-        return _solve_single(block, d0[:, 0], root[:, 0], circles, rs, order, with_moments)
+        return _solve_single(
+            block, d0[:, 0], root[:, 0], circles, rs, order, (aspect_u, aspect_l), with_moments, estimate
+        )
     scale = np.zeros((n, k, size))
     scale[:, :, 1::2] = root
     scale[:, :, 2::2] = root
@@ -102,14 +113,44 @@ def solve_discs(
     w = 0.5 * (w + w.transpose(0, 2, 1))
     centre = np.stack([circles.x[:, :, 0].mean(axis=1), circles.y[:, :, 0].mean(axis=1)], axis=-1)
     coupling = Coupling.of_matrix(w, centre)
+    shaped = solved.reshape(n, k, size, 3)
+    left = np.zeros(n)
+    if estimate:
+        few = (np.arange(k)[:, None] * size + np.arange(order // 2 * 2 + 1)).ravel()
+        part = right_flat[:, few]
+        w_half = part.transpose(0, 2, 1) @ np.linalg.solve(flat[:, few[:, None], few[None, :]], part) / rs
+        reach = np.sqrt([1.0, aspect_u, aspect_l])
+        size_w = np.maximum(np.stack([w[:, 0, 0] * rs] * 3, axis=1), np.array([0.0, 1.0, 1.0])) ** 0.5
+        reach = np.where(np.arange(3) == 0, 1.0 / np.maximum(size_w, 1e-150), reach)
+        norm = reach[:, :, None] * reach[:, None, :]
+        left = _left((w * rs * norm).reshape(n, 9), (w_half * rs * norm).reshape(n, 9))
     if not with_moments:
-        return coupling, None
-    return coupling, Moments(order, solved.reshape(n, k, size, 3) * scale[..., None] / rs)
+        return coupling, None, left
+    return coupling, Moments(order, shaped * scale[..., None] / rs), left
+
+
+def _left(full: Floats, half: Floats) -> Floats:
+    """Estimate of the error of order M from the change since order M/2: geometric decay would square it, shape (n,).
+
+    Args:
+        full: numbers of order 1 that the electrodes see, shape (n, numbers).
+        half: the same at half the order.
+    """
+    change = np.abs(full - half).max(axis=1)
+    return np.asarray(1000.0 * change**1.8)
 
 
 def _solve_single(
-    block: Floats, d0: Floats, root: Floats, circles: Circles, rs: float, order: int, with_moments: bool
-) -> tuple[Coupling, Moments | None]:
+    block: Floats,
+    d0: Floats,
+    root: Floats,
+    circles: Circles,
+    rs: float,
+    order: int,
+    aspects: tuple[float, float],
+    with_moments: bool,
+    estimate: bool,
+) -> tuple[Coupling, Moments | None, Floats]:
     """One disc in each scene: the total current is eliminated first, so nothing cancels however weak the contact."""
     n, size = block.shape[0], 2 * order
     scale = np.repeat(root, 2, axis=1)
@@ -127,12 +168,23 @@ def _solve_single(
     x = circles.x[:, 0, 0] - gram[:, 0, 1]
     y = circles.y[:, 0, 0] - gram[:, 0, 2]
     coupling = Coupling(1.0 / (rs * spread), x, y, gram[:, 1, 1] / rs, gram[:, 1, 2] / rs, gram[:, 2, 2] / rs)
+    left = np.zeros(n)
+    if estimate:
+        few = order // 2 * 2
+        part = right[:, :few]
+        half = part.transpose(0, 2, 1) @ np.linalg.solve(inner[:, :few, :few], part)
+        reach = np.ones((n, 3))
+        reach[:, 0], reach[:, 1:] = 1.0 / np.sqrt(spread), np.sqrt(aspects)
+        norm = reach[:, :, None] * reach[:, None, :]
+        # X and Y themselves, and the rest relative to the conductances beside it.
+        norm[:, 0, 1:] = norm[:, 1:, 0] = 1.0
+        left = _left((gram * norm).reshape(n, 9), (half * norm).reshape(n, 9))
     if not with_moments:
-        return coupling, None
+        return coupling, None, left
     values = np.empty((n, 1, size + 1, 3))
     total = coupling.conductance[:, None] * np.stack([np.ones(n), x, y], axis=-1)
     values[:, 0, 0] = total
     rest = -solved[:, :, :1] * total[:, None, :] * rs
     rest[:, :, 1:] += solved[:, :, 1:]
     values[:, 0, 1:] = rest * scale[:, :, None] / rs
-    return coupling, Moments(order, values)
+    return coupling, Moments(order, values), left

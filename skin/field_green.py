@@ -148,6 +148,7 @@ def kernel(
     singular: Floats | None = None,
     diagonal: Floats | None = None,
     blur: Floats | None = None,
+    taken: Floats | None = None,
 ) -> Floats:
     """Ra G_a + Rb G_b between every pair of points, without its linear part, shape (n, N, N').
 
@@ -161,6 +162,7 @@ def kernel(
         diagonal: A1 of each point with itself, after that division, shape (n, N).
         blur: squared size of the cell around each point, where points stand for cells that may touch their own images,
             shape (n, N).
+        taken: divided out of A2/A3, shape (n, N, N').
     """
     equal = resistance_a == resistance_b
     terms = strip.terms
@@ -190,6 +192,8 @@ def kernel(
     if terms:
         end *= _square(np.asarray(_theta(f1 * f2c + q2 * (x1 * x2c), q2, terms)))
         edge *= _square(np.asarray(_theta(q * (f1 * x2c + x1 * f2c), q2, terms)))
+    if taken is not None:
+        edge *= taken
     ratio = np.log(end / edge)
     ratio *= -(resistance_a - resistance_b) / (4.0 * math.pi)
     out += ratio

@@ -24,7 +24,7 @@ from .field_discs import solve_discs
 from .field_fourport import Phase
 from .field_green import Strip, direct_features, kernel, mirrored
 from .field_model import FieldModel
-from .field_resolution import resolution
+from .field_resolution import LADDER, higher, resolution
 
 __all__ = ["FieldMap"]
 
@@ -69,10 +69,21 @@ class FieldMap:
         check_discs(sheet, u, phi, radius, g)
         scene = Discs(u, phi, radius, g)
         need = resolution(sheet, scene, model.contrast, model.tolerance)
-        order, points = int(need.order[0]), int(need.points[0])
-        coupling, moments = solve_discs(
-            sheet, model.upper_resistance, model.lower_resistance, scene, order, points, with_moments=True
-        )
+        order, per_order = int(need.order[0]), (int(need.points[0]) - 2) // int(need.order[0])
+        while True:
+            coupling, moments, left = solve_discs(
+                sheet,
+                model.upper_resistance,
+                model.lower_resistance,
+                scene,
+                order,
+                per_order * order + 2,
+                with_moments=True,
+                estimate=model.contrast > 0.0 or len(discs) > 1,
+            )
+            if left[0] <= model.tolerance or order == LADDER[-1]:
+                break
+            order = higher(order)
         a, b, c, d = (float(v) for v in model.read(coupling, phase).electrodes[0])
         values = np.zeros((len(discs), 2 * order + 1)) if moments is None else moments.values[0]
         return cls(model, tuple(discs), (a, b, c, d), values @ np.array([b - d, a - b, d - c]), order)

@@ -20,7 +20,7 @@ from .field_coupling import Coupling, admittance
 from .field_disc import Disc, Discs, check_discs
 from .field_discs import solve_discs
 from .field_fourport import Phase, Readings, solve_phase
-from .field_resolution import resolution
+from .field_resolution import LADDER, higher, resolution
 from .field_sheet import SectorSheet
 
 __all__ = ["FieldModel", "solve", "solve_many"]
@@ -122,25 +122,45 @@ class FieldModel:
         return solve_phase(coupling, self.sheet, self.upper_resistance, self.lower_resistance, phase)
 
     def _in_groups(self, discs: Discs, order: int | None) -> Coupling:
-        """Scenes of one resolution together, in pieces whose temporaries stay in the cache."""
+        """Scenes of one resolution together; those whose multipoles have not yet died away again, at a higher order."""
         n = discs.u.shape[0]
         out = np.empty((6, n))
         need = resolution(self.sheet, discs, self.contrast, self.tolerance, order)
-        for points in np.unique(need.points):
-            group = np.flatnonzero(need.points == points)
-            for m in np.unique(need.order[group]):
-                self._solve_group(discs, int(m), int(points), group[need.order[group] == m], out)
+        orders, points = need.order.copy(), need.points.copy()
+        waiting = np.arange(n)
+        while waiting.size:
+            again = []
+            for m in np.unique(orders[waiting]):
+                level = waiting[orders[waiting] == m]
+                for count in np.unique(points[level]):
+                    group = level[points[level] == count]
+                    left = self._solve_group(discs, int(m), int(count), group, out, order is None)
+                    again.append(group[left > self.tolerance])
+            waiting = np.concatenate(again) if order is None else waiting[:0]
+            waiting = waiting[orders[waiting] < LADDER[-1]]
+            per_order = (points[waiting] - 2) // np.maximum(orders[waiting], 1)
+            orders[waiting] = [higher(int(m)) for m in orders[waiting]]
+            points[waiting] = per_order * orders[waiting] + 2
         if not (out[0] >= 0.0).all():
             raise FieldError("a contact next to an edge or to another needs a higher order than was given")
         return Coupling(*out)
 
-    def _solve_group(self, discs: Discs, order: int, points: int, group: NDArray[np.intp], out: Floats) -> None:
+    def _solve_group(
+        self, discs: Discs, order: int, points: int, group: NDArray[np.intp], out: Floats, free: bool
+    ) -> Floats:
         chunk = max(1, PAIRS_AT_ONCE // (points * discs.u.shape[1]) ** 2)
+        tail = np.empty(group.size)
+        # One disc between equal sheets has no near image, and the order chosen for it holds.
+        estimate = free and (self.contrast > 0.0 or discs.u.shape[1] > 1)
         for start in range(0, group.size, chunk):
             index = group[start : start + chunk]
             part = Discs(discs.u[index], discs.phi[index], discs.radius[index], discs.conductance[index])
-            got, _ = solve_discs(self.sheet, self.upper_resistance, self.lower_resistance, part, order, points)
+            got, _, left = solve_discs(
+                self.sheet, self.upper_resistance, self.lower_resistance, part, order, points, estimate=estimate
+            )
             out[:, index] = (got.conductance, got.x, got.y, got.xx, got.xy, got.yy)
+            tail[start : start + chunk] = left
+        return tail
 
 
 def solve(model: FieldModel, discs: Sequence[Disc], *phases: Phase) -> tuple[Readings, ...]:

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from .field_disc import Discs, centre_distance
 from .field_sheet import SectorSheet
 
-__all__ = ["LADDER", "Resolution", "resolution"]
-
-Complex = NDArray[np.complex128]
+__all__ = ["LADDER", "Resolution", "higher", "resolution"]
 
 #: Orders to choose from, so that a batch falls into few groups.
 LADDER = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 80, 96, 128)
@@ -35,12 +33,12 @@ class Resolution:
 def resolution(
     sheet: SectorSheet, discs: Discs, contrast: float, tolerance: float, order: int | None = None
 ) -> Resolution:
-    """Order and points that leave about `tolerance` of the supply, for each scene.
+    """Order and points to begin with; `FieldModel` raises them where the tail of the solution asks for it.
 
     A multipole falls like exp(-2 rate m). The rate is acosh(distance/radius) for the images that act: in the
     corners, in the edges unless the sheets are equal, across the shorter side; half the bispherical distance for a
-    second disc; and ln(r/radius) for the apex. The constant 0.52 covers all but 1 of 240 random sensors, 0.75 those
-    next to an edge (measured against M = 128, N = 512).
+    second disc; and ln(r/radius) for the apex. Near edges are exact (`field_image`), so what they cost depends on the
+    contact too, and is left to the tail.
 
     Args:
         sheet: the sheet.
@@ -51,16 +49,21 @@ def resolution(
     """
     a = discs.radius
     stretch = sheet.stretch(discs.u)
-    corners = [np.abs(_flat_to(sheet, discs, u, phi)) for u in (0.0, sheet.width) for phi in (0.0, sheet.wrap)]
-    rate = np.arccosh(np.maximum(np.minimum.reduce(corners) / a, 1.0))
-    rate = np.minimum(rate, np.arccosh(np.maximum(min(sheet.length, sheet.breadth) * stretch / a, 1.0)))
-    if sheet.curvature != 0.0:
-        rate = np.minimum(rate, np.log(np.maximum(stretch / (abs(sheet.curvature) * a), 1.0)))
+    # The four corners in one go; a flat distance beyond half a turn is none, but large.
+    w = np.array([0.0, 0.0, sheet.length, sheet.length]) + 1j * np.array([0.0, sheet.breadth, 0.0, sheet.breadth])
+    w = w - (sheet.along(discs.u)[0] + 1j * sheet.across(discs.phi)[0])[..., None]
+    kappa = sheet.curvature
+    corners = np.abs(w) if kappa == 0.0 else stretch[..., None] * np.abs(np.expm1(kappa * w) / kappa)
+    reach = np.minimum(corners.min(axis=-1), min(sheet.length, sheet.breadth) * stretch) / a
+    rate = np.arccosh(np.maximum(reach, 1.0))
+    if kappa != 0.0:
+        rate = np.minimum(rate, np.log(np.maximum(stretch / (abs(kappa) * a), 1.0)))
     if contrast > 0.0:
         room = sheet.edge_distances(discs.u, discs.phi).min(axis=-1)
-        rate = np.minimum(rate, np.arccosh(np.maximum(room / a, 1.0)))
+        # Taken out exactly, an edge costs about half of the orders, and a touching one no more than a near one.
+        rate = np.minimum(rate, 1.75 * np.arccosh(np.maximum(room / a, 1.15)))
     slowest = rate.min(axis=1)
-    near = (slowest < 1.0) & (contrast > 0.0)
+    near = np.zeros(slowest.shape, dtype=bool)
     k = a.shape[1]
     for i in range(k):
         for j in range(i):
@@ -70,7 +73,7 @@ def resolution(
             near |= pair < 1.0
             slowest = np.minimum(slowest, pair)
     if order is None:
-        wanted = np.where(slowest < 0.45, 0.75, 0.56) * math.log(1.0 / tolerance) / np.maximum(slowest, 1e-3)
+        wanted = 0.56 * math.log(1.0 / tolerance) / np.maximum(slowest, 1e-3)
         ladder = np.array(LADDER)
         orders = ladder[np.searchsorted(ladder, np.minimum(1.0 + np.ceil(wanted), LADDER[-1]))]
     else:
@@ -78,12 +81,6 @@ def resolution(
     return Resolution(orders, np.where(near, 4, 2) * orders + 2)
 
 
-def _flat_to(sheet: SectorSheet, discs: Discs, u: float, phi: float) -> Complex:
-    """Flat coordinates of a point of the sheet from each centre [m]; beyond half a turn they only are large."""
-    x0, _ = sheet.along(discs.u)
-    y0, _ = sheet.across(discs.phi)
-    x, _ = sheet.along(u)
-    y, _ = sheet.across(phi)
-    w = (x - x0) + 1j * (y - y0)
-    kappa = sheet.curvature
-    return np.asarray(w if kappa == 0.0 else sheet.stretch(discs.u) * np.expm1(kappa * w) / kappa, dtype=np.complex128)
+def higher(order: int) -> int:
+    """The order to try next, about half as much again."""
+    return min((m for m in LADDER if m >= 1.45 * order), default=LADDER[-1])

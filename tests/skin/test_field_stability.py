@@ -31,7 +31,7 @@ STABILITY = _bench()
 CASES = {case.name: case for case in STABILITY.cases()}
 
 #: Where doubles no longer hold the input: the gap to an edge, and 1 + curvature * width next to an apex.
-ILL_POSED = {"a/room = 1 - 1e-06": 1e-10, "a/room = 1 - 1e-12": 1e-4, "narrowing to r2/r1 = 1e-6": 1e-10}
+ILL_POSED = {"a/room = 1 - 1e-06": 1e-10, "a/room = 1 - 1e-12": 1e-3, "narrowing to r2/r1 = 1e-6": 1e-10}
 
 
 @pytest.mark.parametrize("name", list(CASES))
@@ -39,7 +39,7 @@ def test_rounding_at_the_extremes(name: str) -> None:
     result = STABILITY.measure(CASES[name])
     lost = ILL_POSED.get(name, 0.0)
     assert result.volts < 1e-15 + 1e-3 * lost  # a few roundings of the supply
-    assert result.conductance < 2e-14 + lost
+    assert result.conductance < 1e-13 + lost
     assert result.excess < 1e-13 + lost
     assert result.condition < 1e4
 

@@ -1,0 +1,69 @@
+"""Images in near edges: coefficients against brute sampling, distances against geometry, touching discs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from coneskin.skin.field_circles import circle
+from coneskin.skin.field_disc import Discs
+from coneskin.skin.field_discs import solve_discs
+from coneskin.skin.field_fourport import radial_phase
+from coneskin.skin.field_image import edge_images, image_coefficients, image_distance
+from coneskin.skin.field_model import FieldModel
+from coneskin.skin.field_sheet import SectorSheet
+
+from .field_cases import PAPER, SHEETS
+
+PLACES = [
+    (PAPER, 0.02, 0.3, 0.015),
+    (PAPER, 0.085, 0.12, 0.012),
+    (SHEETS["narrowing"], 0.085, 2.0, 0.008),
+    (SHEETS["cylinder"], 0.02, 0.7, 0.014),
+]
+
+
+def scene(u: float, phi: float, radius: float, g: float = math.inf) -> Discs:
+    return Discs(*(np.array([[v]]) for v in (u, phi, radius, g)))
+
+
+@pytest.mark.parametrize(("sheet", "u", "phi", "radius"), PLACES)
+def test_coefficients_are_those_of_the_logarithm(sheet: SectorSheet, u: float, phi: float, radius: float) -> None:
+    images = edge_images(sheet, scene(u, phi, radius), 0)
+    assert images
+    for image in images:
+        zeta, _, fourier = circle(7, 800)
+        sampled = fourier @ np.log(image_distance(image, zeta))[0] @ fourier.T
+        assert np.abs(image_coefficients(image, 7)[0] - sampled).max() < 1e-14
+
+
+def test_distance_is_that_of_the_mirror_image() -> None:
+    """Against the geometry of the drawing: reflection in a straight edge, inversion in an arc."""
+    u, phi, radius = 0.02, 0.3, 0.015
+    zeta, _, _ = circle(3, 8)
+    r, theta = (float(v) for v in PAPER.polar(u, phi))
+    z = (r + radius * zeta) * np.exp(1j * theta)
+    seen = {image.arc: image_distance(image, zeta)[0] for image in edge_images(PAPER, scene(u, phi, radius), 0)}
+    straight = np.abs(z[:, None] - z.conj()) ** 2
+    assert np.allclose(seen[False] / straight, (seen[False] / straight)[0, 0], rtol=1e-13)
+    arc = np.abs(z[:, None] - 0.1**2 / z.conj()) ** 2 * np.abs(z) ** 2
+    assert np.allclose(seen[True] / arc, (seen[True] / arc)[0, 0], rtol=1e-13)
+
+
+@pytest.mark.parametrize("lower", [0.03, 30.0])
+@pytest.mark.parametrize("gap", [0.1, 1e-3, 1e-6])
+def test_a_disc_may_touch_an_edge(lower: float, gap: float) -> None:
+    sheet = SHEETS["cylinder"]
+    model = FieldModel(sheet, 1.0, lower)
+    radius = 0.01
+
+    def volts(order: int) -> np.ndarray:
+        coupling, _, _ = solve_discs(sheet, 1.0, lower, scene(radius * (1 + gap), 1.1, radius, 1e5), order)
+        return model.read(coupling, radial_phase()).electrodes[0]
+
+    error = [float(np.abs(volts(m) - volts(96)).max()) for m in (4, 8, 16, 32)]
+    assert error[1] < 0.2 * error[0]
+    assert error[2] < 2e-7
+    assert error[3] < 2e-10
