@@ -135,15 +135,17 @@ class FieldMap:
         if strip.sigma > 200.0 * math.pi:
             raise FieldError("a map needs a sheet at most 200 times longer than wide")
         one = Discs(*(np.array([[v]]) for v in (disc.u, disc.phi, disc.radius, disc.conductance)))
-        n = 4 * self.order + 2
+        # Each sheet alone has images in the edges, also where those of equal sheets cancel in the solver.
+        room = float(sheet.edge_distances(disc.u, disc.phi).min()) / disc.radius
+        n = max(4 * self.order + 2, min(int(38.0 / math.acosh(max(room, 1.0005))), 1200))
         _, _, fourier = circle(self.order, n)
         source = make_circles(sheet, strip, one, self.order, n)
         charges = fourier.T @ moments
         zeta = np.exp(2j * math.pi * np.arange(n) / n)
         flat = sheet.flat(u, phi, (disc.u, disc.phi)) / disc.radius
         by_a, by_b = np.empty(u.size), np.empty(u.size)
-        for start in range(0, u.size, 4096):
-            part = slice(start, start + 4096)
+        for start in range(0, u.size, 1024):
+            part = slice(start, start + 1024)
             by_a[part], by_b[part] = self._images(strip, source, flat[part], zeta, charges, u[part], phi[part])
         log = self._logarithm(disc, moments, flat)
         by_a += log

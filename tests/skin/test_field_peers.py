@@ -201,11 +201,6 @@ class TestPotentials:
         bad = {r.problem.name: value for r in sensors if not (value := worst_potential(ours, r)) < 2e-9}
         assert not bad
 
-    @pytest.mark.xfail(
-        strict=True,
-        reason="between equal sheets the map's order leaves out the edges' images, which cancel only in the sum of both"
-        " sheets: off by up to 3e-8 of U0 inside a disc 0.01 radius from an edge",
-    )
     def test_close_to_an_edge_between_equal_sheets(self, references: list[Any], ours: ModuleType) -> None:
         near = [r for r in references if "gap" in r.problem.name and r.problem.upper == r.problem.lower]
         assert len(near) == 8
