@@ -23,7 +23,7 @@ from .placed import PlacedFrustum
 from .pose import Vector
 from .rays import Rays
 
-__all__ = ["DisplacementMap", "measure_displacement"]
+__all__ = ["DisplacementMap", "heights_by_ray", "measure_displacement"]
 
 Floats = NDArray[np.float64]
 

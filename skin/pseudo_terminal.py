@@ -15,7 +15,7 @@ from coneskin.errors import SkinConnectionError
 
 from .virtual import VirtualSkin
 
-__all__ = ["Pacing", "PseudoTerminal", "play"]
+__all__ = ["Pacing", "PseudoTerminal", "open_raw_terminal", "play", "wait_for_reader", "write_all"]
 
 
 _OPENING = 0.05  # pyserial throws away what came while it was opening [s]

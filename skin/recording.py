@@ -22,7 +22,17 @@ from typing import BinaryIO, NamedTuple
 
 from coneskin.errors import RecordingError
 
-__all__ = ["END", "MAGIC", "VERSION", "Block", "Recorder", "Recording", "encode_block", "read_recording"]
+__all__ = [
+    "END",
+    "MAGIC",
+    "VERSION",
+    "Block",
+    "Recorder",
+    "Recording",
+    "decode_blocks",
+    "encode_block",
+    "read_recording",
+]
 
 MAGIC = b"CONESKIN"
 VERSION = 1

@@ -62,8 +62,8 @@ def run(args: argparse.Namespace) -> int:
             print(describe(event, start), flush=True)
 
     end = start + args.duration_s if args.duration_s else None
-    person = _Person()
     with guard(scene, on_event=show) as session:
+        person = _Person()
         if session.recording and not args.json:
             print(f"recording to {session.recording}", flush=True)
         while end is None or time.monotonic() < end:

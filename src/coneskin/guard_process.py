@@ -7,6 +7,7 @@ import os
 import select
 import signal
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ def main(arguments: list[str]) -> int:
         with contextlib.ExitStack() as stack:
             _run(scene, start, supervisor, owner, stack)
     except ConeSkinError as exc:
-        event = GuardEvent("died", 0.0, {"what": str(exc)})
+        event = GuardEvent("died", time.monotonic(), {"what": str(exc)})
         supervisor.send(encode_block(event.block()))
         select.select([], [supervisor], [], 1.0)
         supervisor.flush()

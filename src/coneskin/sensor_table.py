@@ -116,7 +116,7 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
         )
         return sensor, PlacedFrustum(frustum, Pose.from_xyz_rpy(values["xyz"], values["rpy"]))
     except ConeSkinError as exc:
-        problems.append(f"{where}: {exc}")
+        problems.append(f"{where}: {_in_words_of_the_file(str(exc))}")
         return None
 
 
@@ -128,3 +128,21 @@ def _from_file(path: Path, where: str, problems: list[str]) -> dict[str, Any]:
     except (ValueError, RecursionError) as exc:  # not TOML, not UTF-8, or a whole number of 5000 digits
         problems.append(f"{where}.file: {path} is not TOML: {exc}")
     return {}
+
+
+_WORDS = {
+    "electronics.supply_volts": "supply_v",
+    "adc_volts": "adc_v",
+    "electronics.adc_bits": "adc_bits",
+    "electronics.input_ohms": "input_ohm",
+    "pulldown_ohms": "pulldown_ohm",
+    "electronics.lead_ohms": "lead_ohm",
+    "electronics.current_full_scale": "current_full_scale_ma",
+}
+
+
+def _in_words_of_the_file(message: str) -> str:
+    """An error of the sensor's classes with the names that stand in the file."""
+    for attribute, key in _WORDS.items():
+        message = message.replace(attribute, key)
+    return message
