@@ -101,7 +101,7 @@ def test_neutral_factor_moves_only_its_layer():
     assert [moved.offset(i) for i in range(4)] == pytest.approx([PAPER_STACK.offset(i) for i in range(4)], rel=1e-14)
 
 
-@pytest.mark.parametrize("turn", [1e-8, 1e-7, 1e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("turn", [1e-8, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4])
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-5, 1e-4])
 def test_snapping_moves_no_cut_by_more_than_the_tolerance(turn, tolerance):
     cone = Frustum(0.054, 0.054 + 0.434 * turn, 0.434)
