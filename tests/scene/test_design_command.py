@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from coneskin import design_command, design_files
+from coneskin import design_files
 from coneskin.cli import main
+from coneskin.design_arguments import EXAMPLE
 from coneskin.sensor_table import build_sensor, with_file
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
@@ -151,11 +152,15 @@ def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
         ([*BALL, "--sheet-gap-mm", "400"], "sheet 1: the gap to its neighbours takes"),
         ([*CYLINDER, "--cut-tolerance-mm", "0"], "--cut-tolerance-mm must be finite and above 0 mm, got 0.0"),
         ([*CYLINDER, "--adc-bits", "0"], "bits of the converter must be from 1 to 32, got 0"),
-        ([*CYLINDER, "--adc-bits", "20"], "sheet 1: sensor.toml.adc_bits must be a whole number"),
-        ([*CYLINDER, "--upper-sheet-ohm", "1"], "current_full_scale must suit the normal drive current of the radial"),
-        ([*CYLINDER, "--supply-v", "3.3"], "electronics.supply_volts must be at most 95 % of adc_volts"),
+        ([*CYLINDER, "--adc-bits", "20"], "sensor.toml.adc_bits must be a whole number"),
+        (
+            [*CYLINDER, "--upper-sheet-ohm", "1"],
+            "current_full_scale_ma must suit the normal drive current of the radial",
+        ),
+        ([*CYLINDER, "--supply-v", "3.3"], "supply_v must be at most 95 % of adc_v"),
         ([*CYLINDER, "--overlap-mm", "5", "--wires", "edge1"], "an overlap at edge1 would cover the tabs"),
         (["nowhere.stl"], "nowhere.stl"),
+        ([*CYLINDER, "--tab-mm", "nan"], "tab must be finite and not negative mm, got nan mm"),
         (["nowhere.stl", "--radius1-mm", "5"], "a mesh and --radius1-mm cannot go together"),
     ],
 )
@@ -290,6 +295,18 @@ def test_a_link_of_a_urdf(tmp_path, capsys):
     assert "no link 'leg'; there are: arm" in capsys.readouterr().err
 
 
+def test_the_seam_looks_where_it_is_asked_to(tmp_path):
+    stl(tmp_path / "cone.stl", list(tube(0.040, 0.050, 0.160)))
+    for name, seam in (("x", (1, 0, 0)), ("z", (0, 0, 1)), ("oblique", (-1, 5, 1))):
+        words = [str(tmp_path / "cone.stl"), "--seam", *map(str, seam), "-o", str(tmp_path / name)]
+        assert design(*words) == 0
+        _, placed = sensor_of(tmp_path / name)
+        middle = placed.point(0.05, 0.5 * placed.frustum.wrap)  # opposite to the seam
+        want = math.atan2(-seam[2], -seam[0])
+        turn = math.atan2(middle[2] - 0.05, middle[0] - 0.3) - want
+        assert math.remainder(turn, 2.0 * math.pi) == pytest.approx(0.0, abs=0.01)
+
+
 def test_a_cube_has_no_sheet_and_says_so(tmp_path, capsys):
     corners = [(x, y, z) for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)]
     faces = [
@@ -353,7 +370,7 @@ def test_a_hull_is_refused_with_the_reason_and_the_nearest_thing(tmp_path, capsy
 def test_help_shows_examples_that_run(tmp_path, monkeypatch):
     """Every example of --help that needs no mesh."""
     monkeypatch.chdir(tmp_path)
-    lines = [row.strip().split("    ")[0] for row in design_command.EXAMPLE.splitlines() if "--radius1-mm" in row]
+    lines = [row.strip().split("    ")[0] for row in EXAMPLE.splitlines() if "--radius1-mm" in row]
     assert len(lines) == 3
     for i, row in enumerate(lines):
         words = row.split()[2:]
