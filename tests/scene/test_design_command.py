@@ -155,7 +155,7 @@ def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
         ([*CYLINDER, "--adc-bits", "20"], "sensor.toml.adc_bits must be a whole number"),
         (
             [*CYLINDER, "--upper-sheet-ohm", "1"],
-            "current_full_scale_ma must suit the normal drive current of the radial",
+            "current_full_scale_ma must suit the normal drive current",
         ),
         ([*CYLINDER, "--supply-v", "3.3"], "supply_v must be at most 95 % of adc_v"),
         ([*CYLINDER, "--overlap-mm", "5", "--wires", "edge1"], "an overlap at edge1 would cover the tabs"),
