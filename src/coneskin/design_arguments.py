@@ -37,6 +37,7 @@ layer. It appears whole or not at all.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    parser.usage = "coneskin design [LINK] -o DIR [options]"
     parser.epilog = EXAMPLE
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
