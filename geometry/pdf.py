@@ -15,7 +15,7 @@ from coneskin.errors import GeometryError
 
 from .cut_sheet import PALETTE, CutSheet
 from .outline import Outline
-from .part_labels import CAP_HEIGHT, Label, text_width
+from .part_labels import CAP_HEIGHT, Label
 from .pdf_file import PdfFile, number
 from .tiling import Tiling, tile
 
@@ -162,10 +162,10 @@ def _tiles(tiling: Tiling, title: str) -> Iterator[list[str]]:
 
 
 def _neighbour(page: int, x: float, y: float, dx: int, dy: int) -> str:
-    text = f"page {page}"
-    width = text_width(text, 1.8)
-    shift = {-1: -7.0 - width, 1: 7.0, 0: 3.5}[dx]
-    return _text(text, x + shift, y + {-1: -7.0, 1: 6.0, 0: 3.5}[dy], 1.8)
+    """The page that joins here, just beyond the bleed, where every printer still prints."""
+    if dx:
+        return _text(f"page {page}", x + (6.5 if dx > 0 else -4.7), y + 4.0, 1.8, 0.0, 1.0)
+    return _text(f"page {page}", x + 4.0, y + (4.7 if dy > 0 else -6.5), 1.8)
 
 
 def _crop_marks(left: float, bottom: float, width: float, height: float) -> Iterator[str]:
