@@ -140,7 +140,7 @@ def _images(kappa, width, arc, u, a, phi, wrap) -> list[tuple[bool, mp.mpc, mp.m
         distance = h * (mp.sin(turn) / kappa if kappa else rest)
         if abs(turn) < mp.pi / 2:
             out.append((False, sign * mp.mpc(0, 1) * a / (2 * distance) * mp.expj(-sign * turn), mp.mpf(0)))
-    return [image for image in out if abs(image[1]) > mp.mpf("0.1")]
+    return [image for image in out if abs(image[1]) > mp.mpf("0.25")]
 
 
 def _coefficients(alpha: mp.mpc, gamma: mp.mpf, order: int) -> mp.matrix:

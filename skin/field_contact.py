@@ -186,7 +186,7 @@ class FieldContacts:
             one = discs[0]
             inside = 0.0 <= one.u <= sheet.width and 0.0 <= one.phi <= sheet.wrap
             if not inside or one.radius > _room(sheet, one):
-                return solve_patch(model, Patch(one.u, one.phi, disc(one.radius), one.conductance))
+                return solve_patch(model, Patch(one.u, one.phi, disc(one.radius), one.conductance), 32, 7)
         else:
             discs = _joined(sheet, [_shrunk(sheet, d) for d in discs])
         return model.discs(discs)

@@ -146,17 +146,24 @@ def solve_phase(
             )
     ideal = all(t.resistance == 0.0 and t.lead == 0.0 for t in phase.terminals if not math.isinf(t.resistance))
     if ideal and opens == [False, False, True, True]:
-        volts, contact = _guided(coupling.x, coupling.y, coupling.xy, coupling.yy, lower, phase.b.emf, phase.a.emf)
-        electrodes = np.stack([np.full(n, phase.a.emf), np.full(n, phase.b.emf), volts[0], volts[1]], axis=-1)
+        electrodes, contact = np.empty((n, 4)), np.zeros(n)
+        electrodes[:, 0], electrodes[:, 1] = phase.a.emf, phase.b.emf
+        _guides(
+            electrodes[:, 2:], coupling.x, coupling.y, coupling.xy / (lower + coupling.yy), phase.b.emf, phase.a.emf
+        )
     elif ideal and opens == [True, True, False, False]:
-        volts, contact = _guided(coupling.y, coupling.x, coupling.xy, coupling.xx, upper, phase.d.emf, phase.c.emf)
-        electrodes = np.stack([volts[0], volts[1], np.full(n, phase.c.emf), np.full(n, phase.d.emf)], axis=-1)
+        electrodes, contact = np.empty((n, 4)), np.zeros(n)
+        electrodes[:, 2], electrodes[:, 3] = phase.c.emf, phase.d.emf
+        _guides(
+            electrodes[:, :2], coupling.y, coupling.x, coupling.xy / (upper + coupling.xx), phase.d.emf, phase.c.emf
+        )
     else:
+        ideal = False
         electrodes, contact = _general(coupling, upper, lower, phase)
     currents = _currents(coupling, upper, lower, electrodes, contact)
-    for e in range(4):
-        if opens[e]:
-            currents[:, e] = 0.0
+    currents[:, opens] = 0.0
+    if ideal:
+        return Readings(phase, electrodes, electrodes, currents, contact)
     resistance = np.array([t.resistance if not o else 0.0 for t, o in zip(phase.terminals, opens, strict=True)])
     lead = np.array([t.lead for t in phase.terminals])
     emf = np.array([t.emf for t in phase.terminals])
@@ -166,18 +173,16 @@ def solve_phase(
     return Readings(phase, electrodes, terminals, currents, contact)
 
 
-def _guided(
-    along: Floats, across: Floats, coupled: Floats, stiff: Floats, guide: float, start: float, end: float
-) -> tuple[tuple[Floats, Floats], Floats]:
-    """Open guides of a sheet of conductance `guide`, the other sheet driven from `start` to `end` along `along`.
+def _guides(out: Floats, along: Floats, across: Floats, moved: Floats, start: float, end: float) -> None:
+    """Open guides of one sheet, the other driven from `start` to `end`; written to columns (far, near).
 
-    No net current passes, so the sheets meet at the electrical centre: start + h (along) = v_d + (v_c - v_d)
-    across. The guide pair is apart by v_c - v_d = (guide sheet's resistance) * (current moved across).
+    No net current passes, so the sheets meet at the electrical centre: start + h along = near + (far - near) across.
+    The guides are apart by the current moved across over their sheet's conductance, for each volt of h.
     """
     h = end - start
-    apart = h * coupled / (guide + stiff)
-    second = start + h * along - apart * across
-    return (second + apart, second), np.zeros_like(along)
+    apart = h * moved
+    out[:, 1] = start + h * along - apart * across
+    out[:, 0] = out[:, 1] + apart
 
 
 def _currents(coupling: Coupling, upper: float, lower: float, volts: Floats, contact: Floats) -> Floats:
@@ -186,9 +191,12 @@ def _currents(coupling: Coupling, upper: float, lower: float, volts: Floats, con
     hy = volts[:, 3] - volts[:, 2]
     qx = coupling.xx * hx + coupling.xy * hy + coupling.x * contact
     qy = coupling.xy * hx + coupling.yy * hy + coupling.y * contact
-    i_a = upper * hx + qx
-    i_c = -lower * hy - qy
-    return np.stack([i_a, contact - i_a, i_c, -contact - i_c], axis=-1)
+    out = np.empty_like(volts)
+    out[:, 0] = upper * hx + qx
+    out[:, 1] = contact - out[:, 0]
+    out[:, 2] = -lower * hy - qy
+    out[:, 3] = -contact - out[:, 2]
+    return out
 
 
 def _general(coupling: Coupling, upper: float, lower: float, phase: Phase) -> tuple[Floats, Floats]:

@@ -27,7 +27,7 @@ __all__ = ["EdgeImage", "edge_images", "image_coefficients", "image_distance"]
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_NEAR = 0.1  # |alpha| from which on an edge counts as near: 5 radii between centre and edge
+_NEAR = 0.25  # |alpha| from which on an edge counts as near: two radii between centre and edge
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -130,11 +130,11 @@ class FieldModel:
         waiting = np.arange(n)
         while waiting.size:
             again = []
-            for m in np.unique(orders[waiting]):
+            for m in sorted(set(orders[waiting].tolist())):
                 level = waiting[orders[waiting] == m]
-                for count in np.unique(points[level]):
+                for count in sorted(set(points[level].tolist())):
                     group = level[points[level] == count]
-                    left = self._solve_group(discs, int(m), int(count), group, out, order is None)
+                    left = self._solve_group(discs, m, count, group, out, order is None)
                     again.append(group[left > self.tolerance])
             waiting = np.concatenate(again) if order is None else waiting[:0]
             waiting = waiting[orders[waiting] < LADDER[-1]]

@@ -49,7 +49,7 @@ class Patch:
     conductance: float | Profile = math.inf
 
 
-def solve_patch(model: FieldModel, patch: Patch, directions: int = 32, rings: int = 7) -> Coupling:
+def solve_patch(model: FieldModel, patch: Patch, directions: int = 48, rings: int = 10) -> Coupling:
     """Coupling of one patch.
 
     Args:

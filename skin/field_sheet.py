@@ -163,15 +163,16 @@ class SectorSheet:
     def edge_distances(self, u: ArrayLike, phi: ArrayLike) -> Floats:
         """Flat distances from a point to the arcs u=0, u=W and the edges phi=0, phi=wrap [m], shape (..., 4)."""
         u, phi = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(phi, dtype=np.float64))
-        stretch = self.stretch(u)
-
-        def to_edge(y: Floats) -> Floats:
-            angle = self.curvature * y
+        out = np.empty((*u.shape, 4))
+        out[..., 0] = u
+        out[..., 1] = self.width - u
+        out[..., 2], out[..., 3] = self.across(phi)
+        if self.curvature != 0.0:
+            angle = self.curvature * out[..., 2:]
             # Beyond a right angle the nearest point of the edge is its narrow end, farther than the narrow arc.
-            return stretch * np.where(np.abs(angle) < 0.5 * math.pi, y * np.sinc(angle / math.pi), math.inf)
-
-        y, rest = self.across(phi)
-        return np.stack([u, self.width - u, to_edge(y), to_edge(rest)], axis=-1)
+            straight = np.sin(angle) * (self.stretch(u) / self.curvature)[..., None]
+            out[..., 2:] = np.where(np.abs(angle) < 0.5 * math.pi, straight, math.inf)
+        return out
 
     def offsets(self, local: NDArray[np.complex128], u: float) -> NDArray[np.complex128]:
         """Offsets x + i y in the rectangle of flat offsets along (e_u, e_phi) from a point at slant distance u [m]."""

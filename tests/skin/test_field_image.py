@@ -41,7 +41,7 @@ def test_coefficients_are_those_of_the_logarithm(sheet: SectorSheet, u: float, p
 
 def test_distance_is_that_of_the_mirror_image() -> None:
     """Against the geometry of the drawing: reflection in a straight edge, inversion in an arc."""
-    u, phi, radius = 0.02, 0.3, 0.015
+    u, phi, radius = 0.02, 0.2, 0.015
     zeta, _, _ = circle(3, 8)
     r, theta = (float(v) for v in PAPER.polar(u, phi))
     z = (r + radius * zeta) * np.exp(1j * theta)
