@@ -140,11 +140,11 @@ class TestCommittedReference:
                 assert max(disagreement(ours.solve(r.problem), r.ports)) < 1e-11, r.problem.name
 
     def test_gaps_of_a_hundredth_of_the_radius(self, references: list[Any], ours: ModuleType) -> None:
-        """Between unequal sheets the series converges slowly there: its longest leaves up to 6e-9 of U0."""
+        """Two discs that close need more multipoles than there are: they are left with 6e-10 of U0."""
         for r in references:
             if "0.01 a" in r.problem.name:
                 volts, _, _ = disagreement(ours.solve(r.problem), r.ports)
-                assert volts < (1e-11 if r.problem.upper == r.problem.lower else 2e-8), r.problem.name
+                assert volts < (2e-9 if len(r.problem.discs) > 1 else 1e-11), r.problem.name
 
     def test_more_multipoles_approach_the_reference(self, references: list[Any], ours: ModuleType) -> None:
         """A gap of 0.1 radius, unequal sheets: each multipole takes exp(-2 acosh(1.1)) or more, as its image does."""
@@ -191,20 +191,20 @@ def worst_potential(ours: ModuleType, r: Any) -> float:
 class TestPotentials:
     """At two points inside the first disc and one outside all.
 
-    The map is for pictures and keeps the ports' order, whose error is the square of the potentials': so 2e-9, not
+    The map is for pictures and keeps the ports' order, whose error is the square of the potentials': so 1e-9, not
     1e-11. Pointwise the elements are good to 1e-10 at worst.
     """
 
     def test_random_sensors(self, references: list[Any], ours: ModuleType) -> None:
         sensors = [r for r in references if r.problem.name.startswith("random")]
         assert sum(r.field_estimate < 1e-11 for r in sensors) >= 100
-        bad = {r.problem.name: value for r in sensors if not (value := worst_potential(ours, r)) < 2e-9}
+        bad = {r.problem.name: value for r in sensors if not (value := worst_potential(ours, r)) < 1e-9}
         assert not bad
 
     def test_close_to_an_edge_between_equal_sheets(self, references: list[Any], ours: ModuleType) -> None:
         near = [r for r in references if "gap" in r.problem.name and r.problem.upper == r.problem.lower]
         assert len(near) == 8
-        assert max(worst_potential(ours, r) for r in near) < 2e-9
+        assert max(worst_potential(ours, r) for r in near) < 1e-11
 
 
 class TestLivePeers:
