@@ -55,7 +55,7 @@ class ArmReaction:
     Attributes:
         phase: where it is.
         state: newest measured state, or None before the first.
-        owner_ready: whether ur_rtde is ready.
+        owner_ready: whether the process is ready that stops the arm when this one is gone: the owner, or the keeper.
         slider: where the controller's speed slider is, or None.
 
     Raises:
@@ -96,6 +96,11 @@ class ArmReaction:
         self._placed: Sequence[ContactOnLink] = ()  # as last seen while the arm stopped
         self._may_move, self._again, self._why = False, 0, ""
 
+    @property
+    def needs_slider(self) -> bool:
+        """Whether a reaction may use the controller's speed slider."""
+        return "slow" in self._rules.kinds
+
     # ---- what it is told
 
     def arm(self, out: Outputs) -> None:
@@ -109,15 +114,7 @@ class ArmReaction:
         self.phase = Phase.STARTING
 
     def touch(self, now: float, link: int, level: float, began: bool, out: Outputs) -> None:
-        """A touch has begun, or has changed.
-
-        Args:
-            now: host time [s].
-            link: index of the touched link's DH frame.
-            level: how firm.
-            began: it has begun.
-            out: takes what comes of it.
-        """
+        """A touch of a link has begun, or has changed, at a host time [s] and with a level."""
         phase = self.phase
         if phase is Phase.ARMED:
             state = self.state
@@ -200,9 +197,10 @@ class ArmReaction:
     def unsound(self, now: float) -> list[str]:
         """Why the arm must not be armed, one line each."""
         wrong = []
-        if Way.OWNER in self._ways and not self.owner_ready:
-            wrong.append("ur_rtde is not ready")
-        if "slow" in self._rules.kinds and self.slider is None:
+        if not self.owner_ready:
+            owner = self._mover is Way.OWNER
+            wrong.append("ur_rtde is not ready" if owner else "the process that watches the guard is not ready")
+        if self.needs_slider and self.slider is None:
             wrong.append("where the controller's speed slider is, is not known")
         if self.state is None or self.silent(now):
             return [*wrong, "the controller is silent"]

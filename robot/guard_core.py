@@ -107,6 +107,11 @@ class GuardCore:
         """Where the guard is."""
         return self._phase if self._arm is None else self._arm.phase
 
+    @property
+    def needs_slider(self) -> bool:
+        """Whether a reaction may use the controller's speed slider."""
+        return self._arm is not None and self._arm.needs_slider
+
     def take(self, block: Block, out: Outputs) -> None:
         """Take one input.
 
@@ -185,13 +190,13 @@ class GuardCore:
             self._arm.owner_ready = True
         elif note.kind == "error":
             self._arm.lose(_WAYS["owner"], block.time, for_good=False)
-            self._fault(block.time, f"ur_rtde: {note.text}", out)
+            self._fault(block.time, note.text, out)
 
     def _take_lost(self, block: Block, out: Outputs) -> None:
         what, _, why = block.payload.decode("utf-8", "replace").partition("\n")
         self._lost[what] = why
         if self._arm is not None:
-            self._arm.owner_ready &= what != "owner"
+            self._arm.owner_ready &= what not in ("owner", "keeper")
             self._arm.lose(_WAYS.get(what, frozenset()), block.time)
         self._react(block.time, why, out)
         tell(out, "ending" if what == "supervisor" else "fault", block.time, what=why)

@@ -23,6 +23,7 @@ from .foreign import ForeignStops
 from .guard_core import GuardCore
 from .journal import GuardEvent, Kind
 from .outputs import Output
+from .owner_messages import BEAT, Alive, Farewell
 from .phase import Phase
 from .retreat_program import RetreatProgram
 from .slowing import Slider
@@ -32,6 +33,7 @@ from .stop_watch import Way
 
 __all__ = ["GuardLoop", "GuardPorts"]
 
+_ALIVE = Alive().encode()
 _TICK = 0.002  # s between two looks at the clocks where nothing else happens
 _OVERRUN = 0.02  # s between two rounds from which on the loop says that it was held up
 _ENDING = 3.0  # s that the arm has to stand when the guard is told to end
@@ -49,6 +51,7 @@ class GuardPorts:
         foreign: stops that do not need ur_rtde, open.
         deceleration: of a stop by script [rad/s2].
         slider: of the controller's speed, open.
+        keeper: the process that stops the arm when this one is gone, where there is no owner to do so.
     """
 
     supervisor: Channel
@@ -58,6 +61,7 @@ class GuardPorts:
     foreign: ForeignStops | None = None
     deceleration: float = 10.0
     slider: SpeedSlider | None = None
+    keeper: Channel | None = None
 
 
 class _Outbox:
@@ -105,6 +109,7 @@ class GuardLoop:
         self._clock = clock
         self._selector = selectors.DefaultSelector()
         self._quit = False
+        self._beat = -BEAT
         self._out: list[bytes] = []
         self._outbox = _Outbox(ports)
 
@@ -133,7 +138,7 @@ class GuardLoop:
 
     def _open(self) -> None:
         ports = self._ports
-        for item in (ports.supervisor, ports.owner, ports.reader, ports.slider):
+        for item in (ports.supervisor, ports.owner, ports.keeper, ports.reader, ports.slider):
             if item is not None:
                 self._selector.register(item, selectors.EVENT_READ)
         if ports.source is not None and (descriptor := ports.source.fileno()) is not None:
@@ -157,11 +162,11 @@ class GuardLoop:
             self._read_arm(ports.reader)
         if ports.slider is not None and ports.slider in ready:
             self._read_slider(ports.slider)
-        if ports.owner is not None and ports.owner in ready:
-            for message in ports.owner.receive():
-                self._take(Kind.OWNER, message)
-            if ports.owner.closed:
-                self._lose("owner", "the process that owns ur_rtde has ended", ports.owner)
+        for channel in (ports.owner, ports.keeper):
+            if channel is not None and channel in ready:
+                self._hear(channel)
+        if self._clock() - self._beat >= BEAT:
+            self._live()
         if "foreign" in ready and ports.foreign is not None:
             self._drain(ports.foreign)
         if ports.supervisor in ready:
@@ -177,6 +182,20 @@ class GuardLoop:
         if self._out:
             ports.supervisor.send(b"".join(self._out))
             self._out.clear()
+
+    def _hear(self, channel: Channel) -> None:
+        for message in channel.receive():
+            self._take(Kind.OWNER, message)
+        if channel.closed:
+            owner = channel is self._ports.owner
+            name, what = ("owner", "owns ur_rtde") if owner else ("keeper", "watches the guard")
+            self._lose(name, f"the process that {what} has ended", channel)
+
+    def _live(self) -> None:
+        self._beat = self._clock()
+        for channel in (self._ports.owner, self._ports.keeper):
+            if channel is not None:
+                channel.send(_ALIVE)
 
     def _read_skin(self, source: Source) -> None:
         try:
@@ -235,9 +254,15 @@ class GuardLoop:
             self._ports.reader = None
         elif what == "slider":
             self._ports.slider = None
+        elif what == "keeper":
+            self._ports.keeper = None
         else:
             self._ports.owner = None
         self._take(Kind.LOST, f"{what}\n{why}".encode())
+        if what == "controller" and (owner := self._ports.owner) is not None:
+            # ur_rtde would connect again by itself, and its program start with whatever command is still there
+            owner.close()
+            self._lose("owner", "ur_rtde must not connect to the controller again by itself", owner)
 
     def _forget(self, fileobj: object) -> None:
         with suppress(KeyError, ValueError, OSError):
@@ -249,4 +274,6 @@ class GuardLoop:
         end = self._clock() + _ENDING
         while (self._core.phase.stopping or self._core.phase is Phase.RETREATING) and self._clock() < end:
             self.step(_TICK)
+        if self._ports.keeper is not None and not (self._core.phase.stopping or self._core.phase is Phase.RETREATING):
+            self._ports.keeper.send(Farewell().encode())
         self._ports.supervisor.flush()

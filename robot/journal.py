@@ -39,7 +39,7 @@ class GuardEvent(NamedTuple):
 
     Attributes:
         name: "waiting", "armed", "contact", "contact_placed", "touch_ended", "fault", "stopping", "slower",
-            "standstill", "escalated", "retreating", "going_back", "complying", "clipped", "retreated", "slowing",
+            "standstill", "escalated", "retreating", "clipped", "retreated", "slowing",
             "resumed", "latched", "refused", "reset", "message", "ending", "died".
         time: host clock [s].
         details: numbers and words that belong to it; SI and radians.

@@ -40,7 +40,7 @@ class Leaving:
         if program is not None:
             out.append(program)
             self._end = now + program.duration + _PROGRAM_LATE
-        tell(out, movement.name, now)
+        tell(out, "retreating", now, **({"how": movement.how} if movement.how else {}))
 
     def step(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
         """Go on; Done where it is over.

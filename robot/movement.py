@@ -25,10 +25,10 @@ class Movement(Protocol):
     """A bounded motion away from a touch.
 
     Attributes:
-        name: "retreating", "going_back" or "complying".
+        how: "", "path" or "push": how the arm leaves.
     """
 
-    name: str
+    how: str
 
     def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
         """What to do in this control cycle, with the touches there are now."""
@@ -37,7 +37,7 @@ class Movement(Protocol):
 class Retreat:
     """Along the normal of the touch (``retreat.py``)."""
 
-    name = "retreating"
+    how = ""
 
     def __init__(self, plan: RetreatPlan) -> None:
         self._plan = plan
@@ -50,7 +50,7 @@ class Retreat:
 class GoBack:
     """Along the arm's own recent path (``trail.py``)."""
 
-    name = "going_back"
+    how = "path"
 
     def __init__(self, plan: PathBack) -> None:
         self._plan = plan
@@ -63,7 +63,7 @@ class GoBack:
 class Comply:
     """With the push (``comply.py``)."""
 
-    name = "complying"
+    how = "push"
 
     def __init__(self, start: Compliance) -> None:
         self._now = start

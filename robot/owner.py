@@ -1,25 +1,30 @@
 """The owner of ur_rtde: a process of its own that moves the arm for the program and stops it for the guard.
 
 Two channels: the guard's, which always comes first, and the program's. After a ``Stop`` the program is refused until
-the guard says ``Clear``. When either channel ends, the arm is stopped and the process ends; when this process ends or
-hangs, the controller's watchdog stops the arm.
+the guard says ``Clear``. When either channel ends, or the guard gives no sign of life, the arm is stopped; when this
+process ends or hangs, the controller's watchdog stops the arm.
 """
 
 from __future__ import annotations
 
+import os
 import select
+import signal
 import sys
+import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 from coneskin.errors import ConeSkinError
 
 from .channel import Channel, inherit
-from .owner_messages import Clear, Halt, Note, Speed, Stop, decode_command, decode_json, encode_json
+from .owner_messages import SILENCE, Clear, Halt, Note, Speed, Stop, decode_command, decode_json, encode_json
 from .ur_rtde import UrArm
 
 __all__ = ["Owner", "main"]
 
+_LEAVING = 2.0  # s for the last stop and the goodbye; ur_rtde can block both for minutes
 _KICK_EVERY = 0.02  # well within the watchdog's period, and no load for the controller
 
 
@@ -30,9 +35,22 @@ class Owner:
         arm: the arm, already open.
         guard: the guard's channel.
         program: the program's channel.
+        clock: monotonic seconds.
+        leaving: called before the last stop.
     """
 
-    def __init__(self, arm: UrArm, guard: Channel, program: Channel) -> None:
+    def __init__(
+        self,
+        arm: UrArm,
+        guard: Channel,
+        program: Channel,
+        clock: Callable[[], float] = time.monotonic,
+        leaving: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._clock = clock
+        self._leaving = leaving
+        self._quit = False
+        self._heard = clock()
         self._arm = arm
         self._guard = guard
         self._program = program
@@ -42,18 +60,25 @@ class Owner:
         self._deceleration = 2.0
 
     def run(self) -> None:
-        """Serve until one of the channels ends; then stop the arm."""
+        """Serve until one of the channels ends, or ``leave``; then stop the arm."""
         self._guard.send(Note("ready").encode())
         try:
-            while self.step(0.005):
+            while not self._quit and self.step(0.005):
                 pass
         finally:
+            self._leaving()
             self._arm.stop(self._deceleration)
+
+    def leave(self) -> None:
+        """End ``run``. May be called from a signal handler."""
+        self._quit = True
 
     def step(self, timeout: float) -> bool:
         """Wait for messages [s] and serve them; False once a channel has ended."""
         select.select([self._guard, self._program], [], [], timeout)
+        now = self._clock()
         for message in self._guard.receive():
+            self._heard = now
             self._serve_guard(message)
         if self._guard.closed:
             return False
@@ -63,7 +88,8 @@ class Owner:
             return False
         if self._waiting and not self._arm.moving():
             self._reply({"ok": True})
-        now = time.monotonic()
+        if self._allowed and now - self._heard > SILENCE:
+            self._forbid(f"the guard has been silent for {SILENCE:g} s")
         if now - self._kicked >= _KICK_EVERY:
             self._arm.kick()
             self._kicked = now
@@ -83,7 +109,18 @@ class Owner:
                     self._allowed = False
                     self._arm.speed_j(qd, acceleration)
                 case Clear():
+                    self._arm.revive()
                     self._allowed = True
+        except ConeSkinError as exc:
+            self._guard.send(Note("error", str(exc)).encode())
+
+    def _forbid(self, why: str) -> None:
+        """Stop the arm because of the guard itself."""
+        self._allowed = False
+        self._refuse_waiting(why)
+        self._guard.send(Note("error", why).encode())
+        try:
+            self._arm.stop(self._deceleration)
         except ConeSkinError as exc:
             self._guard.send(Note("error", str(exc)).encode())
 
@@ -139,12 +176,21 @@ def main(arguments: list[str]) -> int:
     settings = decode_json(hello[0])
     try:
         with UrArm(settings["host"], settings["watchdog_hz"]) as arm:
-            Owner(arm, guard, program).run()
+            owner = Owner(arm, guard, program, leaving=lambda: _end_within(_LEAVING))
+            signal.signal(signal.SIGTERM, lambda *_: owner.leave())
+            owner.run()
     except ConeSkinError as exc:
         guard.send(Note("error", str(exc)).encode())
         program.send(encode_json({"ok": False, "stopped": False, "why": str(exc)}))
         return 1
     return 0
+
+
+def _end_within(seconds: float) -> None:
+    """End this process after so long, whatever ur_rtde does: then the controller's watchdog ends its program."""
+    timer = threading.Timer(seconds, os._exit, (1,))
+    timer.daemon = True
+    timer.start()
 
 
 if __name__ == "__main__":

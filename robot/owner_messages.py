@@ -12,7 +12,24 @@ from typing import Any, NamedTuple
 
 from .ur_models import Joints
 
-__all__ = ["Clear", "GuardCommand", "Halt", "Note", "Speed", "Stop", "decode_command", "decode_json", "encode_json"]
+__all__ = [
+    "BEAT",
+    "SILENCE",
+    "Alive",
+    "Clear",
+    "Farewell",
+    "GuardCommand",
+    "Halt",
+    "Note",
+    "Speed",
+    "Stop",
+    "decode_command",
+    "decode_json",
+    "encode_json",
+]
+
+BEAT = 0.05  #: s between two signs of life of the guard
+SILENCE = 0.5  #: s without one after which the guard counts as dead; a busy machine may hold it up for 0.1 s
 
 _ONE = struct.Struct("<d")
 _SEVEN = struct.Struct("<7d")
@@ -70,7 +87,24 @@ class Clear(NamedTuple):
         return b"C"
 
 
-GuardCommand = Stop | Speed | Halt | Clear
+class Alive(NamedTuple):
+    """The guard is there: sent every ``BEAT``. Whoever misses it for ``SILENCE`` stops the arm."""
+
+    def encode(self) -> bytes:
+        """The message."""
+        return b"A"
+
+
+class Farewell(NamedTuple):
+    """The guard ends on purpose, after it has seen the arm stand."""
+
+    def encode(self) -> bytes:
+        """The message."""
+        return b"F"
+
+
+_WORDS: dict[bytes, Clear | Alive | Farewell] = {word.encode(): word for word in (Clear(), Alive(), Farewell())}
+GuardCommand = Stop | Speed | Halt | Clear | Alive | Farewell
 
 
 class Note(NamedTuple):
@@ -110,8 +144,8 @@ def decode_command(message: bytes) -> GuardCommand:
             return (Stop if letter == b"S" else Halt)(*_ONE.unpack(body))
     except struct.error as exc:
         raise ValueError(f"a command of the guard is damaged: {message!r}") from exc
-    if message == b"C":
-        return Clear()
+    if message in _WORDS:
+        return _WORDS[message]
     raise ValueError(f"not a command of the guard: {message!r}")
 
 

@@ -12,6 +12,7 @@ What is avoided here, and why:
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import Enum
@@ -20,6 +21,9 @@ from typing import Any
 from coneskin.errors import MissingExtra, RobotConnectionError, RobotRefused
 
 __all__ = ["Mode", "UrArm"]
+
+
+_REGISTER = 0.02  # s until a register that was written is surely read: ten control cycles
 
 
 class Mode(Enum):
@@ -83,7 +87,26 @@ class UrArm:
     def kick(self) -> None:
         """Tell the controller's watchdog that this process is alive."""
         with rtde_errors("kicking the controller's watchdog"):
+            if self._control.isProgramRunning():
+                self._control.kickWatchdog()
+
+    def revive(self) -> None:
+        """Start the control program again where something else has ended it; the arm does not move by that.
+
+        The register of the last command is still there, and a new program would execute it at once: after speedJ the
+        arm would start by itself. So command 0 is written first: a kick without a program does nothing else.
+
+        Raises:
+            RobotRefused: the controller does not start it.
+        """
+        with rtde_errors("starting the control program again"):
+            if self._control.isProgramRunning():
+                return
+            self.mode = Mode.IDLE
             self._control.kickWatchdog()
+            time.sleep(_REGISTER)
+            if not (self._control.reuploadScript() and self._control.setWatchdog(self._watchdog_hz)):
+                raise RobotRefused(f"the controller {self.host} does not start ur_rtde's program again")
 
     def move_j(self, q: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a move in joint space to q [rad], with the leading joint's speed [rad/s] and acceleration [rad/s2].

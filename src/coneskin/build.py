@@ -40,7 +40,11 @@ def build_core(scene: Scene) -> GuardCore:
     watch = scene.watch or Watch()
     detection = Detection(stuck_frames=watch.stuck_frames, timing=TimingLimits(late=watch.skin_late))
     stream = Stream([item.sensor for item in scene.sensors], detection)
-    sensors = [GuardedSensor(item.name, item.link_name, item.link, item.place) for item in place_on_arm(scene)]
+    touched = {item.sensor.name: item.sensor.thresholds.touch_level for item in scene.sensors}
+    sensors = [
+        GuardedSensor(item.name, item.link_name, item.link, item.place, touched[item.name])
+        for item in place_on_arm(scene)
+    ]
     return GuardCore(stream, sensors, watch, _arm(scene, watch) if scene.arm else None)
 
 
@@ -50,6 +54,7 @@ def _arm(scene: Scene, watch: Watch) -> ArmReaction:
     from .robot.compiled import compile_contact
     from .robot.link_frames import link_index
     from .robot.stop_watch import Way
+    from .robot.table import Table
     from .robot.ur_models import model
 
     assert scene.arm is not None
@@ -57,7 +62,9 @@ def _arm(scene: Scene, watch: Watch) -> ArmReaction:
     for link in scene.links:
         if index := link_index(link.name):
             compile_contact(arm, index)  # 2 ms that the first touch shall not wait for
-    return ArmReaction(arm, scene.reaction or Reaction(kind="stop"), watch, tuple(Way))
+    ways = tuple(way for way in Way if way is not Way.OWNER or scene.arm.control == "owner")
+    table = None if scene.arm.table_z is None else Table(scene.arm.table_z)
+    return ArmReaction(arm, scene.reaction or Reaction(kind="stop"), watch, ways, scene.rules, table)
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ __all__ = ["main"]
 def main(arguments: list[str]) -> int:
     """Take the channels and the scene, open what it names, and run until told to end."""
     supervisor, *rest = inherit(arguments)
-    owner = rest[0] if rest else None
+    other = rest[0] if rest else None
     while not (hello := supervisor.receive()) and not supervisor.closed:
         select.select([supervisor], [], [], 1.0)
     if not hello:
@@ -38,7 +38,7 @@ def main(arguments: list[str]) -> int:
     try:
         scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
         with contextlib.ExitStack() as stack:
-            _run(scene, start, supervisor, owner, stack)
+            _run(scene, start, supervisor, other, stack)
     except ConeSkinError as exc:
         event = GuardEvent("died", time.monotonic(), {"what": str(exc)})
         supervisor.send(encode_block(event.block()))
@@ -49,15 +49,20 @@ def main(arguments: list[str]) -> int:
 
 
 def _run(
-    scene: Scene, start: dict[str, Any], supervisor: Channel, owner: Channel | None, stack: contextlib.ExitStack
+    scene: Scene, start: dict[str, Any], supervisor: Channel, other: Channel | None, stack: contextlib.ExitStack
 ) -> None:
+    """Guard; the other channel is the owner's, or the keeper's."""
     from .skin.serial_port import SerialPort
 
     core = build_core(scene)
     assert scene.source is not None
     source = stack.enter_context(SerialPort(start["port"], scene.source.baud))
-    ports = GuardPorts(supervisor, source, owner=owner)
+    ports = GuardPorts(supervisor, source)
     if scene.arm is not None:
+        if scene.arm.control == "owner":
+            ports.owner = other
+        else:
+            ports.keeper = other
         from .robot.foreign import ForeignStops
         from .robot.state_reader import StateReader
 
@@ -65,6 +70,10 @@ def _run(
         ports.foreign = stack.enter_context(ForeignStops(scene.arm.host))
         if scene.reaction is not None:
             ports.deceleration = scene.reaction.deceleration
+        if core.needs_slider:
+            from .robot.speed_slider import SpeedSlider
+
+            ports.slider = stack.enter_context(SpeedSlider(scene.arm.host))
     loop = GuardLoop(core, ports)
     signal.signal(signal.SIGTERM, lambda *_: loop.stop())
     loop.run()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .geometry.placed import PlacedFrustum
     from .robot.commands import Reaction
+    from .robot.rules import Rule
     from .robot.watch import Watch
     from .skin.sensor import Sensor
     from .skin.virtual import ScriptedTouch
@@ -36,11 +37,15 @@ class ArmScene:
         model: such as "UR10e".
         host: the controller's name or address.
         watchdog_hz: the controller stops its program when it hears nothing for 1 / watchdog_hz.
+        control: "owner": this program moves the arm, through ur_rtde; "foreign": something else does.
+        table_z: height in the base frame that the arm does not go below while it retreats [m], or None.
     """
 
     model: str
     host: str
-    watchdog_hz: float
+    watchdog_hz: float = 4.0
+    control: str = "owner"
+    table_z: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +144,7 @@ class Scene:
     links: tuple[LinkScene, ...] = ()
     source: SourceScene | None = None
     reaction: Reaction | None = None
+    rules: tuple[Rule, ...] = ()
     watch: Watch | None = None
     recording: RecordingScene | None = None
     motion: MotionScene | None = None

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 from . import scene as s
 from .errors import ConeSkinError, SceneError
 from .link_tables import count_sensors, read_links, write_out
+from .reaction_table import read_reaction
 from .schema import Key, check
 
 if TYPE_CHECKING:
-    from .robot.commands import Reaction
     from .robot.watch import Watch
     from .skin.sensor import Sensor
     from .skin.virtual import ScriptedTouch
@@ -27,6 +27,8 @@ _ARM = (
     Key("model", str),
     Key("host", str),
     Key("watchdog_hz", float, 4.0, low=1.0, high=100.0),
+    Key("control", str, "owner", choices=("owner", "foreign")),
+    Key("table_z_mm", float, None, low=-5000.0, high=5000.0),
 )
 _SOURCE = (
     Key("kind", str, choices=("serial", "virtual")),
@@ -44,15 +46,6 @@ _TOUCH = (
     Key("phi_deg", low=0.0, high=360.0),
     Key("force_n", float, 5.0, low=0.0, high=1000.0),
     Key("radius_mm", float, 0.0, low=0.0, high=500.0),
-)
-_REACTION = (
-    Key("kind", str, choices=("stop", "retreat")),
-    Key("deceleration_rad_s2", low=0.5, high=40.0),
-    Key("distance_mm", low=1.0, high=500.0),
-    Key("speed_mm_s", low=1.0, high=1500.0),
-    Key("acceleration_rad_s2", low=0.1, high=40.0),
-    Key("time_budget_s", low=0.05, high=60.0),
-    Key("arm_speed_mm_s", low=1.0, high=5000.0),
 )
 _WATCH = (
     Key("skin_silence_ms", low=2.0, high=1000.0),
@@ -110,6 +103,7 @@ def parse_scene(text: str, name: str = "scene", folder: Path = Path(), *, record
             problems.append(f"{table} must be one table: write [{table}], once, got {type(tables[table]).__name__}")
             del tables[table]
     text = write_out(tables, folder, problems) or text
+    reaction, rules = read_reaction(tables["reaction"], problems) if "reaction" in tables else (None, ())
     scene = s.Scene(
         name=name,
         text=text,
@@ -117,7 +111,8 @@ def parse_scene(text: str, name: str = "scene", folder: Path = Path(), *, record
         arm=_arm(tables, problems),
         links=read_links(tables, None if recorded else folder, problems),
         source=None,
-        reaction=_reaction(tables, problems),
+        reaction=reaction,
+        rules=rules,
         watch=_watch(tables, problems),
         recording=_recording(tables, folder, problems),
         motion=_motion(tables, problems),
@@ -135,15 +130,6 @@ def _settings(keys: tuple[Key, ...], tables: Mapping[str, Any], name: str, probl
     optional = tuple(key if key.name in required else replace(key, default=None) for key in keys)
     values = check(tables[name], optional, name, problems)
     return {key: value for key, value in values.items() if value is not None}
-
-
-def _reaction(tables: Mapping[str, Any], problems: list[str]) -> Reaction | None:
-    if "reaction" not in tables:
-        return None
-    from .robot.commands import Reaction
-
-    values = _settings(_REACTION, tables, "reaction", problems)
-    return Reaction(**values) if "kind" in values else None
 
 
 def _watch(tables: Mapping[str, Any], problems: list[str]) -> Watch | None:
@@ -168,7 +154,11 @@ def _arm(tables: Mapping[str, Any], problems: list[str]) -> s.ArmScene | None:
             del values["model"]
     if not values.get("host", "?").strip():
         problems.append("arm.host must name the controller, got an empty text")
-    return s.ArmScene(values["model"], values["host"], values["watchdog"]) if len(values) == len(_ARM) else None
+    if values.get("control") == "foreign" and "watchdog_hz" in tables["arm"]:
+        problems.append("arm.watchdog_hz needs control = owner: the watchdog is part of ur_rtde's program; remove it")
+    if len(values) < len(_ARM):
+        return None
+    return s.ArmScene(values["model"], values["host"], values["watchdog"], values["control"], values["table_z"])
 
 
 def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s.SourceScene | None:
@@ -267,6 +257,12 @@ def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, 
         problems.append("[reaction] needs an [arm] that can react")
     if "motion" in named and "arm" not in named:
         problems.append("[motion] needs an [arm] that can move")
+    foreign = scene.arm is not None and scene.arm.control == "foreign"
+    if foreign and "motion" in named:
+        problems.append("[motion] needs arm.control = owner: in a foreign arm another program makes the motion")
+    reactions = [] if scene.reaction is None else [scene.reaction, *(rule.reaction for rule in scene.rules)]
+    if foreign and any(reaction.kind == "comply" for reaction in reactions):
+        problems.append("reaction.kind comply needs arm.control = owner: nothing else can follow a push")
     if "source" in named and isinstance(tables.get("link", []), list) and not count_sensors(tables):
         problems.append("[source] needs a [[link]] with a [[link.sensor]] that its bytes come from")
     if "arm" in named:

@@ -87,6 +87,7 @@ class Session:
         self._children: dict[str, subprocess.Popen[bytes]] = {}
         self._guard: Channel | None = None
         self._skin: Channel | None = None
+        self._keeper: Channel | None = None
         self._arm: ArmProxy | None = None
         self._recorder: Recorder | None = None
         self._thread: threading.Thread | None = None
@@ -100,6 +101,8 @@ class Session:
         Raises:
             RobotRefused: the scene has none.
         """
+        if self._arm is None and self.scene.arm is not None:
+            raise RobotRefused(f"{self.scene.name} says arm.control = foreign: another program moves the arm")
         if self._arm is None:
             raise RobotRefused(f"{self.scene.name} has no [arm]")
         return self._arm
@@ -120,12 +123,12 @@ class Session:
         """Stop the arm, end the children and close the recording; may be called again."""
         if self._guard is not None:
             self._guard.send(b"quit")
-        for name in ("guard", "owner", "skin"):
+        for name in ("guard", "owner", "keeper", "skin"):
             child = self._children.get(name)
             if child is None:
                 continue
             if name != "guard":  # the others end when their channels do, after the guard has stopped the arm
-                for channel in (self._arm.channel if self._arm else None, self._skin):
+                for channel in (self._arm.channel if self._arm else None, self._keeper, self._skin):
                     if channel is not None:
                         channel.close()
             try:
@@ -232,12 +235,17 @@ class Session:
         ours, theirs = pair()
         ends = [theirs]
         if scene.arm is not None:
-            guard_end, owner_guard_end = pair()
-            program_end, owner_program_end = pair()
-            self._children["owner"] = spawn("coneskin.robot.owner", owner_guard_end, owner_program_end)
+            guard_end, other_guard_end = pair()
+            program_end, other_program_end = pair()
             ends.append(guard_end)
-            self._arm = ArmProxy(Channel(program_end), self.check)
-            self._arm.channel.send(encode_json({"host": scene.arm.host, "watchdog_hz": scene.arm.watchdog_hz}))
+            if scene.arm.control == "owner":
+                self._children["owner"] = spawn("coneskin.robot.owner", other_guard_end, other_program_end)
+                self._arm = ArmProxy(Channel(program_end), self.check)
+                self._arm.channel.send(encode_json({"host": scene.arm.host, "watchdog_hz": scene.arm.watchdog_hz}))
+            else:
+                self._children["keeper"] = spawn("coneskin.robot.keeper", other_guard_end, other_program_end)
+                self._keeper = Channel(program_end)
+                self._keeper.send(encode_json(_keeping(scene)))
         self._guard = Channel(ours)
         self._children["guard"] = spawn("coneskin.guard_process", *ends)
         self._guard.send(encode_json({**start, "port": port}))
@@ -329,6 +337,18 @@ class Session:
             if self._on_event is not None:
                 for event in events:
                     self._on_event(event)
+
+
+def _keeping(scene: Scene) -> dict[str, Any]:
+    """What the keeper has to know."""
+    from dataclasses import asdict
+
+    from .robot.commands import Reaction
+    from .robot.watch import Watch
+
+    assert scene.arm is not None
+    deceleration = (scene.reaction or Reaction(kind="stop")).deceleration
+    return {"host": scene.arm.host, "watch": asdict(scene.watch or Watch()), "deceleration": deceleration}
 
 
 def _died(what: str, scene: Scene) -> ConeSkinError:

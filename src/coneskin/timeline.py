@@ -40,6 +40,12 @@ def describe(event: GuardEvent, start: float) -> str:
             text = f"no slowdown: next way to stop, {d['way']}"
         case "clipped":
             text = f"retreat slower than set, because of {', '.join(d['by'])}"
+        case "slowing":
+            text = f"slower: speed slider from {100.0 * d['before']:.0f} % to {100.0 * d['slider']:.0f} %"
+        case "resumed":
+            text = f"free again: speed slider back to {100.0 * d['slider']:.0f} %"
+        case "retreating" if "how" in d:
+            text = {"path": "going back the way the arm came", "push": "giving way to the push"}[d["how"]]
         case "waiting":
             text = "waiting: " + "; ".join(d["reasons"])
         case "refused":

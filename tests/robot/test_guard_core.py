@@ -201,7 +201,7 @@ def test_an_error_of_the_owner_stops():
     rig.feed(Kind.OWNER, Note("error", "moveJ was refused").encode())
     rig.run(0.5)
     assert rig.core.phase is Phase.LATCHED
-    assert "ur_rtde: moveJ was refused" in rig.event("latched").details["why"]
+    assert "moveJ was refused" in rig.event("latched").details["why"]
 
 
 def test_a_damaged_state_is_a_fault():

@@ -9,7 +9,19 @@ from hypothesis import strategies as st
 from coneskin.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.channel import Channel, pair
 from coneskin.robot.owner import Owner
-from coneskin.robot.owner_messages import Clear, Halt, Note, Speed, Stop, decode_command, decode_json, encode_json
+from coneskin.robot.owner_messages import (
+    SILENCE,
+    Alive,
+    Clear,
+    Farewell,
+    Halt,
+    Note,
+    Speed,
+    Stop,
+    decode_command,
+    decode_json,
+    encode_json,
+)
 from coneskin.robot.ur_rtde import Mode, UrArm, rtde_errors
 
 finite = st.floats(allow_nan=False)
@@ -19,7 +31,7 @@ finite = st.floats(allow_nan=False)
     st.one_of(
         st.builds(Stop, finite),
         st.builds(Halt, finite),
-        st.just(Clear()),
+        st.sampled_from([Clear(), Alive(), Farewell()]),
         st.builds(Speed, st.tuples(*[finite] * 6), finite),
     )
 )
@@ -45,6 +57,17 @@ class FakeWheel:
         self.calls = []
         self.accepts = accepts
         self.running = False
+        self.playing = True
+
+    def isProgramRunning(self):
+        return self.playing
+
+    def reuploadScript(self):
+        self.playing = True
+        return self._note("reuploadScript")
+
+    def setWatchdog(self, frequency):
+        return self._note("setWatchdog", frequency)
 
     def _note(self, name, *values):
         self.calls.append((name, *values))
@@ -231,6 +254,76 @@ def test_a_bad_request_is_answered(owner, request_):
     program.send(json.dumps(request_).encode())
     served.step(0.0)
     assert answers(program)[0]["ok"] is False
+
+
+def test_the_program_starts_again_only_after_command_0(owner):
+    """The register of a latched speedJ is still there: a new program would execute it at once (see test_lifecycle)."""
+    served, made, guard, _ = owner
+    served.step(0.0)
+    made._control.playing = False
+    made._control.calls.clear()
+    served._kicked = -1.0
+    served.step(0.0)
+    assert made._control.calls == []  # no kick without a program: each would be a line on the terminal
+    guard.send(Clear().encode())
+    served.step(0.0)
+    assert [call[0] for call in made._control.calls] == ["kick", "reuploadScript", "setWatchdog"]
+    guard.send(Clear().encode())
+    served.step(0.0)
+    assert "reuploadScript" not in [call[0] for call in made._control.calls[3:]]
+
+
+def test_a_program_that_does_not_start_again_is_an_error(owner):
+    served, made, guard, program = owner
+    made._control.playing = made._control.accepts = False
+    guard.send(Clear().encode())
+    served.step(0.0)
+    assert "does not start ur_rtde's program again" in Note.decode(guard.receive()[-1]).text
+    move(program)
+    served.step(0.0)
+    assert answers(program)[0]["stopped"] is True
+
+
+def test_a_silent_guard_counts_as_dead():
+    now = [10.0]
+    made = arm()
+    (guard, guard_end), (program, program_end) = ((Channel(s) for s in pair()) for _ in range(2))
+    served = Owner(made, guard_end, program_end, lambda: now[0])
+    guard.send(Clear().encode())
+    move(program)
+    served.step(0.0)
+    for _ in range(40):
+        now[0] += 0.05
+        guard.send(Alive().encode())
+        served.step(0.0)
+    assert "stopJ" not in stops(made._control)
+    now[0] += SILENCE - 0.01
+    served.step(0.0)
+    assert "stopJ" not in stops(made._control)
+    now[0] += 0.02
+    served.step(0.0)
+    assert stops(made._control)[-1] == "stopJ"
+    assert "silent" in answers(program)[0]["why"]
+    assert "silent" in Note.decode(guard.receive()[-1]).text
+    guard.send(Alive().encode())
+    move(program)
+    served.step(0.0)
+    assert answers(program)[0]["stopped"] is True  # alive again is not enough: the guard has to clear it
+    for channel in (guard, guard_end, program, program_end):
+        channel.close()
+
+
+def test_it_leaves_when_told_and_arms_its_own_end_first(owner):
+    served, made, guard, program = owner
+    order = []
+    served._leaving = lambda: order.append([call[0] for call in made._control.calls])
+    guard.send(Clear().encode())
+    move(program)
+    served.step(0.0)
+    served.leave()
+    served.run()
+    assert order == [["moveJ", "kick"]]  # before the stop, which may block for minutes
+    assert stops(made._control)[-1] == "stopJ"
 
 
 def test_the_watchdog_is_kicked(owner):

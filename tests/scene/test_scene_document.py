@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from coneskin import link_tables, scene_reader, schema, sensor_table
+from coneskin import link_tables, reaction_table, scene_reader, schema, sensor_table
 from coneskin.robot.commands import Reaction
 from coneskin.robot.watch import Watch
 from coneskin.scene_reader import parse_scene
@@ -25,13 +25,21 @@ SECTIONS: dict[str, tuple[Key, ...]] = {
     "[[link.sensor]]": (Key("file", str, None), *sensor_table.SENSOR_KEYS),
     "[source]": scene_reader._SOURCE,
     "[[source.touch]]": scene_reader._TOUCH,
-    "[reaction]": scene_reader._REACTION,
+    "[reaction]": reaction_table.REACTION_KEYS,
+    "[[reaction.rule]]": reaction_table.RULE_KEYS,
     "[watch]": scene_reader._WATCH,
     "[recording]": scene_reader._RECORDING,
     "[motion]": scene_reader._MOTION,
 }
 #: what the document says in words, because the code says None, nothing, or works it out
 IN_WORDS = {
+    ("[arm]", "table_z_mm"): "none",
+    ("[reaction]", "rule"): "none",
+    **{
+        ("[[reaction.rule]]", key.name): "any" if number < 3 else "as above"
+        for number, key in enumerate(reaction_table.RULE_KEYS)
+        if key.name != "kind"
+    },
     ("[[link]]", "mesh"): "none",
     ("[[link]]", "sensor"): "none",
     ("[[link.sensor]]", "file"): "none",

@@ -104,7 +104,7 @@ def with_changes(text: str, *changes: tuple[str, str]) -> str:
         ("height_mm = 140", "height_mm = 140\nwrap_deg = 80", "phi_deg at 80: got 70 mm and 90 deg"),
         ("sensor = 2", "sensor = 3", "source.touch 1: there is no sensor with the id 3"),
         ("end_s = 2.3", "end_s = 1", "source.touch 1: start_s must be before end_s, got 2 s and 1 s"),
-        ('kind = "stop"', 'kind = "flee"', "reaction.kind must be one of stop, retreat, got 'flee'"),
+        ('kind = "stop"', 'kind = "flee"', "reaction.kind must be one of slow, comply, retreat, stop, got 'flee'"),
         ('kind = "stop"', 'kind = "stop"\ndistance_mm = 0.06', "is that in metres? Then write 60"),
         ('kind = "stop"', 'kind = "stop"\ndeceleration_deg_s2 = 60', "did you mean deceleration_rad_s2?"),
         ("settle_ms = 50", "settle_ms = 1e9", "watch.settle_ms must be from 10 to 10000 ms, got 1000000000.0 ms"),

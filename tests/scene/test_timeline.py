@@ -25,6 +25,8 @@ LINES: dict[str, tuple[dict[str, Any], str]] = {
     "standstill": ({"speed": 0.001, "ways": ["owner", "dashboard"]}, "standing: 0.0010 rad/s, by owner, dashboard"),
     "escalated": ({"way": "dashboard"}, "no slowdown: next way to stop, dashboard"),
     "retreating": ({}, "retreating"),
+    "slowing": ({"slider": 0.2, "before": 1.0}, "slower: speed slider from 100 % to 20 %"),
+    "resumed": ({"slider": 1.0}, "free again: speed slider back to 100 %"),
     "clipped": ({"by": ["joint speed", "singularity"]}, "retreat slower than set, because of joint speed, singularity"),
     "retreated": ({"progress": 0.05, "complete": True, "why": "distance"}, "retreated 50.0 mm: distance"),
     "latched": ({"why": "touch"}, "latched until a person resets: touch"),
@@ -66,6 +68,13 @@ def test_every_event_that_the_code_makes_is_here() -> None:
 def test_its_line(name: str) -> None:
     details, words = LINES[name]
     assert describe(GuardEvent(name, 1001.25, details), 1000.0) == f"   1.2500 s  {words}"
+
+
+@pytest.mark.parametrize(
+    ("how", "words"), [("path", "going back the way the arm came"), ("push", "giving way to the push")]
+)
+def test_how_it_leaves(how: str, words: str) -> None:
+    assert describe(GuardEvent("retreating", 1.0, {"how": how}), 1.0).endswith(f"  {words}")
 
 
 def test_a_place_that_is_not_sure_says_so() -> None:

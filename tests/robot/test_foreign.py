@@ -1,0 +1,242 @@
+"""A guard beside a program that knows nothing of it: whatever moves the arm is stopped, and the arm retreats.
+
+The simulated controller runs the programs; nothing of ours but the guard's own sockets and its reader touches it.
+"""
+
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from coneskin.errors import Collision, RobotRefused
+from coneskin.replay import read_run, replay
+from coneskin.scene_reader import parse_scene
+from coneskin.session import guard
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
+
+from coneskin.robot.kinematics import forward  # noqa: E402
+from coneskin.robot.sim_process import SimulatedController, free_host  # noqa: E402
+from coneskin.robot.sim_values import values_of  # noqa: E402
+from coneskin.robot.ur_models import model  # noqa: E402
+
+START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
+GOAL = [math.radians(150.0), *START[1:]]
+SCENE = """\
+[arm]
+model = "UR5e"
+host = "{host}"
+control = "foreign"
+[[link]]
+name = "forearm"
+[[link.sensor]]
+radius1_mm = 37.6
+radius2_mm = 37.2
+height_mm = 260
+xyz_mm = [0, 0, 80]
+[source]
+kind = "virtual"
+[reaction]
+kind = "retreat"
+distance_mm = 30
+[watch]
+skin_silence_ms = 400
+skin_late_ms = 400
+arm_silence_ms = 300
+escalate_ms = 60
+"""
+RAW = f"def users():\n  while True:\n    movej({GOAL}, a=4, v=1)\n    movej({START}, a=4, v=1)\n  end\nend\n"
+POSE = list(values_of(forward(model("UR5e"), [START[0] + 1.2, *START[1:]])))
+RTDE = "import sys, rtde_control\nc = rtde_control.RTDEControlInterface(sys.argv[1])\n"
+WHEEL = pytest.mark.skipif(
+    subprocess.run([sys.executable, "-c", "import rtde_control"], capture_output=True).returncode != 0,
+    reason="the ur_rtde wheel is not installed (there is none for this Python)",
+)
+
+
+@pytest.fixture
+def controller(tmp_path):
+    program = tmp_path / "play.script"
+    program.write_text(RAW)
+    host = free_host()
+    with SimulatedController(model="UR5e", host=host, start_q=START, program=program) as simulated:
+        yield simulated
+
+
+def until(what, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.005)
+
+
+def fast(simulated):
+    return max(map(abs, simulated.state()["qd"])) > 0.9
+
+
+def send(host, port, text):
+    with socket.create_connection((host, port), 5.0) as sock:
+        sock.sendall(text.encode())
+        if port == 29999:
+            sock.makefile().readline()
+            assert sock.makefile().readline() == "Starting program\n"
+        time.sleep(0.05)  # a connection that closes at once may lose what was sent
+
+
+class Child:
+    """A user's program with ur_rtde, in a process of its own."""
+
+    def __init__(self, code):
+        self.code = RTDE + code
+
+    def start(self, host):
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", self.code, host], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+
+    def end(self):
+        self.process.kill()
+        self.process.wait()
+
+
+class Bytes:
+    """A user's program that the controller runs by itself."""
+
+    def __init__(self, port, text):
+        self.port, self.text = port, text
+
+    def start(self, host):
+        send(host, self.port, self.text)
+
+    def end(self):
+        pass
+
+
+PROGRAMS = {
+    "synchronous moveJ": (lambda: Child(f"print(c.moveJ({GOAL}, 1.0, 4.0))"), WHEEL),
+    "synchronous moveL": (lambda: Child(f"print(c.moveL({POSE}, 0.8, 4.0))"), WHEEL),
+    "speedJ streaming": (
+        lambda: Child("import time\nwhile c.speedJ([1, 0, 0, 0, 0, 0], 4.0, 0.0):\n  time.sleep(0.002)"),
+        WHEEL,
+    ),
+    "servoJ streaming": (
+        lambda: Child(
+            f"import time\nq = {START}\nfor k in range(4000):\n"
+            "  q[0] += 0.002\n  c.servoJ(q, 0.0, 0.0, 0.002, 0.1, 300.0)\n  time.sleep(0.0018)"
+        ),
+        WHEEL,
+    ),
+    "raw URScript": (lambda: Bytes(30002, RAW), ()),
+    "dashboard play": (lambda: Bytes(29999, "play\n"), ()),
+}
+
+
+@pytest.fixture
+def run(controller):
+    """Start a program, once the guard is there, and wait until it moves the arm."""
+    started = []
+
+    def start(name):
+        program = PROGRAMS[name][0]()
+        started.append(program)
+        program.start(controller.host)
+        until(lambda: max(map(abs, controller.state()["qd"])) > 0.6)
+        return program
+
+    yield start
+    for program in started:
+        program.end()
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, (_, marks) in PROGRAMS.items()])
+def test_whatever_moves_the_arm_is_stopped_and_the_arm_retreats(controller, run, name, tmp_path):
+    path = tmp_path / "run.rec"
+    with guard(parse_scene(SCENE.format(host=controller.host)), recording=path) as session:
+        assert controller.state()["runtime"] == "STOPPED"  # the guard is armed before there is any program
+        run(name)
+        session.touch(0.13, 1.55, duration=0.2)
+        latched = session.wait_for(("latched",), 20.0)
+        assert latched is not None
+        events = {event.name: event for event in session.events}
+        assert events["standstill"].details["ways"] == ["script"], [e.name for e in session.events]
+        assert events["retreated"].details["complete"] is True
+        # 0.5 mm are left for braking, and one look of 2 ms at 150 mm/s
+        assert events["retreated"].details["progress"] == pytest.approx(0.030, abs=0.001)
+        state = controller.wait_standing()
+        time.sleep(0.5)
+        assert controller.state()["q"] == state["q"], "the arm moves again"
+        with pytest.raises(Collision):
+            session.check()
+    assert replay(read_run(path)).same
+
+
+def test_a_program_that_moves_a_latched_arm_is_stopped_again(controller, run):
+    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+        run("raw URScript")
+        session.touch(0.13, 1.55, duration=0.2)
+        assert session.wait_for(("latched",), 20.0) is not None
+        seen = len(session.events)
+        send(controller.host, 30002, RAW)  # a user's program that heals itself
+        again = session.wait_for(("latched",), 10.0, after=seen)
+        assert "then something moved the arm" in again.details["why"]
+        controller.wait_standing()
+        session.reset()
+        send(controller.host, 30002, RAW)
+        until(lambda: fast(controller))
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_without_its_guard_the_keeper_stops_the_arm(controller, run, number):
+    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+        run("raw URScript")
+        os.kill(session._children["guard"].pid, number)
+        controller.wait_standing()
+        if number is signal.SIGSTOP:
+            os.kill(session._children["guard"].pid, signal.SIGCONT)
+            latched = session.wait_for(("latched",), 10.0)
+            assert "no" in latched.details["why"] or "silent" in latched.details["why"]
+        time.sleep(0.3)
+        assert not any(controller.state()["qd"])
+
+
+def test_without_its_keeper_the_guard_stops_the_arm_and_does_not_arm_again(controller, run):
+    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+        run("raw URScript")
+        os.kill(session._children["keeper"].pid, signal.SIGKILL)
+        latched = session.wait_for(("latched",), 10.0)
+        assert "watches the guard has ended" in latched.details["why"]
+        controller.wait_standing()
+        with pytest.raises(RobotRefused, match="watches the guard has ended"):
+            session.reset()
+
+
+@pytest.mark.parametrize(("fault", "left"), [("close scripts", "dashboard"), ("close dashboard", "script")])
+def test_a_way_to_stop_that_is_gone_stops_the_arm_by_another(controller, run, fault, left):
+    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+        run("raw URScript")
+        controller.call(fault)
+        standing = session.wait_for(("standstill",), 10.0)
+        assert standing.details["ways"] == [left]
+        assert session.wait_for(("latched",), 5.0) is not None
+        controller.wait_standing()
+        with pytest.raises(RobotRefused, match="which a stop may need"):
+            session.reset()
+
+
+def test_leaving_the_guard_stops_the_arm(controller, run):
+    with guard(parse_scene(SCENE.format(host=controller.host))):
+        run("dashboard play")
+    assert not any(controller.state()["qd"])
+
+
+def test_the_arm_is_not_ours_to_move(controller):
+    with (
+        guard(parse_scene(SCENE.format(host=controller.host))) as session,
+        pytest.raises(RobotRefused, match="another program moves the arm"),
+    ):
+        session.arm.move_j(GOAL)
