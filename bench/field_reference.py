@@ -1,6 +1,6 @@
 """Reference solutions of the field problems by NGSolve, written once and committed with their provenance.
 
-    python bench/field_reference.py --write      # makes bench/data/field_reference.json, about three minutes
+    python bench/field_reference.py --write      # makes bench/data/field_reference.json, about four minutes
     python bench/field_reference.py              # compares the committed file with this machine's NGSolve
 
 Every sensor is solved twice, at degree 12 on one mesh and at degree 10 on a finer one; the file keeps the first and the
