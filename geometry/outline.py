@@ -70,7 +70,8 @@ class Segment:
     def at(self, fraction: float) -> Point:
         """Point at a fraction of the length."""
         sweep = self.sweep
-        ratio = math.sin(0.5 * fraction * sweep) / math.sin(0.5 * sweep) if sweep else fraction
+        # below 1e-9 both sines are their arguments, which for denormal sweeps would round away
+        ratio = math.sin(0.5 * fraction * sweep) / math.sin(0.5 * sweep) if abs(sweep) > 1e-9 else fraction
         reach, angle = ratio * self.chord, 0.5 * (self.heading(0.0) + self.heading(fraction))
         return self.start[0] + reach * math.cos(angle), self.start[1] + reach * math.sin(angle)
 

@@ -38,7 +38,7 @@ def inside(points, outline):
     return (crosses & (x < at)).sum(axis=1) % 2 == 1
 
 
-def box(label, step=0.4e-3):
+def box(label, step=0.8e-3):
     """Points all over the box of a label [m]."""
     along = np.linspace(-0.5, 0.5, max(2, math.ceil(label.width / step))) * label.width
     across = np.linspace(-0.5, 0.5, max(2, math.ceil(label.height / step))) * label.height
