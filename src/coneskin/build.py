@@ -103,13 +103,13 @@ def place_on_arm(scene: Scene) -> list[OnArm]:
     for link in scene.links:
         index, dh_mesh_frame, dh_frame = 0, Pose(), Pose()
         if scene.arm is not None:
-            from .robot.link_frames import dh_mesh, link_index
+            from .robot.link_frames import dh_link, dh_mesh, link_index
             from .robot.ur_models import model
 
             index = link_index(link.name)
             dh_mesh_frame = dh_mesh(model(scene.arm.model), link.name)
-            if link.frame == "mesh":
-                dh_frame = dh_mesh_frame
+            frames = {"mesh": dh_mesh_frame, "urdf": dh_link(model(scene.arm.model), link.name), "dh": Pose()}
+            dh_frame = frames[link.frame]
         frusta = [PlacedFrustum(item.placed.frustum, dh_frame @ item.placed.link_frustum) for item in link.sensors]
         surfaces = _surfaces(link.mesh, dh_mesh_frame, frusta) if link.mesh else [None] * len(frusta)
         for item, frustum, surface in zip(link.sensors, frusta, surfaces, strict=True):

@@ -14,7 +14,7 @@ __all__ = ["LINK_KEYS", "count_sensors", "read_links", "write_out"]
 
 LINK_KEYS = (
     Key("name", str),
-    Key("frame", str, "mesh", choices=("mesh", "dh")),
+    Key("frame", str, "mesh", choices=("mesh", "urdf", "dh")),
     Key("mesh", str, None),
     Key("sensor", dict, ()),
 )

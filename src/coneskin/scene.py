@@ -67,7 +67,7 @@ class LinkScene:
 
     Attributes:
         name: its name in the arm's URDF, such as "forearm".
-        frame: "mesh" or "dh": what the poses of its sensors refer to.
+        frame: "mesh", "urdf" or "dh": what the poses of its sensors refer to.
         mesh: the file of its mesh, or None.
         sensors: those on it.
     """

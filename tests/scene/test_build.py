@@ -1,6 +1,7 @@
 """From a scene to places on the arm."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,6 +56,27 @@ def test_the_dh_frame_is_taken_as_it_is() -> None:
     scene = parse_scene(SERIAL_RETREAT.replace('name = "upper_arm"', 'name = "upper_arm"\nframe = "dh"'))
     (placed,) = place_on_arm(scene)
     assert placed.place(0.2, 0.0)[0] == pytest.approx((0.0605, 0.0, 0.3), abs=1e-16)
+
+
+def test_the_urdf_frame_is_at_the_start_of_the_link() -> None:
+    """dh_urdf of the chain above: 0.6127 m along x, no turn."""
+    scene = parse_scene(SERIAL_RETREAT.replace('name = "upper_arm"', 'name = "upper_arm"\nframe = "urdf"'))
+    (placed,) = place_on_arm(scene)
+    assert placed.place(0.2, 0.0)[0] == pytest.approx((0.6127 + 0.0605, 0.0, 0.3), abs=1e-15)
+
+
+def test_a_mesh_takes_the_point_down_to_its_surface() -> None:
+    """The upper arm of a UR10 is a tube of 54 mm whose axis is 45 mm off its mesh's origin."""
+    mesh = Path(__file__).parents[2].parent / "shared" / "data" / "ur" / "ur10" / "collision" / "upperarm.stl"
+    if not mesh.is_file():
+        pytest.skip(f"needs the link mesh {mesh.name} in the folder shared/data beside the repository")
+    text = SERIAL_RETREAT.replace("UR10e", "UR10").replace('name = "upper_arm"', f'name = "upper_arm"\nmesh = "{mesh}"')
+    text = text.replace("xyz_mm = [0, 0, 100]", "xyz_mm = [0, -45, 110]")
+    (placed,) = place_on_arm(parse_scene(text))
+    for u, phi in ((0.02, 0.0), (0.2, 2.0), (0.3, 5.0)):
+        point, _ = placed.place(u, phi)
+        # the sensor's radius is 60.5 mm; the facets of the mesh are 0.05 mm off the round
+        assert placed.frustum.locate(point)[2] == pytest.approx(-0.0065, abs=0.0001)
 
 
 def test_without_an_arm_the_frame_of_the_scene_is_kept() -> None:
