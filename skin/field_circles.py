@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from .field_disc import Discs
 from .field_green import Points, Strip, direct_features, kernel, mirrored
-from .field_image import EdgeImage, edge_images, image_coefficients, image_distance
+from .field_image import (
+    EdgeImage,
+    edge_images,
+    image_coefficients,
+    image_distance,
+    other_disc,
+    pair_coefficients,
+    pair_distance,
+)
 from .field_sheet import SectorSheet
 
 __all__ = ["Circles", "circle", "green_block", "make_circles"]
@@ -29,6 +37,8 @@ class Circles:
     """The circles of n scenes of k discs in the rectangle; lengths in units of (shorter side)/pi.
 
     Attributes:
+        sheet: the sheet.
+        discs: the discs.
         order: M.
         offset: x + i y of the points from their centres, shape (n, k, N).
         slope: |d offset / d zeta| there, zeta on the unit circle, shape (n, k, N).
@@ -41,6 +51,8 @@ class Circles:
         images: near edges of each of the k discs, to be taken out of the samples.
     """
 
+    sheet: SectorSheet
+    discs: Discs
     order: int
     offset: Complex
     slope: Floats
@@ -104,7 +116,7 @@ def make_circles(
     s, s_far, p, p_far = (x, x_far, y, y_far) if strip.along_x else (y, y_far, x, x_far)
     places = range(discs.u.shape[1]) if with_images else ()
     images = tuple(tuple(edge_images(sheet, discs, place)) for place in places)
-    return Circles(order, offset * k, slope, s * k, s_far * k, p * k, p_far * k, fx, fy, images)
+    return Circles(sheet, discs, order, offset * k, slope, s * k, s_far * k, p * k, p_far * k, fx, fy, images)
 
 
 def _pair(strip: Strip, circles: Circles, i: int, j: int, equal: bool) -> tuple[Points, Points, Floats, Floats, Floats]:
@@ -144,7 +156,9 @@ def green_block(strip: Strip, circles: Circles, i: int, j: int, resistance_a: fl
         taken, put_back = _near_images(strip, circles, i)
         values = kernel(strip, first, second, resistance_a, resistance_b, squared, slope * slope, taken=taken)
     else:
-        values = kernel(strip, first, second, resistance_a, resistance_b)
+        zeta, _, _ = circle(circles.order, circles.offset.shape[2])
+        alpha, beta = other_disc(circles.sheet, circles.discs, i, j)
+        values = kernel(strip, first, second, resistance_a, resistance_b, pair_distance(alpha, beta, zeta))
     b = resistance_b / math.pi
     values += ((b * weight_i)[:, None] * first.s)[:, :, None] + ((b * weight_j)[:, None] * second.s)[:, None, :]
     values -= (b / strip.sigma) * (first.s[:, :, None] * second.s[:, None, :])
@@ -152,7 +166,10 @@ def green_block(strip: Strip, circles: Circles, i: int, j: int, resistance_a: fl
     half = (values.reshape(-1, points) @ fourier.T).reshape(n, points, -1).transpose(0, 2, 1)
     block = (half.reshape(-1, points) @ fourier.T).reshape(n, fourier.shape[0], -1).transpose(0, 2, 1)
     block[:, 0, 0] += b * centre
-    if i == j and put_back is not None:
+    if i != j:
+        both = resistance_a + resistance_b
+        block -= both / (4.0 * math.pi) * pair_coefficients(alpha, beta, circles.order)
+    elif put_back is not None:
         block -= (resistance_a - resistance_b) / (4.0 * math.pi) * put_back
     return block
 

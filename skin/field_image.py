@@ -1,4 +1,4 @@
-"""The image of a disc in a near edge, with exact Fourier coefficients.
+"""The image of a disc in a near edge, and another disc beside it, with exact Fourier coefficients.
 
 Between unequal sheets each edge of the sector mirrors a disc with the strength (Ru - Rl). In the flat sheet a
 straight edge mirrors by reflection, an arc by inversion, so from point zeta of the circle to the image of zeta' the
@@ -7,7 +7,8 @@ distance is, to a constant, |1 + alpha zeta + alpha* zeta'* + gamma zeta zeta'*|
     L_m0 = -(-alpha)^m / m,     L_mn = -sum_k delta^k/k C(m-1,k-1) C(n-1,k-1) (-alpha)^(m-k) (-alpha*)^(n-k)
 
 of zeta^m zeta'*^n, with delta = |alpha|^2 - gamma: sums of one sign. Taken out of the sampled Green function and
-put back as coefficients, the nearest singularity no longer decides how many points a circle needs.
+put back as coefficients, the nearest singularity no longer decides how many points a circle needs. From disc to disc
+the distance is |1 + alpha zeta + beta zeta'|: the same with zeta' for zeta'* and gamma = 0.
 """
 
 from __future__ import annotations
@@ -22,7 +23,15 @@ from numpy.typing import NDArray
 from .field_disc import Discs
 from .field_sheet import SectorSheet
 
-__all__ = ["EdgeImage", "edge_images", "image_coefficients", "image_distance"]
+__all__ = [
+    "EdgeImage",
+    "edge_images",
+    "image_coefficients",
+    "image_distance",
+    "other_disc",
+    "pair_coefficients",
+    "pair_distance",
+]
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -117,4 +126,49 @@ def image_coefficients(image: EdgeImage, order: int) -> Floats:
         odd = pair * (sin[:, :, None] * cos[:, None, :] - cos[:, :, None] * sin[:, None, :])
         out[:, 1::2, 2::2] = odd
         out[:, 2::2, 1::2] = -odd
+    return out
+
+
+@lru_cache(maxsize=64)
+def _pairs(order: int) -> Floats:
+    """(m+n-1)! / (m! n!) for m, n = 1..order."""
+    out = np.array([[math.comb(m + n, m) / (m + n) for n in range(1, order + 1)] for m in range(1, order + 1)])
+    out.setflags(write=False)
+    return out
+
+
+def other_disc(sheet: SectorSheet, discs: Discs, i: int, j: int) -> tuple[Complex, Complex]:
+    """alpha, beta with |z_i - z_j| = const |1 + alpha zeta + beta zeta'| from circle i to circle j, shape (n,)."""
+    kappa = sheet.curvature
+    turn = kappa * sheet.arc * (discs.phi[:, j] - discs.phi[:, i]) / sheet.wrap
+    w = (sheet.along(discs.u[:, j])[0] - sheet.along(discs.u[:, i])[0]) + 1j * (
+        sheet.across(discs.phi[:, j])[0] - sheet.across(discs.phi[:, i])[0]
+    )
+    towards = w if kappa == 0.0 else sheet.stretch(discs.u[:, i]) * np.expm1(kappa * w) / kappa
+    # Beyond half a turn the flat sheet may lap over itself; the chord means nothing there.
+    near = np.abs(turn) < math.pi
+    alpha = np.where(near, -discs.radius[:, i] / towards, 0.0)
+    beta = np.where(near, discs.radius[:, j] * np.exp(1j * turn) / towards, 0.0)
+    return np.asarray(alpha, dtype=np.complex128), np.asarray(beta, dtype=np.complex128)
+
+
+def pair_distance(alpha: Complex, beta: Complex, zeta: Complex) -> Floats:
+    """|1 + alpha zeta + beta zeta'|^2, shape (n, N, N)."""
+    z = (1.0 + alpha[:, None] * zeta)[:, :, None] + (beta[:, None] * zeta)[:, None, :]
+    return np.asarray(z.real * z.real + z.imag * z.imag)
+
+
+def pair_coefficients(alpha: Complex, beta: Complex, order: int) -> Floats:
+    """Fourier coefficients of ln of `pair_distance`, shape (n, 2M+1, 2M+1)."""
+    m = np.arange(1, order + 1)
+    out = np.zeros((alpha.size, 2 * order + 1, 2 * order + 1))
+    first, second = np.abs(alpha)[:, None] ** m, np.abs(beta)[:, None] ** m
+    turn1, turn2 = np.angle(-alpha)[:, None] * m, np.angle(-beta)[:, None] * m
+    out[:, 1::2, 0], out[:, 2::2, 0] = -2.0 * first / m * np.cos(turn1), 2.0 * first / m * np.sin(turn1)
+    out[:, 0, 1::2], out[:, 0, 2::2] = -2.0 * second / m * np.cos(turn2), 2.0 * second / m * np.sin(turn2)
+    size = 2.0 * _pairs(order) * first[:, :, None] * second[:, None, :]
+    turn = turn1[:, :, None] + turn2[:, None, :]
+    cos, sin = size * np.cos(turn), size * np.sin(turn)
+    out[:, 1::2, 1::2], out[:, 2::2, 2::2] = -cos, cos
+    out[:, 1::2, 2::2] = out[:, 2::2, 1::2] = sin
     return out

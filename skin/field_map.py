@@ -68,8 +68,7 @@ class FieldMap:
         )
         check_discs(sheet, u, phi, radius, g)
         scene = Discs(u, phi, radius, g)
-        need = resolution(sheet, scene, model.contrast, model.tolerance)
-        order, per_order = int(need.order[0]), (int(need.points[0]) - 2) // int(need.order[0])
+        order = int(resolution(sheet, scene, model.contrast, model.tolerance)[0])
         while True:
             coupling, moments, left = solve_discs(
                 sheet,
@@ -77,7 +76,6 @@ class FieldMap:
                 model.lower_resistance,
                 scene,
                 order,
-                per_order * order + 2,
                 with_moments=True,
                 estimate=model.contrast > 0.0 or len(discs) > 1,
             )

@@ -125,30 +125,23 @@ class FieldModel:
         """Scenes of one resolution together; those whose multipoles have not yet died away again, at a higher order."""
         n = discs.u.shape[0]
         out = np.empty((6, n))
-        need = resolution(self.sheet, discs, self.contrast, self.tolerance, order)
-        orders, points = need.order.copy(), need.points.copy()
+        orders = resolution(self.sheet, discs, self.contrast, self.tolerance, order)
         waiting = np.arange(n)
         while waiting.size:
             again = []
             for m in sorted(set(orders[waiting].tolist())):
-                level = waiting[orders[waiting] == m]
-                for count in sorted(set(points[level].tolist())):
-                    group = level[points[level] == count]
-                    left = self._solve_group(discs, m, count, group, out, order is None)
-                    again.append(group[left > self.tolerance])
+                group = waiting[orders[waiting] == m]
+                left = self._solve_group(discs, m, group, out, order is None)
+                again.append(group[left > self.tolerance])
             waiting = np.concatenate(again) if order is None else waiting[:0]
             waiting = waiting[orders[waiting] < LADDER[-1]]
-            per_order = (points[waiting] - 2) // np.maximum(orders[waiting], 1)
             orders[waiting] = [higher(int(m)) for m in orders[waiting]]
-            points[waiting] = per_order * orders[waiting] + 2
         if not (out[0] >= 0.0).all():
             raise FieldError("a contact next to an edge or to another needs a higher order than was given")
         return Coupling(*out)
 
-    def _solve_group(
-        self, discs: Discs, order: int, points: int, group: NDArray[np.intp], out: Floats, free: bool
-    ) -> Floats:
-        chunk = max(1, PAIRS_AT_ONCE // (points * discs.u.shape[1]) ** 2)
+    def _solve_group(self, discs: Discs, order: int, group: NDArray[np.intp], out: Floats, free: bool) -> Floats:
+        chunk = max(1, PAIRS_AT_ONCE // ((2 * order + 2) * discs.u.shape[1]) ** 2)
         tail = np.empty(group.size)
         # One disc between equal sheets has no near image, and the order chosen for it holds.
         estimate = free and (self.contrast > 0.0 or discs.u.shape[1] > 1)
@@ -156,7 +149,7 @@ class FieldModel:
             index = group[start : start + chunk]
             part = Discs(discs.u[index], discs.phi[index], discs.radius[index], discs.conductance[index])
             got, _, left = solve_discs(
-                self.sheet, self.upper_resistance, self.lower_resistance, part, order, points, estimate=estimate
+                self.sheet, self.upper_resistance, self.lower_resistance, part, order, estimate=estimate
             )
             out[:, index] = (got.conductance, got.x, got.y, got.xx, got.xy, got.yy)
             tail[start : start + chunk] = left

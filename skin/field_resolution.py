@@ -1,9 +1,8 @@
-"""How many multipoles and points a contact needs for a tolerance."""
+"""How many multipoles a contact needs for a tolerance."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,34 +10,21 @@ from numpy.typing import NDArray
 from .field_disc import Discs, centre_distance
 from .field_sheet import SectorSheet
 
-__all__ = ["LADDER", "Resolution", "higher", "resolution"]
+__all__ = ["LADDER", "higher", "resolution"]
 
 #: Orders to choose from, so that a batch falls into few groups.
 LADDER = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 80, 96, 128)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Resolution:
-    """What each scene needs.
-
-    Attributes:
-        order: M, shape (n,).
-        points: N on each circle, shape (n,).
-    """
-
-    order: NDArray[np.int64]
-    points: NDArray[np.int64]
-
-
 def resolution(
     sheet: SectorSheet, discs: Discs, contrast: float, tolerance: float, order: int | None = None
-) -> Resolution:
-    """Order and points to begin with; `FieldModel` raises them where the tail of the solution asks for it.
+) -> NDArray[np.int64]:
+    """Order to begin with for each scene, shape (n,); `FieldModel` raises it where the solution asks for it.
 
     A multipole falls like exp(-2 rate m). The rate is acosh(distance/radius) for the images that act: in the
     corners, in the edges unless the sheets are equal, across the shorter side; half the bispherical distance for a
-    second disc; and ln(r/radius) for the apex. Near edges are exact (`field_image`), so what they cost depends on the
-    contact too, and is left to the tail.
+    second disc; and ln(r/radius) for the apex. Near edges and other discs are exact (`field_image`), so what they cost
+    depends on the contact too, and is left to the solution's own estimate.
 
     Args:
         sheet: the sheet.
@@ -63,22 +49,19 @@ def resolution(
         # Taken out exactly, an edge costs about half of the orders, and a touching one no more than a near one.
         rate = np.minimum(rate, 1.75 * np.arccosh(np.maximum(room / a, 1.15)))
     slowest = rate.min(axis=1)
-    near = np.zeros(slowest.shape, dtype=bool)
     k = a.shape[1]
     for i in range(k):
         for j in range(i):
             d = centre_distance(sheet, discs.u[:, i], discs.phi[:, i], discs.u[:, j], discs.phi[:, j])
             cosh = (d * d - a[:, i] ** 2 - a[:, j] ** 2) / (2.0 * a[:, i] * a[:, j])
-            pair = 0.5 * np.arccosh(np.maximum(cosh, 1.0))
-            near |= pair < 1.0
-            slowest = np.minimum(slowest, pair)
+            slowest = np.minimum(slowest, 1.75 * 0.5 * np.arccosh(np.maximum(cosh, 1.65)))
     if order is None:
         wanted = 0.56 * math.log(1.0 / tolerance) / np.maximum(slowest, 1e-3)
         ladder = np.array(LADDER)
         orders = ladder[np.searchsorted(ladder, np.minimum(1.0 + np.ceil(wanted), LADDER[-1]))]
     else:
         orders = np.full(slowest.shape, order)
-    return Resolution(orders, np.where(near, 4, 2) * orders + 2)
+    return np.asarray(orders, dtype=np.int64)
 
 
 def higher(order: int) -> int:

@@ -11,7 +11,14 @@ from coneskin.skin.field_circles import circle
 from coneskin.skin.field_disc import Discs
 from coneskin.skin.field_discs import solve_discs
 from coneskin.skin.field_fourport import radial_phase
-from coneskin.skin.field_image import edge_images, image_coefficients, image_distance
+from coneskin.skin.field_image import (
+    edge_images,
+    image_coefficients,
+    image_distance,
+    other_disc,
+    pair_coefficients,
+    pair_distance,
+)
 from coneskin.skin.field_model import FieldModel
 from coneskin.skin.field_sheet import SectorSheet
 
@@ -67,3 +74,42 @@ def test_a_disc_may_touch_an_edge(lower: float, gap: float) -> None:
     assert error[1] < 0.2 * error[0]
     assert error[2] < 2e-7
     assert error[3] < 2e-10
+
+
+@pytest.mark.parametrize("name", ["paper", "narrowing", "cylinder"])
+def test_from_disc_to_disc(name: str) -> None:
+    sheet = SHEETS[name]
+    u, phi = np.array([[0.4, 0.55]]) * sheet.width, np.array([[0.5, 0.35]]) * sheet.wrap
+    apart = abs(complex(sheet.flat(u[0, 1], phi[0, 1], (u[0, 0], phi[0, 0]))))
+    discs = Discs(u, phi, np.array([[0.5, 0.35]]) * apart, np.array([[math.inf, math.inf]]))
+    alpha, beta = other_disc(sheet, discs, 0, 1)
+    zeta, _, fourier = circle(6, 900)
+    sampled = fourier @ np.log(pair_distance(alpha, beta, zeta))[0] @ fourier.T
+    assert np.abs(pair_coefficients(alpha, beta, 6)[0] - sampled).max() < 1e-13
+    few, _, _ = circle(2, 6)
+    w = [
+        complex(float(sheet.along(u[0, k])[0]), float(sheet.across(phi[0, k])[0]))
+        + sheet.offsets(discs.radius[0, k] * few, float(u[0, k]))
+        for k in (0, 1)
+    ]
+    places = [sheet.locate(v.real, v.imag) for v in w]
+    drawn = np.array(
+        [
+            [abs(complex(sheet.flat(a, b, (c, d)))) for a, b in zip(*places[1], strict=True)]
+            for c, d in zip(*places[0], strict=True)
+        ]
+    )
+    ratio = drawn**2 / pair_distance(alpha, beta, few)[0]
+    assert np.allclose(ratio, ratio[0, 0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("g", [1e4, math.inf])
+def test_two_discs_may_all_but_touch(g: float) -> None:
+    model = FieldModel(PAPER, 1.0, 3.0)
+    for gap in (0.1, 0.01, 1e-4):
+        half = 0.01 * (1.0 + gap / 2)
+        u, phi = np.array([[0.05 - half, 0.05 + half]]), np.array([[0.7, 0.7]])
+        best = model.contacts(u, phi, 0.01, g, order=96).matrix()
+        got = model.contacts(u, phi, 0.01, g).matrix()
+        assert np.abs(got / best - 1.0).max() < 1e-10
+        assert np.abs(model.contacts(u, phi, 0.01, g, order=12).matrix() / best - 1.0).max() < 1e-6
