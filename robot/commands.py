@@ -129,7 +129,8 @@ class JointVelocity:
         away: speed that the touched point will have away from the obstacle [m/s]; the mean over several touches.
         progress: how far it has got so far [m]; the farthest over several touches.
         clipped_by: what kept it from moving as set: "joint speed", "arm speed", "distance" (it brakes for the end),
-            "singularity", "joint 3 limit"; of comply also "level" (pushed less than fully), "damping".
+            "singularity", "joint 3 limit"; of comply also "level" (pushed less than fully), "damping",
+            "place" (it is not known).
     """
 
     qd: Joints

@@ -3,7 +3,7 @@
     v_wanted = speed * min(1, (level - threshold) / (full_level - threshold))        along -n, of the touched point
     v       += (v_wanted - v) * (1 - exp(-dt / DAMPING))                             so that it neither jumps nor rings
 
-Point and normal are taken anew in each cycle, where the touch is then. Each cycle is one step of a retreat
+Point and normal are taken anew in each cycle, where the touch is then; where that is not known, the arm stands. Each cycle is one step of a retreat
 (``retreat.py``) from where the arm is, so its limits are the same. It ends with the touch, or when the distance or the
 time is used up. The arm stands when it begins, and is stopped and latched when it ends.
 """
@@ -86,12 +86,13 @@ def comply_step(
         return now, Done("the distance is made", progress)
     if not state.time - now.start_time < reaction.time_budget:
         return now, Done(f"the time of {reaction.time_budget} s is over", progress)
-    wanted = wanted_speed(reaction, contacts)
+    placed = all(contact.location_valid for contact in contacts)  # as a push ends, its place is lost before itself
+    wanted = wanted_speed(reaction, contacts) if placed else 0.0
     share = 1.0 - math.exp(-max(0.0, state.time - now.time) / DAMPING)
     speed = now.speed + share * (wanted - now.speed)
-    if speed < _LEAST:
+    if speed < _LEAST or not placed:
         still = replace(now, time=state.time, speed=speed, progress=progress, plan=None)
-        return still, JointVelocity(STILL, reaction.acceleration, 0.0, progress, ("level",))
+        return still, JointVelocity(STILL, reaction.acceleration, 0.0, progress, ("level" if placed else "place",))
     setting = replace(reaction, speed=speed, distance=reaction.distance - progress)
     plan = plan_retreat(now.model, state, contacts, setting, now.table)
     step = plan if isinstance(plan, Done) else retreat_step(plan, state)

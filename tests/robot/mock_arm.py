@@ -1,8 +1,12 @@
 """A mocked robot: six joints that obey the guard's commands after one cycle, or do not, on a clock of their own."""
 
+import re
+from collections import deque
 from dataclasses import dataclass, field
 
 from coneskin.robot.owner_messages import Clear, Halt, Speed, Stop
+from coneskin.robot.retreat_program import RetreatProgram
+from coneskin.robot.slowing import Slider
 from coneskin.robot.state_reader import RECIPE
 from coneskin.robot.stop_watch import Way
 
@@ -11,7 +15,7 @@ CYCLE = 0.002
 
 @dataclass
 class MockArm:
-    """Joints at q [rad] that move at qd [rad/s]; ``obeys`` are the ways to stop that work."""
+    """Joints at q [rad] that move at qd [rad/s]; ``obeys`` are the ways to stop that work, ``heeds`` the slider."""
 
     q: list[float]
     qd: list[float]
@@ -22,11 +26,18 @@ class MockArm:
     target: list[float] | None = None
     acceleration: float = 0.0
     commands: list[object] = field(default_factory=list)
+    heeds: bool = True
+    slider: float = 1.0
+    program: deque[tuple[list[float], float, int]] = field(default_factory=deque)
 
     def take(self, command: object) -> None:
         """Obey a command of the guard, if this arm does."""
         self.commands.append(command)
-        if isinstance(command, Way):
+        if isinstance(command, Slider):
+            self.slider = command.fraction
+        elif isinstance(command, RetreatProgram):
+            self.program = deque(_lines(command.text))
+        elif isinstance(command, Way):
             if command in self.obeys:
                 self._go([0.0] * 6, 10.0)
                 if command is Way.PROTECTIVE:
@@ -38,15 +49,35 @@ class MockArm:
         elif isinstance(command, Speed):
             self._go(list(command.qd), command.acceleration)
 
+    def go(self, target: list[float], acceleration: float) -> None:
+        """Let the joints go to these speeds."""
+        self._go(target, acceleration)
+
     def _go(self, target: list[float], acceleration: float) -> None:
         self.target, self.acceleration = target, acceleration
+        self.program.clear()
 
     def step(self) -> bytes:
         """One control cycle; the payload of its RTDE packet."""
         self.clock += CYCLE
+        if self.program:
+            target, acceleration, left = self.program.popleft()
+            self.target, self.acceleration = target, acceleration
+            if left > 1:
+                self.program.appendleft((target, acceleration, left - 1))
         if self.target is not None:
-            gap = max(abs(t - v) for t, v in zip(self.target, self.qd, strict=True))
+            target = [self.slider * t if self.heeds else t for t in self.target]
+            gap = max(abs(t - v) for t, v in zip(target, self.qd, strict=True))
             share = min(1.0, self.acceleration * CYCLE / gap) if gap else 1.0
-            self.qd = [v + share * (t - v) for t, v in zip(self.target, self.qd, strict=True)]
+            self.qd = [v + share * (t - v) for t, v in zip(target, self.qd, strict=True)]
         self.q = [x + v * CYCLE for x, v in zip(self.q, self.qd, strict=True)]
         return RECIPE.pack((self.clock, tuple(self.q), tuple(self.qd), self.robot_mode, self.safety_bits, 2))
+
+
+def _lines(text: str) -> list[tuple[list[float], float, int]]:
+    """Speeds, acceleration and control cycles of each line of a retreat's program."""
+    lines = []
+    for speeds, acceleration, seconds in re.findall(r"speedj\(\[(.*)\], ([\d.]+), ([\d.]+)\)", text):
+        lines.append(([float(v) for v in speeds.split(",")], float(acceleration), round(float(seconds) / CYCLE)))
+    stop = re.findall(r"stopj\(([\d.]+)\)", text)
+    return [*lines, *(([0.0] * 6, float(value), 10_000) for value in stop)]

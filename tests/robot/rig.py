@@ -7,14 +7,18 @@ from coneskin.errors import SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm_reaction import ArmReaction, Phase
+from coneskin.robot.arm_reaction import ArmReaction
 from coneskin.robot.commands import Reaction
 from coneskin.robot.guard_core import GuardCore, GuardedSensor
 from coneskin.robot.journal import GuardEvent, Kind
 from coneskin.robot.kinematics import link_pose
 from coneskin.robot.link_frames import LINK_INDEX, dh_mesh
 from coneskin.robot.owner_messages import Note
+from coneskin.robot.phase import Phase
+from coneskin.robot.rtde_codec import Recipe
+from coneskin.robot.rules import Rule
 from coneskin.robot.stop_watch import Way
+from coneskin.robot.table import Table
 from coneskin.robot.ur_models import model
 from coneskin.robot.watch import Watch
 from coneskin.skin.detector import Detection
@@ -29,6 +33,7 @@ from .mock_arm import MockArm
 MODEL = model("UR5e")
 START_Q = [math.radians(q) for q in (-20.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
 LINK = LINK_INDEX["forearm"]
+SLIDER = Recipe(("target_speed_fraction",))
 CONE = PlacedFrustum(Frustum(0.0376, 0.0372, 0.26), dh_mesh(MODEL, "forearm") @ Pose(translation=(0.0, 0.0, 0.08)))
 
 
@@ -50,11 +55,14 @@ class Rig:
         obeys: frozenset[Way] = frozenset(Way),
         sensors: int = 1,
         speed: float = 0.0,
+        rules: tuple[Rule, ...] = (),
+        foreign: bool = False,
+        table: Table | None = None,
     ) -> None:
         names = ("one", "two")[:sensors]
         skins = [Sensor(CONE.frustum, number, name=name) for number, name in enumerate(names)]
         self.skin = VirtualSkin(skins, touches, faults=faults)
-        self.core = make_core(skins, reaction or Reaction())
+        self.core = make_core(skins, reaction or Reaction(), rules, foreign, table)
         self.arm = MockArm(list(START_Q), [0.0] * 6, obeys)
         self.speed = speed
         self.now = 100.0
@@ -94,6 +102,8 @@ class Rig:
             if not self.mute_skin and data:
                 self.feed(Kind.SKIN, data)
             if step % 2 == 0:
+                if step % 20 == 0 and self.core.needs_slider:
+                    self.feed(Kind.SLIDER, SLIDER.pack((self.arm.slider,)))
                 if self.core.phase is Phase.ARMED and self.arm.target is None:
                     self.arm._go([self.speed, 0, 0, 0, 0, 0], 4.0)
                 payload = self.arm.step()
@@ -120,12 +130,19 @@ class Rig:
         return link_pose(MODEL, self.arm.q, LINK).rotate(CONE.normal(phi))
 
 
-def make_core(sensors: list[Sensor], reaction: Reaction) -> GuardCore:
+def make_core(
+    sensors: list[Sensor],
+    reaction: Reaction,
+    rules: tuple[Rule, ...] = (),
+    foreign: bool = False,
+    table: Table | None = None,
+) -> GuardCore:
     """A core for sensors that all lie on the same place of the forearm."""
     watch = Watch()
     placed = [
-        GuardedSensor(s.name, "forearm", LINK, lambda u, phi: (CONE.point(u, phi), CONE.normal(phi))) for s in sensors
+        GuardedSensor(s.name, "forearm", LINK, lambda u, phi: (CONE.point(u, phi), CONE.normal(phi)), 0.1)
+        for s in sensors
     ]
-    return GuardCore(
-        Stream(sensors, Detection(stuck_frames=200)), placed, watch, ArmReaction(MODEL, reaction, watch, tuple(Way))
-    )
+    ways = tuple(way for way in Way if not (foreign and way is Way.OWNER))
+    arm = ArmReaction(MODEL, reaction, watch, ways, rules, table)
+    return GuardCore(Stream(sensors, Detection(stuck_frames=200)), placed, watch, arm)

@@ -1,0 +1,58 @@
+"""An arm that goes on slowly while it is touched."""
+
+from coneskin.robot.slowing import HOLD, SLOW_ENOUGH, Slowing
+
+
+def slowing(speed=1.0, before=1.0, fraction=0.2):
+    return Slowing(10.0, speed, before, fraction, 0.2, 1.0)
+
+
+def test_no_trouble_where_it_becomes_slower_in_time():
+    one = slowing()
+    one.sample(0.95)
+    assert one.trouble(10.19) == ""
+    one.sample(0.89)
+    assert one.trouble(10.5) == ""
+
+
+def test_trouble_at_the_budget_where_it_does_not():
+    one = slowing()
+    for speed in (1.0, 1.2, 1.1):  # it was still speeding up: a tenth of the top is what counts
+        one.sample(speed)
+    assert one.trouble(10.199) == ""
+    assert one.trouble(10.2) == "the arm did not become slower"
+    one.sample(1.07)
+    assert one.trouble(10.3) == ""
+
+
+def test_a_slow_arm_need_not_become_slower():
+    one = slowing(speed=SLOW_ENOUGH)
+    assert one.trouble(10.9) == ""
+
+
+def test_a_touch_may_last_so_long_and_no_longer():
+    one = slowing(speed=0.0)
+    one.touched(10.0, True)
+    assert one.trouble(10.99) == ""
+    assert one.trouble(11.0) == "the touch lasts too long"
+    one.touched(11.0, False)
+    assert one.trouble(11.0) == ""
+
+
+def test_it_is_over_a_while_after_the_last_touch():
+    one = slowing()
+    for now, touched, over in (
+        (10.1, True, False),
+        (10.2, False, False),
+        (10.2 + HOLD - 0.01, False, False),
+        (10.3 + HOLD, True, False),  # touched again in time
+        (10.4 + HOLD, False, False),
+        (10.4 + 2 * HOLD, False, True),
+    ):
+        one.touched(now, touched)
+        assert one.over(now) is over
+
+
+def test_the_slider_is_never_raised():
+    assert slowing(before=0.1).fraction == 0.1
+    assert slowing().fraction == 0.2
