@@ -9,25 +9,21 @@ channel. A child that dies is seen as the end of its channel, and ends in a stop
 
 from __future__ import annotations
 
-import json
 import select
 import subprocess
-import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from . import __version__
 from .arm_proxy import ArmProxy
 from .errors import Collision, ConeSkinError, RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
 from .robot.channel import Channel, pair, spawn
-from .robot.journal import GuardEvent, Kind, decode_event
+from .robot.journal import GuardEvent
 from .robot.owner_messages import decode_json, encode_json
+from .run_log import RunLog, new_recording
 from .scene import Scene, load
-from .skin.recording import Block, Recorder, decode_blocks
 
 __all__ = ["Session", "guard"]
 
@@ -64,7 +60,6 @@ class Session:
 
     Attributes:
         scene: what is there.
-        events: what has happened so far, in order.
         recording: the file that is recorded to, or None.
     """
 
@@ -79,20 +74,20 @@ class Session:
         if missing := [f"a guard needs a {name}" for name, part in there.items() if not part]:
             raise SceneError(missing, scene.name)
         self.scene = scene
-        self.events: list[GuardEvent] = []
         self.recording = recording
         self._on_event = on_event
         self._start_timeout = start_timeout
-        self._changed = threading.Condition()
+        self._log = RunLog(None, None)
         self._children: dict[str, subprocess.Popen[bytes]] = {}
         self._guard: Channel | None = None
         self._skin: Channel | None = None
         self._keeper: Channel | None = None
         self._arm: ArmProxy | None = None
-        self._recorder: Recorder | None = None
-        self._thread: threading.Thread | None = None
-        self._trouble: ConeSkinError | None = None
-        self._torn = b""
+
+    @property
+    def events(self) -> list[GuardEvent]:
+        """What has happened so far, in order."""
+        return self._log.events
 
     @property
     def arm(self) -> ArmProxy:
@@ -137,14 +132,9 @@ class Session:
                 child.kill()
                 child.wait()
         self._children.clear()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
+        self._log.close()
         if self._guard is not None:
             self._guard.close()
-        if self._recorder is not None:
-            recorder, self._recorder = self._recorder, None
-            recorder.close()
 
     def reset(self, timeout: float = 5.0) -> None:
         """Let the arm move again after a collision or a fault: call it because a person has looked.
@@ -184,15 +174,7 @@ class Session:
 
     def wait_for(self, names: tuple[str, ...], timeout: float, after: int = 0) -> GuardEvent | None:
         """The first event of one of these names from position ``after`` on; None after the timeout [s]."""
-        end = time.monotonic() + timeout
-        with self._changed:
-            while True:
-                for event in self.events[after:]:
-                    if event.name in names:
-                        return event
-                left = end - time.monotonic()
-                if left <= 0.0 or self._trouble is not None or not self._changed.wait(left):
-                    return None
+        return self._log.wait_for(names, timeout, after)
 
     def check(self, stopped: bool = False) -> None:
         """Raise what has happened: a collision, a fault, or the end of a process.
@@ -207,8 +189,8 @@ class Session:
         """
         since = max((i for i, event in enumerate(self.events) if event.name == "armed"), default=-1) + 1
         stop = self.wait_for(("stopping",), 1.0 if stopped else 0.0, after=since)
-        if self._trouble is not None:
-            raise self._trouble
+        if (trouble := self._trouble()) is not None:
+            raise trouble
         if stop is None:
             return
         self.wait_for(("latched",), _END, after=since)
@@ -227,7 +209,10 @@ class Session:
         scene = self.scene
         assert scene.source is not None
         start = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve())}
-        self._open_recording(start)
+        if self.recording is None and scene.recording is not None:
+            self.recording = new_recording(scene.recording.folder)
+        self._log = RunLog(self.recording, self._on_event)
+        self._log.open(start)
         port = scene.source.port
         if scene.source.kind == "virtual":
             self._skin = self._spawn("skin", "coneskin.skin_process", encode_json(start))
@@ -249,8 +234,7 @@ class Session:
         self._guard = Channel(ours)
         self._children["guard"] = spawn("coneskin.guard_process", *ends)
         self._guard.send(encode_json({**start, "port": port}))
-        self._thread = threading.Thread(target=self._listen, args=(self._guard,), name="coneskin recorder", daemon=True)
-        self._thread.start()
+        self._log.listen(self._guard)
 
     def _spawn(self, name: str, module: str, hello: bytes) -> Channel:
         ours, theirs = pair()
@@ -259,29 +243,12 @@ class Session:
         channel.send(hello)
         return channel
 
-    def _open_recording(self, start: dict[str, Any]) -> None:
-        if self.recording is None and self.scene.recording is not None:
-            stamp = time.strftime("%Y-%m-%dT%H-%M-%S")
-            folder = self.scene.recording.folder / stamp
-            number = 1
-            while folder.exists():
-                number += 1
-                folder = self.scene.recording.folder / f"{stamp}-{number}"
-            folder.mkdir(parents=True)
-            self.recording = folder / "run.rec"
-        if self.recording is None:
-            return
-        self._recorder = Recorder(self.recording).__enter__()
-        clocks = {"monotonic": time.monotonic(), "unix": time.time()}
-        header = {**start, "coneskin": __version__, "python": sys.version.split()[0], "clocks": clocks}
-        self._recorder.write(Block(Kind.HEADER, clocks["monotonic"], json.dumps(header).encode()))
-
     def _await_armed(self) -> None:
         event = self.wait_for(("armed", "died"), self._start_timeout)
         if event is not None and event.name == "armed":
             return
-        if self._trouble is not None:
-            raise self._trouble
+        if (trouble := self._trouble()) is not None:
+            raise trouble
         waiting = next((event for event in reversed(self.events) if event.name == "waiting"), None)
         faults = [str(event.details["what"]) for event in self.events if event.name in ("fault", "died")]
         reasons = _reasons(waiting) if waiting else []
@@ -301,42 +268,14 @@ class Session:
                     return answer[key]
         raise SkinConnectionError("the process of the virtual skin does not answer")
 
-    # ---- what it hears
-
-    def _listen(self, channel: Channel) -> None:
-        """Record and note what the guard tells, until its channel ends."""
-        while not channel.closed:
-            select.select([channel], [], [], 0.5)
-            data = b"".join(channel.receive())
-            if data:
-                self._hear(data)
-        with self._changed:
-            child = self._children.get("guard")
-            if self._trouble is None and child is not None and not any(e.name == "died" for e in self.events):
-                ended = any(e.name == "ending" for e in self.events[-20:])
-                if not ended:
-                    self._trouble = RobotConnectionError("the guard's process has ended; the owner stops the arm")
-            self._changed.notify_all()
-
-    def _hear(self, data: bytes) -> None:
-        blocks = [block for _, block in decode_blocks(data)]
-        events = [decode_event(block) for block in blocks if block.kind == Kind.EVENT]
-        if self._recorder is not None:
-            try:
-                self._recorder.write(*blocks)
-            except ConeSkinError as exc:
-                self._recorder = None
-                events.append(GuardEvent("message", blocks[-1].time, {"what": f"recording ended: {exc}"}))
-        if events:
-            with self._changed:
-                self.events += events
-                for event in events:
-                    if event.name == "died":
-                        self._trouble = _died(str(event.details["what"]), self.scene)
-                self._changed.notify_all()
-            if self._on_event is not None:
-                for event in events:
-                    self._on_event(event)
+    def _trouble(self) -> ConeSkinError | None:
+        """Why there is no guard any more, if there is none."""
+        for event in self.events:
+            if event.name == "died":
+                return _died(str(event.details["what"]), self.scene)
+        if self._log.ended and not any(event.name == "ending" for event in self.events[-20:]):
+            return RobotConnectionError("the guard's process has ended; what it leaves behind stops the arm")
+        return None
 
 
 def _keeping(scene: Scene) -> dict[str, Any]:
