@@ -3,9 +3,9 @@
     v_wanted = speed * min(1, (level - threshold) / (full_level - threshold))        along -n, of the touched point
     v       += (v_wanted - v) * (1 - exp(-dt / DAMPING))                             so that it neither jumps nor rings
 
-Point and normal are taken anew in each cycle, where the touch is then; where that is not known, the arm stands. Each cycle is one step of a retreat
-(``retreat.py``) from where the arm is, so its limits are the same. It ends with the touch, or when the distance or the
-time is used up. The arm stands when it begins, and is stopped and latched when it ends.
+Point and normal are taken anew in each cycle, where the touch is then; where that is not known, the arm stands. Each
+cycle is one step of a retreat (``retreat.py``) from where the arm is, so its limits are the same. It ends with the
+touch, or when the distance or the time is used up. The arm stands when it begins; it is stopped and latched at the end.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Reactions by rule, a foreign arm, fallbacks, lateness: the guard on a virtual skin and a mocked arm, in virtual time."""
+"""Reactions by rule, a foreign arm, fallbacks, lateness: on a virtual skin and a mocked arm, in virtual time."""
 
 import math
 
