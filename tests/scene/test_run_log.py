@@ -29,7 +29,7 @@ def test_what_is_told_is_recorded_and_waited_for(tmp_path, channel):
     ours, theirs = channel
     seen = []
     log = RunLog(tmp_path / "run.rec", seen.append)
-    log.open({"scene": "", "name": "x"})
+    log.open({"scene": "", "name": "x", "folder": "."})
     log.listen(ours)
     theirs.send(encode_block(Block(Kind.TICK, 0.5, b"")))
     tell(theirs, "armed")
@@ -54,7 +54,7 @@ def test_a_full_disk_ends_the_recording_and_says_so(tmp_path, channel):
     log = RunLog(tmp_path / "run.rec", None)
     log.open({})
     log._recorder._file.close()
-    log._recorder._file = open("/dev/full", "wb", buffering=0)
+    log._recorder._file = open("/dev/full", "wb", buffering=0)  # noqa: SIM115 - the log closes it
     log.listen(ours)
     tell(theirs, "armed")
     message = log.wait_for(("message",), 5.0)
