@@ -37,8 +37,8 @@ class Region:
     Attributes:
         u: slant distance of the centre from end 1 [m].
         phi: azimuth of the centre [rad].
-        radius: in equidistant directions from 0 [m], shape (n,); where cut, of the sector of equal area.
-        toward: exp(i direction), shape (n,); where cut, the sector's centroid in units of 2/3 radius.
+        radius: in equidistant directions from 0 [m], shape (n,); with corners, of the sector of equal area.
+        toward: exp(i direction), shape (n,); with corners, the sector's centroid in units of 2/3 radius.
         cut: an edge of the sheet cuts it.
     """
 
@@ -108,7 +108,7 @@ def clip(sheet: SectorSheet, u: float, phi: float, outline: Outline, directions:
     seen = np.unwrap(np.angle(rim))
     if not (np.diff(seen) > 0.0).all() or seen[-1] - seen[0] > 2.0 * math.pi:
         raise FieldError("a contact cut by an edge must be visible whole from its middle; split it in two")
-    if not cut:
+    if not cut and not _cornered(radius):
         ray = 2.0 * math.pi * np.arange(directions) / directions
         return Region(u, phi, np.asarray(outline(ray), dtype=np.float64), np.exp(1j * ray), False)
     # Sectors keep the area and the centroid of the piece that they stand for, so that corners need no cell of their
@@ -121,7 +121,13 @@ def clip(sheet: SectorSheet, u: float, phi: float, outline: Outline, directions:
     # The mean direction within a sector shortens the centroid of a circle too; a ring's own curvature is exact already.
     straight = np.sinc(1.0 / directions)
     radius = np.sqrt(square)
-    return Region(u1, phi1, radius, cube / (square * radius * straight), True)
+    return Region(u1, phi1, radius, cube / (square * radius * straight), cut)
+
+
+def _cornered(radius: Floats) -> bool:
+    """The outline has corners: its slope jumps between two of the fine directions."""
+    log = np.log(radius)
+    return bool(np.abs(np.roll(log, 1) - 2.0 * log + np.roll(log, -1)).max() > 0.3 * 2.0 * math.pi / _FINE)
 
 
 def _centroid(sheet: SectorSheet, u: float, phi: float, radius: Floats, angle: Floats) -> tuple[float, float]:
