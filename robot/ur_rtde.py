@@ -23,6 +23,7 @@ from coneskin.errors import MissingExtra, RobotConnectionError, RobotRefused
 __all__ = ["Mode", "UrArm"]
 
 
+_START = 2.0  # s for the control program to start; ur_rtde itself allows 5
 _REGISTER = 0.02  # s until a register that was written is surely read: ten control cycles
 
 
@@ -105,8 +106,18 @@ class UrArm:
             self.mode = Mode.IDLE
             self._control.kickWatchdog()
             time.sleep(_REGISTER)
-            if not (self._control.reuploadScript() and self._control.setWatchdog(self._watchdog_hz)):
+            running = self._control.reuploadScript() and self._await_program(_START)
+            if not (running and self._control.setWatchdog(self._watchdog_hz)):
                 raise RobotRefused(f"the controller {self.host} does not start ur_rtde's program again")
+
+    def _await_program(self, seconds: float) -> bool:
+        """Wait for the control program to run: uploading it only sends it."""
+        end = time.monotonic() + seconds
+        while not self._control.isProgramRunning():
+            if time.monotonic() > end:
+                return False
+            time.sleep(0.005)
+        return True
 
     def move_j(self, q: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a move in joint space to q [rad], with the leading joint's speed [rad/s] and acceleration [rad/s2].
