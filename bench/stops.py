@@ -1,0 +1,148 @@
+"""Do stops show before the next way to stop is taken? Real processes, real wheel, simulated controller.
+
+    python bench/stops.py [--stops 30]
+
+In turns: a guarded arm moved by ur_rtde (asynchronous moveJ), and one moved by a program that knows nothing of the
+guard (raw URScript); on an idle machine, and with a busy process on each core. With the default limits. A touch stops
+the arm; a reset lets it go on. From the guard's own record: command -> first measured slowdown, command -> standing;
+escalations (a next way was taken although the first one worked), and stops for another reason than the touch.
+
+What it does not show: a real controller, whose start of a program and braking are not known here.
+"""
+
+import argparse
+import math
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import threading
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from platform import machine, platform, python_version
+
+from coneskin.errors import ConeSkinError
+from coneskin.robot.sim_process import SimulatedController, free_host
+from coneskin.scene_reader import parse_scene
+from coneskin.session import Session, guard
+
+START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
+GOAL = [math.radians(150.0), *START[1:]]
+RAW = f"def users():\n  while True:\n    movej({GOAL}, a=8, v=1)\n    movej({START}, a=8, v=1)\n  end\nend\n"
+SCENE = """\
+[arm]
+model = "UR5e"
+host = "{host}"
+control = "{control}"
+[[link]]
+name = "forearm"
+[[link.sensor]]
+radius1_mm = 37.6
+radius2_mm = 37.2
+height_mm = 260
+xyz_mm = [0, 0, 80]
+[source]
+kind = "virtual"
+[reaction]
+kind = "stop"
+"""
+
+
+def main() -> None:
+    """Run the turns and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--stops", type=int, default=30)
+    args = parser.parse_args()
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True
+    )
+    print(f"{platform()} {machine()}, {os.cpu_count()} cores, Python {python_version()}")
+    print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC, load {os.getloadavg()[0]:.1f}\n")
+    print(f"{'ms':34}{'stops':>6}{'slower med':>12}{'worst':>8}{'standing med':>14}{'worst':>8}", end="")
+    print(f"{'escalated':>11}{'other':>7}")
+    for busy in (False, True):
+        for control in ("owner", "foreign"):
+            load = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(busy * os.cpu_count())]  # type: ignore[operator]
+            try:
+                row(f"{control}, {'busy' if busy else 'idle'} machine", *measure(control, args.stops))
+            finally:
+                for child in load:
+                    child.kill()
+                    child.wait()
+
+
+def row(name: str, slower: list[float], standing: list[float], escalated: int, other: list[str]) -> None:
+    """One line of the table."""
+    values = [f(x) * 1e3 if x else math.nan for x in (slower, standing) for f in (statistics.median, max)]
+    print(f"{name:34}{len(standing):6}{values[0]:12.1f}{values[1]:8.1f}{values[2]:14.1f}{values[3]:8.1f}", end="")
+    print(f"{escalated:11}{len(other):7}", flush=True)
+    for why in sorted(set(other)):
+        print(f"    {other.count(why)} x {why}")
+
+
+def measure(control: str, stops: int) -> tuple[list[float], list[float], int, list[str]]:
+    """Touch a moving arm so often."""
+    slower: list[float] = []
+    standing: list[float] = []
+    escalated, other = 0, []
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+        scene = parse_scene(SCENE.format(host=simulated.host, control=control))
+        with guard(scene) as session:
+            for _ in range(stops):
+                seen = len(session.events)
+                mover = start(session, control, simulated.host)
+                while max(map(abs, simulated.state()["qd"])) < 0.9:
+                    time.sleep(0.01)
+                    if session.wait_for(("stopping",), 0.0, after=seen):
+                        break
+                session.touch(0.13, 1.55, duration=0.1)
+                if session.wait_for(("latched",), 10.0, after=seen) is None:
+                    raise SystemExit("the arm did not stand within 10 s")
+                mover.join()
+                events = {event.name: event for event in reversed(session.events[seen:])}
+                if events["stopping"].details["why"] != "touch":
+                    other.append(events["stopping"].details["why"])
+                else:
+                    begin = events["stopping"].time
+                    slower.append(events["slower"].time - begin)
+                    standing.append(events["standstill"].time - begin)
+                escalated += sum(event.name == "escalated" for event in session.events[seen:])
+                again(session)
+    return slower, standing, escalated, other
+
+
+def start(session: Session, control: str, host: str) -> threading.Thread:
+    """Let something move the arm."""
+
+    def owned() -> None:
+        try:
+            session.arm.move_j(GOAL, 1.0, 8.0)
+            session.arm.move_j(START, 1.0, 8.0)
+        except ConeSkinError:
+            pass  # the touch
+
+    def foreign() -> None:
+        with socket.create_connection((host, 30002), 5.0) as sock:
+            sock.sendall(RAW.encode())
+            time.sleep(0.1)
+
+    thread = threading.Thread(target=owned if control == "owner" else foreign)
+    thread.start()
+    return thread
+
+
+def again(session: Session) -> None:
+    """Reset as soon as the skin is free."""
+    for _ in range(100):
+        try:
+            session.reset()
+            return
+        except ConeSkinError:
+            time.sleep(0.05)
+    raise SystemExit("the guard does not reset")
+
+
+if __name__ == "__main__":
+    main()
