@@ -118,13 +118,11 @@ def write_frames(rate_hz: float, master: int, states: int, stamps: int) -> None:
     ]
     skin = VirtualSkin(SENSOR, touches, rate_hz=rate_hz, duration=60 * CYCLE / rate_hz)
     frames = [(due, encode(frame), frame.sequence) for due, frame in skin.frames()]
-    state = (0.0, (0.0, -1.5, 1.5, -1.5, -1.5, 0.0), (0.0,) * 6, 7, 1, 2)
-    payload = RECIPE.pack(state)
     with mmap.mmap(stamps, 0) as memory, memoryview(memory) as raw, raw.cast("d") as times:
-        _write(frames, payload, times, master, states)
+        _write(frames, times, master, states)
 
 
-def _write(frames: list[Any], payload: bytes, times: memoryview, master: int, states: int) -> None:
+def _write(frames: list[Any], times: memoryview, master: int, states: int) -> None:
     start = CLOCK() + 0.1
     try:
         for number, (due, data, sequence) in enumerate(frames):
@@ -132,7 +130,7 @@ def _write(frames: list[Any], payload: bytes, times: memoryview, master: int, st
             times[sequence] = CLOCK()
             os.write(master, data)
             if number % 2 == 0:
-                os.write(states, payload)
+                os.write(states, RECIPE.pack((due, (0.0, -1.5, 1.5, -1.5, -1.5, 0.0), (0.0,) * 6, 7, 1, 2)))
     except OSError:
         return
 

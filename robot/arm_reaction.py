@@ -77,6 +77,7 @@ class ArmReaction:
         self.slider: float | None = None
         self._model = model
         self._rules = Rules(reaction, rules)
+        self._plain = not rules and reaction.kind in ("stop", "retreat")
         if Way.OWNER not in ways and "comply" in self._rules.kinds:
             raise RobotRefused("comply needs the owner of ur_rtde: a program of its own cannot follow a push")
         self._watch = watch
@@ -94,6 +95,7 @@ class ArmReaction:
         self._levels: dict[int, float] = {}  # link -> firmest since the touch began
         self._contacts: Sequence[ContactOnLink] = ()  # now
         self._placed: Sequence[ContactOnLink] = ()  # as last seen while the arm stopped
+        self._fresh = -math.inf  # host time of the newest state that was a new one
         self._may_move, self._again, self._why = False, 0, ""
 
     @property
@@ -117,9 +119,11 @@ class ArmReaction:
         """A touch of a link has begun, or has changed, at a host time [s] and with a level."""
         phase = self.phase
         if phase is Phase.ARMED:
-            state = self.state
-            self._touch_speed = math.inf if state is None else state.speed
-            self._levels = {link: level}
+            if self._plain:  # nothing to choose: the stop is out before anything is looked at
+                self._stop_now(now, "touch", True, out)
+            self._touch_speed, self._levels = math.inf if self.state is None else self.state.speed, {link: level}
+            if self._plain:
+                return
             reaction = self._reaction = self._rules.choose(link, level, self._touch_speed)
             if reaction.kind == "slow" and self.slider is not None:
                 self._slow(now, reaction, self.slider, out)
@@ -156,13 +160,14 @@ class ArmReaction:
 
     def lose(self, ways: frozenset[Way], now: float, for_good: bool = True) -> None:
         """These ways to stop are gone, or this stop shall not count on them: take the next one at once."""
-        if for_good:
-            self._ways = tuple(way for way in self._ways if way not in ways)
+        self._ways = tuple(way for way in self._ways if way not in ways or not for_good)
         if self._stop is not None:
             self._stop.forget(ways, now)
 
     def sample(self, state: ControllerState, out: Outputs) -> None:
         """Take a measured state."""
+        if self.state is None or state.controller_time != self.state.controller_time:
+            self._fresh = state.time
         self.state = state
         measured_at = self._clock.measured_at(state.time, state.controller_time)
         self._trail.note(measured_at, state.q)
@@ -191,8 +196,8 @@ class ArmReaction:
                 tell(out, "resumed", now, slider=slowing.before)
 
     def silent(self, now: float) -> bool:
-        """Whether the controller's newest state is too old."""
-        return self.state is None or now - self.state.time > self._watch.arm_silence
+        """Whether the controller's newest state is too old; one that repeats itself is."""
+        return now - self._fresh > self._watch.arm_silence
 
     def unsound(self, now: float) -> list[str]:
         """Why the arm must not be armed, one line each."""
@@ -228,8 +233,7 @@ class ArmReaction:
         tell(out, "stopping", now, why=why)
 
     def _begin(self, now: float, phase: Phase, command: Stop | Halt, out: Outputs) -> None:
-        if self._ways:
-            first = self._ways[0]
+        for first in self._ways[:1]:
             out.append(command if first is Way.OWNER else first)
         state, watch = self.state, self._watch
         speed = None if state is None or self.silent(now) else state.speed

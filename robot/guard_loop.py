@@ -34,6 +34,7 @@ from .stop_watch import Way
 __all__ = ["GuardLoop", "GuardPorts"]
 
 _ALIVE = Alive().encode()
+_OURS = (Way, RetreatProgram, Slider)
 _TICK = 0.002  # s between two looks at the clocks where nothing else happens
 _OVERRUN = 0.02  # s between two rounds from which on the loop says that it was held up
 _ENDING = 3.0  # s that the arm has to stand when the guard is told to end
@@ -79,19 +80,26 @@ class _Outbox:
         ports = self._ports
         if isinstance(output, GuardEvent):
             self.events.append(output)
-        elif isinstance(output, Way):
-            taken = ports.foreign is not None and ports.foreign.use(output, ports.deceleration)
-            self.sent.append(f"{output.value}\n{'sent' if taken else 'not sent'}".encode())
-        elif isinstance(output, RetreatProgram):
-            taken = ports.foreign is not None and ports.foreign.run(output.text)
-            self.sent.append(f"script{'' if taken else ', not sent'}\n{output.text}".encode())
-        elif isinstance(output, Slider):
-            taken = ports.slider is not None and ports.slider.set(output.fraction)
-            self.sent.append(f"slider{'' if taken else ', not sent'}\n{output.fraction}".encode())
+        elif isinstance(output, _OURS):
+            self._append_ours(ports, output)
         else:
             message = output.encode()
             taken = ports.owner is not None and ports.owner.send(message)
             self.sent.append((b"owner\n" if taken else b"owner, not sent\n") + message)
+
+    def _append_ours(self, ports: GuardPorts, output: Way | RetreatProgram | Slider) -> None:
+        """What goes through connections of the guard's own."""
+        if isinstance(output, Way):
+            name = output.value
+            taken = ports.foreign is not None and ports.foreign.use(output, ports.deceleration)
+            text = "sent" if taken else "not sent"
+        elif isinstance(output, RetreatProgram):
+            taken = ports.foreign is not None and ports.foreign.run(output.text)
+            name, text = ("script" if taken else "script, not sent"), output.text
+        else:
+            taken = ports.slider is not None and ports.slider.set(output.fraction)
+            name, text = ("slider" if taken else "slider, not sent"), str(output.fraction)
+        self.sent.append(f"{name}\n{text}".encode())
 
 
 class GuardLoop:

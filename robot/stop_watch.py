@@ -7,6 +7,7 @@ Only where no sample arrives at all does the host's clock count.
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 
 __all__ = ["STEADY", "StopWatch", "Way"]
@@ -58,6 +59,7 @@ class StopWatch:
         self._standstill = standstill
         self._silence = silence
         self._began = self._newest = self._arrived = now
+        self._last = -math.inf
         self._next = now + patience
         self._deadline = now + budget
         self._steady = 0
@@ -76,9 +78,9 @@ class StopWatch:
         """
         self._arrived = time
         measured_at = time if measured_at is None else measured_at
-        if measured_at < self._began:
+        if measured_at < self._began or measured_at <= self._last:  # a state that repeats itself is no new one
             return
-        self._newest = measured_at
+        self._newest = self._last = measured_at
         if self._top is None or (speed > self._top and self.slowed_at is None):
             self._top = speed  # it may still have been speeding up when the stop was commanded
         slower = self._top - speed >= min(_SLOWER, 0.1 * self._top)
@@ -105,7 +107,8 @@ class StopWatch:
         """The ways to take now [s]; each is named once."""
         if self.standing_at is not None:
             return []
-        seen = now if now - self._arrived > self._silence else self._newest
+        silent = now - self._arrived > self._silence
+        seen = now if silent else max(self._newest, now - self._silence)  # a controller's clock may stand still
         take: list[Way] = []
         if seen >= self._deadline:
             take, self._left = self._left, []

@@ -316,6 +316,17 @@ def test_a_stop_that_does_not_work_is_seen_in_late_states_too():
     assert rig.arm.commands[-1] is Way.SCRIPT
 
 
+def test_a_controller_that_repeats_itself_is_silent():
+    rig = Rig(speed=1.0).run(0.5)
+    state = rig.arm.step()
+    rig.mute_arm = True
+    for _ in range(200):
+        rig.run(0.002)
+        rig.feed(Kind.ARM, state)
+    assert "has sent no state for 50 ms" in rig.event("stopping").details["why"]
+    assert Way.PROTECTIVE in rig.arm.commands
+
+
 def test_the_wall_clock_is_no_part_of_it(monkeypatch):
     """Nothing in the guard asks for the time of day: a clock that jumps by a year changes nothing."""
     import time

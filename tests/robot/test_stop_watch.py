@@ -65,6 +65,45 @@ def test_a_passing_zero_is_no_standstill():
     assert stop.standing_at is None
 
 
+def test_samples_from_before_the_stop_say_nothing_and_late_ones_are_not_counted_as_slow():
+    stop = StopWatch(1.0, 1.0, ALL, 0.025, 0.3, 0.01, 0.05)
+    now = 1.0005
+    for k in range(20):  # 20 states of the 40 ms before the stop, read just after it
+        stop.sample(now, 0.9, 0.96 + 0.002 * k)
+        assert stop.next_ways(now) == []
+    assert stop.slowed_at is None
+    now = 1.04  # held up again: what comes now was measured from 2 ms after the stop on
+    for k in range(20):
+        measured = 1.002 + 0.002 * k
+        stop.sample(now, 1.0 - 10.0 * max(0.0, measured - 1.006), measured)
+        assert stop.next_ways(now) == []
+    assert stop.slowed_at == now
+
+
+@pytest.mark.parametrize("stuck", [True, False])
+def test_neither_silence_nor_a_clock_that_stands_still_keeps_the_next_way_away(stuck):
+    stop = StopWatch(1.0, 1.0, ALL, 0.025, 0.3, 0.01, 0.05)
+    taken = {}
+    for k in range(1, 600):
+        now = 1.0 + 0.001 * k
+        if stuck:
+            stop.sample(now, 1.0, 1.001)
+        for way in stop.next_ways(now):
+            taken[way] = now - 1.0
+    assert list(taken) == list(ALL[1:])
+    assert taken[Way.SCRIPT] < 0.025 + 0.05 + 0.002
+    assert taken[Way.PROTECTIVE] <= 0.3 + 0.05 + 0.002
+
+
+def test_ways_that_are_gone_are_not_taken():
+    stop = watch()
+    stop.forget(frozenset({Way.SCRIPT, Way.PROTECTIVE}), 0.0)
+    assert [way for k in range(400) for way in stop.next_ways(0.001 * k)] == [Way.DASHBOARD]
+    stop = watch()
+    stop.forget(frozenset({Way.OWNER}), 0.001)
+    assert stop.next_ways(0.001) == [Way.SCRIPT]  # the one in use is gone: no patience
+
+
 def test_hurry_takes_the_next_way_at_once():
     stop = watch()
     stop.sample(0.002, 0.9)
