@@ -103,8 +103,6 @@ class ArmReaction:
         """Whether a reaction may use the controller's speed slider."""
         return "slow" in self._rules.kinds
 
-    # ---- what it is told
-
     def arm(self, out: Outputs) -> None:
         """Let the program move the arm, and react from now on."""
         self.phase, self._reaction = Phase.ARMED, self._rules.default

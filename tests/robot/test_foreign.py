@@ -3,6 +3,7 @@
 The simulated controller runs the programs; nothing of ours but the guard's own sockets and its reader touches it.
 """
 
+import json
 import math
 import os
 import signal
@@ -240,3 +241,25 @@ def test_the_arm_is_not_ours_to_move(controller):
         pytest.raises(RobotRefused, match="another program moves the arm"),
     ):
         session.arm.move_j(GOAL)
+
+
+def test_the_command_line_beside_a_program(controller, tmp_path):
+    """``coneskin guard`` as a user runs it; its exit code says that a collision ended it."""
+    touched = "[[source.touch]]\nstart_s = 6\nend_s = 6.3\nu_mm = 130\nphi_deg = 89\n[reaction]"
+    (tmp_path / "scene.toml").write_text(SCENE.format(host=controller.host).replace("[reaction]", touched))
+    command = [sys.executable, "-m", "coneskin", "guard", str(tmp_path / "scene.toml"), "--once", "--json"]
+    child = subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        lines = iter(child.stdout.readline, "")
+        assert any(json.loads(line)["name"] == "armed" for line in lines)
+        send(controller.host, 29999, "play\n")
+        until(lambda: fast(controller))
+        _, said = child.communicate(timeout=40)
+    finally:
+        child.kill()
+        child.wait()
+    assert child.returncode == 3, said
+    assert "was touched at u = 130." in said or "was touched at u = 129." in said
+    controller.wait_standing()
