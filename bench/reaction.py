@@ -358,7 +358,7 @@ def read_turn(mode: str, path: Path, touched: list[float], arrivals: list[float]
             continue
         frame = stop.time  # when the bytes were read that made it stop
         command = commands[bisect_left(commands, frame)]
-        row = follow(mode, "guard", command, samples, arrivals)
+        row = follow(mode, "guard", command, samples, arrivals, since=frame)
         row |= {"touch_frame": frame - begin, "frame_command": command - frame}
         row["frame_slower"] = row["command_slower"] + command - frame
         row["called"] = stop.details["why"]
@@ -387,7 +387,7 @@ def floor_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, Any]
             simulated.wait_standing()
             time.sleep(0.1)
         arrivals = came(mode, simulated)
-        return [follow(mode, "floor", call, samples, arrivals) for call in called]
+        return [follow(mode, "floor", call, samples, arrivals, since=call) for call in called]
 
 
 def read_states(reader: StateReader, samples: list[tuple[float, float]], over: threading.Event) -> None:
@@ -399,9 +399,12 @@ def read_states(reader: StateReader, samples: list[tuple[float, float]], over: t
 
 
 def follow(
-    mode: str, who: str, command: float, samples: list[tuple[float, float]], arrivals: list[float]
+    mode: str, who: str, command: float, samples: list[tuple[float, float]], arrivals: list[float], since: float
 ) -> dict[str, Any]:
-    """How a stop went on after it was sent [s], by the guard's own rule for slower and standing."""
+    """How a stop went on after it was sent [s], by the guard's own rule for slower and standing.
+
+    The first arrival since then counts: a stop may be there before its send has returned.
+    """
     at = bisect_left(samples, (command, 0.0))
     speed = samples[at - 1][1]
     watch = StopWatch(command, speed, (Way.OWNER,), 9.0, 9.0, 0.01)
@@ -411,7 +414,7 @@ def follow(
             break
     if watch.slowed_at is None or watch.standing_at is None:
         raise RuntimeError(f"{mode}: the arm did not stand after a stop of the {who}")
-    arrival = bisect_left(arrivals, command - 1e-4)  # a script may be there before its send returns
+    arrival = bisect_left(arrivals, since)
     return {
         "mode": mode,
         "who": who,
@@ -482,7 +485,8 @@ def main() -> int:
         run_mover(args.mover)
         return 0
     if args.floor:
-        run_floor(*args.floor[:2], json.loads(args.floor[2]))
+        host, mode, tool = args.floor
+        run_floor(host, mode, json.loads(tool))
         return 0
     modes = args.modes.split(",")
     if unknown := set(modes) - set(MODES):
