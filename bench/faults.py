@@ -1,0 +1,223 @@
+"""The fault campaign: everything that can go wrong, at random times, and whether the arm then stands within its budget.
+
+    python bench/faults.py [--times 100] [--kinds guard,skin] [--control owner] [--parallel 1] [--json]
+
+A simulated arm moves under guard, by its own program (control = "owner") or by a raw one (control = "foreign"). At a
+random time something fails, or two things at once (bench/faults_kinds.py). The budget is the time in which the fault
+must be noticed, v / a and four times the patience (docs/safety.md), and --slack for a machine that is busy with other
+things. Time runs until the log of the simulated controller says that the arm stands. A trial fails where the arm
+
+    stands too late, goes on to its goal, moves again, or retreats without a touch,
+    reacts before there is a fault,
+
+or where the program is not told, or a frame before the fault is missing in the recording, or its replay differs. The
+exit code is 0 only if none has failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from faults_kinds import KINDS, FaultKind
+from faults_trial import CLOCK, GOAL, STOP, Outcome, Trial, judge_recording
+
+from coneskin.errors import ConeSkinError
+from coneskin.replay import read_run
+
+PATIENCE = 3.0  # s beyond the budget in which we look how late it was
+SAME = 1e-4  # rad: the arm has not moved
+
+
+def budget_of(kind: FaultKind, slack: float) -> float:
+    return kind.notice + STOP + slack
+
+
+def run_trial(kind: FaultKind, control: str, seed: str, slack: float) -> Outcome:
+    """One trial; what it showed."""
+    outcome = Outcome()
+    try:
+        with Trial(control, seed) as trial:
+            if kind.before:
+                _refused(kind, trial, outcome)
+            else:
+                _stopped(kind, trial, outcome, budget_of(kind, slack))
+    except (ConeSkinError, RuntimeError, OSError, KeyError) as exc:
+        outcome.failures.append(f"the trial could not be made: {type(exc).__name__}: {exc}")
+    return outcome
+
+
+def _refused(kind: FaultKind, trial: Trial, outcome: Outcome) -> None:
+    kind.inject(trial)
+    answer = trial.start_program(1.5)
+    outcome.why = str(answer.get("why", "")).strip().splitlines()[-1:][0] if answer.get("why") else ""
+    if "refused" not in answer:
+        outcome.failures.append(f"the guard has armed, or said nothing: {answer} {trial.program.errors}")
+    if kind.arm and trial.moves():
+        outcome.failures.append("the arm moves")
+
+
+def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> None:
+    armed = trial.start_program(10.0)
+    if "armed" not in armed:
+        raise RuntimeError(f"the guard did not arm: {armed}")
+    trial.run_up()
+    fault_at = began = kind.inject(trial)
+    if kind.tolerated:
+        time.sleep(0.3)
+        if trial.moves():
+            began = trial.touch()
+    if kind.arm:
+        _see_it_stand(kind, trial, outcome, began, budget)
+    told = trial.program.hear(9.0) if kind.answers else {}
+    if kind.answers and "told" not in told:
+        outcome.failures.append(f"the program was not told: {told or 'it heard nothing'}")
+    outcome.why = str(told.get("why", ""))
+    if not kind.arm:
+        outcome.seconds = told.get("at", began + 9.0) - began
+    if outcome.seconds is not None and outcome.seconds > budget:
+        outcome.failures.append(f"it took {outcome.seconds:.3f} s, and may take {budget:.3f} s")
+    trial.thaw_all()
+    if not trial.program.close(15.0) and kind.answers:
+        outcome.failures.append("the program did not end within 15 s")
+    until = min(fault_at, began)
+    touched = kind.touched or kind.tolerated
+    outcome.failures += judge_recording(trial.recording, until, armed["armed"], touched)
+    if not outcome.why:
+        with suppress(ConeSkinError):
+            stops = [e for e in read_run(trial.recording).events if e.name == "stopping"]
+            outcome.why = str(stops[0].details["why"]) if stops else ""
+
+
+def _see_it_stand(kind: FaultKind, trial: Trial, outcome: Outcome, began: float, budget: float) -> None:
+    q = trial.await_standing(budget + PATIENCE)
+    stood = trial.stood_at(began)
+    if q is None or stood is None:
+        outcome.failures.append("the arm did not stand" if q is None else "the arm stood before the fault")
+        return
+    outcome.seconds = stood - began
+    if q[0] > GOAL[0] - 0.05:
+        outcome.failures.append("the arm went on to its goal")
+    if kind.touched or kind.tolerated:
+        time.sleep(0.8)  # it may retreat
+        trial.await_standing(3.0)
+        q = trial.simulated.state()["q"]
+    if kind.after is not None:
+        kind.after(trial)
+    time.sleep(0.3)
+    now = trial.simulated.state()["q"]
+    if moved := [i for i, (a, b) in enumerate(zip(q, now, strict=True), 1) if abs(a - b) > SAME]:
+        outcome.failures.append(f"joints {moved} moved again after the arm stood")
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
+
+
+def summary(kind: FaultKind, control: str, outcomes: list[Outcome], slack: float) -> dict[str, Any]:
+    """One line of the table [s]."""
+    times = [outcome.seconds for outcome in outcomes if outcome.seconds is not None]
+    failures = [line for outcome in outcomes for line in outcome.failures]
+    return {
+        "kind": kind.name,
+        "control": control,
+        "count": len(outcomes),
+        "median": round(quantile(times, 0.5), 4) if times else None,
+        "worst": round(max(times), 4) if times else None,
+        "budget": None if kind.before else round(budget_of(kind, slack), 3),
+        "failed": sum(bool(outcome.failures) for outcome in outcomes),
+        "failures": list(dict.fromkeys(failures)),
+        "said": next((outcome.why for outcome in outcomes if outcome.why), ""),
+    }
+
+
+def show(line: dict[str, Any]) -> None:
+    def cell(key: str) -> str:
+        return f"{line[key]:8.3f}" if line[key] is not None else f"{'-':>8}"
+
+    name = f"{line['kind']} [{line['control']}]"
+    print(f"{name:52}{line['count']:6}{cell('median')}{cell('worst')}{cell('budget')}{line['failed']:8}")
+    for failure in line["failures"][:5]:
+        print(f"    FAILED: {failure}")
+
+
+def chosen(args: argparse.Namespace) -> list[tuple[FaultKind, str]]:
+    words = args.kinds.split(",") if args.kinds else [""]
+    controls = (args.control,) if args.control else ("owner", "foreign")
+    return [
+        (kind, control)
+        for kind in KINDS
+        for control in controls
+        if control in kind.controls and any(word == kind.name or word in kind.name for word in words)
+    ]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--times", type=int, default=100, help="trials of each kind (%(default)s)")
+    parser.add_argument("--kinds", help="those with one of these words in their names, separated by commas")
+    parser.add_argument("--control", choices=("owner", "foreign"), help="(both)")
+    parser.add_argument("--parallel", type=int, default=1, help="trials at a time (%(default)s)")
+    parser.add_argument("--slack-ms", type=float, default=100.0, help="of the budget (%(default)g)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--list", action="store_true", help="name the kinds, and end")
+    parser.add_argument("--json", action="store_true", help="a line of JSON for each kind")
+    args = parser.parse_args()
+    pairs = chosen(args)
+    if args.list:
+        print("\n".join(f"{kind.name} [{control}]" for kind, control in pairs))
+        return 0
+    if not pairs:
+        parser.error("no kind has such a name; --list names them")
+    if not args.json:
+        _head(args)
+    slack, began, failed = 1e-3 * args.slack_ms, CLOCK(), 0
+    with ThreadPoolExecutor(args.parallel) as pool:
+        futures = [
+            (kind, control, [pool.submit(run_trial, kind, control, f"{args.seed}/{kind.name}/{control}/{n}", slack)
+                             for n in range(args.times)])
+            for kind, control in pairs
+        ]  # fmt: skip
+        try:
+            for kind, control, trials in futures:
+                line = summary(kind, control, [trial.result() for trial in trials], slack)
+                failed += line["failed"]
+                if args.json:
+                    print(json.dumps(line), flush=True)
+                else:
+                    show(line)
+                    sys.stdout.flush()
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)
+            print("interrupted: this is what was tried", file=sys.stderr)
+            return 130
+    if not args.json:
+        count = len(pairs) * args.times
+        print(f"\n{len(pairs)} kinds, {count} trials in {CLOCK() - began:.0f} s; {failed} failed")
+    return 1 if failed else 0
+
+
+def _head(args: argparse.Namespace) -> None:
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True
+    )
+    print(f"{platform.platform()}, {os.cpu_count()} cores, Python {platform.python_version()}")
+    print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC, load {os.getloadavg()[0]:.1f}")
+    print(f"{args.parallel} at a time; budgets with {args.slack_ms:g} ms for this machine\n")
+    print(f"{'s from the fault to standstill':52}{'count':>6}{'median':>8}{'worst':>8}{'budget':>8}{'failed':>8}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,244 @@
+"""What goes wrong in bench/faults.py: one entry for each kind of fault, with the time in which it must be noticed."""
+
+from __future__ import annotations
+
+import resource
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from faults_trial import ARM_SILENCE, CLOCK, ESCALATE, GOAL, SKIN_SILENCE, STUCK, Trial
+
+from coneskin.robot.owner_messages import SILENCE
+
+BOTH, OWNER, FOREIGN = ("owner", "foreign"), ("owner",), ("foreign",)
+FRAME = 0.001
+WATCHDOG = 0.25  # s: 1 / watchdog_hz
+FEW = 0.02  # s: a fault in the frames themselves shows within a few of them, and the loop has to run
+
+
+@dataclass(frozen=True)
+class FaultKind:
+    """A kind of fault.
+
+    Attributes:
+        name: for people, and for --kinds.
+        inject: does it; returns the time from which the arm has to stand within the budget.
+        notice: time within which the guard must notice [s].
+        controls: the control modes in which it makes sense.
+        touched: the skin is touched, so that the arm may retreat.
+        tolerated: the arm may go on; then it is touched, and the time counts from the touch.
+        recorder: what is recorded ends with the fault, because what records is gone.
+        answers: the program is there to be told.
+        before: it is wrong before the guard arms, so the guard has to refuse.
+        arm: there is an arm left whose standstill can be measured.
+        after: what happens once the arm stands; nothing of it may move the arm.
+    """
+
+    name: str
+    inject: Callable[[Trial], float]
+    notice: float = FEW
+    controls: tuple[str, ...] = BOTH
+    touched: bool = False
+    tolerated: bool = False
+    recorder: bool = True
+    answers: bool = True
+    before: bool = False
+    arm: bool = True
+    after: Callable[[Trial], object] | None = None
+
+
+def frozen_controller(t: Trial) -> float:
+    """The arm of a controller that is frozen is frozen too: time counts from when it goes on."""
+    import time
+
+    t.simulated.freeze()
+    time.sleep(2.0 * ARM_SILENCE)
+    t.simulated.thaw()
+    return CLOCK()
+
+
+def killed_controller(t: Trial) -> float:
+    at = CLOCK()
+    t.simulated.kill()
+    return at
+
+
+def another_program(t: Trial) -> float:
+    """Somebody starts a program that moves the arm on, in place of the one that runs; then the skin is touched."""
+    t.send_script(f"def other():\n  movej({GOAL}, a=4, v=1)\nend\n")
+    return t.touch()
+
+
+def full_disk(t: Trial) -> float:
+    """The file that the recorder writes cannot grow any more."""
+    at, size = CLOCK(), t.recording.stat().st_size + t.rng.randrange(5000)
+    resource.prlimit(t.program.pid, resource.RLIMIT_FSIZE, (size, size))
+    return at
+
+
+def together(*parts: Callable[[Trial], float]) -> Callable[[Trial], float]:
+    """One after the other, as quickly as possible; the time of the first counts."""
+
+    def inject(t: Trial) -> float:
+        return min([part(t) for part in parts])
+
+    return inject
+
+
+def then(*parts: Callable[[Trial], float]) -> Callable[[Trial], float]:
+    """One after the other; the time of the last counts."""
+
+    def inject(t: Trial) -> float:
+        return [part(t) for part in parts][-1]
+
+    return inject
+
+
+def breaks(**faults: int | str) -> Callable[[Trial], float]:
+    return lambda t: t.breaks(**faults)
+
+
+def wires(wiring: str) -> Callable[[Trial], float]:
+    return lambda t: t.breaks(wiring=wiring, wiring_after=0)
+
+
+def says(line: str) -> Callable[[Trial], float]:
+    return lambda t: t.controller(line)
+
+
+def kill(who: str) -> Callable[[Trial], float]:
+    return lambda t: t.signal(who, signal.SIGKILL)
+
+
+def halt(who: str) -> Callable[[Trial], float]:
+    return lambda t: t.signal(who, signal.SIGSTOP)
+
+
+def end(who: str) -> Callable[[Trial], float]:
+    return lambda t: t.signal(who, signal.SIGTERM)
+
+
+def unplug(t: Trial) -> float:
+    return t.skins(unplug=True)
+
+
+touch = Trial.touch
+
+KINDS = (
+    # nothing but a touch: the campaign's own floor
+    FaultKind("touch", touch, touched=True),
+    # the skin
+    FaultKind("skin silent", breaks(stall_after=0), SKIN_SILENCE),
+    FaultKind("skin silent for 0.3 s", breaks(stall_after=0, stall_frames=300), SKIN_SILENCE),
+    FaultKind("skin skips 50 frames", breaks(stall_after=0, stall_frames=50), 0.05 + FEW),
+    FaultKind("skin drops every third frame", breaks(drop_every=3)),
+    FaultKind("skin drops every 60th frame", breaks(drop_every=60), tolerated=True),
+    FaultKind("skin corrupt, every second frame", breaks(corrupt_every=2)),
+    FaultKind("skin corrupt, every frame", breaks(corrupt_every=1), SKIN_SILENCE),
+    FaultKind("skin sends garbage between frames", breaks(garbage_every=1)),
+    FaultKind("skin stuck", breaks(stuck_after=0), STUCK * FRAME + FEW),
+    FaultKind("skin stuck, supply alone", breaks(stuck_after=0, stuck_channel="supply"), STUCK * FRAME + FEW),
+    FaultKind("skin saturated", breaks(saturate_after=0)),
+    FaultKind("skin saturated, one guide", breaks(saturate_after=0, stuck_channel="radial_c")),
+    FaultKind("skin stuck at zero", breaks(saturate_after=0, saturate_count=0)),
+    FaultKind("skin replays what it sent", lambda t: t.skins(replay=300)),
+    FaultKind("skin out of order", breaks(swap_every=2)),
+    FaultKind("skin sends everything twice", breaks(duplicate_every=1)),
+    FaultKind("skin cut in a frame, once", breaks(cut_after=0), tolerated=True),
+    FaultKind("skin cut in a frame, then silent", breaks(cut_after=0, stall_after=1), SKIN_SILENCE),
+    FaultKind("skin later and later", lambda t: t.skins(slow=1.0), 2.0 * SKIN_SILENCE + FEW),
+    FaultKind("skin's process frozen", halt("skin"), SKIN_SILENCE, after=Trial.thaw_all),
+    FaultKind("skin unplugged", unplug),
+    FaultKind("skin unplugged and back", unplug, after=lambda t: t.skins(plug=True)),
+    FaultKind("skin restarts", breaks(restart_after=0)),
+    FaultKind("skin's clock jumps", breaks(clock_jump_after=0)),
+    FaultKind("skin reports a self-test fault", breaks(status_after=0)),
+    *[FaultKind(f"wire of {name} open", wires(f"open-{name}")) for name in "ABCD"],
+    *[FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}")) for a, b in (("A", "ground"), ("B", "ground"))],
+    *[FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}")) for a, b in (("C", "supply"), ("D", "supply"))],
+    *[FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}")) for a, b in (("A", "B"), ("C", "D"), ("A", "C"))],
+    # the controller
+    FaultKind("controller frozen for 0.5 s", frozen_controller),
+    FaultKind("controller killed", killed_controller, ARM_SILENCE, arm=False),
+    FaultKind("RTDE closed", says("close rtde")),
+    FaultKind("RTDE silent", says("rtde silent"), ARM_SILENCE, after=lambda t: t.controller("rtde normal")),
+    FaultKind("dashboard closed", says("close dashboard")),
+    FaultKind("dashboard silent, then a touch", then(says("dashboard silent"), touch), touched=True),
+    FaultKind("script ports closed", says("close scripts")),
+    FaultKind("protective stop", says("protective stop")),
+    FaultKind("emergency stop", says("emergency stop")),
+    FaultKind("another program started, then a touch", another_program, touched=True),
+    # the processes
+    FaultKind("guard killed", kill("guard")),
+    FaultKind("guard frozen", halt("guard"), SILENCE, after=Trial.thaw_all),
+    FaultKind("guard told to end", end("guard")),
+    FaultKind("owner killed", kill("owner"), controls=OWNER),
+    FaultKind("owner frozen", halt("owner"), WATCHDOG, controls=OWNER, after=Trial.thaw_all),
+    FaultKind(
+        "owner frozen, then a touch",
+        then(halt("owner"), touch),
+        ESCALATE,
+        controls=OWNER,
+        touched=True,
+        after=Trial.thaw_all,
+    ),
+    FaultKind("owner told to end", end("owner"), controls=OWNER),
+    FaultKind("keeper killed", kill("keeper"), controls=FOREIGN),
+    FaultKind("keeper told to end", end("keeper"), controls=FOREIGN),
+    FaultKind(
+        "keeper frozen, then a touch",
+        then(halt("keeper"), touch),
+        controls=FOREIGN,
+        touched=True,
+        after=Trial.thaw_all,
+    ),
+    FaultKind("program killed", kill("program"), recorder=False, answers=False),
+    FaultKind("program told to end", end("program"), recorder=False, answers=False),
+    FaultKind(
+        "program frozen, then a touch",
+        then(halt("program"), touch),
+        touched=True,
+        answers=False,
+        after=Trial.thaw_all,
+    ),
+    FaultKind("disk full, then a touch", then(full_disk, touch), touched=True, recorder=False),
+    # two at once
+    FaultKind("guard and owner killed", together(kill("guard"), kill("owner")), WATCHDOG, controls=OWNER),
+    FaultKind(
+        "guard frozen and owner killed",
+        together(halt("guard"), kill("owner")),
+        WATCHDOG,
+        controls=OWNER,
+        after=Trial.thaw_all,
+    ),
+    FaultKind(
+        "guard and owner frozen",
+        together(halt("guard"), halt("owner")),
+        WATCHDOG,
+        controls=OWNER,
+        after=Trial.thaw_all,
+    ),
+    FaultKind("skin unplugged and RTDE closed", together(unplug, says("close rtde"))),
+    FaultKind("skin silent and dashboard closed", together(breaks(stall_after=0), says("close dashboard"))),
+    FaultKind("a touch and guard killed", together(touch, kill("guard")), touched=True),
+    FaultKind("a touch and owner killed", together(touch, kill("owner")), controls=OWNER, touched=True),
+    FaultKind("a touch and RTDE closed", together(touch, says("close rtde")), touched=True),
+    FaultKind(
+        "owner frozen and script ports closed",
+        together(halt("owner"), says("close scripts")),
+        ESCALATE,
+        controls=OWNER,
+        after=Trial.thaw_all,
+    ),
+    FaultKind("script ports and dashboard closed", together(says("close scripts"), says("close dashboard"))),
+    FaultKind("skin unplugged and program killed", together(unplug, kill("program")), recorder=False, answers=False),
+    # before the guard arms
+    FaultKind("refused: skin silent", breaks(stall_after=0), before=True),
+    FaultKind("refused: skin broken wire", wires("open-A"), before=True),
+    FaultKind("refused: skin touched", lambda t: t.skins(touch={"u": 0.1, "phi": 1.0, "duration": 60.0}), before=True),
+    FaultKind("refused: protective stop", says("protective stop"), before=True),
+    FaultKind("refused: emergency stop", says("emergency stop"), before=True),
+    FaultKind("refused: RTDE silent", says("rtde silent"), before=True),
+    FaultKind("refused: controller killed", killed_controller, before=True, arm=False),
+)

@@ -1,0 +1,326 @@
+"""One trial of the fault campaign: a guarded arm moves, something goes wrong, and what the arm then does is judged.
+
+Arm, skin and the guarded program are processes of their own, so that each can be frozen and killed. What decides is not
+the guard's word but the log of the simulated controller, and its state.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import queue
+import random
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from coneskin.errors import ConeSkinError, RobotConnectionError
+from coneskin.replay import Run, read_run, replay
+from coneskin.robot.journal import Kind
+from coneskin.robot.sim_process import SimulatedController, free_host
+from coneskin.skin.wire import Decoder
+
+HERE = Path(__file__).parent
+START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
+GOAL = [math.radians(140.0), *START[1:]]
+SPEED, ACCELERATION, DECELERATION = 1.0, 4.0, 10.0
+SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
+STUCK = 200  # frames
+ESCALATE = 0.025  # s, the default
+#: v / a, and four times the patience: what docs/safety.md promises once the fault is known
+STOP = SPEED / DECELERATION + 4.0 * ESCALATE
+SCENE = """\
+[arm]
+model = "UR5e"
+host = "{host}"
+control = "{control}"
+[[link]]
+name = "forearm"
+[[link.sensor]]
+radius1_mm = 37.6
+radius2_mm = 37.2
+height_mm = 260
+xyz_mm = [0, 0, 80]
+[source]
+kind = "serial"
+port = "{port}"
+[reaction]
+kind = "retreat"
+distance_mm = 30
+[watch]
+skin_silence_ms = 250
+skin_late_ms = 250
+arm_silence_ms = 250
+stuck_frames = 200
+"""
+CLOCK = time.monotonic
+
+
+class Child:
+    """A process that is spoken to in lines of JSON."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._threads = [threading.Thread(target=self._read), threading.Thread(target=self._read_errors)]
+        self.errors = ""
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            if line.startswith("{"):  # the wheel prints lines of its own
+                self._lines.put(line)
+
+    def _read_errors(self) -> None:
+        assert self._process.stderr is not None
+        self.errors = self._process.stderr.read()
+
+    def say(self, **request: Any) -> None:
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(json.dumps(request) + "\n")
+            self._process.stdin.flush()
+
+    def hear(self, timeout: float) -> dict[str, Any]:
+        """The next answer; empty if there is none in time."""
+        with suppress(queue.Empty):
+            answer: dict[str, Any] = json.loads(self._lines.get(timeout=timeout))
+            return answer
+        return {}
+
+    def ask(self, **request: Any) -> dict[str, Any]:
+        self.say(**request)
+        return self.hear(5.0)
+
+    def close(self, patience: float = 0.0) -> bool:
+        """End it; whether it ended by itself within the patience [s]."""
+        assert self._process.stdin is not None
+        with suppress(OSError):
+            self._process.stdin.close()
+        try:
+            self._process.wait(patience)
+            ended = True
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            ended = False
+        for thread in self._threads:
+            thread.join()
+        for pipe in (self._process.stdout, self._process.stderr):
+            if pipe is not None:
+                pipe.close()
+        return ended
+
+
+@dataclass
+class Outcome:
+    """What a trial showed.
+
+    Attributes:
+        seconds: from the fault to the measured standstill; None where there was none to measure.
+        failures: what must not be, one line each.
+        why: what the guard said.
+    """
+
+    seconds: float | None = None
+    failures: list[str] = field(default_factory=list)
+    why: str = ""
+
+
+class Trial:
+    """The things that can go wrong, for the kinds of fault to reach; used in a ``with``.
+
+    Attributes:
+        control: "owner" or "foreign".
+        simulated: the controller.
+        skin: the skin's process.
+        program: the guarded program's process.
+        pids: of the guard and of its helpers.
+        rng: of this trial.
+    """
+
+    _starting = threading.Lock()  # two trials must not choose the same address
+
+    def __init__(self, control: str, seed: str) -> None:
+        self.control = control
+        self.rng = random.Random(seed)
+        self.pids: dict[str, int] = {}
+        self._stack = ExitStack()
+        self._frozen: list[int] = []
+
+    def __enter__(self) -> Trial:
+        try:
+            stack = self._stack
+            self.folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            with self._starting:
+                self.host = free_host()
+                controller = SimulatedController("UR5e", self.host, START, log=self.folder / "log.jsonl")
+                self.simulated = stack.enter_context(controller)
+            port = self.folder / "port"
+            self.skin = Child(str(HERE / "faults_skin.py"), str(port), str(self.rng.randrange(1 << 30)))
+            stack.callback(self.skin.close)
+            if not self.skin.hear(10.0):
+                raise RuntimeError(f"the skin did not start: {self.skin.errors}")
+            (self.folder / "scene.toml").write_text(
+                SCENE.format(host=self.host, port=port, control=self.control), encoding="utf-8"
+            )
+        except BaseException:
+            self._stack.close()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for pid in self._frozen:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGCONT)
+        self._stack.close()
+
+    # ---- what the kinds of fault use; each returns when it happened
+
+    def breaks(self, **faults: Any) -> float:
+        """Faults of the skin from the next frame on."""
+        return float(self.skin.ask(faults=faults)["at"])
+
+    def touch(self) -> float:
+        """Touch the skin."""
+        return self.skins(touch={"u": 0.13, "phi": 1.55, "duration": 0.2})
+
+    def skins(self, **request: Any) -> float:
+        """Anything that bench/faults_skin.py can do."""
+        return float(self.skin.ask(**request)["at"])
+
+    def controller(self, line: str) -> float:
+        """A fault of the simulated controller."""
+        at = CLOCK()
+        self.simulated.call(line)
+        return at
+
+    def signal(self, who: str, number: signal.Signals) -> float:
+        """Send a signal to "guard", "owner", "keeper", "program" or "skin"."""
+        pid = {"program": self.program.pid, "skin": self.skin.pid, **self.pids}[who]
+        at = CLOCK()
+        os.kill(pid, number)
+        if number == signal.SIGSTOP:
+            self._frozen.append(pid)
+        return at
+
+    def send_script(self, text: str) -> float:
+        """Send a program to the controller, as any other client may."""
+        at = CLOCK()
+        with socket.create_connection((self.host, 30003), 5.0) as raw:
+            raw.sendall(text.encode())
+            end = CLOCK() + 0.1
+            while (left := end - CLOCK()) > 0.0 and select.select([raw], [], [], left)[0]:
+                raw.recv(1 << 16)
+        return at
+
+    # ---- the course of a trial
+
+    def start_program(self, timeout: float) -> dict[str, Any]:
+        """Start the guarded program; what it says once the guard has armed, or has refused to."""
+        arguments = [str(HERE / "faults_program.py"), str(self.folder / "scene.toml"), str(self.recording)]
+        self.program = Child(*arguments, repr(timeout), json.dumps(GOAL))
+        self._stack.callback(self.program.close)
+        answer = self.program.hear(timeout + 15.0)
+        self.pids = answer.get("pids", {})
+        return answer
+
+    @property
+    def recording(self) -> Path:
+        return self.folder / "run.rec"
+
+    def run_up(self) -> None:
+        """Let the arm move, and a random time pass."""
+        if self.control == "owner":
+            self.program.say(go=True)
+        else:
+            self.send_script(f"def bench_move():\n  movej({GOAL}, a={ACCELERATION}, v={SPEED})\nend\n")
+        end = CLOCK() + 10.0
+        while abs(self.simulated.state()["qd"][0]) < 0.95 * SPEED:
+            if CLOCK() > end:
+                raise RuntimeError(f"the arm does not move: {self.program.hear(0.0)}")
+            time.sleep(0.005)
+        time.sleep(0.8 * self.rng.random())
+
+    def moves(self) -> bool:
+        """Whether the arm moves now."""
+        return any(self.simulated.state()["qd"])
+
+    def await_standing(self, seconds: float) -> list[float] | None:
+        """Joint positions once the arm stands; None if it does not in time."""
+        with suppress(ConeSkinError):
+            found: list[float] = self.simulated.wait_standing(seconds)["q"]
+            return found
+        return None
+
+    def stood_at(self, since: float) -> float | None:
+        """When the arm came to its first standstill after a time, by the controller's own log."""
+        return next((e["monotonic"] for e in self.simulated.events("standstill") if e["monotonic"] >= since), None)
+
+    def thaw_all(self) -> None:
+        """Whoever was stopped goes on."""
+        for pid in self._frozen:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGCONT)
+        self._frozen.clear()
+        with suppress(RobotConnectionError, ProcessLookupError):
+            self.simulated.thaw()
+
+
+def judge_recording(path: Path, fault_at: float, armed_at: float, touched: bool) -> Iterator[str]:
+    """What the recording must not lack or hold."""
+    try:
+        run = read_run(path)
+    except ConeSkinError as exc:
+        yield f"the recording cannot be read: {exc}"
+        return
+    names = [(event.name, event.time) for event in run.events]
+    if not touched and any(name == "retreating" for name, _ in names):
+        yield "it retreated without a touch"
+    early = [event for event in run.events if event.name in ("stopping", "slowing") and event.time < fault_at]
+    if early:
+        yield f"it reacted {fault_at - early[0].time:.3f} s before the fault: {early[0].details}"
+    last = max((block.time for block in run.blocks), default=0.0)
+    if last < fault_at - 0.06:
+        yield f"the recording ends {fault_at - last:.3f} s before the fault"
+    if missing := _missing_frames(run, armed_at, fault_at):
+        yield f"{missing} frames before the fault are not in the recording"
+    again = replay(run)
+    if not again.same:
+        yield f"its replay is another: {again.differences[:1]}"
+
+
+def _missing_frames(run: Run, since: float, until: float) -> int:
+    decoder = Decoder()
+    before: int | None = None
+    missing = 0
+    for block in run.blocks:
+        if block.kind == Kind.SKIN and since <= block.time < until - 0.01:
+            for frame in decoder.feed(block.payload):
+                if before is not None:
+                    missing += (frame.sequence - before - 1) & 0xFFFF
+                before = frame.sequence
+    return missing
