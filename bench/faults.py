@@ -10,8 +10,8 @@ things. Time runs until the log of the simulated controller says that the arm st
     stands too late, goes on to its goal, moves again, or retreats without a touch,
     reacts before there is a fault,
 
-or where the program is not told, or a frame before the fault is missing in the recording, or its replay differs. The
-exit code is 0 only if none has failed.
+or where the program is not told, or a frame before the fault is missing in the recording, or its replay differs. "Held
+up" is the longest time for which the machine did not let the guard's loop run. The exit code is 0 only if none failed.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from faults_trial import CLOCK, GOAL, STOP, Outcome, Trial, judge_recording
 
 from coneskin.errors import ConeSkinError
 from coneskin.replay import read_run
+from coneskin.robot.journal import Kind
 
 PATIENCE = 3.0  # s beyond the budget in which we look how late it was
 SAME = 1e-4  # rad: the arm has not moved
@@ -94,10 +95,12 @@ def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> 
     until = min(fault_at, began)
     touched = kind.touched or kind.tolerated
     outcome.failures += judge_recording(trial.recording, until, armed["armed"], touched)
-    if not outcome.why:
-        with suppress(ConeSkinError):
-            stops = [e for e in read_run(trial.recording).events if e.name == "stopping"]
-            outcome.why = str(stops[0].details["why"]) if stops else ""
+    with suppress(ConeSkinError):
+        run = read_run(trial.recording)
+        stops = [event for event in run.events if event.name == "stopping"]
+        outcome.why = outcome.why or (str(stops[0].details["why"]) if stops else "")
+        late = [json.loads(block.payload)["late"] for block in run.blocks if block.kind == Kind.OVERRUN]
+        outcome.held_up = max(late, default=0.0)
 
 
 def _see_it_stand(kind: FaultKind, trial: Trial, outcome: Outcome, began: float, budget: float) -> None:
@@ -137,6 +140,7 @@ def summary(kind: FaultKind, control: str, outcomes: list[Outcome], slack: float
         "median": round(quantile(times, 0.5), 4) if times else None,
         "worst": round(max(times), 4) if times else None,
         "budget": None if kind.before else round(budget_of(kind, slack), 3),
+        "held_up": round(max(outcome.held_up for outcome in outcomes), 4),
         "failed": sum(bool(outcome.failures) for outcome in outcomes),
         "failures": list(dict.fromkeys(failures)),
         "said": next((outcome.why for outcome in outcomes if outcome.why), ""),
@@ -148,7 +152,9 @@ def show(line: dict[str, Any]) -> None:
         return f"{line[key]:8.3f}" if line[key] is not None else f"{'-':>8}"
 
     name = f"{line['kind']} [{line['control']}]"
-    print(f"{name:52}{line['count']:6}{cell('median')}{cell('worst')}{cell('budget')}{line['failed']:8}")
+    print(
+        f"{name:52}{line['count']:6}{cell('median')}{cell('worst')}{cell('budget')}{cell('held_up')}{line['failed']:8}"
+    )
     for failure in line["failures"][:5]:
         print(f"    FAILED: {failure}")
 
@@ -156,6 +162,9 @@ def show(line: dict[str, Any]) -> None:
 def chosen(args: argparse.Namespace) -> list[tuple[FaultKind, str]]:
     words = args.kinds.split(",") if args.kinds else [""]
     controls = (args.control,) if args.control else ("owner", "foreign")
+    if args.quick:
+        kinds = [kind for kind in KINDS if not kind.variant]
+        return [(kind, kind.controls[number % len(kind.controls)]) for number, kind in enumerate(kinds)]
     return [
         (kind, control)
         for kind in KINDS
@@ -172,6 +181,7 @@ def main() -> int:
     parser.add_argument("--parallel", type=int, default=1, help="trials at a time (%(default)s)")
     parser.add_argument("--slack-ms", type=float, default=100.0, help="of the budget (%(default)g)")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--quick", action="store_true", help="each kind in one control mode, without close variants")
     parser.add_argument("--list", action="store_true", help="name the kinds, and end")
     parser.add_argument("--json", action="store_true", help="a line of JSON for each kind")
     args = parser.parse_args()
@@ -216,7 +226,8 @@ def _head(args: argparse.Namespace) -> None:
     print(f"{platform.platform()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC, load {os.getloadavg()[0]:.1f}")
     print(f"{args.parallel} at a time; budgets with {args.slack_ms:g} ms for this machine\n")
-    print(f"{'s from the fault to standstill':52}{'count':>6}{'median':>8}{'worst':>8}{'budget':>8}{'failed':>8}")
+    columns = "".join(f"{name:>8}" for name in ("median", "worst", "budget", "held up", "failed"))
+    print(f"{'s from the fault to standstill':52}{'count':>6}{columns}")
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ class FaultKind:
         before: it is wrong before the guard arms, so the guard has to refuse.
         arm: there is an arm left whose standstill can be measured.
         after: what happens once the arm stands; nothing of it may move the arm.
+        variant: close to another kind; a quick campaign leaves it out.
     """
 
     name: str
@@ -46,6 +47,7 @@ class FaultKind:
     before: bool = False
     arm: bool = True
     after: Callable[[Trial], object] | None = None
+    variant: bool = False
 
 
 def frozen_controller(t: Trial) -> float:
@@ -130,39 +132,52 @@ KINDS = (
     FaultKind("touch", touch, touched=True),
     # the skin
     FaultKind("skin silent", breaks(stall_after=0), SKIN_SILENCE),
-    FaultKind("skin silent for 0.3 s", breaks(stall_after=0, stall_frames=300), SKIN_SILENCE),
+    FaultKind("skin silent for 0.3 s", breaks(stall_after=0, stall_frames=300), SKIN_SILENCE, variant=True),
     FaultKind("skin skips 50 frames", breaks(stall_after=0, stall_frames=50), 0.05 + FEW),
     FaultKind("skin drops every third frame", breaks(drop_every=3)),
-    FaultKind("skin drops every 60th frame", breaks(drop_every=60), tolerated=True),
+    FaultKind("skin drops every 60th frame", breaks(drop_every=60), tolerated=True, variant=True),
     FaultKind("skin corrupt, every second frame", breaks(corrupt_every=2)),
-    FaultKind("skin corrupt, every frame", breaks(corrupt_every=1), SKIN_SILENCE),
+    FaultKind("skin corrupt, every frame", breaks(corrupt_every=1), SKIN_SILENCE, variant=True),
     FaultKind("skin sends garbage between frames", breaks(garbage_every=1)),
     FaultKind("skin stuck", breaks(stuck_after=0), STUCK * FRAME + FEW),
-    FaultKind("skin stuck, supply alone", breaks(stuck_after=0, stuck_channel="supply"), STUCK * FRAME + FEW),
+    FaultKind(
+        "skin stuck, supply alone", breaks(stuck_after=0, stuck_channel="supply"), STUCK * FRAME + FEW, variant=True
+    ),
     FaultKind("skin saturated", breaks(saturate_after=0)),
-    FaultKind("skin saturated, one guide", breaks(saturate_after=0, stuck_channel="radial_c")),
-    FaultKind("skin stuck at zero", breaks(saturate_after=0, saturate_count=0)),
+    FaultKind("skin saturated, one guide", breaks(saturate_after=0, stuck_channel="radial_c"), variant=True),
+    FaultKind("skin stuck at zero", breaks(saturate_after=0, saturate_count=0), variant=True),
     FaultKind("skin replays what it sent", lambda t: t.skins(replay=300)),
     FaultKind("skin out of order", breaks(swap_every=2)),
-    FaultKind("skin sends everything twice", breaks(duplicate_every=1)),
+    FaultKind("skin sends everything twice", breaks(duplicate_every=1), variant=True),
     FaultKind("skin cut in a frame, once", breaks(cut_after=0), tolerated=True),
-    FaultKind("skin cut in a frame, then silent", breaks(cut_after=0, stall_after=1), SKIN_SILENCE),
+    FaultKind("skin cut in a frame, then silent", breaks(cut_after=0, stall_after=1), SKIN_SILENCE, variant=True),
     FaultKind("skin later and later", lambda t: t.skins(slow=1.0), 2.0 * SKIN_SILENCE + FEW),
-    FaultKind("skin's process frozen", halt("skin"), SKIN_SILENCE, after=Trial.thaw_all),
-    FaultKind("skin unplugged", unplug),
+    FaultKind("skin's process frozen", halt("skin"), SKIN_SILENCE, after=Trial.thaw_all, variant=True),
+    FaultKind("skin unplugged", unplug, variant=True),
     FaultKind("skin unplugged and back", unplug, after=lambda t: t.skins(plug=True)),
     FaultKind("skin restarts", breaks(restart_after=0)),
     FaultKind("skin's clock jumps", breaks(clock_jump_after=0)),
-    FaultKind("skin reports a self-test fault", breaks(status_after=0)),
-    *[FaultKind(f"wire of {name} open", wires(f"open-{name}")) for name in "ABCD"],
-    *[FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}")) for a, b in (("A", "ground"), ("B", "ground"))],
-    *[FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}")) for a, b in (("C", "supply"), ("D", "supply"))],
-    *[FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}")) for a, b in (("A", "B"), ("C", "D"), ("A", "C"))],
+    FaultKind("skin reports a self-test fault", breaks(status_after=0), variant=True),
+    *[FaultKind(f"wire of {name} open", wires(f"open-{name}"), variant=name != "A") for name in "ABCD"],
+    *[
+        FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}"), variant=True)
+        for a, b in (("A", "ground"), ("B", "ground"))
+    ],
+    *[
+        FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}"), variant=a != "C")
+        for a, b in (("C", "supply"), ("D", "supply"))
+    ],
+    *[
+        FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}"), variant=a != "A")
+        for a, b in (("A", "B"), ("C", "D"), ("A", "C"))
+    ],
     # the controller
     FaultKind("controller frozen for 0.5 s", frozen_controller),
     FaultKind("controller killed", killed_controller, ARM_SILENCE, arm=False),
     FaultKind("RTDE closed", says("close rtde")),
-    FaultKind("RTDE silent", says("rtde silent"), ARM_SILENCE, after=lambda t: t.controller("rtde normal")),
+    FaultKind(
+        "RTDE silent", says("rtde silent"), ARM_SILENCE, after=lambda t: t.controller("rtde normal"), variant=True
+    ),
     FaultKind("dashboard closed", says("close dashboard")),
     FaultKind("dashboard silent, then a touch", then(says("dashboard silent"), touch), touched=True),
     FaultKind("script ports closed", says("close scripts")),
@@ -183,18 +198,19 @@ KINDS = (
         touched=True,
         after=Trial.thaw_all,
     ),
-    FaultKind("owner told to end", end("owner"), controls=OWNER),
+    FaultKind("owner told to end", end("owner"), controls=OWNER, variant=True),
     FaultKind("keeper killed", kill("keeper"), controls=FOREIGN),
-    FaultKind("keeper told to end", end("keeper"), controls=FOREIGN),
+    FaultKind("keeper told to end", end("keeper"), controls=FOREIGN, variant=True),
     FaultKind(
         "keeper frozen, then a touch",
         then(halt("keeper"), touch),
         controls=FOREIGN,
         touched=True,
         after=Trial.thaw_all,
+        variant=True,
     ),
     FaultKind("program killed", kill("program"), recorder=False, answers=False),
-    FaultKind("program told to end", end("program"), recorder=False, answers=False),
+    FaultKind("program told to end", end("program"), recorder=False, answers=False, variant=True),
     FaultKind(
         "program frozen, then a touch",
         then(halt("program"), touch),
@@ -211,6 +227,7 @@ KINDS = (
         WATCHDOG,
         controls=OWNER,
         after=Trial.thaw_all,
+        variant=True,
     ),
     FaultKind(
         "guard and owner frozen",
@@ -220,7 +237,9 @@ KINDS = (
         after=Trial.thaw_all,
     ),
     FaultKind("skin unplugged and RTDE closed", together(unplug, says("close rtde"))),
-    FaultKind("skin silent and dashboard closed", together(breaks(stall_after=0), says("close dashboard"))),
+    FaultKind(
+        "skin silent and dashboard closed", together(breaks(stall_after=0), says("close dashboard")), variant=True
+    ),
     FaultKind("a touch and guard killed", together(touch, kill("guard")), touched=True),
     FaultKind("a touch and owner killed", together(touch, kill("owner")), controls=OWNER, touched=True),
     FaultKind("a touch and RTDE closed", together(touch, says("close rtde")), touched=True),
@@ -234,11 +253,11 @@ KINDS = (
     FaultKind("script ports and dashboard closed", together(says("close scripts"), says("close dashboard"))),
     FaultKind("skin unplugged and program killed", together(unplug, kill("program")), recorder=False, answers=False),
     # before the guard arms
-    FaultKind("refused: skin silent", breaks(stall_after=0), before=True),
+    FaultKind("refused: skin silent", breaks(stall_after=0), before=True, variant=True),
     FaultKind("refused: skin broken wire", wires("open-A"), before=True),
     FaultKind("refused: skin touched", lambda t: t.skins(touch={"u": 0.1, "phi": 1.0, "duration": 60.0}), before=True),
     FaultKind("refused: protective stop", says("protective stop"), before=True),
-    FaultKind("refused: emergency stop", says("emergency stop"), before=True),
-    FaultKind("refused: RTDE silent", says("rtde silent"), before=True),
+    FaultKind("refused: emergency stop", says("emergency stop"), before=True, variant=True),
+    FaultKind("refused: RTDE silent", says("rtde silent"), before=True, variant=True),
     FaultKind("refused: controller killed", killed_controller, before=True, arm=False),
 )

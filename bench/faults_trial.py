@@ -143,9 +143,11 @@ class Outcome:
         seconds: from the fault to the measured standstill; None where there was none to measure.
         failures: what must not be, one line each.
         why: what the guard said.
+        held_up: the longest time that the guard's loop was held up, as it says itself [s].
     """
 
     seconds: float | None = None
+    held_up: float = 0.0
     failures: list[str] = field(default_factory=list)
     why: str = ""
 
