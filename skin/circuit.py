@@ -31,13 +31,21 @@ class Contact(NamedTuple):
     phi: float  #: azimuth of the middle [rad]
     conductance: float  #: between the layers, all of the contact [S]
     radius: float = 0.0  #: of a round contact [m]; 0 for a point
+    reach: float = 0.0  #: the radius that it will have at its firmest [m]; 0: this one
 
 
 class ContactModel(Protocol):
     """How the sheets and their contacts look from the four electrodes."""
 
-    def admittance(self, sensor: Sensor, contacts: Sequence[Contact]) -> Matrix:
-        """The 4 x 4 matrix Y [S] of the bare sheets, in the order A, B, C, D: symmetric, each row sums to zero."""
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[Contact]]) -> list[Matrix]:
+        """For each scene of contacts the 4 x 4 matrix Y [S] of the bare sheets, in the order A, B, C, D.
+
+        Each is symmetric, and its rows sum to zero. Scenes of the same contacts, more or less firm, are cheap together.
+        """
+        ...
+
+    def prepare(self, sensor: Sensor, contact: Contact) -> None:
+        """Do beforehand what would take long when the sensor is touched there."""
         ...
 
 

@@ -1,238 +1,211 @@
-"""From a force on the skin to the contact between its layers, and how that contact looks from the electrodes.
+"""The exact field as contact model of the virtual skin: any script of touches, in a tenth of a millisecond a frame.
 
-The foam under the upper layer is a standard linear solid: a part of its give comes at once, the rest with a relaxation
-time. The layers meet when it has given as much as the threshold force (0.5 N in the paper) presses it in the end.
-Beyond, a round body touches over a radius that grows with the cube root of the force (Hertz), and the conductance per
-area grows with the pressure, as of any rough layer.
+The touches stay where they are while their force changes, so `field_places` works out what depends on the places when
+a touch begins (0.5 to 5 ms), and each moment after is one small system.
 """
 
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from coneskin.errors import FieldError
 
 from .circuit import Contact, Matrix
-from .field_disc import Disc, centre_distance
+from .field_coupling import Coupling
+from .field_disc import centre_distance
 from .field_model import FieldModel
-from .field_patch import Patch, solve_patch
-from .field_shape import disc
+from .field_places import Places
 from .field_sheet import SectorSheet
+from .ladder import Ladder
+from .sensor import Sensor
 
-if TYPE_CHECKING:
-    from .field_coupling import Coupling
-    from .sensor import Sensor
+__all__ = ["FieldContacts"]
 
-__all__ = ["FieldContacts", "Foam", "Layers", "Touch", "settled"]
-
-
-class Touch(NamedTuple):
-    """A round contact between the layers.
-
-    Attributes:
-        radius: [m]; 0 where the layers do not touch.
-        conductance: per area [S/m^2].
-    """
-
-    radius: float
-    conductance: float
-
-    @property
-    def siemens(self) -> float:
-        """Conductance of the whole contact, spreading in the sheets not included [S]."""
-        return self.conductance * math.pi * self.radius * self.radius
-
-
-@dataclass(frozen=True, slots=True)
-class Foam:
-    """A viscoelastic substrate, a standard linear solid.
-
-    Attributes:
-        relaxation_time: of the delayed part at constant force [s].
-        delayed: part of the final give that comes late, 0 to below 1.
-
-    Raises:
-        FieldError: a value out of range.
-    """
-
-    relaxation_time: float = 0.02
-    delayed: float = 0.5
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.relaxation_time) and self.relaxation_time > 0.0):
-            raise FieldError(f"relaxation_time must be positive and finite [s], got {self.relaxation_time!r}")
-        if not 0.0 <= self.delayed < 1.0:
-            raise FieldError(f"delayed must be in [0, 1), got {self.delayed!r}")
-
-    def advance(self, state: float, force: float, time: float) -> float:
-        """The delayed part's state [N] after a constant force has acted; exact for any step.
-
-        Args:
-            state: before; 0 at rest.
-            force: on the skin [N].
-            time: for how long [s].
-        """
-        return force + (state - force) * math.exp(-time / self.relaxation_time)
-
-    def seated(self, state: float, force: float) -> float:
-        """The force that would in the end press the foam as far as it is now [N]."""
-        return force + self.delayed * (state - force)
-
-    def delay(self, force: float, threshold: float) -> float:
-        """Time from a sudden force to the moment at which the layers meet [s]; inf below the threshold."""
-        if force <= threshold:
-            return math.inf
-        if (1.0 - self.delayed) * force >= threshold:
-            return 0.0
-        return self.relaxation_time * math.log(self.delayed * force / (force - threshold))
-
-
-@dataclass(frozen=True, slots=True)
-class Layers:
-    """How the two layers touch under a force.
-
-    Attributes:
-        threshold_force: at which they meet [N]; the paper measured 0.5 N.
-        radius_at_newton: radius of the contact at 1 N above that [m].
-        conductance_at_newton: per area at 1 N above the threshold [S/m^2].
-        pressure_exponent: conductance per area ~ pressure^this; 0.95 for elastic rough contact.
-
-    Raises:
-        FieldError: a value is negative or not finite.
-    """
-
-    threshold_force: float = 0.5
-    radius_at_newton: float = 4e-3
-    conductance_at_newton: float = 200.0
-    pressure_exponent: float = 0.95
-
-    def __post_init__(self) -> None:
-        for name in ("threshold_force", "radius_at_newton", "conductance_at_newton", "pressure_exponent"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise FieldError(f"{name} must be 0 or more and finite, got {value!r}")
-
-    def touch(self, force: float) -> Touch:
-        """Contact under a seated force [N]."""
-        beyond = force - self.threshold_force
-        if not beyond > 0.0:
-            return Touch(0.0, 0.0)
-        root = beyond ** (1.0 / 3.0)
-        # pressure = F / (pi a^2) ~ F^(1/3)
-        return Touch(self.radius_at_newton * root, self.conductance_at_newton * root**self.pressure_exponent)
-
-
-def settled(target: float, before: float, time: float, time_constant: float) -> float:
-    """Potential of a line some time after its drive was switched [V]: what is left of the potential before decays."""
-    return target + (before - target) * math.exp(-time / time_constant)
+_KEPT = 64  # sets of places that are remembered: one for each combination of touches
+_ROOM = 0.95  # of the way to an edge that a disc may take
+_Key = tuple[tuple[float, float, float], ...]
 
 
 class FieldContacts:
-    """Contact model of the virtual skin that takes any script.
+    """Contact model of round contacts with the exact field around them.
 
-    Contacts that overlap are joined into one of the same area and conductance at their common centre. A single contact
-    cut by an edge is solved as a patch, to about 1e-4 of the supply; beside others it is shrunk into the sheet.
+    What cannot be a disc inside the sheet is replaced by one that can: of a contact across an edge, the disc about the
+    centroid of the part that is on the sheet, with that part's conductance; of contacts that overlap at their firmest,
+    one about their common middle where they overlap by more than half, otherwise smaller ones of the same conductance.
 
     Args:
         point_radius: of a contact that has none of its own [m].
-        tolerance: of the potentials, relative to the supply.
+        tolerance: of the potentials, relative to the supply; a count of 16 bits is 1.5e-5.
 
     Raises:
         FieldError: point_radius is not positive.
     """
 
-    def __init__(self, point_radius: float = 1e-3, tolerance: float = 1e-9) -> None:
+    def __init__(self, point_radius: float = 1e-3, tolerance: float = 1e-7) -> None:
         if not (math.isfinite(point_radius) and point_radius > 0.0):
             raise FieldError(f"point_radius must be positive and finite [m], got {point_radius!r}")
         self.point_radius = point_radius
         self.tolerance = tolerance
+        self._settings: OrderedDict[tuple[Sensor, _Key], _Setting] = OrderedDict()
 
     def admittance(self, sensor: Sensor, contacts: Sequence[Contact]) -> Matrix:
-        """The 4 x 4 matrix Y [S] in the order A, B, C, D.
+        """The 4 x 4 matrix Y [S] of one scene; see ``admittances``."""
+        return self.admittances(sensor, [contacts])[0]
+
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[Contact]]) -> list[Matrix]:
+        """For each scene the 4 x 4 matrix Y [S] in the order A, B, C, D: symmetric, its rows sum to zero.
 
         Raises:
-            FieldError: a conductance is negative or NaN, or a contact's middle is not finite.
+            FieldError: a conductance is negative, not finite or NaN, or a contact's middle is off the sensor.
         """
-        sheet = SectorSheet.of_frustum(sensor.frustum)
-        model = FieldModel(sheet, sensor.upper_sheet_ohms, sensor.lower_sheet_ohms, self.tolerance)
-        y = model.admittance(self.coupling(model, contacts))[0]
-        return tuple(tuple(float(value) for value in row) for row in y)
+        found: dict[_Key, list[tuple[int, list[Contact]]]] = {}
+        for number, contacts in enumerate(scenes):
+            touching = [self._checked(sensor, contact) for contact in contacts if contact.conductance != 0.0]
+            key = tuple((c.u, c.phi, c.reach) for c in touching)
+            found.setdefault(key, []).append((number, touching))
+        out: list[Matrix] = [()] * len(scenes)
+        for key, group in found.items():
+            if not key:
+                matrices: list[Matrix] = Ladder().admittances(sensor, [()] * len(group))
+            else:
+                matrices = self._setting(sensor, key).admittances([touching for _, touching in group])
+            for (number, _), matrix in zip(group, matrices, strict=True):
+                out[number] = matrix
+        return out
 
-    def coupling(self, model: FieldModel, contacts: Sequence[Contact]) -> Coupling:
-        """The six numbers of a scene of contacts."""
-        sheet = model.sheet
-        for contact in contacts:
-            if not contact.conductance >= 0.0:
-                raise FieldError(f"conductance of a contact must be 0 or more [S], got {contact.conductance!r}")
-        discs = [
-            Disc(
-                c.u,
-                c.phi,
-                c.radius or self.point_radius,
-                c.conductance / (math.pi * (c.radius or self.point_radius) ** 2),
+    def prepare(self, sensor: Sensor, contact: Contact) -> None:
+        """Work out a contact's place before it is touched, so that nothing waits for it then."""
+        self.admittances(sensor, [[contact]])
+
+    def _checked(self, sensor: Sensor, contact: Contact) -> Contact:
+        cone = sensor.frustum
+        if not (0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap):
+            raise FieldError(
+                f"a contact must lie on {sensor.name}: u in [0, {cone.slant:g}] m and phi in [0, {cone.wrap:g}] rad, "
+                f"got {contact.u!r} m and {contact.phi!r} rad"
             )
-            for c in contacts
-            if c.conductance > 0.0
-        ]
-        if not discs:
-            return model.discs([Disc(0.5 * sheet.width, 0.5 * sheet.wrap, 1e-3 * min(sheet.width, sheet.arc), 0.0)])
-        discs = _joined(sheet, discs)
-        if len(discs) == 1:
-            one = discs[0]
-            inside = 0.0 <= one.u <= sheet.width and 0.0 <= one.phi <= sheet.wrap
-            if not inside or one.radius > _room(sheet, one):
-                return solve_patch(model, Patch(one.u, one.phi, disc(one.radius), one.conductance), 32, 7)
+        if not 0.0 <= contact.conductance < math.inf:
+            raise FieldError(f"conductance of a contact must be 0 or more and finite [S], got {contact.conductance!r}")
+        radius = contact.radius or self.point_radius
+        return contact._replace(radius=radius, reach=max(contact.reach, radius))
+
+    def _setting(self, sensor: Sensor, key: _Key) -> _Setting:
+        known = self._settings.get((sensor, key))
+        if known is None:
+            known = _Setting.of(sensor, key, self.tolerance)
+            self._settings[sensor, key] = known
+            if len(self._settings) > _KEPT:
+                self._settings.popitem(last=False)
         else:
-            discs = _joined(sheet, [_shrunk(sheet, d) for d in discs])
-        return model.discs(discs)
+            self._settings.move_to_end((sensor, key))
+        return known
 
 
-def _room(sheet: SectorSheet, one: Disc) -> float:
-    return float(sheet.edge_distances(one.u, one.phi).min())
+class _Spot(NamedTuple):
+    """The disc that stands for one contact, or for several that overlap."""
+
+    u: float
+    phi: float
+    reach: float  #: its radius at its firmest [m]
+    members: tuple[int, ...]  #: the contacts that it stands for
+    on_sheet: float  #: part of their conductance that is on the sheet
 
 
-def _shrunk(sheet: SectorSheet, one: Disc) -> Disc:
-    """A disc of the same conductance inside the sheet."""
-    x_margin, y_margin = 1e-3 * sheet.width, 1e-3 * sheet.wrap
-    u = min(max(one.u, x_margin), sheet.width - x_margin)
-    phi = min(max(one.phi, y_margin), sheet.wrap - y_margin)
-    moved = replace(one, u=u, phi=phi)
-    radius = min(one.radius, 0.9 * _room(sheet, moved))
-    return replace(moved, radius=radius, conductance=one.conductance * (one.radius / radius) ** 2)
+class _Setting(NamedTuple):
+    """Contacts at their places, ready for any force."""
+
+    places: Places
+    spots: tuple[_Spot, ...]
+    reaches: tuple[float, ...]  #: what the spots' radii are at the contacts' firmest, before any is made smaller
+
+    @classmethod
+    def of(cls, sensor: Sensor, key: _Key, tolerance: float) -> _Setting:
+        sheet = SectorSheet.of_frustum(sensor.frustum)
+        model = FieldModel(sheet, sensor.upper_sheet_ohms, sensor.lower_sheet_ohms, tolerance)
+        spots = _merged(sheet, [_clipped(sheet, sensor, *one, n) for n, one in enumerate(key)])
+        limits = _limits(sheet, spots)
+        u, phi = [spot.u for spot in spots], [spot.phi for spot in spots]
+        return cls(Places.of(model, u, phi, limits), tuple(spots), tuple(spot.reach for spot in spots))
+
+    def admittances(self, scenes: Sequence[Sequence[Contact]]) -> list[Matrix]:
+        radius = np.empty((len(scenes), len(self.spots)))
+        siemens = np.empty_like(radius)
+        for row, contacts in enumerate(scenes):
+            for column, spot in enumerate(self.spots):
+                members = [contacts[n] for n in spot.members]
+                radius[row, column] = math.sqrt(sum(c.radius * c.radius for c in members))
+                siemens[row, column] = spot.on_sheet * sum(c.conductance for c in members)
+        radius *= np.minimum(self.places.largest / self.reaches, 1.0)
+        np.minimum(radius, self.places.largest, out=radius)
+        coupling: Coupling = self.places.coupling(radius, siemens / (math.pi * radius * radius))
+        return [tuple(map(tuple, y)) for y in self.places.model.admittance(coupling).tolist()]
 
 
-def _joined(sheet: SectorSheet, discs: list[Disc]) -> list[Disc]:
-    """Join overlapping discs until none overlaps."""
-    done: list[Disc] = []
-    for new in discs:
-        joined = new
-        again = True
-        while again:
-            again = False
-            for other in done:
-                if _apart(sheet, joined, other) <= 1.001 * (joined.radius + other.radius):
-                    done.remove(other)
-                    joined = _join(joined, other)
-                    again = True
-                    break
-        done.append(joined)
+def _clipped(sheet: SectorSheet, sensor: Sensor, u: float, phi: float, reach: float, number: int) -> _Spot:
+    """The part of a disc that is on the sheet, at its firmest: its centroid, and how much of the disc it is."""
+    cuts = [_cut(distance / reach) for distance in sheet.edge_distances(u, phi).tolist()]
+    (kept1, off1), (kept2, off2), (kept_d, off_d), (kept_c, off_c) = cuts
+    u = _within(u + reach * (off1 - off2), sheet.width)
+    phi = _within(phi + reach * (off_d - off_c) / sensor.frustum.radius_at(u), sheet.wrap)
+    return _Spot(u, phi, reach, (number,), kept1 * kept2 * kept_d * kept_c)
+
+
+def _within(value: float, end: float) -> float:
+    return min(max(value, 1e-3 * end), (1.0 - 1e-3) * end)
+
+
+def _cut(distance: float) -> tuple[float, float]:
+    """What a straight edge leaves of the unit disc: the part of its area, and its centroid's way from the middle.
+
+    Args:
+        distance: of the edge from the middle.
+    """
+    if distance >= 1.0:
+        return 1.0, 0.0
+    sine = math.sqrt(1.0 - distance * distance)
+    kept = 1.0 - (math.acos(distance) - distance * sine) / math.pi
+    return kept, 2.0 / 3.0 * sine**3 / (math.pi * kept)
+
+
+def _merged(sheet: SectorSheet, spots: list[_Spot]) -> list[_Spot]:
+    """Make one of those that overlap by more than half."""
+    done: list[_Spot] = []
+    for spot in spots:
+        while True:
+            near = [s for s in done if _apart(sheet, spot, s) <= 0.5 * (spot.reach + s.reach)]
+            if not near:
+                break
+            other = near[0]
+            done.remove(other)
+            own, others = spot.reach**2 * spot.on_sheet, other.reach**2 * other.on_sheet
+            part = others / (own + others)
+            spot = _Spot(
+                (1.0 - part) * spot.u + part * other.u,
+                (1.0 - part) * spot.phi + part * other.phi,
+                math.hypot(spot.reach, other.reach),
+                spot.members + other.members,
+                (1.0 - part) * spot.on_sheet + part * other.on_sheet,
+            )
+        done.append(spot)
     return done
 
 
-def _apart(sheet: SectorSheet, first: Disc, second: Disc) -> float:
+def _limits(sheet: SectorSheet, spots: Sequence[_Spot]) -> list[float]:
+    """The largest radii at which all are inside the sheet and apart."""
+    radii = [min(spot.reach, _ROOM * float(sheet.edge_distances(spot.u, spot.phi).min())) for spot in spots]
+    for i, first in enumerate(spots):
+        for j in range(i):
+            ratio = _ROOM * _apart(sheet, first, spots[j]) / (radii[i] + radii[j])
+            if ratio < 1.0:
+                radii[i], radii[j] = radii[i] * ratio, radii[j] * ratio
+    return radii
+
+
+def _apart(sheet: SectorSheet, first: _Spot, second: _Spot) -> float:
     u1, phi1, u2, phi2 = (np.array([v]) for v in (first.u, first.phi, second.u, second.phi))
     return float(centre_distance(sheet, u1, phi1, u2, phi2)[0])
-
-
-def _join(first: Disc, second: Disc) -> Disc:
-    areas = first.radius**2, second.radius**2
-    weights = [a * min(d.conductance, 1e30) for a, d in zip(areas, (first, second), strict=True)]
-    total = sum(weights)
-    part = weights[1] / total
-    u, phi = (1.0 - part) * first.u + part * second.u, (1.0 - part) * first.phi + part * second.phi
-    return Disc(u, phi, math.sqrt(sum(areas)), total / sum(areas))

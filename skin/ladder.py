@@ -24,6 +24,13 @@ _LEAST_PART = 1e-6  # of a sheet between two nodes, so that nodes may coincide
 class Ladder:
     """Contact model of ideal series and parallel resistors."""
 
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[Contact]]) -> list[Matrix]:
+        """The matrix of each scene; see ``admittance``."""
+        return [self.admittance(sensor, contacts) for contacts in scenes]
+
+    def prepare(self, sensor: Sensor, contact: Contact) -> None:
+        """Nothing takes long here."""
+
     def admittance(self, sensor: Sensor, contacts: Sequence[Contact]) -> Matrix:
         """The 4 x 4 matrix Y [S] in the order A, B, C, D.
 

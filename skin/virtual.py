@@ -1,8 +1,8 @@
 """The virtual skin: a script of touches becomes the very bytes that a real sensor would send.
 
-The chain is a device's own: force -> conductance between the layers -> potentials and currents at the converter in
-each of the three phases -> settling, noise, counts -> frame -> bytes -> a line with faults. The same seed gives the
-same bytes.
+The chain is a device's own: force -> foam, which yields late -> contact of the layers: its radius and conductance ->
+field in the sheets -> potentials and currents at the converter in each of the three phases -> settling, drift, noise,
+counts -> frame -> bytes -> a line with faults. The same seed gives the same bytes.
 """
 
 from __future__ import annotations
@@ -10,19 +10,30 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from coneskin.errors import SensorError
 
-from .circuit import Contact, ContactModel, Matrix, Volts, Wiring, measure
+from .circuit import Contact, ContactModel, Matrix, Volts, measure
 from .faults import Faults, FaultyLine
-from .ladder import Ladder
 from .sensor import Sensor
+from .substrate import Foam, Layers
 from .wire import VERSION, Frame
 
-__all__ = ["Imperfections", "ScriptedTouch", "VirtualSkin"]
+__all__ = ["MODELS", "Imperfections", "ScriptedTouch", "VirtualSkin"]
 
+MODELS = ("field", "ladder")
 _CURRENTS = (2, 5, 8)  # places of the drive currents in Volts
+_FORCE_DIGITS = 6  # of a seated force in newtons: far below a count, and a relaxing touch comes to rest
+_FORGOTTEN = 40.0  # relaxation times, after which nothing is left of a touch
+# Conductance of 1 S spread evenly over the rectangle of the field: the mean of f f^T, f = (x, 1 - x, -y, y - 1)
+_SPREAD = (
+    (1 / 3, 1 / 6, -1 / 4, -1 / 4),
+    (1 / 6, 1 / 3, -1 / 4, -1 / 4),
+    (-1 / 4, -1 / 4, 1 / 3, 1 / 6),
+    (-1 / 4, -1 / 4, 1 / 6, 1 / 3),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +47,7 @@ class ScriptedTouch:
         phi: azimuth [rad].
         force: at its firmest [N].
         rise: time in which the force rises, and falls again [s].
-        radius: of the contact [m]; 0 for a point.
+        radius: of a flat body's face [m]; 0 for a round body, whose contact grows with the force.
         sensor: name of the sensor touched; empty: the first.
 
     Raises:
@@ -67,6 +78,22 @@ class ScriptedTouch:
             return 0.0
         return self.force if since >= self.rise else 0.5 * self.force * (1.0 - math.cos(math.pi * since / self.rise))
 
+    def seated_at(self, time: float, foam: Foam) -> float:
+        """Force that would in the end press the foam as far as it is pressed at a time [N]."""
+        since, length = time - self.start, self.end - self.start
+        if since <= 0.0 or since > length + _FORGOTTEN * foam.relaxation_time:
+            return 0.0
+        swing, state = 0.5 * self.force, 0.0
+        ramp = min(self.rise, 0.5 * length)  # a short touch turns back on its way up
+        if ramp > 0.0:
+            rate = math.pi / self.rise
+            state = foam.advance_swing(state, swing, swing, rate, 0.0, min(since, ramp))
+        state = foam.advance(state, self.force, min(max(since - ramp, 0.0), length - 2.0 * ramp))
+        if ramp > 0.0 and since > length - ramp:
+            state = foam.advance_swing(state, swing, swing, -rate, rate * ramp, min(since - length, 0.0) + ramp)
+        state = foam.advance(state, 0.0, max(since - length, 0.0))
+        return foam.seated(state, self.force_at(time))
+
 
 @dataclass(frozen=True, slots=True)
 class Imperfections:
@@ -74,27 +101,41 @@ class Imperfections:
 
     Attributes:
         noise_counts: standard deviation of each count.
-        settling: part of the previous phase's potential that is left on a wire when it is read.
-        leak: conductance between the layers without any touch [S].
+        settling_time: time constant with which a wire follows when the drive is switched [s]; it is read at the end of
+            its phase.
+        leak: conductance between the layers without any touch, spread evenly [S]; much less than the sheets conduct.
         leak_drift: its growth [S/s], as from damp.
-        threshold_force: force at which the layers begin to touch [N]; the paper measured 0.5 N.
-        siemens_per_newton: conductance of a contact for each newton above that [S/N].
+        foam: how the substrate yields.
+        layers: how the layers touch.
         supply_ratio: actual over nominal supply.
         clock_ratio: speed of the device clock over true time.
+
+    Raises:
+        SensorError: settling_time is negative or not finite.
     """
 
     noise_counts: float = 0.7
-    settling: float = 0.0
+    settling_time: float = 2e-6
     leak: float = 0.0
     leak_drift: float = 0.0
-    threshold_force: float = 0.5
-    siemens_per_newton: float = 1e-3
+    foam: Foam = field(default_factory=Foam)
+    layers: Layers = field(default_factory=Layers)
     supply_ratio: float = 1.0
     clock_ratio: float = 1.0
 
-    def conductance(self, force: float) -> float:
-        """Conductance of a contact under a force [N], in siemens."""
-        return self.siemens_per_newton * max(0.0, force - self.threshold_force)
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.settling_time) and self.settling_time >= 0.0):
+            raise SensorError(f"settling_time must be finite and not negative, got {self.settling_time!r} s")
+
+
+class _Placed(NamedTuple):
+    """A touch of the script, and the radius that its contact will have at its firmest [m]."""
+
+    touch: ScriptedTouch
+    reach: float
+
+
+_Scene = tuple[Contact, ...]
 
 
 class VirtualSkin:
@@ -107,11 +148,12 @@ class VirtualSkin:
         seed: of noise and of random damage.
         imperfections: noise, drift, contact law.
         faults: what goes wrong.
-        model: how the sheets look from their electrodes; ideal ladders by default.
+        model: how the sheets look from their electrodes: "field", exactly (needs numpy and scipy), "ladder", as ideal
+            resistors, or a model of your own.
         duration: when the device goes away [s]; infinite by default.
 
     Raises:
-        SensorError: no sensor, a rate that is not positive, or a touch of a sensor that is not here.
+        SensorError: no sensor, a rate that is not positive, an unknown model, or a touch of a sensor that is not here.
     """
 
     def __init__(
@@ -123,7 +165,7 @@ class VirtualSkin:
         seed: int = 0,
         imperfections: Imperfections | None = None,
         faults: Faults | None = None,
-        model: ContactModel | None = None,
+        model: ContactModel | str = "field",
         duration: float = math.inf,
     ) -> None:
         self.sensors = (sensors,) if isinstance(sensors, Sensor) else tuple(sensors)
@@ -137,11 +179,13 @@ class VirtualSkin:
         self.seed = seed
         self.imperfections = imperfections or Imperfections()
         self.faults = faults or Faults()
-        self.model = model or Ladder()
+        self.model = _model(model) if isinstance(model, str) else model
         self.duration = duration
-        self._touches: dict[str, list[ScriptedTouch]] = {sensor.name: [] for sensor in self.sensors}
-        self._cache: dict[str, tuple[tuple[Contact, ...], Matrix]] = {}
-        self._measured: dict[str, tuple[tuple[Matrix, ...], Wiring, Volts]] = {}
+        self._touches: dict[str, list[_Placed]] = {sensor.name: [] for sensor in self.sensors}
+        self._solved: dict[str, tuple[tuple[_Scene, ...], list[Matrix]]] = {}
+        self._measured: dict[str, tuple[object, Volts]] = {}
+        for sensor in self.sensors:  # so that the first touch does not wait for what is loaded on first use
+            self.model.prepare(sensor, Contact(0.5 * sensor.frustum.slant, 0.5 * sensor.frustum.wrap, 1e-3))
         for touch in touches:
             self.touch(touch)
 
@@ -162,7 +206,11 @@ class VirtualSkin:
                 f"a touch must lie on {name}: u up to {cone.slant:g} m and phi up to {cone.wrap:g} rad, got "
                 f"{touch.u!r} m and {touch.phi!r} rad"
             )
-        self._touches[name].append(touch)
+        layers = self.imperfections.layers
+        firmest = layers.touch(touch.force, touch.radius)
+        if firmest.siemens > 0.0:
+            self.model.prepare(sensor, Contact(touch.u, touch.phi, firmest.siemens, firmest.radius, firmest.radius))
+        self._touches[name].append(_Placed(touch, firmest.radius))
 
     def frames(self) -> Iterator[tuple[float, Frame]]:
         """The frames that the device measures, for ever or until ``duration``.
@@ -199,47 +247,50 @@ class VirtualSkin:
             yield time, line.send(frame)
 
     def _volts(self, sensor: Sensor, times: tuple[float, float, float], index: int) -> Volts:
-        sheets = tuple(self._sheets(sensor, time) for time in times)
+        """What stands at the converter; the newest answer is kept, because a touch mostly rests."""
+        scenes = tuple(self._contacts(sensor, time) for time in times)
+        leaks = tuple(self.imperfections.leak + self.imperfections.leak_drift * time for time in times)
         wiring = self.faults.wiring_at(index)
+        key = (scenes, leaks, wiring)
         known = self._measured.get(sensor.name)
-        if known is not None and known[1] == wiring and all(a is b for a, b in zip(known[0], sheets, strict=True)):
-            return known[2]
-        volts = measure(sensor, sheets, wiring)
-        self._measured[sensor.name] = (sheets, wiring, volts)
-        return volts
-
-    def _sheets(self, sensor: Sensor, time: float) -> Matrix:
-        """The sheets at a time; the newest answer is kept, because a touch mostly rests."""
-        real = self.imperfections
-        contacts = []
-        leak = real.leak + real.leak_drift * time
-        if leak > 0.0:
-            cone = sensor.frustum
-            contacts.append(Contact(0.5 * cone.slant, 0.5 * cone.wrap, leak))
-        for touch in self._touches[sensor.name]:
-            conductance = real.conductance(touch.force_at(time))
-            if conductance > 0.0:
-                contacts.append(Contact(touch.u, touch.phi, conductance, touch.radius))
-        key = tuple(contacts)
-        known = self._cache.get(sensor.name)
         if known is None or known[0] != key:
-            known = (key, self.model.admittance(sensor, contacts))
-            self._cache[sensor.name] = known
+            sheets = [_leaking(y, leak) for y, leak in zip(self._sheets(sensor, scenes), leaks, strict=True)]
+            known = (key, measure(sensor, sheets, wiring))
+            self._measured[sensor.name] = known
         return known[1]
+
+    def _sheets(self, sensor: Sensor, scenes: tuple[_Scene, ...]) -> list[Matrix]:
+        known = self._solved.get(sensor.name)
+        if known is None or known[0] != scenes:
+            known = (scenes, self.model.admittances(sensor, scenes))
+            self._solved[sensor.name] = known
+        return known[1]
+
+    def _contacts(self, sensor: Sensor, time: float) -> _Scene:
+        """Where the layers touch at a time."""
+        foam, layers = self.imperfections.foam, self.imperfections.layers
+        contacts = []
+        for touch, reach in self._touches[sensor.name]:
+            seated = round(touch.seated_at(time, foam), _FORCE_DIGITS)
+            if seated > layers.threshold_force:
+                contact = layers.touch(seated, touch.radius)
+                contacts.append(Contact(touch.u, touch.phi, contact.siemens, contact.radius, reach))
+        return tuple(contacts)
 
     def _convert(self, sensor: Sensor, volts: Volts, rng: random.Random) -> list[int]:
         """Settling, noise and rounding."""
         real, parts = self.imperfections, sensor.electronics
         values = list(volts)
-        if real.settling:
+        if real.settling_time:
+            left_over = math.exp(-1.0 / (3.0 * self.rate_hz * len(self.sensors) * real.settling_time))
             supply = parts.supply_volts
             at_c, at_d = (supply, 0.0) if sensor.c_positive else (0.0, supply)
             rest = (at_c, at_d, volts.touch_c, volts.touch_d)  # the wires' potentials one phase before
             for place, left in zip((0, 1, 3, 4), rest, strict=True):
-                values[place] += real.settling * (left - values[place])
+                values[place] += left_over * (left - values[place])
             at_a, at_b = (0.0, supply) if sensor.b_positive else (supply, 0.0)
             for place, left in zip((6, 7), (at_a, at_b), strict=True):
-                values[place] += real.settling * (left - values[place])
+                values[place] += left_over * (left - values[place])
         full, counts = parts.full_count, []
         volt, ampere = full / parts.adc_volts * real.supply_ratio, full / parts.current_full_scale * real.supply_ratio
         for place, value in enumerate(values):
@@ -248,3 +299,24 @@ class VirtualSkin:
                 count += rng.gauss(0.0, real.noise_counts)
             counts.append(min(max(round(count), 0), full))
         return counts
+
+
+def _model(name: str) -> ContactModel:
+    if name == "field":
+        from .field_contact import FieldContacts
+
+        return FieldContacts()
+    if name == "ladder":
+        from .ladder import Ladder
+
+        return Ladder()
+    raise SensorError(f"the model of a virtual skin must be one of {', '.join(MODELS)}, got {name!r}")
+
+
+def _leaking(sheets: Matrix, leak: float) -> Matrix:
+    if leak <= 0.0:
+        return sheets
+    return tuple(
+        tuple(y + leak * part for y, part in zip(row, parts, strict=True))
+        for row, parts in zip(sheets, _SPREAD, strict=True)
+    )

@@ -26,7 +26,8 @@ from coneskin.skin.faults import Faults
 from coneskin.skin.recording import Block
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.stream import Stream
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.substrate import Foam
+from coneskin.skin.virtual import Imperfections, ScriptedTouch, VirtualSkin
 
 from .mock_arm import MockArm
 
@@ -61,7 +62,9 @@ class Rig:
     ) -> None:
         names = ("one", "two")[:sensors]
         skins = [Sensor(CONE.frustum, number, name=name) for number, name in enumerate(names)]
-        self.skin = VirtualSkin(skins, touches, faults=faults)
+        # Foam without delay and ideal resistors: a touch begins and ends in the frames that the tests name.
+        at_once = Imperfections(foam=Foam(delayed=0.0))
+        self.skin = VirtualSkin(skins, touches, faults=faults, imperfections=at_once, model="ladder")
         self.core = make_core(skins, reaction or Reaction(), rules, foreign, table)
         self.arm = MockArm(list(START_Q), [0.0] * 6, obeys)
         self.speed = speed
