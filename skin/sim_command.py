@@ -21,7 +21,7 @@ from coneskin.geometry.frustum import Frustum
 from .circuit import Wiring
 from .faults import Faults
 from .sensor import Sensor
-from .virtual import Imperfections, ScriptedTouch, VirtualSkin
+from .virtual import MODELS, Imperfections, ScriptedTouch, VirtualSkin
 
 __all__ = ["EXAMPLE", "HELP", "add_arguments", "parse_fault", "parse_touch", "play_skin", "run"]
 
@@ -66,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help=f"let something go wrong; may be repeated: {', '.join(_FAULT_NAMES)}; wiring is open-A or short-A-ground",
     )
+    add("--model", choices=MODELS, default="field", help="the sheets: exact field, or ideal resistors (default field)")
     add("--noise-counts", type=float, default=0.7, help="standard deviation of each reading (default 0.7)")
     add("--leak-drift", type=float, default=0.0, help="growth of the leak between the layers [S/s] (default 0)")
     add("--seed", type=int, default=0, help="of noise and damage: the same seed gives the same bytes (default 0)")
@@ -88,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
         imperfections=Imperfections(noise_counts=args.noise_counts, leak_drift=args.leak_drift),
         faults=Faults(**dict(args.fault)),
+        model=args.model,
         duration=args.duration_s,
     )
     return play_skin(skin, output=args.output, link=args.link, at_once=args.now, as_json=args.json)

@@ -88,6 +88,7 @@ class SourceScene:
         baud: of a serial source [bit/s].
         rate_hz: of a virtual source: frames per second of each sensor.
         seed: of a virtual source's noise.
+        model: of a virtual source's sheets: "field", exactly, or "ladder", as ideal resistors.
         touches: of a virtual source.
     """
 
@@ -96,6 +97,7 @@ class SourceScene:
     baud: int
     rate_hz: float
     seed: int
+    model: str
     touches: tuple[ScriptedTouch, ...]
 
 

@@ -36,6 +36,7 @@ _SOURCE = (
     Key("baud", int, 921600, low=1200, high=12_000_000),
     Key("rate_hz", float, 1000.0, low=1.0, high=10_000.0),
     Key("seed", int, 0, low=0, high=2**31),
+    Key("model", str, "field", choices=("field", "ladder")),
     Key("touch", dict, ()),
 )
 _TOUCH = (
@@ -170,7 +171,7 @@ def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s
     sensors = [*built, *[None] * (count_sensors(tables) - len(built))]
     if kind == "serial" and not values["port"]:
         problems.append("source.port is missing: a device such as /dev/ttyUSB0, COM3 or hwgrep://0403:6001")
-    for key in ("rate_hz", "seed", "touch") if kind == "serial" else ("port", "baud"):
+    for key in ("rate_hz", "seed", "model", "touch") if kind == "serial" else ("port", "baud"):
         if kind and key in tables["source"]:
             problems.append(f"source.{key} means nothing to a {kind} source: remove it")
     touches = [
@@ -180,7 +181,8 @@ def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s
     ]
     if kind is None:
         return None
-    return s.SourceScene(kind, values["port"], values["baud"], values["rate"], values["seed"], tuple(touches))
+    rate, model = values["rate"], values["model"]
+    return s.SourceScene(kind, values["port"], values["baud"], rate, values["seed"], model, tuple(touches))
 
 
 def _touch(

@@ -30,6 +30,7 @@ def virtual_skin(scene: Scene) -> VirtualSkin:
         scene.source.touches,
         rate_hz=scene.source.rate_hz,
         seed=scene.source.seed,
+        model=scene.source.model,
     )
 
 
