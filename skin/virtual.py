@@ -26,6 +26,7 @@ __all__ = ["MODELS", "Imperfections", "ScriptedTouch", "VirtualSkin"]
 MODELS = ("field", "ladder")
 _CURRENTS = (2, 5, 8)  # places of the drive currents in Volts
 _FORCE_DIGITS = 6  # of a seated force in newtons: far below a count, and a relaxing touch comes to rest
+_AHEAD = 8  # frames that are solved at once while touches change
 _FORGOTTEN = 40.0  # relaxation times, after which nothing is left of a touch
 # Conductance of 1 S spread evenly over the rectangle of the field: the mean of f f^T, f = (x, 1 - x, -y, y - 1)
 _SPREAD = (
@@ -135,7 +136,7 @@ class _Placed(NamedTuple):
     reach: float
 
 
-_Scene = tuple[Contact, ...]
+_Scenes = tuple[tuple[Contact, ...], ...]  # the contacts in each phase of a frame
 
 
 class VirtualSkin:
@@ -182,7 +183,7 @@ class VirtualSkin:
         self.model = _model(model) if isinstance(model, str) else model
         self.duration = duration
         self._touches: dict[str, list[_Placed]] = {sensor.name: [] for sensor in self.sensors}
-        self._solved: dict[str, tuple[tuple[_Scene, ...], list[Matrix]]] = {}
+        self._ahead: dict[str, list[tuple[_Scenes, list[Matrix]]]] = {}
         self._measured: dict[str, tuple[object, Volts]] = {}
         for sensor in self.sensors:  # so that the first touch does not wait for what is loaded on first use
             self.model.prepare(sensor, Contact(0.5 * sensor.frustum.slant, 0.5 * sensor.frustum.wrap, 1e-3))
@@ -254,19 +255,31 @@ class VirtualSkin:
         key = (scenes, leaks, wiring)
         known = self._measured.get(sensor.name)
         if known is None or known[0] != key:
-            sheets = [_leaking(y, leak) for y, leak in zip(self._sheets(sensor, scenes), leaks, strict=True)]
+            sheets = [_leaking(y, leak) for y, leak in zip(self._sheets(sensor, scenes, times), leaks, strict=True)]
             known = (key, measure(sensor, sheets, wiring))
             self._measured[sensor.name] = known
         return known[1]
 
-    def _sheets(self, sensor: Sensor, scenes: tuple[_Scene, ...]) -> list[Matrix]:
-        known = self._solved.get(sensor.name)
-        if known is None or known[0] != scenes:
-            known = (scenes, self.model.admittances(sensor, scenes))
-            self._solved[sensor.name] = known
-        return known[1]
+    def _sheets(self, sensor: Sensor, scenes: _Scenes, times: Sequence[float]) -> list[Matrix]:
+        """The sheets of one frame. While touches change, the next frames are solved with it, which costs little more.
 
-    def _contacts(self, sensor: Sensor, time: float) -> _Scene:
+        A touch that is added later makes those frames other ones, and they are solved again.
+        """
+        ahead = self._ahead.setdefault(sensor.name, [])
+        while ahead and ahead[0][0] != scenes:
+            ahead.pop(0)
+        if not ahead:
+            frames = [scenes]
+            for number in range(1, _AHEAD):
+                later = tuple(self._contacts(sensor, time + number / self.rate_hz) for time in times)
+                if later == frames[-1]:
+                    break
+                frames.append(later)
+            solved = self.model.admittances(sensor, [scene for frame in frames for scene in frame])
+            ahead += [(frame, solved[3 * number : 3 * number + 3]) for number, frame in enumerate(frames)]
+        return ahead[0][1]
+
+    def _contacts(self, sensor: Sensor, time: float) -> tuple[Contact, ...]:
         """Where the layers touch at a time."""
         foam, layers = self.imperfections.foam, self.imperfections.layers
         contacts = []
