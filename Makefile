@@ -20,7 +20,7 @@ $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/demo.stamp: $(VENV)/bin/python pyproject.toml
-	$(BIN)/python -m pip install -q -e '.[pictures]'
+	$(BIN)/python -m pip install -q -e '.[pictures,design]'
 	touch $@
 
 $(VENV)/test.stamp: $(VENV)/bin/python pyproject.toml

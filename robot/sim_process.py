@@ -101,7 +101,11 @@ class SimulatedController:
     def __enter__(self) -> SimulatedController:
         command = [sys.executable, "-m", "coneskin.robot.sim_command", "--json", "--exit-with-parent"]
         self._process = process = subprocess.Popen(
-            [*command, *self._arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*command, *self._arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # a terminal's Ctrl-C is for the program, which ends this when the arm stands
         )
         lines: queue.SimpleQueue[str] = queue.SimpleQueue()
         threading.Thread(target=lambda: lines.put(_first_line(process)), daemon=True).start()

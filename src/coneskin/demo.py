@@ -59,7 +59,7 @@ rate_hz = 1000
 kind = "{reaction}"
 distance_mm = 50
 
-[watch]
+[watch]                  # defaults: 50 ms each; a pseudo-terminal on a busy machine can stall for longer
 skin_silence_ms = 250
 skin_late_ms = 250
 arm_silence_ms = 250

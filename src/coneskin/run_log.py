@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
-from .errors import ConeSkinError
+from .errors import ConeSkinError, RecordingError
 from .robot.channel import Channel
 from .robot.journal import GuardEvent, Kind, decode_event
 from .skin.recording import Block, Recorder, decode_blocks
@@ -115,11 +115,20 @@ class RunLog:
 
 
 def new_recording(folder: Path) -> Path:
-    """Make a folder for a new run in this folder, named by the time; its recording's path."""
+    """Make a folder for a new run in this folder, named by the time; its recording's path.
+
+    Raises:
+        RecordingError: it cannot be made.
+    """
     stamp = time.strftime("%Y-%m-%dT%H-%M-%S")
     made, number = folder / stamp, 1
     while made.exists():
         number += 1
         made = folder / f"{stamp}-{number}"
-    made.mkdir(parents=True)
+    try:
+        made.mkdir(parents=True)
+    except OSError as exc:
+        raise RecordingError(
+            f"cannot make the folder {made} for the recording: {exc.strerror or exc}; see recording.folder"
+        ) from exc
     return made / "run.rec"

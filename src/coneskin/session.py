@@ -9,6 +9,7 @@ channel. A child that dies is seen as the end of its channel, and ends in a stop
 
 from __future__ import annotations
 
+import math
 import select
 import subprocess
 import time
@@ -22,6 +23,7 @@ from .errors import Collision, ConeSkinError, RobotConnectionError, RobotRefused
 from .robot.channel import Channel, pair, spawn
 from .robot.journal import GuardEvent
 from .robot.owner_messages import decode_json, encode_json
+from .robot.ur_models import model
 from .run_log import RunLog, new_recording
 from .scene import Scene, load
 
@@ -96,6 +98,8 @@ class Session:
         Raises:
             RobotRefused: the scene has none.
         """
+        if self._arm is None and self._guard is None:
+            raise RobotRefused("nothing is guarded yet: enter the guard with a `with`")
         if self._arm is None and self.scene.arm is not None:
             raise RobotRefused(f"{self.scene.name} says arm.control = foreign: another program moves the arm")
         if self._arm is None:
@@ -193,15 +197,16 @@ class Session:
             raise trouble
         if stop is None:
             return
-        self.wait_for(("latched",), _END, after=since)
-        contact = self.wait_for(("contact",), 0.0, after=since)
+        latched = self.wait_for(("latched",), _END, after=since)
+        outcome = "the arm stands" if latched else "the arm was NOT seen to stand"
+        contact = self.wait_for(("contact_placed",), 0.0, after=since) or self.wait_for(("contact",), 0.0, after=since)
         if contact is not None and stop.details["why"] == "touch":
             where = contact.details
             raise Collision(
                 f"{where['sensor']} on the {where['link']} was touched at u = {1e3 * where['u']:.1f} mm, "
-                f"phi = {where['phi']:.3f} rad; the arm has stopped until a person resets the guard"
+                f"phi = {math.degrees(where['phi']):.1f} deg; {outcome}, until a person resets the guard"
             )
-        raise RobotRefused(f"the guard has stopped the arm: {stop.details['why']}")
+        raise RobotRefused(f"the guard has stopped the arm: {stop.details['why']}; {outcome}")
 
     # ---- how it starts
 
@@ -225,7 +230,7 @@ class Session:
             ends.append(guard_end)
             if scene.arm.control == "owner":
                 self._children["owner"] = spawn("coneskin.robot.owner", other_guard_end, other_program_end)
-                self._arm = ArmProxy(Channel(program_end), self.check)
+                self._arm = ArmProxy(Channel(program_end), self.check, model(scene.arm.model))
                 self._arm.channel.send(encode_json({"host": scene.arm.host, "watchdog_hz": scene.arm.watchdog_hz}))
             else:
                 self._children["keeper"] = spawn("coneskin.robot.keeper", other_guard_end, other_program_end)
@@ -244,18 +249,22 @@ class Session:
         return channel
 
     def _await_armed(self) -> None:
-        event = self.wait_for(("armed", "died"), self._start_timeout)
-        if event is not None and event.name == "armed":
-            return
+        end = time.monotonic() + self._start_timeout
+        while time.monotonic() < end:
+            event = self.wait_for(("armed", "died"), 0.2)
+            if event is not None and event.name == "armed":
+                return
+            owner = self._children.get("owner")
+            if event is not None or self._log.ended or (owner is not None and owner.poll() is not None):
+                break  # waiting longer would not help
+        self.wait_for(("fault",), 0.5)
         if (trouble := self._trouble()) is not None:
             raise trouble
         waiting = next((event for event in reversed(self.events) if event.name == "waiting"), None)
         faults = [str(event.details["what"]) for event in self.events if event.name in ("fault", "died")]
         reasons = _reasons(waiting) if waiting else []
         listed = list(dict.fromkeys([*faults, *reasons])) or ["its process sent nothing"]
-        raise RobotRefused(
-            f"the guard did not arm within {self._start_timeout:g} s:\n" + "\n".join(f"  {line}" for line in listed)
-        )
+        raise RobotRefused("the guard did not arm:\n" + "\n".join(f"  {line}" for line in listed))
 
     def _ask_skin(self, key: str) -> Any:
         assert self._skin is not None
