@@ -39,6 +39,8 @@ from coneskin.robot.journal import Kind
 
 PATIENCE = 3.0  # s beyond the budget in which we look how late it was
 SAME = 1e-4  # rad: the arm has not moved
+SKIN_LATE = 0.1  # s that a frame of the virtual skin may be late because the machine does other things
+REPEATS = 4
 
 
 def budget_of(kind: FaultKind, slack: float) -> float:
@@ -46,7 +48,16 @@ def budget_of(kind: FaultKind, slack: float) -> float:
 
 
 def run_trial(kind: FaultKind, control: str, seed: str, slack: float) -> Outcome:
-    """One trial; what it showed."""
+    """One trial; what it showed. One in which the machine made the skin late before the fault is made again."""
+    for repeated in range(REPEATS):
+        outcome = _try(kind, control, f"{seed}/{repeated}", slack)
+        outcome.repeated = repeated
+        if not (outcome.failures and outcome.skin_late > SKIN_LATE):
+            break
+    return outcome
+
+
+def _try(kind: FaultKind, control: str, seed: str, slack: float) -> Outcome:
     outcome = Outcome()
     try:
         with Trial(control, seed) as trial:
@@ -74,6 +85,7 @@ def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> 
     if "armed" not in armed:
         raise RuntimeError(f"the guard did not arm: {armed}")
     trial.run_up()
+    outcome.skin_late = float(trial.skin.ask(report=True).get("late", 0.0))
     fault_at = began = kind.inject(trial)
     if kind.tolerated:
         time.sleep(0.3)
@@ -85,22 +97,22 @@ def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> 
     if kind.answers and "told" not in told:
         outcome.failures.append(f"the program was not told: {told or 'it heard nothing'}")
     outcome.why = str(told.get("why", ""))
-    if not kind.arm:
-        outcome.seconds = told.get("at", began + 9.0) - began
-    if outcome.seconds is not None and outcome.seconds > budget:
-        outcome.failures.append(f"it took {outcome.seconds:.3f} s, and may take {budget:.3f} s")
     trial.thaw_all()
     if not trial.program.close(15.0) and kind.answers:
         outcome.failures.append("the program did not end within 15 s")
-    until = min(fault_at, began)
+    until = min(fault_at, began) if trial.happened is None else trial.happened
     touched = kind.touched or kind.tolerated
     outcome.failures += judge_recording(trial.recording, until, armed["armed"], touched)
     with suppress(ConeSkinError):
         run = read_run(trial.recording)
         stops = [event for event in run.events if event.name == "stopping"]
         outcome.why = outcome.why or (str(stops[0].details["why"]) if stops else "")
+        if not kind.arm:
+            outcome.seconds = next((event.time - began for event in stops if event.time >= began), 9.0)
         late = [json.loads(block.payload)["late"] for block in run.blocks if block.kind == Kind.OVERRUN]
         outcome.held_up = max(late, default=0.0)
+    if outcome.seconds is not None and outcome.seconds > budget:
+        outcome.failures.append(f"it took {outcome.seconds:.3f} s, and may take {budget:.3f} s")
 
 
 def _see_it_stand(kind: FaultKind, trial: Trial, outcome: Outcome, began: float, budget: float) -> None:
@@ -140,6 +152,7 @@ def summary(kind: FaultKind, control: str, outcomes: list[Outcome], slack: float
         "median": round(quantile(times, 0.5), 4) if times else None,
         "worst": round(max(times), 4) if times else None,
         "budget": None if kind.before else round(budget_of(kind, slack), 3),
+        "repeated": sum(outcome.repeated for outcome in outcomes),
         "held_up": round(max(outcome.held_up for outcome in outcomes), 4),
         "failed": sum(bool(outcome.failures) for outcome in outcomes),
         "failures": list(dict.fromkeys(failures)),
@@ -155,6 +168,8 @@ def show(line: dict[str, Any]) -> None:
     print(
         f"{name:52}{line['count']:6}{cell('median')}{cell('worst')}{cell('budget')}{cell('held_up')}{line['failed']:8}"
     )
+    if line["repeated"]:
+        print(f"    repeated {line['repeated']} trials in which the virtual skin was held up before the fault")
     for failure in line["failures"][:5]:
         print(f"    FAILED: {failure}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,7 +32,7 @@ class FaultKind:
         recorder: what is recorded ends with the fault, because what records is gone.
         answers: the program is there to be told.
         before: it is wrong before the guard arms, so the guard has to refuse.
-        arm: there is an arm left whose standstill can be measured.
+        arm: there is an arm left whose standstill can be measured; otherwise time runs until the guard sends its stop.
         after: what happens once the arm stands; nothing of it may move the arm.
         variant: close to another kind; a quick campaign leaves it out.
     """
@@ -52,8 +53,7 @@ class FaultKind:
 
 def frozen_controller(t: Trial) -> float:
     """The arm of a controller that is frozen is frozen too: time counts from when it goes on."""
-    import time
-
+    t.happened = CLOCK()
     t.simulated.freeze()
     time.sleep(2.0 * ARM_SILENCE)
     t.simulated.thaw()
@@ -103,6 +103,10 @@ def breaks(**faults: int | str) -> Callable[[Trial], float]:
 
 def wires(wiring: str) -> Callable[[Trial], float]:
     return lambda t: t.breaks(wiring=wiring, wiring_after=0)
+
+
+def shorted(a: str, b: str, touched: bool = False, variant: bool = False) -> FaultKind:
+    return FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}"), touched=touched, variant=variant)
 
 
 def says(line: str) -> Callable[[Trial], float]:
@@ -159,18 +163,13 @@ KINDS = (
     FaultKind("skin's clock jumps", breaks(clock_jump_after=0)),
     FaultKind("skin reports a self-test fault", breaks(status_after=0), variant=True),
     *[FaultKind(f"wire of {name} open", wires(f"open-{name}"), variant=name != "A") for name in "ABCD"],
-    *[
-        FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}"), variant=True)
-        for a, b in (("A", "ground"), ("B", "ground"))
-    ],
-    *[
-        FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}"), variant=a != "C")
-        for a, b in (("C", "supply"), ("D", "supply"))
-    ],
-    *[
-        FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}"), variant=a != "A")
-        for a, b in (("A", "B"), ("C", "D"), ("A", "C"))
-    ],
+    shorted("A", "ground", variant=True),
+    shorted("B", "ground", variant=True),
+    shorted("C", "supply"),
+    shorted("D", "supply", variant=True),
+    shorted("A", "B"),
+    shorted("C", "D", variant=True),
+    shorted("A", "C", touched=True),  # one sheet on the other is what a touch is: here, a firm one in a corner
     # the controller
     FaultKind("controller frozen for 0.5 s", frozen_controller),
     FaultKind("controller killed", killed_controller, ARM_SILENCE, arm=False),

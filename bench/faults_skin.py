@@ -7,6 +7,8 @@ Started with the name that its port shall have. A line of JSON in, a line of JSO
     {"slow": 1.0}                        from now on frames take so much longer to arrive, more with each
     {"touch": {"u": 0.13, "phi": 1.5, "duration": 0.2}}
     {"unplug": true}  {"plug": true}     the port goes away, and comes back under the same name
+
+Each answer also says how late the machine has made a frame at worst.
 """
 
 from __future__ import annotations
@@ -43,6 +45,7 @@ class FaultySkin:
         self._index = 0  # of the next frame, as the line counts
         self._slow = self._lag_since = self._due = 0.0
         self._began = CLOCK()
+        self._worst_late = 0.0
         self._master: int | None = None
         self._keep: int | None = None
 
@@ -56,6 +59,8 @@ class FaultySkin:
             self._due = due
             if self._wait(self._began + due + self._slow * max(0.0, due - self._lag_since) - CLOCK()):
                 return
+            if not self._slow:
+                self._worst_late = max(self._worst_late, CLOCK() - self._began - due)
             data = self._line.send(frame)
             if self._replayed:
                 data = self._replayed[self._index % len(self._replayed)]
@@ -102,7 +107,7 @@ class FaultySkin:
                     self._keep = self._master = None
                 case "plug":
                     self._plug()
-        say(at=at)
+        say(at=at, late=self._worst_late)
 
     def _break(self, values: dict[str, Any]) -> None:
         known = {}

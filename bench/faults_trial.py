@@ -143,11 +143,15 @@ class Outcome:
         seconds: from the fault to the measured standstill; None where there was none to measure.
         failures: what must not be, one line each.
         why: what the guard said.
+        skin_late: how late the machine had made a frame of the virtual skin before the fault [s].
+        repeated: trials that were thrown away for that.
         held_up: the longest time that the guard's loop was held up, as it says itself [s].
     """
 
     seconds: float | None = None
     held_up: float = 0.0
+    skin_late: float = 0.0
+    repeated: int = 0
     failures: list[str] = field(default_factory=list)
     why: str = ""
 
@@ -162,6 +166,7 @@ class Trial:
         program: the guarded program's process.
         pids: of the guard and of its helpers.
         rng: of this trial.
+        happened: when the fault happened, where time does not run from then on.
     """
 
     _starting = threading.Lock()  # two trials must not choose the same address
@@ -170,6 +175,7 @@ class Trial:
         self.control = control
         self.rng = random.Random(seed)
         self.pids: dict[str, int] = {}
+        self.happened: float | None = None
         self._stack = ExitStack()
         self._frozen: list[int] = []
 
