@@ -76,5 +76,5 @@ def test_guard_a_program() -> None:
 
 def test_replay_as_test() -> None:
     out = play("05_replay_as_test.py")
-    assert "touch on sensor 0/0 (tube): u = 200.0 mm" in out
+    assert "touch on sensor 0/0 (tube): u = 199.9 mm" in out
     assert out.endswith("the same events, bit by bit\n")

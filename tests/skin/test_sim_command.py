@@ -74,6 +74,16 @@ def test_a_file_holds_the_bytes_of_the_virtual_skin(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out) == {"output": str(file), "bytes": len(expected)}
 
 
+def test_the_model_of_the_sheets_can_be_chosen(tmp_path):
+    files = [tmp_path / model for model in ("field", "ladder")]
+    for file in files:
+        words = ["--touch", "0.01:0.03:50:90", "--duration-s", "0.05", "--model", file.name]
+        assert run(*CONE, *words, "--output", str(file)) == 0
+    assert files[0].read_bytes() != files[1].read_bytes()
+    with pytest.raises(SystemExit):
+        run("--model", "comsol")
+
+
 def test_a_file_needs_an_end_and_a_place(tmp_path):
     with pytest.raises(SensorError, match="give --duration-s"):
         run("--output", str(tmp_path / "x"))
