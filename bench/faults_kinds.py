@@ -68,7 +68,7 @@ def killed_controller(t: Trial) -> float:
 
 def another_program(t: Trial) -> float:
     """Somebody starts a program that moves the arm on, in place of the one that runs; then the skin is touched."""
-    t.send_script(f"def other():\n  movej({GOAL}, a=4, v=1)\nend\n")
+    t.send_script(f"def other():\n  movej({GOAL}, a=2, v=1)\nend\n")
     return t.touch()
 
 

@@ -33,7 +33,7 @@ def _move(session: Session, goal: list[float]) -> None:
     try:
         if session.scene.arm.control == "owner":
             sys.stdin.readline()
-            session.arm.move_j(goal, 1.0, 4.0)
+            session.arm.move_j(goal, 1.0, 2.0)  # far softer than the stop that the scene asks for
         else:
             end = time.monotonic() + 20.0
             while time.monotonic() < end:

@@ -34,7 +34,7 @@ from coneskin.skin.wire import Decoder
 HERE = Path(__file__).parent
 START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
 GOAL = [math.radians(140.0), *START[1:]]
-SPEED, ACCELERATION, DECELERATION = 1.0, 4.0, 10.0
+SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
 SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
 STUCK = 200  # frames
 ESCALATE = 0.025  # s, the default
