@@ -27,7 +27,8 @@ from .phase import Phase
 from .retreat_program import RetreatProgram, retreat_program
 from .rules import Rule, Rules
 from .slowing import Slider, Slowing
-from .state_reader import ControllerState
+from .speed_slider import decode_fraction
+from .state_reader import ControllerState, decode_state
 from .stop_watch import STEADY, StopWatch, Way
 from .table import Table
 from .trail import Trail
@@ -61,6 +62,10 @@ class ArmReaction:
     Raises:
         RobotRefused: comply without OWNER.
     """
+
+    #: how what the arm's controller sends is read; here, so that a guard without an arm loads neither
+    decode_state = staticmethod(decode_state)
+    decode_slider = staticmethod(decode_fraction)
 
     def __init__(
         self,

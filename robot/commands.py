@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from coneskin.errors import RobotRefused
 from coneskin.geometry.pose import Vector
 
-from .ur_models import Joints
+if TYPE_CHECKING:
+    from .ur_models import Joints
 
 __all__ = ["KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction", "Stop"]
 

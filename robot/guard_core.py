@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import RobotConnectionError
 from coneskin.geometry.pose import Vector
@@ -17,16 +17,16 @@ from coneskin.skin.events import Event, SkinFault, Touch, TouchBegan, TouchEnded
 from coneskin.skin.recording import Block
 from coneskin.skin.stream import Stream
 
-from .arm_reaction import ArmReaction
 from .commands import ContactOnLink
 from .journal import Kind
 from .outputs import Outputs, tell
 from .owner_messages import Note
 from .phase import Phase
-from .speed_slider import decode_fraction
-from .state_reader import decode_state
 from .stop_watch import Way
 from .watch import Watch
+
+if TYPE_CHECKING:
+    from .arm_reaction import ArmReaction
 
 __all__ = ["GuardCore", "GuardedSensor"]
 
@@ -174,7 +174,7 @@ class GuardCore:
         if self._arm is None:
             return
         try:
-            state = decode_state(block.time, block.payload)
+            state = self._arm.decode_state(block.time, block.payload)
         except RobotConnectionError as exc:
             self._fault(block.time, f"the controller's state cannot be read: {exc}", out)
             return
@@ -205,7 +205,7 @@ class GuardCore:
         if self._arm is None:
             return
         try:
-            self._arm.slider = decode_fraction(block.payload)
+            self._arm.slider = self._arm.decode_slider(block.payload)
         except RobotConnectionError as exc:
             self._fault(block.time, f"the speed slider cannot be read: {exc}", out)
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from .journal import GuardEvent
-from .owner_messages import Clear, Halt, Speed, Stop
-from .retreat_program import RetreatProgram
-from .slowing import Slider
-from .stop_watch import Way
+
+if TYPE_CHECKING:  # a guard without an arm loads none of them
+    from .owner_messages import Clear, Halt, Speed, Stop
+    from .retreat_program import RetreatProgram
+    from .slowing import Slider
+    from .stop_watch import Way
 
 __all__ = ["Command", "Output", "Outputs", "tell"]
 
-Command = Stop | Speed | Halt | Clear | Way | RetreatProgram | Slider
-Output = Command | GuardEvent
+Command: TypeAlias = "Stop | Speed | Halt | Clear | Way | RetreatProgram | Slider"
+Output: TypeAlias = "Command | GuardEvent"
 
 
 class Outputs(Protocol):

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 import struct
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .ur_models import Joints
+if TYPE_CHECKING:
+    from .ur_models import Joints
 
 __all__ = [
     "BEAT",

@@ -100,6 +100,7 @@ def test_it_ends_when_its_parent_has_gone() -> None:
 def test_a_taken_port_is_one_line_that_names_it() -> None:
     host = free_host()
     with socket.socket() as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # an earlier test may just have left the port
         taken.bind((host, 29999))
         taken.listen()
         done = subprocess.run([*COMMAND, "--host", host], capture_output=True, text=True, timeout=20, check=False)
