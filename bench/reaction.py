@@ -321,13 +321,22 @@ def guarded_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, An
                     raise RuntimeError(f"no {name} within 10 s: {[e.name for e in session.events[before:]]}")
             arm.over()
             before = len(session.events)
-            while True:
-                with suppress(ConeSkinError):  # the skin must be quiet for some frames
-                    session.reset()
-                    break
-                time.sleep(0.005)
+            reset(session)
         session.close()
         return read_turn(mode, folder / "run.rec", touched, came(mode, simulated))
+
+
+def reset(session: Session) -> None:
+    """Reset as soon as it is allowed: the skin must be quiet for some frames."""
+    end = CLOCK() + 10.0
+    while True:
+        try:
+            session.reset()
+            return
+        except ConeSkinError:
+            if CLOCK() > end:
+                raise
+            time.sleep(0.005)
 
 
 def came(mode: str, simulated: SimulatedController) -> list[float]:
