@@ -93,6 +93,7 @@ class GuardCore:
         self._lost: dict[str, str] = {}  # what is gone for good
         self._sound_since: float | None = None
         self._told: float | None = None
+        self._waiting_for: list[str] = []
         self._takers: Mapping[int, Callable[[Block, Outputs], None]] = {
             Kind.SKIN: self._take_skin,
             Kind.ARM: self._take_arm,
@@ -240,8 +241,8 @@ class GuardCore:
             self._sound_since = None
             if self._told is None:
                 self._told = now
-            elif now - self._told >= _TELL_EVERY:
-                self._told = now
+            elif wrong != self._waiting_for and now - self._told >= _TELL_EVERY:
+                self._told, self._waiting_for = now, wrong
                 tell(out, "waiting", now, reasons=wrong)
         elif self._sound_since is None:
             self._sound_since = now

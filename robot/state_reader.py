@@ -7,20 +7,14 @@ newest state also knows how old it is.
 
 from __future__ import annotations
 
-import select
-import socket
-import time
-from collections.abc import Callable
 from typing import NamedTuple
 
-from coneskin.errors import RobotConnectionError, RobotTimeout
-
 from . import rtde_codec as rtde
+from .rtde_connection import RtdeConnection
 from .ur_models import Joints
 
 __all__ = ["RECIPE", "ControllerState", "StateReader", "decode_state"]
 
-PORT = 30004
 _NAMES = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
 #: what the reader asks for
 RECIPE = rtde.Recipe(_NAMES)
@@ -84,7 +78,7 @@ def decode_state(time: float, payload: bytes) -> ControllerState:
     return ControllerState(time, *RECIPE.unpack(payload))  # type: ignore[arg-type]
 
 
-class StateReader:
+class StateReader(RtdeConnection):
     """Reads the controller's state; open it in a ``with``.
 
     Args:
@@ -97,73 +91,11 @@ class StateReader:
         RobotTimeout: on entering, where it does not answer.
     """
 
-    def __init__(self, host: str, timeout: float = 2.0, clock: Callable[[], float] = time.monotonic) -> None:
-        self.host = host
-        self._timeout = timeout
-        self._clock = clock
-        self._sock: socket.socket | None = None
-        self._rest = b""
-
     def __enter__(self) -> StateReader:
-        try:
-            self._sock = socket.create_connection((self.host, PORT), self._timeout)
-            self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            accepted = self._ask(rtde.pack_version_request(), rtde.PacketKind.PROTOCOL_VERSION)
-            if accepted != b"\x01":
-                raise RobotConnectionError(f"{self.host} does not speak RTDE version {rtde.PROTOCOL_VERSION}")
-            rtde.unpack_types(self._ask(rtde.pack_outputs_request(_NAMES), rtde.PacketKind.OUTPUTS), _NAMES)
-            if self._ask(rtde.pack_start_request(), rtde.PacketKind.START) != b"\x01":
-                raise RobotConnectionError(f"{self.host} does not start its RTDE output")
-            self._sock.setblocking(False)
-        except TimeoutError as exc:
-            self.close()
-            raise RobotTimeout(
-                f"no answer from the controller {self.host}:{PORT} within {self._timeout:g} s: "
-                "is it on, and RTDE enabled?"
-            ) from exc
-        except OSError as exc:
-            self.close()
-            if isinstance(exc, RobotConnectionError):
-                raise
-            raise RobotConnectionError(
-                f"cannot reach the controller {self.host}:{PORT}: {exc.strerror or exc}"
-            ) from exc
-        except BaseException:
-            self.close()
-            raise
+        super().__enter__()
+        self.ask_outputs(_NAMES)
+        self.start()
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the connection; may be called again."""
-        if self._sock is not None:
-            self._sock.close()
-            self._sock = None
-
-    def fileno(self) -> int:
-        """The descriptor, for select and poll; -1 when closed."""
-        return -1 if self._sock is None else self._sock.fileno()
-
-    def read(self) -> list[bytes]:
-        """Payloads of the data packets that have arrived, oldest first, for ``decode_state``. Never waits.
-
-        Raises:
-            RobotConnectionError: the controller has closed the connection.
-        """
-        if self._sock is None:
-            raise RobotConnectionError(f"the connection to the controller {self.host} is not open")
-        try:
-            data = self._sock.recv(1 << 16)
-        except BlockingIOError:
-            return []
-        except OSError as exc:
-            raise RobotConnectionError(f"the controller {self.host} is gone: {exc.strerror or exc}") from exc
-        if not data:
-            raise RobotConnectionError(f"the controller {self.host} has closed the connection")
-        packets, self._rest = rtde.split(self._rest + data)
-        return [packet.payload for packet in packets if packet.kind is rtde.PacketKind.DATA]
 
     def wait(self, timeout: float) -> ControllerState:
         """Wait for the next state, for scripts and set-up; the guard's loop uses ``fileno`` and ``read``.
@@ -172,22 +104,4 @@ class StateReader:
             RobotTimeout: none came within the timeout [s].
             RobotConnectionError: the controller is gone.
         """
-        end = self._clock() + timeout
-        while (left := end - self._clock()) > 0.0:
-            if select.select([self], [], [], left)[0] and (payloads := self.read()):
-                return decode_state(self._clock(), payloads[-1])
-        raise RobotTimeout(f"the controller {self.host} sent no state within {timeout:g} s")
-
-    def _ask(self, request: bytes, kind: rtde.PacketKind) -> bytes:
-        assert self._sock is not None
-        self._sock.sendall(request)
-        end = self._clock() + self._timeout
-        while self._clock() < end:
-            data = self._sock.recv(1 << 16)
-            if not data:
-                raise RobotConnectionError(f"the controller {self.host} has closed the connection during set-up")
-            packets, self._rest = rtde.split(self._rest + data)
-            for packet in packets:
-                if packet.kind is kind:
-                    return packet.payload
-        raise TimeoutError
+        return decode_state(self._clock(), self.wait_data(timeout))

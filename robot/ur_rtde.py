@@ -46,7 +46,8 @@ def rtde_errors(doing: str) -> Iterator[None]:
     try:
         yield
     except RuntimeError as exc:
-        raise RobotConnectionError(f"{doing}: {exc}") from exc
+        why = "another program controls the arm, a second coneskin perhaps" if "already in use" in str(exc) else exc
+        raise RobotConnectionError(f"{doing}: {why}") from exc
 
 
 class UrArm:

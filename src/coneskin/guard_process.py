@@ -63,9 +63,13 @@ def _run(
             ports.owner = other
         else:
             ports.keeper = other
+        from .robot.arm_identity import check_identity, read_pose
         from .robot.foreign import ForeignStops
         from .robot.state_reader import StateReader
+        from .robot.ur_models import model
 
+        if (pose := read_pose(scene.arm.host)) is not None:
+            check_identity(model(scene.arm.model), pose, scene.arm.host)
         ports.reader = stack.enter_context(StateReader(scene.arm.host))
         ports.foreign = stack.enter_context(ForeignStops(scene.arm.host))
         if scene.reaction is not None:

@@ -301,6 +301,8 @@ def _keeping(scene: Scene) -> dict[str, Any]:
 
 def _died(what: str, scene: Scene) -> ConeSkinError:
     """The error for a guard that could not start, as what it is about."""
+    if "correct arm.model" in what or "no model fits" in what:
+        return RobotRefused(what)
     if scene.arm is not None and scene.arm.host in what:
         return RobotConnectionError(what)
     return SkinConnectionError(what)

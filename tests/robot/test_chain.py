@@ -249,3 +249,26 @@ def test_a_touched_skin_does_not_arm(controller):
     scene = scene_for(controller, **{"[reaction]": "[" + touched})
     with pytest.raises(RobotRefused, match="it is touched"):
         guard(scene, start_timeout=3.0).__enter__()
+
+
+def test_a_second_guard_on_the_same_arm_gives_up_at_once(controller):
+    with guard(scene_for(controller)) as first:
+        begun = time.monotonic()
+        with pytest.raises(RobotRefused, match="another program controls the arm"):
+            guard(scene_for(controller), start_timeout=60.0).__enter__()
+        assert time.monotonic() - begun < 50.0, "it waited for what cannot come"
+        first.check()
+
+
+def test_another_arm_than_the_scenes_is_refused(controller):
+    with pytest.raises(RobotRefused, match=r"is no UR10e: .* UR5e"):
+        guard(scene_for(controller, UR5e="UR10e"), start_timeout=20.0).__enter__()
+
+
+def test_a_target_in_degrees_is_refused_before_anything_moves(controller):
+    with guard(scene_for(controller)) as session:
+        with pytest.raises(ValueError, match=r"q\[1\] must be within -6.283 to 6.283 rad.*-90 deg are -1.5708 rad"):
+            session.arm.move_j([0, -90, 90, -90, -90, 0])
+        with pytest.raises(ValueError, match="must be 6 finite numbers"):
+            session.arm.move_j([0.0] * 5)
+        assert max(map(abs, controller.state()["qd"])) == 0.0

@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from coneskin.errors import RobotConnectionError, RobotRefused, RobotTimeout
-from coneskin.robot import foreign, rtde_codec, state_reader
+from coneskin.robot import foreign, rtde_codec, rtde_connection
 from coneskin.robot.foreign import ForeignStops
 from coneskin.robot.sim_process import SimulatedController, free_host
 from coneskin.robot.state_reader import ControllerState, StateReader, decode_state
@@ -71,7 +71,7 @@ class Peer:
 
     def __init__(self, *answers, close=True):
         self.host = free_host()
-        self._server = socket.create_server((self.host, state_reader.PORT))
+        self._server = socket.create_server((self.host, rtde_connection.PORT))
         self._answers, self._close = answers, close
         self._thread = threading.Thread(target=self._serve)
 

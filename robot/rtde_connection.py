@@ -1,0 +1,177 @@
+"""One RTDE connection to a controller: set-up with a time limit, then data without waiting.
+
+What is read or written on it is its user's: ``state_reader``, ``speed_slider``, ``arm_identity``.
+"""
+
+from __future__ import annotations
+
+import select
+import socket
+import time
+from collections.abc import Callable, Sequence
+
+from coneskin.errors import RobotConnectionError, RobotTimeout
+
+from . import rtde_codec as rtde
+
+__all__ = ["PORT", "RtdeConnection"]
+
+PORT = 30004
+
+
+class RtdeConnection:
+    """A connection; open it in a ``with``, ask for what is wanted, then ``start``.
+
+    Args:
+        host: the controller.
+        timeout: how long connecting and each reply may take [s].
+        clock: monotonic seconds.
+
+    Raises:
+        RobotConnectionError: the controller cannot be reached, or refuses.
+        RobotTimeout: it does not answer.
+    """
+
+    def __init__(self, host: str, timeout: float = 2.0, clock: Callable[[], float] = time.monotonic) -> None:
+        self.host = host
+        self._timeout = timeout
+        self._clock = clock
+        self._sock: socket.socket | None = None
+        self._rest = b""
+        self._waiting: list[bytes] = []
+
+    def __enter__(self) -> RtdeConnection:
+        try:
+            self._sock = socket.create_connection((self.host, PORT), self._timeout)
+        except TimeoutError as exc:
+            raise self._silent() from exc
+        except OSError as exc:
+            raise RobotConnectionError(
+                f"cannot reach the controller {self.host}:{PORT}: {exc.strerror or exc}"
+            ) from exc
+        self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self._ask(rtde.pack_version_request(), rtde.PacketKind.PROTOCOL_VERSION) != b"\x01":
+            self.close()
+            raise RobotConnectionError(f"{self.host} does not speak RTDE version {rtde.PROTOCOL_VERSION}")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection; may be called again."""
+        if self._sock is not None:
+            self._sock.close()
+            self._sock = None
+
+    def ask_outputs(self, names: Sequence[str], frequency_hz: float = 500.0) -> rtde.Recipe:
+        """Ask for variables that the controller sends at a frequency [Hz].
+
+        Raises:
+            RobotRefused: it does not know one of them.
+        """
+        return self._recipe(rtde.pack_outputs_request(names, frequency_hz), rtde.PacketKind.OUTPUTS, names)
+
+    def ask_inputs(self, names: Sequence[str]) -> rtde.Recipe:
+        """Ask for variables that the controller takes from here.
+
+        Raises:
+            RobotRefused: it does not know one of them, or another client owns it.
+        """
+        return self._recipe(rtde.pack_inputs_request(names), rtde.PacketKind.INPUTS, names)
+
+    def start(self) -> None:
+        """Let the data flow; from now on nothing waits."""
+        if self._ask(rtde.pack_start_request(), rtde.PacketKind.START) != b"\x01":
+            self.close()
+            raise RobotConnectionError(f"{self.host} does not start its RTDE output")
+        if self._sock is not None:
+            self._sock.setblocking(False)
+
+    def fileno(self) -> int:
+        """The descriptor, for select and poll; -1 when closed."""
+        return -1 if self._sock is None else self._sock.fileno()
+
+    def read(self) -> list[bytes]:
+        """Payloads of the data packets that have arrived, oldest first. Never waits.
+
+        Raises:
+            RobotConnectionError: the controller has closed the connection.
+        """
+        payloads, self._waiting = self._waiting, []
+        if self._sock is None:
+            raise RobotConnectionError(f"the connection to the controller {self.host} is not open")
+        try:
+            data = self._sock.recv(1 << 16)
+        except BlockingIOError:
+            return payloads
+        except OSError as exc:
+            raise RobotConnectionError(f"the controller {self.host} is gone: {exc.strerror or exc}") from exc
+        if not data:
+            raise RobotConnectionError(f"the controller {self.host} has closed the connection")
+        packets, self._rest = rtde.split(self._rest + data)
+        return payloads + [packet.payload for packet in packets if packet.kind is rtde.PacketKind.DATA]
+
+    def wait_data(self, timeout: float) -> bytes:
+        """The payload of the newest data packet, within a timeout [s].
+
+        Raises:
+            RobotTimeout: none came.
+            RobotConnectionError: the controller is gone.
+        """
+        end = self._clock() + timeout
+        while (left := end - self._clock()) > 0.0:
+            if payloads := self.read():
+                return payloads[-1]
+            select.select([self], [], [], left)
+        raise RobotTimeout(f"the controller {self.host} sent no state within {timeout:g} s")
+
+    def send(self, recipe: rtde.Recipe, values: Sequence[rtde.Value]) -> bool:
+        """Send inputs without waiting; whether the system took the bytes."""
+        data = rtde.pack(rtde.PacketKind.DATA, recipe.pack(values))
+        try:
+            return self._sock is not None and self._sock.send(data) == len(data)
+        except OSError:
+            return False
+
+    def _recipe(self, request: bytes, kind: rtde.PacketKind, names: Sequence[str]) -> rtde.Recipe:
+        reply = self._ask(request, kind)
+        try:
+            return rtde.unpack_types(reply, names)
+        except BaseException:
+            self.close()
+            raise
+
+    def _ask(self, request: bytes, kind: rtde.PacketKind) -> bytes:
+        """Send a request and wait for the reply of its kind; closes the connection where it fails."""
+        assert self._sock is not None
+        end = self._clock() + self._timeout
+        try:
+            self._sock.sendall(request)
+            reply: bytes | None = None
+            while reply is None:
+                if self._clock() >= end:
+                    raise TimeoutError
+                data = self._sock.recv(1 << 16)
+                if not data:
+                    raise RobotConnectionError(f"the controller {self.host} has closed the connection during set-up")
+                packets, self._rest = rtde.split(self._rest + data)
+                for packet in packets:
+                    if packet.kind is kind and reply is None:
+                        reply = packet.payload
+                    elif packet.kind is rtde.PacketKind.DATA:
+                        self._waiting.append(packet.payload)
+        except TimeoutError as exc:
+            self.close()
+            raise self._silent() from exc
+        except OSError as exc:
+            self.close()
+            if isinstance(exc, RobotConnectionError):
+                raise
+            raise RobotConnectionError(f"the controller {self.host}:{PORT} is gone: {exc.strerror or exc}") from exc
+        return reply
+
+    def _silent(self) -> RobotTimeout:
+        return RobotTimeout(
+            f"no answer from the controller {self.host}:{PORT} within {self._timeout:g} s: is it on, and RTDE enabled?"
+        )
