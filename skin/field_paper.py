@@ -23,7 +23,7 @@ __all__ = ["ErrorMap", "Row", "decode_errors", "error_map", "influence_of_area",
 
 Floats = NDArray[np.float64]
 
-_GRID = "of that size; its grid is unpublished"
+_GRID = "depends on the grid of places, which is unpublished"
 
 #: Paper, Table 2: (r [mm], theta [deg]) applied, error (mm, deg); contact radius 9.5 mm.
 TABLE_2 = (
