@@ -162,7 +162,7 @@ def _making(design: SheetDesign) -> Iterator[str]:
     yield ""
     steps = [
         "Red is cut, magenta are holes, blue is marked but not cut, green is folded. Print PDF files at 100 %; the bar "
-        "on each page must measure 100 mm. Cut from the files of single parts: `all` nests them over the pages of a plotter.",
+        "on each page must measure 100 mm. Cut from the files of single parts: `all` nests them across pages.",
         "Every part says which face is up in the drawing. Inside is the face towards the link. A part laid the other "
         "way round has its tabs and its lead on the wrong side.",
         "Lay the electrodes (2, 6) on the backs of the conductive sheets (3, 5) as marked: the lower ones inside, the "
