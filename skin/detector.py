@@ -21,6 +21,11 @@ from .wire import Frame, Status
 
 __all__ = ["Detection", "Detector"]
 
+#: what a frame shows during whose phases a contact changes
+_CONTRADICTIONS = frozenset({Fault.GUIDE_DRIVEN, Fault.OUT_OF_RANGE, Fault.GUIDES_DISAGREE, Fault.LEAK})
+_FORGIVEN = 2.5  # such frames: three in a row, for a contact that closes slowly
+_FORGOTTEN = 0.1  # of them, for each good frame
+
 
 @dataclass(frozen=True, slots=True)
 class Detection:
@@ -89,6 +94,7 @@ class Detector:
         "_above",
         "_began",
         "_below",
+        "_changes",
         "_last_counts",
         "_lasting",
         "_level",
@@ -127,7 +133,7 @@ class Detector:
         self.baseline = 0.0
         self._radius = max(sensor.frustum.radius1, sensor.frustum.radius2)
         self._above = self._below = self._quiet = 0
-        self._began = 0.0
+        self._began = self._changes = 0.0
         self._lasting = False
         self._level = self._u = self._phi = 0.0
         self._valid = self._placed = False
@@ -164,9 +170,14 @@ class Detector:
         reading = read(self.sensor, frame)
         if reading.fault is not None:
             self._seen_valid = False
-            self._report(events, reading.fault, frame, now)
-            return events
-        self.timing.seen_valid(now)
+            if not self._is_change(reading.fault):
+                self._report(events, reading.fault, frame, now)
+                return events
+            if reading.level < self.sensor.thresholds.touch_level:
+                return events  # the next frames say what it was
+        else:
+            self._changes = max(0.0, self._changes - _FORGOTTEN)
+            self.timing.seen_valid(now)
         if self.detection.stuck_frames and self._stands_still(frame):
             self._report(events, Fault.STUCK, frame, now)
             return events
@@ -180,6 +191,17 @@ class Detector:
         else:
             self._while_untouched(events, frame, now, level, u, phi, settled)
         return events
+
+    def _is_change(self, fault: Fault) -> bool:
+        """Whether a fault may be a contact that came or went between the phases of this one frame.
+
+        The phases are measured one after the other, so such a frame contradicts itself. A few frames later the contact
+        rests, or has passed the threshold; if they go on, or come more often than now and then, it is a fault.
+        """
+        if fault not in _CONTRADICTIONS or self._changes > _FORGIVEN:
+            return False
+        self._changes += 1.0
+        return True
 
     def silence(self, now: float, longest: float) -> list[Event]:
         """Report that no valid frame has come for too long.

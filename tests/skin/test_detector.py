@@ -1,18 +1,21 @@
 """Touch or no touch, from true frames: latency, hysteresis, drift, lasting contacts, and every fault on the way."""
 
 import math
+import random
 
 import pytest
 
 from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.geometry.frustum import Frustum
 from coneskin.skin.circuit import Contact, Wiring
 from coneskin.skin.detector import Detection, Detector
 from coneskin.skin.diagnosis import Fault
 from coneskin.skin.events import Event, SkinFault, TouchBegan, TouchEnded, TouchMoved
 from coneskin.skin.faults import Faults
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.stream import Stream
 from coneskin.skin.virtual import Imperfections, ScriptedTouch, VirtualSkin
-from coneskin.skin.wire import Decoder
+from coneskin.skin.wire import Decoder, Frame
 
 from .bench_top import UR10, measured
 
@@ -292,3 +295,31 @@ def test_silence_is_reported_once_and_ends_with_untouched_frames():
 def test_a_detector_that_cannot_be_is_refused(changes, words):
     with pytest.raises(SensorError, match=words):
         Detector(SENSOR, Detection(**changes))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_touch_that_begins_or_ends_between_two_phases_is_a_touch(seed):
+    """The phases of one frame then contradict each other, for up to three frames while the layers close."""
+    rng = random.Random(seed)
+    sensor = Sensor(Frustum(0.0376, 0.0373, 0.24))
+    start, end = 0.1 + 0.001 * rng.random(), 0.16 + 0.001 * rng.random()
+    touch = ScriptedTouch(start, end, rng.uniform(0.01, 0.23), rng.uniform(0.1, 6.1))
+    stream, events = Stream([sensor]), []
+    for time, data in VirtualSkin(sensor, [touch], seed=seed, duration=0.25).packets():
+        events += stream.feed(data, time)
+    assert [type(event) for event in events if not isinstance(event, TouchMoved)] == [TouchBegan, TouchEnded]
+
+
+def test_a_guide_that_stays_driven_is_a_fault_after_three_frames():
+    sensor = Sensor(Frustum(0.0376, 0.0373, 0.24))
+    detector, events = Detector(sensor), []
+    for number in range(1, 80):
+        guide = 2900 if number > 70 else 0
+        frame = Frame(1, 0, 0, 0, number, 1000 * number, 0, 0, 0, guide, guide, 0, 0, 0, 0, 0)
+        currents = {
+            "radial_current": sensor.electronics.count_amperes(sensor.radial_amperes),
+            "angular_current": sensor.electronics.count_amperes(sensor.angular_amperes),
+            "supply": sensor.electronics.count_volts(2.5),
+        }
+        events += detector.feed(frame._replace(**currents), 0.001 * number)
+    assert [(event.fault, event.sequence) for event in events] == [(Fault.GUIDE_DRIVEN, 74)]
