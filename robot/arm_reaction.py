@@ -57,6 +57,7 @@ class ArmReaction:
         phase: where it is.
         state: newest measured state, or None before the first.
         owner_ready: whether the process is ready that stops the arm when this one is gone: the owner, or the keeper.
+        owned: whether ur_rtde moves the arm, in a process of ours.
         slider: where the controller's speed slider is, or None.
 
     Raises:
@@ -80,6 +81,7 @@ class ArmReaction:
         self.state: ControllerState | None = None
         self.owner_ready = False
         self.slider: float | None = None
+        self.owned = Way.OWNER in ways
         self._model = model
         self._rules = Rules(reaction, rules)
         self._plain = not rules and reaction.kind in ("stop", "retreat")

@@ -92,6 +92,7 @@ class GuardCore:
         self._faults: dict[str, str] = {}  # since the last reset
         self._lost: dict[str, str] = {}  # what is gone for good
         self._sound_since: float | None = None
+        self._played = False
         self._told: float | None = None
         self._waiting_for: list[str] = []
         self._takers: Mapping[int, Callable[[Block, Outputs], None]] = {
@@ -182,6 +183,17 @@ class GuardCore:
         self._arm.sample(state, out)
         if state.stopped_by_safety and self.phase.watched:
             self._fault(block.time, "the controller's own safety system has stopped the arm", out)
+        self._watch_program(block.time, state.playing, out)
+
+    def _watch_program(self, now: float, playing: bool, out: Outputs) -> None:
+        """The program of ur_rtde ends by itself when its owner hangs, and nobody else may have noticed."""
+        if self._arm is None or not self._arm.owned or not self.phase.watched:
+            self._played = False
+        elif playing:
+            self._played = True
+        elif self._played:
+            self._played = False
+            self._fault(now, "the program of ur_rtde has ended on the controller: is its owner hung?", out)
 
     def _take_owner(self, block: Block, out: Outputs) -> None:
         if self._arm is None:

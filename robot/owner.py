@@ -37,6 +37,7 @@ class Owner:
         program: the program's channel.
         clock: monotonic seconds.
         leaving: called before the last stop.
+        deceleration: of the leading joint, for a stop that the guard does not command any more [rad/s2].
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Owner:
         program: Channel,
         clock: Callable[[], float] = time.monotonic,
         leaving: Callable[[], None] = lambda: None,
+        deceleration: float = 10.0,
     ) -> None:
         self._clock = clock
         self._leaving = leaving
@@ -57,7 +59,7 @@ class Owner:
         self._allowed = False
         self._waiting = False  # the program waits for the end of a move
         self._kicked = -1.0
-        self._deceleration = 2.0
+        self._deceleration = deceleration
 
     def run(self) -> None:
         """Serve until one of the channels ends, or ``leave``; then stop the arm."""
@@ -130,7 +132,6 @@ class Owner:
             if not self._allowed:
                 self._reply({"ok": False, "stopped": True, "why": "the guard does not let the arm move"})
                 return
-            self._deceleration = float(request.get("acceleration", self._deceleration))
             self._waiting = self._start(request)
             if not self._waiting:
                 self._reply({"ok": True})
@@ -176,7 +177,9 @@ def main(arguments: list[str]) -> int:
     settings = decode_json(hello[0])
     try:
         with UrArm(settings["host"], settings["watchdog_hz"]) as arm:
-            owner = Owner(arm, guard, program, leaving=lambda: _end_within(_LEAVING))
+            owner = Owner(
+                arm, guard, program, leaving=lambda: _end_within(_LEAVING), deceleration=settings["deceleration"]
+            )
             signal.signal(signal.SIGTERM, lambda *_: owner.leave())
             owner.run()
     except ConeSkinError as exc:

@@ -231,7 +231,7 @@ class Session:
             if scene.arm.control == "owner":
                 self._children["owner"] = spawn("coneskin.robot.owner", other_guard_end, other_program_end)
                 self._arm = ArmProxy(Channel(program_end), self.check, model(scene.arm.model))
-                self._arm.channel.send(encode_json({"host": scene.arm.host, "watchdog_hz": scene.arm.watchdog_hz}))
+                self._arm.channel.send(encode_json({**_keeping(scene), "watchdog_hz": scene.arm.watchdog_hz}))
             else:
                 self._children["keeper"] = spawn("coneskin.robot.keeper", other_guard_end, other_program_end)
                 self._keeper = Channel(program_end)
@@ -288,7 +288,7 @@ class Session:
 
 
 def _keeping(scene: Scene) -> dict[str, Any]:
-    """What the keeper has to know."""
+    """What the owner, or the keeper, has to know to stop the arm when the guard is gone."""
     from dataclasses import asdict
 
     from .robot.commands import Reaction

@@ -23,6 +23,7 @@ class MockArm:
     clock: float = 0.0
     safety_bits: int = 1
     robot_mode: int = 7
+    runtime_state: int = 2
     target: list[float] | None = None
     acceleration: float = 0.0
     commands: list[object] = field(default_factory=list)
@@ -71,7 +72,9 @@ class MockArm:
             share = min(1.0, self.acceleration * CYCLE / gap) if gap else 1.0
             self.qd = [v + share * (t - v) for t, v in zip(target, self.qd, strict=True)]
         self.q = [x + v * CYCLE for x, v in zip(self.q, self.qd, strict=True)]
-        return RECIPE.pack((self.clock, tuple(self.q), tuple(self.qd), self.robot_mode, self.safety_bits, 2))
+        return RECIPE.pack(
+            (self.clock, tuple(self.q), tuple(self.qd), self.robot_mode, self.safety_bits, self.runtime_state)
+        )
 
 
 def _lines(text: str) -> list[tuple[list[float], float, int]]:

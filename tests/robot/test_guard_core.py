@@ -204,6 +204,15 @@ def test_an_error_of_the_owner_stops():
     assert "moveJ was refused" in rig.event("latched").details["why"]
 
 
+def test_a_program_that_ends_by_itself_is_a_fault():
+    """The controller's watchdog ends it when the owner of ur_rtde hangs."""
+    rig = Rig(speed=1.0).run(0.5)
+    rig.arm.runtime_state = 1
+    rig.run(0.5)
+    assert rig.core.phase is Phase.LATCHED
+    assert "the program of ur_rtde has ended" in rig.event("stopping").details["why"]
+
+
 def test_a_damaged_state_is_a_fault():
     rig = Rig(speed=1.0).run(0.5)
     rig.feed(Kind.ARM, b"short")
