@@ -40,7 +40,7 @@ def main(arguments: list[str]) -> int:
         with contextlib.ExitStack() as stack:
             _run(scene, start, supervisor, other, stack)
     except ConeSkinError as exc:
-        event = GuardEvent("died", time.monotonic(), {"what": str(exc)})
+        event = GuardEvent("died", time.monotonic(), {"what": str(exc), "error": type(exc).__name__})
         supervisor.send(encode_block(event.block()))
         select.select([], [supervisor], [], 1.0)
         supervisor.flush()

@@ -18,8 +18,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from . import errors
 from .arm_proxy import ArmProxy
-from .errors import Collision, ConeSkinError, RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
+from .errors import (
+    Collision,
+    ConeSkinError,
+    MissingExtra,
+    RobotConnectionError,
+    RobotRefused,
+    SceneError,
+    SkinConnectionError,
+)
 from .robot.channel import Channel, pair, spawn
 from .robot.journal import GuardEvent
 from .robot.owner_messages import decode_json, encode_json
@@ -281,7 +290,7 @@ class Session:
         """Why there is no guard any more, if there is none."""
         for event in self.events:
             if event.name == "died":
-                return _died(str(event.details["what"]), self.scene)
+                return _died(event)
         if self._log.ended and not any(event.name == "ending" for event in self.events[-20:]):
             return RobotConnectionError("the guard's process has ended; what it leaves behind stops the arm")
         return None
@@ -299,13 +308,13 @@ def _keeping(scene: Scene) -> dict[str, Any]:
     return {"host": scene.arm.host, "watch": asdict(scene.watch or Watch()), "deceleration": deceleration}
 
 
-def _died(what: str, scene: Scene) -> ConeSkinError:
-    """The error for a guard that could not start, as what it is about."""
-    if "correct arm.model" in what or "no model fits" in what:
-        return RobotRefused(what)
-    if scene.arm is not None and scene.arm.host in what:
-        return RobotConnectionError(what)
-    return SkinConnectionError(what)
+def _died(event: GuardEvent) -> ConeSkinError:
+    """The error that a guard died of, of the kind that it was there."""
+    kind = getattr(errors, str(event.details.get("error")), RobotConnectionError)
+    if kind in (SceneError, MissingExtra):  # made of parts, of which only the message has come
+        kind = RobotRefused
+    error: ConeSkinError = kind(event.details["what"])
+    return error
 
 
 def _reasons(event: GuardEvent) -> list[str]:
