@@ -55,7 +55,7 @@ def test_a_slider_that_somebody_else_owns_is_one_clear_line(controller):
     other = rtde_io.RTDEIOInterface(controller.host)
     try:
         scene = scene_for(controller, **{RETREAT: 'kind = "slow"'})
-        with pytest.raises(RobotConnectionError, match=r"a slow reaction needs the speed slider .* in use"):
+        with pytest.raises(RobotRefused, match=r"a slow reaction needs the speed slider .* in use"):
             guard(scene, start_timeout=5.0).__enter__()
     finally:
         other.disconnect()
