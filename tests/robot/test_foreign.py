@@ -201,7 +201,8 @@ def test_without_its_guard_the_keeper_stops_the_arm(controller, run, number):
         if number is signal.SIGSTOP:
             os.kill(session._children["guard"].pid, signal.SIGCONT)
             latched = session.wait_for(("latched",), 10.0)
-            assert "no" in latched.details["why"] or "silent" in latched.details["why"]
+            # what it misses first depends on how much the sockets and the port kept for it
+            assert any(word in latched.details["why"] for word in ("no ", "silent", "more frames are missing"))
         time.sleep(0.3)
         assert not any(controller.state()["qd"])
 
