@@ -1,6 +1,6 @@
 """The fault campaign: everything that can go wrong, at random times, and whether the arm then stands within its budget.
 
-    python bench/faults.py [--times 100] [--kinds guard,skin] [--control owner] [--parallel 1] [--json]
+    python bench/faults.py [--times 100] [--kinds guard,skin] [--control owner] [--parallel 1] [--keep FILE] [--json]
 
 A simulated arm moves under guard, by its own program (control = "owner") or by a raw one (control = "foreign"). At a
 random time something fails, or two things at once (bench/faults_kinds.py). The budget is the time in which the fault
@@ -12,6 +12,9 @@ things. Time runs until the log of the simulated controller says that the arm st
 
 or where the program is not told, or a frame before the fault is missing in the recording, or its replay differs. "Held
 up" is the longest time for which the machine did not let the guard's loop run. The exit code is 0 only if none failed.
+
+Every kind is tried once before any is tried twice. With --keep each trial is added to a file, and a campaign that was
+interrupted goes on from there.
 """
 
 from __future__ import annotations
@@ -24,8 +27,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import ExitStack, suppress
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -194,6 +198,7 @@ def main() -> int:
     parser.add_argument("--kinds", help="those with one of these words in their names, separated by commas")
     parser.add_argument("--control", choices=("owner", "foreign"), help="(both)")
     parser.add_argument("--parallel", type=int, default=1, help="trials at a time (%(default)s)")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="add each trial to this file; go on from it")
     parser.add_argument("--slack-ms", type=float, default=100.0, help="of the budget (%(default)g)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--quick", action="store_true", help="each kind in one control mode, without close variants")
@@ -208,30 +213,70 @@ def main() -> int:
         parser.error("no kind has such a name; --list names them")
     if not args.json:
         _head(args)
-    slack, began, failed = 1e-3 * args.slack_ms, CLOCK(), 0
-    with ThreadPoolExecutor(args.parallel) as pool:
-        futures = [
-            (kind, control, [pool.submit(run_trial, kind, control, f"{args.seed}/{kind.name}/{control}/{n}", slack)
-                             for n in range(args.times)])
-            for kind, control in pairs
-        ]  # fmt: skip
+    slack, began = 1e-3 * args.slack_ms, CLOCK()
+    outcomes = read_trials(args.keep) if args.keep and args.keep.exists() else {}
+    new = 0
+    try:
+        new = run_all(pairs, args, slack, outcomes)
+    except KeyboardInterrupt:
+        print("\ninterrupted: this is what was tried", file=sys.stderr)
+    failed = count = 0
+    for kind, control in pairs:
+        if tried := outcomes.get((kind.name, control)):
+            line = summary(kind, control, list(tried.values()), slack)
+            failed, count = failed + line["failed"], count + line["count"]
+            print(json.dumps(line)) if args.json else show(line)
+    if not args.json:
+        print(f"\n{len(pairs)} kinds, {count} trials, {new} of them now in {CLOCK() - began:.0f} s; {failed} failed")
+    return 1 if failed else 0
+
+
+#: by kind and control mode, then by number
+Outcomes = dict[tuple[str, str], dict[int, Outcome]]
+
+
+def run_all(pairs: list[tuple[FaultKind, str]], args: argparse.Namespace, slack: float, outcomes: Outcomes) -> int:
+    """Try what has not been tried; the number of trials that were made."""
+    left = [
+        (number, kind, control)
+        for number in range(args.times)
+        for kind, control in pairs
+        if number not in outcomes.get((kind.name, control), {})
+    ]
+    with ThreadPoolExecutor(args.parallel) as pool, ExitStack() as stack:
+        file = stack.enter_context(args.keep.open("a")) if args.keep else None
+        trials = {
+            pool.submit(run_trial, kind, control, f"{args.seed}/{kind.name}/{control}/{number}", slack): (
+                number,
+                kind.name,
+                control,
+            )
+            for number, kind, control in left
+        }
         try:
-            for kind, control, trials in futures:
-                line = summary(kind, control, [trial.result() for trial in trials], slack)
-                failed += line["failed"]
-                if args.json:
-                    print(json.dumps(line), flush=True)
-                else:
-                    show(line)
-                    sys.stdout.flush()
+            for done, trial in enumerate(as_completed(trials), 1):
+                number, name, control = trials[trial]
+                outcomes.setdefault((name, control), {})[number] = outcome = trial.result()
+                if file is not None:
+                    row = {"kind": name, "control": control, "number": number, **asdict(outcome)}
+                    print(json.dumps(row), file=file, flush=True)
+                print(f"\r{done} of {len(left)} trials    ", end="", file=sys.stderr, flush=True)
         except KeyboardInterrupt:
             pool.shutdown(cancel_futures=True)
-            print("interrupted: this is what was tried", file=sys.stderr)
-            return 130
-    if not args.json:
-        count = len(pairs) * args.times
-        print(f"\n{len(pairs)} kinds, {count} trials in {CLOCK() - began:.0f} s; {failed} failed")
-    return 1 if failed else 0
+            raise
+    print(file=sys.stderr)
+    return len(left)
+
+
+def read_trials(path: Path) -> Outcomes:
+    """The trials that --keep has written."""
+    found: Outcomes = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        row = json.loads(line)
+        key = row.pop("kind"), row.pop("control")
+        number = row.pop("number")
+        found.setdefault(key, {})[number] = Outcome(**row)
+    return found
 
 
 def _head(args: argparse.Namespace) -> None:
