@@ -13,27 +13,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from coneskin.errors import RobotRefused
 
 from .arm_checks import arm_faults
-from .commands import ArmState, ContactOnLink, Done, Reaction
+from .commands import ArmState, ContactOnLink, Reaction
 from .controller_clock import ControllerClock
-from .leaving import Leaving
-from .movement import choose_movement
 from .outputs import Command, Output, Outputs, tell
 from .owner_messages import Clear, Halt, Stop
 from .phase import Phase
-from .retreat_program import RetreatProgram, retreat_program
 from .rules import Rule, Rules
 from .slowing import Slider, Slowing
 from .speed_slider import decode_fraction
 from .state_reader import ControllerState, decode_state
 from .stop_watch import STEADY, StopWatch, Way
-from .table import Table
-from .trail import Trail
 from .ur_models import ArmModel
 from .watch import Watch
+
+if TYPE_CHECKING:  # a reaction that only stops loads neither
+    from .leaving import Leaving
+    from .mover import Mover
 
 __all__ = ["ArmReaction", "Command", "Output", "Outputs", "Phase"]
 
@@ -49,9 +49,9 @@ class ArmReaction:
         reaction: what it does when it is touched and no rule fits.
         watch: the limits.
         ways: the ways to stop that there are; the first is used for every stop, the others where it does not work.
-            Without OWNER, whoever moves the arm is not known here, and a retreat is a program of its own.
+            Without OWNER, whoever moves the arm is not known here.
         rules: reactions with conditions.
-        table: what the arm must not go below while it retreats.
+        mover: moves the arm away; None where no reaction does.
 
     Attributes:
         phase: where it is.
@@ -61,7 +61,7 @@ class ArmReaction:
         slider: where the controller's speed slider is, or None.
 
     Raises:
-        RobotRefused: comply without OWNER.
+        RobotRefused: comply without OWNER, or a reaction that moves the arm without a mover.
     """
 
     #: how what the arm's controller sends is read; here, so that a guard without an arm loads neither
@@ -75,7 +75,7 @@ class ArmReaction:
         watch: Watch,
         ways: tuple[Way, ...],
         rules: tuple[Rule, ...] = (),
-        table: Table | None = None,
+        mover: Mover | None = None,
     ) -> None:
         self.phase = Phase.STARTING
         self.state: ControllerState | None = None
@@ -87,11 +87,12 @@ class ArmReaction:
         self._plain = not rules and reaction.kind in ("stop", "retreat")
         if Way.OWNER not in ways and "comply" in self._rules.kinds:
             raise RobotRefused("comply needs the owner of ur_rtde: a program of its own cannot follow a push")
+        if mover is None and self._rules.move:
+            raise RobotRefused("a reaction that moves the arm away needs a mover")
         self._watch = watch
         self._ways = ways
-        self._mover = Way.OWNER if Way.OWNER in ways else Way.SCRIPT
-        self._table = table
-        self._trail = Trail()
+        self._mover = mover
+        self._first = Way.OWNER if self.owned else Way.SCRIPT
         self._clock = ControllerClock()
         self._stop: StopWatch | None = None
         self._slowing: Slowing | None = None
@@ -175,7 +176,8 @@ class ArmReaction:
             self._fresh = state.time
         self.state = state
         measured_at = self._clock.measured_at(state.time, state.controller_time)
-        self._trail.note(measured_at, state.q)
+        if self._mover is not None:
+            self._mover.note(measured_at, state.q)
         if self._stop is not None:
             self._follow(self._stop, state, measured_at, out)
         elif self._leaving is not None:
@@ -208,7 +210,7 @@ class ArmReaction:
         """Why the arm must not be armed, one line each."""
         wrong = []
         if not self.owner_ready:
-            owner = self._mover is Way.OWNER
+            owner = self.owned
             wrong.append("ur_rtde is not ready" if owner else "the process that watches the guard is not ready")
         if self.needs_slider and self.slider is None:
             wrong.append("where the controller's speed slider is, is not known")
@@ -262,28 +264,21 @@ class ArmReaction:
         self._reaction = self._rules.hardest(self._levels.items(), self._touch_speed)  # how firm it was shows by now
         if self._reaction.kind in ("stop", "slow"):
             self._latch(state.time, self._why, out)
-        elif stop.used != [self._mover]:
-            who = "ur_rtde" if self._mover is Way.OWNER else "a program"
+        elif stop.used != [self._first]:
+            who = "ur_rtde" if self.owned else "a program"
             self._latch(state.time, f"{self._why}; no retreat: {who} did not stop the arm", out)
         else:
             self._begin_movement(state, out)
 
     def _begin_movement(self, state: ControllerState, out: Outputs) -> None:
+        assert self._mover is not None
         here = ArmState(state.time, state.q, state.qd)
-        movement = choose_movement(
-            self._model, self._reaction, self._at_touch or here, here, self._placed, self._trail, self._table
-        )
-        if isinstance(movement, str):
-            self._latch(state.time, f"{self._why}; no retreat: {movement}", out)
+        leaving = self._mover.begin(self._reaction, self._at_touch or here, here, self._placed, out)
+        if isinstance(leaving, str):
+            self._latch(state.time, f"{self._why}; no retreat: {leaving}", out)
             return
-        program: RetreatProgram | Done | None = None
-        if self._mover is Way.SCRIPT:
-            program = retreat_program(movement, here, self._placed, self._reaction.deceleration)
-        if isinstance(program, Done):
-            self._latch(state.time, f"{self._why}; no retreat: {program.reason}", out)
-            return
-        self.phase, self._leaving = Phase.RETREATING, Leaving(movement, state.time, program, out)
-        self._move(state, self._leaving, out)
+        self.phase, self._leaving = Phase.RETREATING, leaving
+        self._move(state, leaving, out)
 
     def _move(self, state: ControllerState, leaving: Leaving, out: Outputs) -> None:
         over = leaving.step(state, self._contacts, out)

@@ -13,23 +13,26 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from coneskin.errors import ConeSkinError, SkinTimeout
 from coneskin.skin.recording import Block, encode_block
 from coneskin.skin.source import Source
 
 from .channel import Channel
-from .foreign import ForeignStops
+from .commands import RetreatProgram
 from .guard_core import GuardCore
 from .journal import GuardEvent, Kind
 from .outputs import Output
 from .owner_messages import BEAT, Alive, Farewell
 from .phase import Phase
-from .retreat_program import RetreatProgram
 from .slowing import Slider
-from .speed_slider import SpeedSlider
-from .state_reader import StateReader
 from .stop_watch import Way
+
+if TYPE_CHECKING:  # opened for it where the scene has an arm
+    from .foreign import ForeignStops
+    from .speed_slider import SpeedSlider
+    from .state_reader import StateReader
 
 __all__ = ["GuardLoop", "GuardPorts"]
 

@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .commands import ArmState, ContactOnLink, Done
+from .commands import ArmState, ContactOnLink, Done, RetreatProgram
 from .movement import Movement
 from .outputs import Outputs, tell
 from .owner_messages import Speed
-from .retreat_program import RetreatProgram
 from .state_reader import ControllerState
 
 __all__ = ["Leaving"]

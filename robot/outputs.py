@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 from .journal import GuardEvent
 
 if TYPE_CHECKING:  # a guard without an arm loads none of them
+    from .commands import RetreatProgram
     from .owner_messages import Clear, Halt, Speed, Stop
-    from .retreat_program import RetreatProgram
     from .slowing import Slider
     from .stop_watch import Way
 

@@ -8,33 +8,16 @@ It ends by itself, whatever becomes of the guard and of the network.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
-from .commands import STILL, ArmState, ContactOnLink, Done
+from .commands import STILL, ArmState, ContactOnLink, Done, RetreatProgram
 from .movement import Movement
 from .ur_models import Joints
 
-__all__ = ["SEGMENT", "RetreatProgram", "retreat_program"]
+__all__ = ["SEGMENT", "retreat_program"]
 
 SEGMENT = 0.02  #: s of one speedj: the direction turns by less than 1 deg in it at 150 mm/s
 _CYCLE = 0.002
 _MOST = 400  # of them: 8 s, 40 kB
-
-
-class RetreatProgram(NamedTuple):
-    """A program for the script port.
-
-    Attributes:
-        text: URScript.
-        duration: from its first cycle to its stopj [s].
-        progress: how far the touched point should get [m].
-        why: the reason for its end.
-    """
-
-    text: str
-    duration: float
-    progress: float
-    why: str
 
 
 def retreat_program(

@@ -72,6 +72,11 @@ class Rules:
         """Every kind of reaction that may come of it."""
         return frozenset(reaction.kind for reaction in (self.default, *(rule.reaction for rule in self.rules)))
 
+    @property
+    def move(self) -> bool:
+        """Whether one of them may move the arm away."""
+        return not self.kinds.isdisjoint(("comply", "retreat"))
+
     def choose(self, link: int, level: float, speed: float) -> Reaction:
         """The reaction to one touch; arguments as of ``Rule.fits``."""
         for rule in self.rules:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from .geometry.pose import Pose, Vector
     from .robot.arm_reaction import ArmReaction
     from .robot.guard_core import GuardCore
+    from .robot.mover import Mover
+    from .robot.ur_models import ArmModel
     from .robot.watch import Watch
     from .scene import Scene
 
@@ -51,20 +53,30 @@ def build_core(scene: Scene) -> GuardCore:
 def _arm(scene: Scene, watch: Watch) -> ArmReaction:
     from .robot.arm_reaction import ArmReaction
     from .robot.commands import Reaction
-    from .robot.compiled import compile_contact
-    from .robot.link_frames import link_index
+    from .robot.rules import Rules
     from .robot.stop_watch import Way
-    from .robot.table import Table
     from .robot.ur_models import model
 
     assert scene.arm is not None
     arm = model(scene.arm.model)
+    reaction = scene.reaction or Reaction(kind="stop")
+    ways = tuple(way for way in Way if way is not Way.OWNER or scene.arm.control == "owner")
+    mover = _mover(scene, arm) if Rules(reaction, scene.rules).move else None
+    return ArmReaction(arm, reaction, watch, ways, scene.rules, mover)
+
+
+def _mover(scene: Scene, arm: ArmModel) -> Mover:
+    from .robot.compiled import compile_contact
+    from .robot.link_frames import link_index
+    from .robot.mover import Mover
+    from .robot.table import Table
+
+    assert scene.arm is not None
     for link in scene.links:
         if index := link_index(link.name):
             compile_contact(arm, index)  # 2 ms that the first touch shall not wait for
-    ways = tuple(way for way in Way if way is not Way.OWNER or scene.arm.control == "owner")
     table = None if scene.arm.table_z is None else Table(scene.arm.table_z)
-    return ArmReaction(arm, scene.reaction or Reaction(kind="stop"), watch, ways, scene.rules, table)
+    return Mover(arm, scene.arm.control == "foreign", table)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,8 @@ import re
 from collections import deque
 from dataclasses import dataclass, field
 
+from coneskin.robot.commands import RetreatProgram
 from coneskin.robot.owner_messages import Clear, Halt, Speed, Stop
-from coneskin.robot.retreat_program import RetreatProgram
 from coneskin.robot.slowing import Slider
 from coneskin.robot.state_reader import RECIPE
 from coneskin.robot.stop_watch import Way

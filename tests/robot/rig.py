@@ -13,6 +13,7 @@ from coneskin.robot.guard_core import GuardCore, GuardedSensor
 from coneskin.robot.journal import GuardEvent, Kind
 from coneskin.robot.kinematics import link_pose
 from coneskin.robot.link_frames import LINK_INDEX, dh_mesh
+from coneskin.robot.mover import Mover
 from coneskin.robot.owner_messages import Note
 from coneskin.robot.phase import Phase
 from coneskin.robot.rtde_codec import Recipe
@@ -147,5 +148,5 @@ def make_core(
         for s in sensors
     ]
     ways = tuple(way for way in Way if not (foreign and way is Way.OWNER))
-    arm = ArmReaction(MODEL, reaction, watch, ways, rules, table)
+    arm = ArmReaction(MODEL, reaction, watch, ways, rules, Mover(MODEL, foreign, table))
     return GuardCore(Stream(sensors, Detection(stuck_frames=200)), placed, watch, arm)

@@ -5,11 +5,10 @@ import math
 import pytest
 
 from coneskin.errors import RobotRefused
-from coneskin.robot.commands import Reaction
+from coneskin.robot.commands import Reaction, RetreatProgram
 from coneskin.robot.journal import Kind
 from coneskin.robot.owner_messages import Halt, Speed, Stop
 from coneskin.robot.phase import Phase
-from coneskin.robot.retreat_program import RetreatProgram
 from coneskin.robot.rules import Rule
 from coneskin.robot.slowing import Slider
 from coneskin.robot.stop_watch import Way

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.commands import STILL, ArmState, ContactOnLink, Done, Reaction
+from coneskin.robot.commands import STILL, ArmState, ContactOnLink, Done, Reaction, RetreatProgram
 from coneskin.robot.comply import DAMPING, begin_compliance, comply_step, wanted_speed
 from coneskin.robot.kinematics import link_pose
 from coneskin.robot.limits import MARGIN
 from coneskin.robot.movement import Retreat, choose_movement
 from coneskin.robot.retreat import plan_retreat
-from coneskin.robot.retreat_program import SEGMENT, RetreatProgram, retreat_program
+from coneskin.robot.retreat_program import SEGMENT, retreat_program
 from coneskin.robot.skeleton import skeleton
 from coneskin.robot.table import Table
 from coneskin.robot.trail import PathBack, Trail, path_back, path_back_step

@@ -1,0 +1,63 @@
+"""What moves the arm away once it stands after a touch. Built only where a reaction of the scene may move it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .commands import ArmState, ContactOnLink, Done, Reaction
+from .leaving import Leaving
+from .movement import choose_movement
+from .outputs import Outputs
+from .retreat_program import retreat_program
+from .table import Table
+from .trail import Trail
+from .ur_models import ArmModel, Joints
+
+__all__ = ["Mover"]
+
+
+class Mover:
+    """Knows where the arm has been, and begins the movement that a reaction wants.
+
+    Args:
+        model: the arm.
+        by_program: whether a movement is a program of its own; otherwise the owner of ur_rtde is streamed to.
+        table: what the arm must not go below while it moves.
+    """
+
+    def __init__(self, model: ArmModel, by_program: bool = False, table: Table | None = None) -> None:
+        self._model = model
+        self._by_program = by_program
+        self._table = table
+        self._trail = Trail()
+
+    def note(self, time: float, q: Joints) -> None:
+        """Take measured joint positions [rad] of a time [s]."""
+        self._trail.note(time, q)
+
+    def begin(
+        self,
+        reaction: Reaction,
+        at_touch: ArmState,
+        here: ArmState,
+        contacts: Sequence[ContactOnLink],
+        out: Outputs,
+    ) -> Leaving | str:
+        """Begin to move away; or why that cannot be.
+
+        Args:
+            reaction: its kind is "retreat" or "comply".
+            at_touch: the arm when the touch was seen.
+            here: the arm now, standing.
+            contacts: the touches, as they were last seen.
+            out: takes what comes of it.
+        """
+        movement = choose_movement(self._model, reaction, at_touch, here, contacts, self._trail, self._table)
+        if isinstance(movement, str):
+            return movement
+        if not self._by_program:
+            return Leaving(movement, here.time, None, out)
+        program = retreat_program(movement, here, contacts, reaction.deceleration)
+        if isinstance(program, Done):
+            return program.reason
+        return Leaving(movement, here.time, program, out)
