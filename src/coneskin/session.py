@@ -9,7 +9,6 @@ channel. A child that dies is seen as the end of its channel, and ends in a stop
 
 from __future__ import annotations
 
-import math
 import select
 import subprocess
 import time
@@ -18,23 +17,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from . import errors
 from .arm_proxy import ArmProxy
-from .errors import (
-    Collision,
-    ConeSkinError,
-    MissingExtra,
-    RobotConnectionError,
-    RobotRefused,
-    SceneError,
-    SkinConnectionError,
-)
+from .errors import ConeSkinError, RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
 from .robot.channel import Channel, pair, spawn
 from .robot.journal import GuardEvent
 from .robot.owner_messages import decode_json, encode_json
 from .robot.ur_models import model
 from .run_log import RunLog, new_recording
 from .scene import Scene, load
+from .verdict import NOT_SEEN, STANDS, STILL_LEAVING, braking_time, death, reasons, stop_error
 
 __all__ = ["Session", "guard"]
 
@@ -160,7 +151,7 @@ class Session:
         self._guard.send(b"reset")
         event = self.wait_for(("armed", "refused", "message"), timeout, after=seen)
         if event is None or event.name != "armed":
-            why = "the guard did not arm in time" if event is None else "; ".join(_reasons(event))
+            why = "the guard did not arm in time" if event is None else "; ".join(reasons(event))
             raise RobotRefused(f"reset refused: {why}")
 
     def touch(self, u: float, phi: float, force: float = 5.0, duration: float = 0.3, sensor: str = "") -> float:
@@ -206,16 +197,15 @@ class Session:
             raise trouble
         if stop is None:
             return
-        latched = self.wait_for(("latched",), _END, after=since)
-        outcome = "the arm stands" if latched else "the arm was NOT seen to stand"
+        outcome = self._outcome(since)
         contact = self.wait_for(("contact_placed",), 0.0, after=since) or self.wait_for(("contact",), 0.0, after=since)
-        if contact is not None and stop.details["why"] == "touch":
-            where = contact.details
-            raise Collision(
-                f"{where['sensor']} on the {where['link']} was touched at u = {1e3 * where['u']:.1f} mm, "
-                f"phi = {math.degrees(where['phi']):.1f} deg; {outcome}, until a person resets the guard"
-            )
-        raise RobotRefused(f"the guard has stopped the arm: {stop.details['why']}; {outcome}")
+        raise stop_error(stop, contact, outcome)
+
+    def _outcome(self, since: int) -> str:
+        """What has become of a stop, as far as it is known in time."""
+        if self.wait_for(("standstill", "latched"), braking_time(self.scene), after=since) is None:
+            return NOT_SEEN
+        return STANDS if self.wait_for(("latched",), _END, after=since) else STILL_LEAVING
 
     # ---- how it starts
 
@@ -271,8 +261,8 @@ class Session:
             raise trouble
         waiting = next((event for event in reversed(self.events) if event.name == "waiting"), None)
         faults = [str(event.details["what"]) for event in self.events if event.name in ("fault", "died")]
-        reasons = _reasons(waiting) if waiting else []
-        listed = list(dict.fromkeys([*faults, *reasons])) or ["its process sent nothing"]
+        waited_for = reasons(waiting) if waiting else []
+        listed = list(dict.fromkeys([*faults, *waited_for])) or ["its process sent nothing"]
         raise RobotRefused("the guard did not arm:\n" + "\n".join(f"  {line}" for line in listed))
 
     def _ask_skin(self, key: str) -> Any:
@@ -290,7 +280,7 @@ class Session:
         """Why there is no guard any more, if there is none."""
         for event in self.events:
             if event.name == "died":
-                return _died(event)
+                return death(event)
         if self._log.ended and not any(event.name == "ending" for event in self.events[-20:]):
             return RobotConnectionError("the guard's process has ended; what it leaves behind stops the arm")
         return None
@@ -306,17 +296,3 @@ def _keeping(scene: Scene) -> dict[str, Any]:
     assert scene.arm is not None
     deceleration = (scene.reaction or Reaction(kind="stop")).deceleration
     return {"host": scene.arm.host, "watch": asdict(scene.watch or Watch()), "deceleration": deceleration}
-
-
-def _died(event: GuardEvent) -> ConeSkinError:
-    """The error that a guard died of, of the kind that it was there."""
-    kind = getattr(errors, str(event.details.get("error")), RobotConnectionError)
-    if kind in (SceneError, MissingExtra):  # made of parts, of which only the message has come
-        kind = RobotRefused
-    error: ConeSkinError = kind(event.details["what"])
-    return error
-
-
-def _reasons(event: GuardEvent) -> list[str]:
-    details = event.details
-    return [str(reason) for reason in details.get("reasons", [details.get("what", event.name)])]

@@ -204,6 +204,16 @@ def test_a_frozen_controller_is_a_fault_and_stops_when_it_wakes(controller):
         assert isinstance(raised[0], RobotRefused)
 
 
+def test_a_controller_that_stays_frozen_is_told_as_an_arm_that_nobody_saw_stand(controller):
+    with guard(scene_for(controller)) as session:
+        thread, raised = run_until_moving(controller, session)
+        controller.freeze()
+        thread.join(20)
+        controller.thaw()
+        assert "the arm was NOT seen to stand" in str(raised[0])
+        assert_stopped_on_the_way(controller)
+
+
 def test_the_program_killed_the_arm_stops(controller, tmp_path):
     """Program and supervisor in one process, killed with SIGKILL: guard and owner see their channels end."""
     (tmp_path / "scene.toml").write_text(SCENE.format(host=controller.host))
