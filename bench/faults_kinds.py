@@ -16,6 +16,7 @@ BOTH, OWNER, FOREIGN = ("owner", "foreign"), ("owner",), ("foreign",)
 FRAME = 0.001
 WATCHDOG = 0.25  # s: 1 / watchdog_hz
 FEW = 0.02  # s: a fault in the frames themselves shows within a few of them, and the loop has to run
+LAST = 1.05  # s: the process that started the guard has heard nothing for 1 s, and opens its sockets
 
 
 @dataclass(frozen=True)
@@ -233,6 +234,14 @@ KINDS = (
         together(halt("guard"), halt("owner")),
         WATCHDOG,
         controls=OWNER,
+        after=Trial.thaw_all,
+    ),
+    FaultKind("guard and keeper killed", together(kill("guard"), kill("keeper")), controls=FOREIGN),
+    FaultKind(
+        "guard and keeper frozen",
+        together(halt("guard"), halt("keeper")),
+        LAST,
+        controls=FOREIGN,
         after=Trial.thaw_all,
     ),
     FaultKind("skin unplugged and RTDE closed", together(unplug, says("close rtde"))),

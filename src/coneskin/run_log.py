@@ -21,6 +21,8 @@ from .skin.recording import Block, Recorder, decode_blocks
 
 __all__ = ["RunLog", "new_recording"]
 
+_SILENCE = 1.0  # s; an owner, or a keeper, has acted by then, if it can
+
 
 class RunLog:
     """Hears the guard from a thread of its own, until the guard's channel ends.
@@ -40,6 +42,7 @@ class RunLog:
         self._recorder = Recorder(recording) if recording else None
         self._on_event = on_event
         self._changed = threading.Condition()
+        self._on_lost: Callable[[], None] | None = None
         self._thread: threading.Thread | None = None
 
     def open(self, header: dict[str, Any]) -> None:
@@ -55,8 +58,14 @@ class RunLog:
         full = {**header, "coneskin": __version__, "python": sys.version.split()[0], "clocks": clocks}
         self._recorder.write(Block(Kind.HEADER, clocks["monotonic"], json.dumps(full).encode()))
 
-    def listen(self, channel: Channel) -> None:
-        """Begin to hear the guard."""
+    def listen(self, channel: Channel, on_lost: Callable[[], None] | None = None) -> None:
+        """Begin to hear the guard.
+
+        Args:
+            channel: the guard's.
+            on_lost: called once, from that thread, where an armed guard falls silent or ends without a word.
+        """
+        self._on_lost = on_lost
         self._thread = threading.Thread(target=self._listen, args=(channel,), name="coneskin recorder", daemon=True)
         self._thread.start()
 
@@ -83,12 +92,22 @@ class RunLog:
 
     def _listen(self, channel: Channel) -> None:
         while not channel.closed:
-            select.select([channel], [], [], 0.5)
+            heard, _, _ = select.select([channel], [], [], _SILENCE)
             if data := b"".join(channel.receive()):
                 self._hear([block for _, block in decode_blocks(data)])
+            if not heard:
+                self._lose()
+        self._lose()
         with self._changed:
             self.ended = True
             self._changed.notify_all()
+
+    def _lose(self) -> None:
+        """The guard is gone, or hangs: it says something in every control cycle otherwise."""
+        names = {event.name for event in self.events}
+        if "armed" in names and "ending" not in names and self._on_lost is not None:
+            on_lost, self._on_lost = self._on_lost, None
+            on_lost()
 
     def _hear(self, blocks: list[Block]) -> None:
         events = [decode_event(block) for block in blocks if block.kind == Kind.EVENT]

@@ -9,6 +9,7 @@ channel. A child that dies is seen as the end of its channel, and ends in a stop
 
 from __future__ import annotations
 
+import contextlib
 import select
 import subprocess
 import time
@@ -207,6 +208,21 @@ class Session:
             return NOT_SEEN
         return STANDS if self.wait_for(("latched",), _END, after=since) else STILL_LEAVING
 
+    def _stop_the_arm(self) -> None:
+        """The guard is gone, and its keeper may be: nobody else is left that can stop a foreign arm."""
+        from .robot.foreign import ForeignStops
+        from .robot.state_reader import StateReader
+        from .robot.stopper import Stopper
+        from .robot.watch import Watch
+
+        keeping = _keeping(self.scene)
+        with (
+            contextlib.suppress(ConeSkinError),
+            ForeignStops(keeping["host"]) as stops,
+            StateReader(keeping["host"]) as reader,
+        ):
+            Stopper(stops, reader, Watch(**keeping["watch"]), keeping["deceleration"]).stop()
+
     # ---- how it starts
 
     def _open(self) -> None:
@@ -238,7 +254,7 @@ class Session:
         self._guard = Channel(ours)
         self._children["guard"] = spawn("coneskin.guard_process", *ends)
         self._guard.send(encode_json({**start, "port": port}))
-        self._log.listen(self._guard)
+        self._log.listen(self._guard, self._stop_the_arm if self._keeper is not None else None)
 
     def _spawn(self, name: str, module: str, hello: bytes) -> Channel:
         ours, theirs = pair()

@@ -207,6 +207,19 @@ def test_without_its_guard_the_keeper_stops_the_arm(controller, run, number):
         assert not any(controller.state()["qd"])
 
 
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_without_both_the_guarding_program_stops_the_arm(controller, run, number):
+    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+        run("raw URScript")
+        for name in ("keeper", "guard"):
+            os.kill(session._children[name].pid, number)
+        controller.wait_standing()
+        time.sleep(0.3)
+        assert not any(controller.state()["qd"])
+        for name in ("keeper", "guard"):
+            os.kill(session._children[name].pid, signal.SIGCONT)
+
+
 def test_without_its_keeper_the_guard_stops_the_arm_and_does_not_arm_again(controller, run):
     with guard(parse_scene(SCENE.format(host=controller.host))) as session:
         run("raw URScript")
