@@ -7,6 +7,7 @@ manual; which of these stops which motion was measured in a simulation (docs/saf
 from __future__ import annotations
 
 import socket
+from contextlib import suppress
 
 from coneskin.errors import RobotConnectionError
 
@@ -14,8 +15,7 @@ from .stop_watch import Way
 
 __all__ = ["ForeignStops"]
 
-SCRIPT_PORT = 30003
-DASHBOARD_PORT = 29999
+_PORTS = {"script": 30003, "dashboard": 29999}
 
 
 class ForeignStops:
@@ -36,8 +36,8 @@ class ForeignStops:
 
     def __enter__(self) -> ForeignStops:
         try:
-            self._open_ones["script"] = self._open(SCRIPT_PORT)
-            self._open_ones["dashboard"] = self._open(DASHBOARD_PORT)
+            for name, port in _PORTS.items():
+                self._open_ones[name] = self._open(port)
         except BaseException:
             self.close()
             raise
@@ -95,6 +95,16 @@ class ForeignStops:
     def run(self, program: str) -> bool:
         """Send a program, without waiting; it replaces the one that runs. Whether the system took it."""
         return self._send("script", program.encode())
+
+    def reopen(self) -> bool:
+        """Open again what is gone, waiting for each no longer than the timeout; whether any was opened."""
+        opened = False
+        for name, port in _PORTS.items():
+            if name not in self._open_ones:
+                with suppress(RobotConnectionError):
+                    self._open_ones[name] = self._open(port)
+                    opened = True
+        return opened
 
     def _send(self, name: str, data: bytes) -> bool:
         sock = self._open_ones.get(name)

@@ -35,6 +35,7 @@ _WAYS: Mapping[str, frozenset[Way]] = {
     "owner": frozenset({Way.OWNER}),
     "script": frozenset({Way.SCRIPT, Way.PROTECTIVE}),
     "dashboard": frozenset({Way.DASHBOARD}),
+    "keeper": frozenset({Way.KEEPER}),
 }
 _TELL_EVERY = 0.5  # s between two lists of what the guard waits for
 

@@ -24,7 +24,7 @@ from .commands import RetreatProgram
 from .guard_core import GuardCore
 from .journal import GuardEvent, Kind
 from .outputs import Output
-from .owner_messages import BEAT, Alive, Farewell
+from .owner_messages import BEAT, Alive, Farewell, Stop
 from .phase import Phase
 from .slowing import Slider
 from .stop_watch import Way
@@ -94,7 +94,10 @@ class _Outbox:
         """What goes through connections of the guard's own."""
         if isinstance(output, Way):
             name = output.value
-            taken = ports.foreign is not None and ports.foreign.use(output, ports.deceleration)
+            if output is Way.KEEPER:
+                taken = ports.keeper is not None and ports.keeper.send(Stop(ports.deceleration).encode())
+            else:
+                taken = ports.foreign is not None and ports.foreign.use(output, ports.deceleration)
             text = "sent" if taken else "not sent"
         elif isinstance(output, RetreatProgram):
             taken = ports.foreign is not None and ports.foreign.run(output.text)

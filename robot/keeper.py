@@ -1,7 +1,8 @@
 """Stops the arm when the guard is gone, where no owner of ur_rtde is there to do so: a process of its own.
 
 Its sockets are open before they are needed, and it imports nothing that can block. It acts when the guard's channel
-ends without a farewell, or brings no sign of life; then it stops the arm by one way after the other, until it stands.
+ends without a farewell, brings no sign of life, or asks for a stop because its own sockets are gone; then it stops the
+arm by one way after the other, until it stands.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from coneskin.errors import ConeSkinError
 
 from .channel import Channel, inherit
 from .foreign import ForeignStops
-from .owner_messages import SILENCE, Farewell, Note, decode_json
+from .owner_messages import SILENCE, Farewell, Note, Stop, decode_command, decode_json
 from .state_reader import StateReader
 from .stopper import Stopper
 from .watch import Watch
@@ -54,8 +55,11 @@ class Keeper:
         now = self._clock()
         for message in self._guard.receive():
             self._heard = now
-            if message == Farewell().encode():
-                return False
+            match decode_command(message):
+                case Farewell():
+                    return False
+                case Stop():
+                    self._stopper.stop()
         self._stopper.read()
         if self._guard.closed:
             self._stopper.stop()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from enum import Enum
 
-__all__ = ["STEADY", "StopWatch", "Way"]
+__all__ = ["FOREIGN", "OWNED", "STEADY", "StopWatch", "Way"]
 
 STEADY = 5  #: samples in a row below the standstill speed that count as standing
 _SLOWER = 0.05  # rad/s; a drop by this much, or by a tenth, is a slowdown and not noise of the measurement
@@ -23,6 +23,12 @@ class Way(Enum):
     SCRIPT = "script"  #: a program of one stopj, sent to the controller: it replaces whatever program runs
     DASHBOARD = "dashboard"  #: the dashboard's stop
     PROTECTIVE = "protective"  #: a program that triggers a protective stop; a person has to unlock it
+    KEEPER = "keeper"  #: the keeper's stop, which opens new connections where the controller has closed the others
+
+
+#: the ways that there are where ur_rtde is ours, and where another program moves the arm
+OWNED = (Way.OWNER, Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE)
+FOREIGN = (Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE, Way.KEEPER)
 
 
 class StopWatch:

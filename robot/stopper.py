@@ -16,6 +16,7 @@ from .watch import Watch
 __all__ = ["Stopper"]
 
 WAYS = (Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE)
+_REOPEN = 0.05  # s between two looks whether a connection is gone and can be opened again
 _LONGEST = 5.0  # s that a stop may take before it is given up
 
 
@@ -53,6 +54,9 @@ class Stopper:
     def stop(self) -> bool:
         """Stop the arm; whether it was seen standing."""
         now = start = self._clock()
+        reopen_at = now + _REOPEN
+        self.read()
+        self._stops.reopen()
         watch, budget = self._watch, (self._speed or 0.0) / self._deceleration + 4.0 * self._watch.escalate
         stop = StopWatch(now, self._speed, WAYS, watch.escalate, budget, watch.standstill, watch.arm_silence)
         self._stops.use(WAYS[0], self._deceleration)
@@ -62,6 +66,10 @@ class Stopper:
             now = self._clock()
             for way in stop.next_ways(now):
                 self._stops.use(way, self._deceleration)
+            if now >= reopen_at:
+                reopen_at = now + _REOPEN
+                if self._stops.reopen():  # what was sent to the old ones may be lost
+                    self._stops.use(WAYS[0], self._deceleration)
         return stop.standing_at is not None
 
     def read(self, stop: StopWatch | None = None) -> None:
@@ -75,4 +83,5 @@ class Stopper:
                     stop.sample(state.time, state.speed)
         except ConeSkinError:
             self._reader = None  # whoever else reads says so; here only the stops are left
-        self._stops.drain()
+        for _, sock in self._stops.drain():
+            sock.close()

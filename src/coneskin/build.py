@@ -54,13 +54,13 @@ def _arm(scene: Scene, watch: Watch) -> ArmReaction:
     from .robot.arm_reaction import ArmReaction
     from .robot.commands import Reaction
     from .robot.rules import Rules
-    from .robot.stop_watch import Way
+    from .robot.stop_watch import FOREIGN, OWNED
     from .robot.ur_models import model
 
     assert scene.arm is not None
     arm = model(scene.arm.model)
     reaction = scene.reaction or Reaction(kind="stop")
-    ways = tuple(way for way in Way if way is not Way.OWNER or scene.arm.control == "owner")
+    ways = OWNED if scene.arm.control == "owner" else FOREIGN
     mover = _mover(scene, arm) if Rules(reaction, scene.rules).move else None
     return ArmReaction(arm, reaction, watch, ways, scene.rules, mover)
 

@@ -18,7 +18,7 @@ from coneskin.robot.owner_messages import Note
 from coneskin.robot.phase import Phase
 from coneskin.robot.rtde_codec import Recipe
 from coneskin.robot.rules import Rule
-from coneskin.robot.stop_watch import Way
+from coneskin.robot.stop_watch import FOREIGN, OWNED, Way
 from coneskin.robot.table import Table
 from coneskin.robot.ur_models import model
 from coneskin.robot.watch import Watch
@@ -147,6 +147,6 @@ def make_core(
         GuardedSensor(s.name, "forearm", LINK, lambda u, phi: (CONE.point(u, phi), CONE.normal(phi)), 0.1)
         for s in sensors
     ]
-    ways = tuple(way for way in Way if not (foreign and way is Way.OWNER))
+    ways = FOREIGN if foreign else OWNED
     arm = ArmReaction(MODEL, reaction, watch, ways, rules, Mover(MODEL, foreign, table))
     return GuardCore(Stream(sensors, Detection(stuck_frames=200)), placed, watch, arm)

@@ -244,6 +244,20 @@ def test_a_way_to_stop_that_is_gone_stops_the_arm_by_another(controller, run, fa
             session.reset()
 
 
+def test_with_all_connections_gone_at_once_the_keeper_opens_new_ones(controller, run):
+    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+        run("raw URScript")
+        guarding = session._children["guard"].pid
+        os.kill(guarding, signal.SIGSTOP)  # so that it sees both at once
+        controller.call("close scripts")
+        controller.call("close dashboard")
+        os.kill(guarding, signal.SIGCONT)
+        standing = session.wait_for(("standstill",), 10.0)
+        assert "keeper" in standing.details["ways"]
+        assert session.wait_for(("latched",), 5.0) is not None
+        controller.wait_standing()
+
+
 def test_leaving_the_guard_stops_the_arm(controller, run):
     with guard(parse_scene(SCENE.format(host=controller.host))):
         run("dashboard play")

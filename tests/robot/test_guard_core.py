@@ -11,7 +11,7 @@ from coneskin.robot.commands import Reaction
 from coneskin.robot.guard_core import GuardCore
 from coneskin.robot.journal import GuardEvent, Kind
 from coneskin.robot.owner_messages import Clear, Halt, Note, Speed, Stop
-from coneskin.robot.stop_watch import Way
+from coneskin.robot.stop_watch import OWNED, Way
 from coneskin.skin.circuit import Wiring
 from coneskin.skin.faults import Faults
 from coneskin.skin.recording import Block
@@ -118,7 +118,7 @@ def test_a_stop_that_does_not_show_is_followed_by_the_next_way(works):
     rig.arm._go([1.0, 0, 0, 0, 0, 0], 100.0)  # somebody else moves it; the owner's stop does nothing
     rig.run(1.5)
     ways = [o for o in rig.arm.commands if isinstance(o, Way)]
-    assert ways == list(Way)[1 : list(Way).index(works) + 1]
+    assert ways == list(OWNED[1 : OWNED.index(works) + 1])
     assert rig.core.phase is Phase.LATCHED
     assert "ur_rtde did not stop the arm" in rig.event("latched").details["why"]
     assert not any(isinstance(output, Speed) for output in rig.outputs)

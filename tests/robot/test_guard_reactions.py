@@ -209,10 +209,20 @@ def test_a_way_that_is_lost_is_not_tried(lost, first):
     assert "it is gone" in rig.event("refused").details["reasons"]
 
 
-def test_with_no_way_left_it_says_that_it_waits():
-    rig = Rig(foreign=True, speed=1.0).run(0.5)
+def test_with_its_own_connections_gone_at_once_the_guard_asks_the_keeper():
+    """What went to the dashboard between the two is lost, and nothing says so."""
+    rig = Rig(foreign=True, speed=1.0, obeys=frozenset({Way.KEEPER})).run(0.5)
     rig.feed(Kind.LOST, b"script\ngone")
     rig.feed(Kind.LOST, b"dashboard\ngone")
+    rig.run(0.3)
+    assert rig.arm.commands == [Way.DASHBOARD, Way.KEEPER]
+    assert rig.core.phase is Phase.LATCHED
+
+
+def test_with_no_way_left_it_says_that_it_waits():
+    rig = Rig(foreign=True, speed=1.0).run(0.5)
+    for name in ("script", "dashboard", "keeper"):
+        rig.feed(Kind.LOST, f"{name}\ngone".encode())
     rig.arm.go([1.0, 0, 0, 0, 0, 0], 100.0)
     rig.run(1.0)
     assert rig.core.phase is Phase.STOPPING

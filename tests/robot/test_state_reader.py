@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from coneskin.errors import RobotConnectionError, RobotRefused, RobotTimeout
-from coneskin.robot import foreign, rtde_codec, rtde_connection
+from coneskin.robot import rtde_codec, rtde_connection
 from coneskin.robot.foreign import ForeignStops
 from coneskin.robot.sim_process import SimulatedController, free_host
 from coneskin.robot.state_reader import ControllerState, StateReader, decode_state
@@ -131,7 +131,5 @@ def test_nobody_there():
     host = free_host()
     with pytest.raises(RobotConnectionError, match=rf"cannot reach the controller {host}:30004"):
         StateReader(host).__enter__()
-    with pytest.raises(
-        RobotConnectionError, match=rf"cannot reach port {foreign.SCRIPT_PORT} of the controller {host}"
-    ):
+    with pytest.raises(RobotConnectionError, match=rf"cannot reach port 30003 of the controller {host}"):
         ForeignStops(host).__enter__()
