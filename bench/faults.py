@@ -35,7 +35,7 @@ from pathlib import Path
 from typing import Any
 
 from faults_kinds import KINDS, FaultKind
-from faults_trial import CLOCK, GOAL, STOP, Outcome, Trial, judge_recording
+from faults_trial import CLOCK, GOAL, STOP, Outcome, Trial, judge_recording, longest_gap
 
 from coneskin.errors import ConeSkinError
 from coneskin.replay import read_run
@@ -52,7 +52,7 @@ def budget_of(kind: FaultKind, slack: float) -> float:
 
 
 def run_trial(kind: FaultKind, control: str, seed: str, slack: float) -> Outcome:
-    """One trial; what it showed. One in which the machine made the skin late before the fault is made again."""
+    """One trial; what it showed. One in which the machine held the skin up before the fault is made again."""
     for repeated in range(REPEATS):
         outcome = _try(kind, control, f"{seed}/{repeated}", slack)
         outcome.repeated = repeated
@@ -88,7 +88,11 @@ def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> 
     armed = trial.start_program(10.0)
     if "armed" not in armed:
         raise RuntimeError(f"the guard did not arm: {armed}")
-    trial.run_up()
+    try:
+        trial.run_up()
+    except RuntimeError:
+        outcome.skin_late = longest_gap(trial.recording, armed["armed"], CLOCK())
+        raise
     outcome.skin_late = float(trial.skin.ask(report=True).get("late", 0.0))
     fault_at = began = kind.inject(trial)
     if kind.tolerated:
@@ -107,6 +111,7 @@ def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> 
     until = min(fault_at, began) if trial.happened is None else trial.happened
     touched = kind.touched or kind.tolerated
     outcome.failures += judge_recording(trial.recording, until, armed["armed"], touched)
+    outcome.skin_late = max(outcome.skin_late, longest_gap(trial.recording, armed["armed"], until))
     with suppress(ConeSkinError):
         run = read_run(trial.recording)
         stops = [event for event in run.events if event.name == "stopping"]

@@ -6,6 +6,7 @@ the guard's word but the log of the simulated controller, and its state.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import os
@@ -23,7 +24,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from coneskin.errors import ConeSkinError, RobotConnectionError
 from coneskin.replay import Run, read_run, replay
@@ -143,7 +144,7 @@ class Outcome:
         seconds: from the fault to the measured standstill; None where there was none to measure.
         failures: what must not be, one line each.
         why: what the guard said.
-        skin_late: how late the machine had made a frame of the virtual skin before the fault [s].
+        skin_late: how late the machine had made the frames of the virtual skin before the fault [s].
         repeated: trials that were thrown away for that.
         held_up: the longest time that the guard's loop was held up, as it says itself [s].
     """
@@ -170,6 +171,7 @@ class Trial:
     """
 
     _starting = threading.Lock()  # two trials must not choose the same address
+    _hosts: ClassVar[set[str]] = set()  # a killed controller's address must stay dead while its trial lasts
 
     def __init__(self, control: str, seed: str) -> None:
         self.control = control
@@ -184,7 +186,8 @@ class Trial:
             stack = self._stack
             self.folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
             with self._starting:
-                self.host = free_host()
+                self.host = free_host(self._hosts)
+                self._hosts.add(self.host)
                 controller = SimulatedController("UR5e", self.host, START, log=self.folder / "log.jsonl")
                 self.simulated = stack.enter_context(controller)
             port = self.folder / "port"
@@ -296,6 +299,15 @@ class Trial:
         self._frozen.clear()
         with suppress(RobotConnectionError, ProcessLookupError):
             self.simulated.thaw()
+
+
+def longest_gap(path: Path, since: float, until: float) -> float:
+    """The longest time in which no byte of the skin was read, between these times [s]."""
+    with suppress(ConeSkinError):
+        times = [block.time for block in read_run(path).blocks if block.kind == Kind.SKIN]
+        times = [time for time in times if since <= time <= until]
+        return max((b - a for a, b in itertools.pairwise(times)), default=0.0)
+    return 0.0
 
 
 def judge_recording(path: Path, fault_at: float, armed_at: float, touched: bool) -> Iterator[str]:

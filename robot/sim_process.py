@@ -18,7 +18,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +29,21 @@ from .sim_server import PORTS
 __all__ = ["SimulatedController", "free_host"]
 
 
-def free_host() -> str:
+def free_host(used: Container[str] = ()) -> str:
     """A loopback address on which no other simulated controller listens, so that tests can run side by side.
 
     Linux answers on all of 127.0.0.0/8; elsewhere there may be 127.0.0.1 alone.
+
+    Args:
+        used: addresses not to take again, though nobody listens there any more.
     """
     if not sys.platform.startswith("linux"):
         return "127.0.0.1"
     start = os.getpid() * 7
-    for number in range(start, start + 500):
+    for number in range(start, start + 20_000):
         host = f"127.{1 + number // 62500 % 250}.{number // 250 % 250}.{1 + number % 250}"
+        if host in used:
+            continue
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
@@ -46,7 +51,7 @@ def free_host() -> str:
             except OSError:
                 continue
             return host
-    raise RobotConnectionError("no loopback address is free for a simulated controller: 500 were tried")
+    raise RobotConnectionError("no loopback address is free for a simulated controller: 20 000 were tried")
 
 
 class SimulatedController:
