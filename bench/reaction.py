@@ -538,7 +538,7 @@ def measure(modes: Sequence[str], args: argparse.Namespace, rows: list[dict[str,
                 if done >= wanted:
                     continue
                 left += wanted - done
-                new = turn(mode, min(EACH, wanted - done), rng)
+                new = turn(mode, min(max(1, EACH * wanted // args.collisions), wanted - done), rng)
                 rows += new
                 if args.keep:
                     with args.keep.open("a") as file:
