@@ -34,8 +34,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from faults_judge import judge_recording, longest_gap
 from faults_kinds import KINDS, FaultKind
-from faults_trial import CLOCK, GOAL, STOP, Outcome, Trial, judge_recording, longest_gap
+from faults_trial import CLOCK, GOAL, STOP, Outcome, Trial
 
 from coneskin.errors import ConeSkinError
 from coneskin.replay import read_run

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from .commands import STILL, ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from .retreat import CLOSE, RetreatPlan, plan_retreat, retreat_step
-from .table import Table
+from .space import Space
 from .ur_models import ArmModel
 
 __all__ = ["DAMPING", "Compliance", "begin_compliance", "comply_step", "wanted_speed"]
@@ -32,7 +32,7 @@ class Compliance:
     Attributes:
         model: the arm.
         reaction: the settings.
-        table: what the arm must not go below, or None.
+        space: the room that the arm has, or None.
         start_time: [s].
         time: of the last step [s].
         speed: of the touched point that was wanted then [m/s].
@@ -42,7 +42,7 @@ class Compliance:
 
     model: ArmModel
     reaction: Reaction
-    table: Table | None
+    space: Space | None
     start_time: float
     time: float
     speed: float = 0.0
@@ -50,9 +50,9 @@ class Compliance:
     plan: RetreatPlan | None = None
 
 
-def begin_compliance(model: ArmModel, state: ArmState, reaction: Reaction, table: Table | None = None) -> Compliance:
+def begin_compliance(model: ArmModel, state: ArmState, reaction: Reaction, space: Space | None = None) -> Compliance:
     """Begin, with the arm standing as in ``state``."""
-    return Compliance(model, reaction, table, state.time, state.time)
+    return Compliance(model, reaction, space, state.time, state.time)
 
 
 def wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> float:
@@ -94,7 +94,7 @@ def comply_step(
         still = replace(now, time=state.time, speed=speed, progress=progress, plan=None)
         return still, JointVelocity(STILL, reaction.acceleration, 0.0, progress, ("level" if placed else "place",))
     setting = replace(reaction, speed=speed, distance=reaction.distance - progress)
-    plan = plan_retreat(now.model, state, contacts, setting, now.table)
+    plan = plan_retreat(now.model, state, contacts, setting, now.space)
     step = plan if isinstance(plan, Done) else retreat_step(plan, state)
     if isinstance(plan, Done) or isinstance(step, Done):
         assert isinstance(step, Done)

@@ -193,8 +193,11 @@ class GuardLoop:
             self._quit = True
         if not ready:
             self._take(Kind.TICK, b"")
+        self._tell()
+
+    def _tell(self) -> None:
         if self._out:
-            ports.supervisor.send(b"".join(self._out))
+            self._ports.supervisor.send(b"".join(self._out))
             self._out.clear()
 
     def _hear(self, channel: Channel) -> None:
@@ -290,4 +293,5 @@ class GuardLoop:
             self.step(_TICK)
         if self._ports.keeper is not None and not (self._core.phase.stopping or self._core.phase is Phase.RETREATING):
             self._ports.keeper.send(Farewell().encode())
+        self._tell()
         self._ports.supervisor.flush()

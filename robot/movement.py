@@ -6,12 +6,13 @@ The three are used in the same way: ``step`` says in each control cycle how the 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from .commands import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from .comply import Compliance, begin_compliance, comply_step
 from .retreat import RetreatPlan, plan_retreat, retreat_step
-from .table import Table
+from .space import Space
 from .trail import PathBack, Trail, path_back, path_back_step
 from .ur_models import ArmModel
 
@@ -81,7 +82,7 @@ def choose_movement(
     state: ArmState,
     contacts: Sequence[ContactOnLink],
     trail: Trail,
-    table: Table | None,
+    space: Space,
 ) -> Movement | str:
     """The movement that a reaction wants, or why there is none.
 
@@ -92,18 +93,18 @@ def choose_movement(
         state: the arm now, standing.
         contacts: the touches, as they were last seen.
         trail: where the arm has been.
-        table: what the arm must not go below.
+        space: the room that the arm has; on the way back, which it has just come, its own links do not count.
     """
     if reaction.kind == "comply":
-        return Comply(begin_compliance(model, state, reaction, table))
-    plan = plan_retreat(model, at_touch, contacts, reaction, table)
+        return Comply(begin_compliance(model, state, reaction, space))
+    plan = plan_retreat(model, at_touch, contacts, reaction, space)
     if not isinstance(plan, Done):
         return Retreat(plan)
     if reaction.fallback != "path":
         return plan.reason
     if max(map(abs, at_touch.qd)) < _CAME:
         return f"{plan.reason}; no way back: the arm stood when it was touched"
-    back = path_back(model, state, trail, reaction, table)
+    back = path_back(model, state, trail, reaction, replace(space, itself=False))
     if isinstance(back, Done):
         return f"{plan.reason}; no way back: {back.reason}"
     if towards := _towards(model, state, contacts, back):

@@ -9,6 +9,7 @@ from .leaving import Leaving
 from .movement import choose_movement
 from .outputs import Outputs
 from .retreat_program import retreat_program
+from .space import Space
 from .table import Table
 from .trail import Trail
 from .ur_models import ArmModel, Joints
@@ -28,7 +29,7 @@ class Mover:
     def __init__(self, model: ArmModel, by_program: bool = False, table: Table | None = None) -> None:
         self._model = model
         self._by_program = by_program
-        self._table = table
+        self._space = Space(model, table)
         self._trail = Trail()
 
     def note(self, time: float, q: Joints) -> None:
@@ -52,7 +53,7 @@ class Mover:
             contacts: the touches, as they were last seen.
             out: takes what comes of it.
         """
-        movement = choose_movement(self._model, reaction, at_touch, here, contacts, self._trail, self._table)
+        movement = choose_movement(self._model, reaction, at_touch, here, contacts, self._trail, self._space)
         if isinstance(movement, str):
             return movement
         if not self._by_program:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .commands import ArmState, ContactOnLink, Done, JointVelocity, Reaction, Stop
 from .retreat import RetreatPlan, plan_retreat, retreat_step
-from .table import Table
+from .space import Space
 from .ur_models import ArmModel
 
 __all__ = [
@@ -28,7 +28,7 @@ def react(
     state: ArmState,
     contacts: Sequence[ContactOnLink],
     reaction: Reaction,
-    table: Table | None = None,
+    space: Space | None = None,
 ) -> tuple[Stop, RetreatPlan | None] | None:
     """What to do now, and then.
 
@@ -37,7 +37,7 @@ def react(
         state: the arm as measured when the touch was seen.
         contacts: all touches of this frame.
         reaction: the settings.
-        table: what the arm must not go below while it retreats.
+        space: the room that the arm has while it retreats; without it nothing is in the way.
 
     Returns:
         None without a contact. Otherwise the stop to send at once, whatever else is true; and, for "retreat" and where
@@ -53,7 +53,7 @@ def react(
     touched = "touch on link " + ", ".join(str(link) for link in links)
     if reaction.kind != "retreat":
         return Stop(reaction.deceleration, touched), None
-    plan = plan_retreat(model, state, contacts, reaction, table)
+    plan = plan_retreat(model, state, contacts, reaction, space)
     if isinstance(plan, Done):
         return Stop(reaction.deceleration, f"{touched}; no retreat: {plan.reason}"), None
     return Stop(reaction.deceleration, touched), plan

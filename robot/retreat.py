@@ -23,7 +23,7 @@ from .commands import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from .compiled import compile_contact
 from .damped import FLOOR, damped_speeds, damping_squared, stacked_speeds
 from .limits import REACTION_TIME, JointLimits
-from .table import Table
+from .space import Space
 from .ur_models import ArmModel
 
 __all__ = ["CLOSE", "LEAST_PROGRESS", "RetreatPlan", "plan_retreat", "retreat_step"]
@@ -66,16 +66,14 @@ class RetreatPlan:
         reaction: the settings.
         limits: of the joints.
         start_time: of the touch [s].
-        model: the arm.
-        table: what the arm must not go below, or None.
+        space: the room that the arm has, or None.
     """
 
     tracks: tuple[_Track, ...]
     reaction: Reaction
     limits: JointLimits
     start_time: float
-    model: ArmModel
-    table: Table | None = None
+    space: Space | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +90,7 @@ def plan_retreat(
     state: ArmState,
     contacts: Sequence[ContactOnLink],
     reaction: Reaction,
-    table: Table | None = None,
+    space: Space | None = None,
 ) -> RetreatPlan | Done:
     """Fix direction, point and start of a retreat.
 
@@ -101,7 +99,7 @@ def plan_retreat(
         state: the arm at the touch.
         contacts: all touches at that time.
         reaction: the settings.
-        table: what the arm must not go below.
+        space: the room that the arm has; without it nothing is in the way.
 
     Returns:
         the plan, or Done with the reason why there is no way out.
@@ -127,7 +125,7 @@ def plan_retreat(
         away = (-nx / length, -ny / length, -nz / length)
         tracks.append(_Track(contact.link, contact.point, away, (x, y, z), link.drive, link.place))
     limits = JointLimits.of(model, reaction.acceleration)
-    plan = RetreatPlan(tuple(tracks), reaction, limits, state.time, model, table)
+    plan = RetreatPlan(tuple(tracks), reaction, limits, state.time, space)
     first = retreat_step(plan, ArmState(state.time, state.q))  # from a standstill: the arm stops first
     return first if isinstance(first, Done) else plan
 
@@ -175,8 +173,8 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
     if damping > FLOOR:
         clipped += ("singularity",)
     wanted += [0.0] * (6 - len(wanted))
-    if plan.table is not None and plan.table.entered(plan.model, q, wanted, limits.braking):
-        return Done(f"the table at {1e3 * plan.table.height:g} mm is in the way", progress)
+    if plan.space is not None and (why := plan.space.left(q, wanted, limits.braking)):
+        return Done(why, progress)
     a, b, c, d, e, f = wanted
     return JointVelocity((a, b, c, d, e, f), reaction.acceleration, speed * away, progress, clipped)
 

@@ -1,7 +1,8 @@
-"""The arm as a line to draw: along its tubes, where they really are."""
+"""The arm as a line: along its tubes, where they really are."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 from coneskin.geometry.pose import Vector
@@ -20,7 +21,16 @@ def skeleton(model: ArmModel, q: Sequence[float]) -> list[Vector]:
     """
     poses = link_poses(model, q)
     corners: list[Vector] = [poses[0].translation, poses[1].translation]
-    for name, length in (("upper_arm", abs(model.a[1])), ("forearm", abs(model.a[2]))):
-        tube = poses[LINK_INDEX[name]] @ dh_mesh(model, name)
-        corners += [tube.translation, tube.apply((0.0, 0.0, length))]
+    for link, begin, end in _tubes(model):
+        corners += [poses[link].apply(begin), poses[link].apply(end)]
     return [*corners, *(pose.translation for pose in poses[4:])]
+
+
+@functools.lru_cache(maxsize=32)
+def _tubes(model: ArmModel) -> tuple[tuple[int, Vector, Vector], ...]:
+    """Upper arm and forearm: index of the DH frame, and both ends of the middle line in it [m]."""
+    tubes = []
+    for name, length in (("upper_arm", abs(model.a[1])), ("forearm", abs(model.a[2]))):
+        mesh = dh_mesh(model, name)
+        tubes.append((LINK_INDEX[name], mesh.translation, mesh.apply((0.0, 0.0, length))))
+    return tuple(tubes)

@@ -1,13 +1,11 @@
-"""A plane that the arm does not go below while it retreats: the table, or the floor. Pure."""
+"""A plane that the arm does not go below while it moves away from a touch: the table, or the floor. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .limits import REACTION_TIME
-from .skeleton import skeleton
-from .ur_models import ArmModel
+from coneskin.geometry.pose import Vector
 
 __all__ = ["Table"]
 
@@ -25,21 +23,17 @@ class Table:
 
     height: float
 
-    def entered(self, model: ArmModel, q: Sequence[float], qd: Sequence[float], braking: float) -> bool:
-        """Whether some point would be below the plane, and lower than now, before joints that move so could brake.
+    def below(self, corners: Sequence[Vector]) -> bool:
+        """Whether some corner of a skeleton is below the plane."""
+        return any(corner[2] < self.height for corner in corners[1:])
+
+    def entered(self, here: Sequence[Vector], there: Sequence[Vector]) -> bool:
+        """Whether some corner would be below the plane, and lower than now.
 
         Args:
-            model: the arm.
-            q: joint positions [rad].
-            qd: joint speeds wanted [rad/s].
-            braking: deceleration of the leading joint [rad/s^2].
+            here: the arm's skeleton now [m].
+            there: its skeleton after the movement [m].
         """
-        leading = max(map(abs, qd))
-        if not leading:
-            return False
-        ahead = REACTION_TIME + leading / (2.0 * braking)
-        there = skeleton(model, [angle + ahead * speed for angle, speed in zip(q, qd, strict=True)])
-        here = skeleton(model, q)
         return any(
             after[2] < self.height and after[2] < before[2] for before, after in zip(here[1:], there[1:], strict=True)
         )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from .commands import ArmState, Done, JointVelocity, Reaction
 from .limits import REACTION_TIME, JointLimits
-from .table import Table
+from .space import Space
 from .ur_models import ArmModel, Joints
 
 __all__ = ["PathBack", "Trail", "path_back", "path_back_step"]
@@ -56,8 +56,7 @@ class PathBack:
         lengths: of the way up to each place, as the farthest that a point of the bare arm may have come on it [m].
         reaction: the settings.
         limits: of the joints.
-        model: the arm.
-        table: what the arm must not go below, or None.
+        space: the room that the arm has, or None.
         start_time: [s].
     """
 
@@ -65,13 +64,12 @@ class PathBack:
     lengths: tuple[float, ...]
     reaction: Reaction
     limits: JointLimits
-    model: ArmModel
-    table: Table | None
+    space: Space | None
     start_time: float
 
 
 def path_back(
-    model: ArmModel, state: ArmState, trail: Trail, reaction: Reaction, table: Table | None = None
+    model: ArmModel, state: ArmState, trail: Trail, reaction: Reaction, space: Space | None = None
 ) -> PathBack | Done:
     """Plan to go back the way the arm came, as far as the reaction's distance.
 
@@ -80,7 +78,7 @@ def path_back(
         state: the arm, standing.
         trail: where it has been.
         reaction: the settings.
-        table: what the arm must not go below.
+        space: the room that the arm has.
     """
     limits = JointLimits.of(model, reaction.acceleration)
     places, lengths = [state.q], [0.0]
@@ -98,7 +96,7 @@ def path_back(
         lengths.append(lengths[-1] + step)
     if lengths[-1] < _LEAST_WAY:
         return Done("the arm has not come from anywhere")
-    plan = PathBack(tuple(places), tuple(lengths), reaction, limits, model, table, state.time)
+    plan = PathBack(tuple(places), tuple(lengths), reaction, limits, space, state.time)
     first = path_back_step(plan, ArmState(state.time, state.q))
     return first if isinstance(first, Done) else plan
 
@@ -141,8 +139,8 @@ def path_back_step(plan: PathBack, state: ArmState) -> JointVelocity | Done:
     wanted = [value * speed / length for value in way]
     if blocked := limits.blocked(state.q, state.qd, wanted):
         return Done(f"joint {blocked[0] + 1} is at its limit on the way back", made)
-    if plan.table is not None and plan.table.entered(plan.model, state.q, wanted, limits.braking):
-        return Done(f"the table at {1e3 * plan.table.height:g} mm is in the way", made)
+    if plan.space is not None and (why := plan.space.left(state.q, wanted, limits.braking)):
+        return Done(why, made)
     a, b, c, d, e, f = wanted
     return JointVelocity((a, b, c, d, e, f), reaction.acceleration, speed, made, clipped)
 

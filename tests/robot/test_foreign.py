@@ -174,7 +174,9 @@ def test_whatever_moves_the_arm_is_stopped_and_the_arm_retreats(controller, run,
         assert controller.state()["q"] == state["q"], "the arm moves again"
         with pytest.raises(Collision):
             session.check()
-    assert replay(read_run(path)).same
+    run = read_run(path)
+    assert replay(run).same
+    assert run.events[-1].name == "ending"  # its last word too is in the recording
 
 
 def test_a_program_that_moves_a_latched_arm_is_stopped_again(controller, run):

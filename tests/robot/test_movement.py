@@ -16,6 +16,7 @@ from coneskin.robot.movement import Retreat, choose_movement
 from coneskin.robot.retreat import plan_retreat
 from coneskin.robot.retreat_program import SEGMENT, retreat_program
 from coneskin.robot.skeleton import skeleton
+from coneskin.robot.space import Space
 from coneskin.robot.table import Table
 from coneskin.robot.trail import PathBack, Trail, path_back, path_back_step
 from coneskin.robot.ur_models import model
@@ -205,8 +206,8 @@ def test_a_joint_at_its_limit_ends_the_way_back():
 @settings(max_examples=20, deadline=None)
 def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
     contact = ContactOnLink(3, (0.2, 0.0, 0.0), unit(normal))
-    table = Table(height)
-    plan = plan_retreat(ARM, ArmState(0.0, q), [contact], Reaction(distance=0.2), table)
+    space = Space(ARM, Table(height), itself=False)
+    plan = plan_retreat(ARM, ArmState(0.0, q), [contact], Reaction(distance=0.2), space)
     assume(not isinstance(plan, Done))
     states, over = follow(lambda state: Retreat(plan).step(state, ()), q)
     assert isinstance(over, Done)
@@ -222,9 +223,9 @@ def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
 
 def test_the_table_is_named():
     down = ContactOnLink(3, (0.2, 0.0, 0.0), unit(link_pose(ARM, Q, 3).inverse().rotate((0.0, 0.0, 1.0))))
-    plan = plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(), Table(1.5))
+    plan = plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(), Space(ARM, Table(1.5)))
     assert plan == Done("the table at 1500 mm is in the way")
-    assert not isinstance(plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(), Table(-1.0)), Done)
+    assert not isinstance(plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(), Space(ARM, Table(-1.0))), Done)
 
 
 # ---- one program

@@ -86,3 +86,31 @@ def test_a_callback_that_fails_is_called_no_more(channel, caplog):
 
 def test_two_runs_in_one_second_have_folders_of_their_own(tmp_path):
     assert len({new_recording(tmp_path / "runs") for _ in range(4)}) == 4
+
+
+@pytest.mark.parametrize(
+    ("told", "times"), [(["armed"], 1), (["armed", "latched"], 1), (["armed", "ending"], 0), (["waiting", "died"], 0)]
+)
+def test_an_armed_guard_that_ends_without_a_word_is_missed_once(channel, told, times):
+    ours, theirs = channel
+    missed = []
+    log = RunLog(None, None)
+    log.listen(ours, lambda: missed.append(True))
+    for name in told:
+        tell(theirs, name)
+    theirs.close()
+    log.close()
+    assert len(missed) == times
+
+
+def test_an_armed_guard_that_falls_silent_is_missed_once(channel, monkeypatch):
+    monkeypatch.setattr("coneskin.run_log._SILENCE", 0.01)
+    ours, theirs = channel
+    missed, lost = [], threading.Event()
+    log = RunLog(None, None)
+    log.listen(ours, lambda: (missed.append(True), lost.set()))
+    tell(theirs, "armed")
+    assert lost.wait(5.0)
+    theirs.close()
+    log.close()
+    assert len(missed) == 1
