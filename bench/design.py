@@ -19,20 +19,18 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
-import platform
 import random
-import subprocess
 import time
 import timeit
 from collections.abc import Callable, Iterator
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from report import head
 
 from coneskin.geometry.cones import Fit, Sheet, find_cones
 from coneskin.geometry.displacement import measure_displacement
@@ -53,30 +51,6 @@ LINKS = (
 GRIDS = ((32, 64), (64, 128), (128, 256), (256, 512))
 PLACES = 20_000
 TOLERANCE = 0.001
-
-
-def machine() -> str:
-    model = platform.processor()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        lines = (line for line in info.read_text().splitlines() if line.startswith("model name"))
-        model = next(lines, model).split(":")[-1].strip()
-    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
-    commit = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
-    names = ("numpy", "scipy", "trimesh", "embreex", "pyransac3d")
-    listed = ", ".join(f"{name} {has}" for name in names if (has := installed(name)))
-    return (
-        f"{model}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; Python {platform.python_version()},"
-        f" {listed}\n"
-        f"commit {commit}, {time.strftime('%Y-%m-%d')}"
-    )
-
-
-def installed(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
 
 
 def barrel() -> Mesh:
@@ -158,7 +132,7 @@ def map_rows(mesh: Mesh, sheet: Sheet) -> Iterator[tuple[str, Floats, float, flo
         built,
         math.nan,
     )
-    if installed("rtree"):
+    if find_spec("rtree"):
         import trimesh
 
         body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
@@ -250,7 +224,7 @@ def fit_rows(mesh: Mesh, fine: Sheet, long: bool) -> Iterator[tuple[str, float, 
         1e3 * (radius - middle),
         residual(origin, axis, radius),
     )
-    if installed("pyransac3d"):
+    if find_spec("pyransac3d"):
         import pyransac3d  # type: ignore[import-untyped]
 
         random.seed(1)  # it draws from the global generators
@@ -292,7 +266,7 @@ def main() -> None:
     parser.add_argument("--long", action="store_true", help="pyransac3d with 10 000 rounds too")
     parser.add_argument("--link", type=Path, action="append", help="a mesh file instead of the shared links")
     arguments = parser.parse_args()
-    print(machine())
+    print(head("numpy", "scipy", "trimesh", "embreex", "pyransac3d"))
     files = arguments.link or [DATA / name for name in (LINKS[:1] if arguments.quick else LINKS)]
     there = [file for file in files if file.is_file()]
     for file in files:

@@ -17,16 +17,16 @@ import argparse
 import gc
 import json
 import os
-import platform
 import random
 import resource
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+from report import head
+from scenes import forearm_scene
 
 from coneskin.build import build_core
 from coneskin.robot.journal import GuardEvent, Kind
@@ -43,23 +43,6 @@ RATE_HZ = 1000
 QUIET, SCRIPTS, TOUCHED = 5000, 50, 150  # frames of each
 SPEED, DECELERATION = 1.0, 10.0  # of the arm, rad/s and rad/s2
 GROWTH = 1 << 20  # bytes of resident memory after the first report that still count as none
-SCENE = """\
-[arm]
-model = "UR5e"
-host = "127.0.0.1"
-[[link]]
-name = "forearm"
-[[link.sensor]]
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
-[source]
-kind = "virtual"
-[reaction]
-kind = "stop"
-deceleration_rad_s2 = 10
-"""
 
 
 def contents(sensor: Sensor, seed: int) -> tuple[list[tuple[int, ...]], list[list[tuple[int, ...]]]]:
@@ -84,7 +67,7 @@ class Day:
     """Feeds the core, and does what an arm would."""
 
     def __init__(self, seed: int, touch_every: float) -> None:
-        scene = parse_scene(SCENE)
+        scene = parse_scene(forearm_scene())
         self.core = build_core(scene)
         self._quiet, self._scripts = contents(scene.sensors[0].sensor, seed)
         self._every = max(2 * TOUCHED, round(touch_every * RATE_HZ))
@@ -199,13 +182,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true", help="print one JSON object at the end")
     args = parser.parse_args()
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True
-    )
-    head = f"{platform.platform()}, {os.cpu_count()} cores, Python {platform.python_version()}\n"
-    head += f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC, load {os.getloadavg()[0]:.1f}"
+    machine = head()
     show = sys.stderr if args.json else sys.stdout
-    print(f"{head}\n\n{'hours':>9}{'frames/s':>10}{'MB':>10}{'objects':>10}{'files':>7}{'touches':>9}", file=show)
+    print(f"{machine}\n\n{'hours':>9}{'frames/s':>10}{'MB':>10}{'objects':>10}{'files':>7}{'touches':>9}", file=show)
     day = Day(args.seed, args.touch_every_s)
     reports = []
     began = time.perf_counter()
@@ -224,7 +203,7 @@ def main() -> int:
     growth = reports[-1]["resident"] - reports[0]["resident"] if reports else 0
     seconds = time.perf_counter() - began
     facts = {
-        "machine": head,
+        "machine": machine,
         "frames": day.frames,
         "seconds": round(seconds, 1),
         "growth": growth,

@@ -21,22 +21,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
-import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack, suppress
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from faults_judge import judge_recording, longest_gap
 from faults_kinds import KINDS, FaultKind
 from faults_trial import CLOCK, GOAL, STOP, Outcome, Trial
+from report import head, quantile
 
 from coneskin.errors import ConeSkinError
 from coneskin.replay import read_run
@@ -144,11 +140,6 @@ def _see_it_stand(kind: FaultKind, trial: Trial, outcome: Outcome, began: float,
     now = trial.simulated.state()["q"]
     if moved := [i for i, (a, b) in enumerate(zip(q, now, strict=True), 1) if abs(a - b) > SAME]:
         outcome.failures.append(f"joints {moved} moved again after the arm stood")
-
-
-def quantile(values: Sequence[float], share: float) -> float:
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
 
 
 def summary(kind: FaultKind, control: str, outcomes: list[Outcome], slack: float) -> dict[str, Any]:
@@ -286,12 +277,7 @@ def read_trials(path: Path) -> Outcomes:
 
 
 def _head(args: argparse.Namespace) -> None:
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True
-    )
-    print(f"{platform.platform()}, {os.cpu_count()} cores, Python {platform.python_version()}")
-    print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC, load {os.getloadavg()[0]:.1f}")
-    print(f"{args.parallel} at a time; budgets with {args.slack_ms:g} ms for this machine\n")
+    print(f"{head()}\n{args.parallel} at a time; budgets with {args.slack_ms:g} ms for this machine\n")
     columns = "".join(f"{name:>8}" for name in ("median", "worst", "budget", "held up", "failed"))
     print(f"{'s from the fault to standstill':52}{'count':>6}{columns}")
 

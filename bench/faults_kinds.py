@@ -8,7 +8,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from faults_trial import ARM_SILENCE, CLOCK, ESCALATE, GOAL, SKIN_SILENCE, STUCK, Trial
+from faults_trial import ARM_SILENCE, CLOCK, GOAL, SKIN_SILENCE, STUCK, Trial
+from scenes import ESCALATE
 
 from coneskin.robot.owner_messages import SILENCE
 

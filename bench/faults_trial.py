@@ -7,7 +7,6 @@ the guard's word but the log of the simulated controller, and its state.
 from __future__ import annotations
 
 import json
-import math
 import os
 import queue
 import random
@@ -24,42 +23,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from scenes import ESCALATE, START, forearm_scene, start_with
+
 from coneskin.errors import ConeSkinError, RobotConnectionError
 from coneskin.robot.sim_process import SimulatedController, free_host
 
 HERE = Path(__file__).parent
-START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
-GOAL = [math.radians(140.0), *START[1:]]
+GOAL = start_with(140.0)
 SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
 SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
 STUCK = 200  # frames
-ESCALATE = 0.025  # s, the default
+REACTION = 'kind = "retreat"\ndistance_mm = 30'
+WATCH = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nstuck_frames = 200"
 #: v / a, and four times the patience: what docs/safety.md promises once the fault is known
 STOP = SPEED / DECELERATION + 4.0 * ESCALATE
-SCENE = """\
-[arm]
-model = "UR5e"
-host = "{host}"
-control = "{control}"
-[[link]]
-name = "forearm"
-[[link.sensor]]
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
-[source]
-kind = "serial"
-port = "{port}"
-[reaction]
-kind = "retreat"
-distance_mm = 30
-[watch]
-skin_silence_ms = 250
-skin_late_ms = 250
-arm_silence_ms = 250
-stuck_frames = 200
-"""
 CLOCK = time.monotonic
 
 
@@ -191,7 +168,7 @@ class Trial:
             if not self.skin.hear(10.0):
                 raise RuntimeError(f"the skin did not start: {self.skin.errors}")
             (self.folder / "scene.toml").write_text(
-                SCENE.format(host=self.host, port=port, control=self.control), encoding="utf-8"
+                forearm_scene(self.host, self.control, port, REACTION, WATCH), encoding="utf-8"
             )
         except BaseException:
             self._stack.close()

@@ -18,10 +18,7 @@ import one_thread  # noqa: F401
 # isort: split
 import argparse
 import json
-import os
-import platform
 import statistics
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -36,6 +33,7 @@ import numpy as np
 from field_problems import Problem, ports
 from field_reference import Reference, load, provenance
 from field_tables import Run, draw, print_agreement, print_table, print_work, show_time
+from report import head
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
 CELLS = ((8, 2), (12, 3), (16, 4), (24, 5), (32, 7), (48, 9), (64, 11))
@@ -58,32 +56,6 @@ def installed() -> list[Any]:
 
             found.append(peers_pyeit)
     return found
-
-
-def machine(peers: list[Any]) -> str:
-    """Processor, load, versions, commit and date."""
-    model = platform.processor()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        lines = (line for line in info.read_text().splitlines() if line.startswith("model name"))
-        model = next(lines, model).split(":")[-1].strip()
-    commit = _git("rev-parse", "--short", "HEAD") or "unknown"
-    if _git("status", "--porcelain", "--untracked-files=no", "--", "skin", "bench"):
-        commit += " with changes in skin or bench"
-    versions = {"numpy": np.__version__}
-    for module in peers:
-        versions |= module.versions()
-    listed = ", ".join(f"{name} {version}" for name, version in versions.items())
-    busy = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    return (
-        f"{model}, {os.cpu_count()} cores{busy}, one thread used; {platform.system()},"
-        f" Python {platform.python_version()}, {listed}\ncommit {commit}, {time.strftime('%Y-%m-%d')}"
-    )
-
-
-def _git(*arguments: str) -> str:
-    command = ["git", "-C", str(Path(__file__).parent.parent), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
 
 
 def repeat(solve: Callable[[], Any], budget: float, least: int = 3) -> tuple[float, Any]:
@@ -183,7 +155,7 @@ def main() -> int:
         import ngsolve
 
         ngsolve.SetNumThreads(1)
-    print(machine(peers))
+    print(head("numpy", "scipy", "ngsolve", "scikit-fem", "pyeit") + "; one thread used")
     made = provenance()
     print(f"reference: {made['command']}, NGSolve {made['versions']['ngsolve']}, {made['date']}; {made['order']}")
     references = load()

@@ -8,17 +8,15 @@ does not solve for joint speeds, the rows "drive" and "retreat_step" do. Does no
 from __future__ import annotations
 
 import argparse
-import platform
 import random
-import subprocess
 import sys
 import time
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from report import head
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -39,11 +37,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--calls", type=int, default=2000, help="paced calls for each row (default: %(default)s)")
     calls = parser.parse_args().calls
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout
-    print(
-        f"{platform.machine()} {platform.python_implementation()} {platform.python_version()}, "
-        f"pinocchio {pin.__version__}, {commit.strip()}, {date.today()}\n"
-    )
+    print(head("pin") + "\n")
     errors()
     print(f"\n{'microseconds a call':44} {'hot med':>8} {'paced med':>10} {'p99':>7}")
     nominal = model("UR10e")

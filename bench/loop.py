@@ -20,17 +20,15 @@ import mmap
 import os
 import select
 import socket
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from pathlib import Path
-from platform import machine, platform, python_version
 from typing import Any
+
+from report import head, quantile
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed import PlacedFrustum
@@ -68,11 +66,7 @@ def main() -> None:
     if args.write:
         write_frames(args.rate_hz, *args.write)
         return
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True
-    )
-    print(f"{platform()} {machine()}, {os.cpu_count()} cores, Python {python_version()}")
-    print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC, load {os.getloadavg()[0]:.1f}")
+    print(head())
     each = 25
     turns = max(1, args.touches // each)
     seconds = each * CYCLE / args.rate_hz
@@ -102,12 +96,9 @@ def row(name: str, seconds: list[float]) -> None:
     if not seconds:
         print(f"{name:58}{'-':>9}")
         return
-    values = sorted(1e6 * s for s in seconds)
-
-    def at(share: float) -> float:
-        return values[min(len(values) - 1, int(share * len(values)))]
-
-    print(f"{name:58}{statistics.median(values):9.1f}{at(0.99):9.1f}{at(0.999):9.1f}{values[-1]:10.1f}")
+    values = [1e6 * s for s in seconds]
+    print(f"{name:58}" + "".join(f"{quantile(values, share):9.1f}" for share in (0.5, 0.99, 0.999)), end="")
+    print(f"{max(values):10.1f}")
 
 
 def write_frames(rate_hz: float, master: int, states: int, stamps: int) -> None:

@@ -35,12 +35,6 @@ class Solved:
     potentials: Array | None = None
 
 
-def versions() -> dict[str, str]:
-    import ngsolve
-
-    return {"ngsolve": ngsolve.__version__}
-
-
 def make_mesh(problem: Problem, size: float, inside: float, order: int) -> Any:
     """Curved triangles of the sector with every disc resolved.
 

@@ -28,12 +28,6 @@ class Solved:
     unknowns: int
 
 
-def versions() -> dict[str, str]:
-    from importlib.metadata import version
-
-    return {"pyeit": version("pyeit")}
-
-
 def solve(problem: Problem, size: float = 0.1, inside: float = 0.2, mesh: Flat | None = None) -> Solved:
     """Impedances between the electrodes, then the energies of the three modes."""
     from pyeit.eit.fem import assemble, calculate_ke

@@ -35,12 +35,6 @@ class Solved:
     unknowns: int
 
 
-def versions() -> dict[str, str]:
-    from importlib.metadata import version
-
-    return {"scikit-fem": version("scikit-fem")}
-
-
 def make_mesh(problem: Problem, size: float, inside: float) -> Flat:
     """Netgen's triangles as arrays; arguments as in peers_ngsolve."""
     from peers_ngsolve import make_mesh as netgen

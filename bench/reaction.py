@@ -21,18 +21,15 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
-import platform
 import random
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from reaction_moves import MODES
 from reaction_turns import floor_turn, guarded_turn
+from report import head, quantile
 
 EACH = 200  # collisions in a turn
 COLUMNS = (
@@ -43,11 +40,6 @@ COLUMNS = (
     ("frame read -> slower", "frame_slower"),
     ("stop sent -> standing", "command_standing"),
 )
-
-
-def quantile(values: Sequence[float], share: float) -> float:
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else math.nan
 
 
 def summary(rows: list[dict[str, Any]], mode: str) -> dict[str, Any]:
@@ -100,20 +92,16 @@ def main() -> int:
     modes = args.modes.split(",")
     if unknown := set(modes) - set(MODES):
         parser.error(f"no such mode: {', '.join(sorted(unknown))}; there are {', '.join(MODES)}")
-    machine = f"{platform.platform()}, {os.cpu_count()} cores, Python {platform.python_version()}"
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True
-    )
-    head = f"{machine}\ncommit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC, load {os.getloadavg()[0]:.1f}"
+    machine = head()
     rows = [json.loads(line) for line in args.keep.read_text().splitlines()] if args.keep and args.keep.exists() else []
     try:
         measure(modes, args, rows)
     except KeyboardInterrupt:
         print("\ninterrupted: this is what was measured", file=sys.stderr)
     if args.json:
-        print(json.dumps({"machine": head, "modes": [summary(rows, mode) for mode in modes]}))
+        print(json.dumps({"machine": machine, "modes": [summary(rows, mode) for mode in modes]}))
     else:
-        print(head + "\n")
+        print(machine + "\n")
         show(rows, modes)
     return 1 if any(row.get("missed") or row.get("called", "touch") != "touch" for row in rows) else 0
 

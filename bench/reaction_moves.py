@@ -18,24 +18,25 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
+from scenes import START
+
 from coneskin.errors import ConeSkinError
 from coneskin.session import Session
 
 MODES = ("moveJ", "moveL", "speedJ", "servoJ", "sync", "script")
 FOREIGN = ("sync", "script")
-HOME = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
-REACH = 0.9  # rad of the base to both sides of HOME
+REACH = 0.9  # rad of the base to both sides of START
 SPEED, ACCELERATION, DECELERATION = 1.0, 20.0, 10.0
 TOOL_SPEED, TOOL_ACCELERATION = 0.5, 10.0  # of moveL: about 0.8 rad/s of the base
 CLOCK = time.monotonic
 
 
 def goal(side: int) -> list[float]:
-    return [HOME[0] + side * REACH, *HOME[1:]]
+    return [START[0] + side * REACH, *START[1:]]
 
 
 def poses(tool: Sequence[float]) -> dict[int, list[float]]:
-    """Tool poses to both sides of the one at HOME, on a straight line the way that the base turns it."""
+    """Tool poses to both sides of the one at START, on a straight line the way that the base turns it."""
     x, y, *rest = tool
     radius = math.hypot(x, y)
     return {side: [x - side * 0.35 * y / radius, y + side * 0.35 * x / radius, *rest] for side in (-1, 1)}
@@ -45,7 +46,7 @@ def servo_target(start: Sequence[float], side: int, seconds: float) -> list[floa
     """Speeds up in 0.1 s and then goes on with SPEED; never farther than REACH."""
     ramp = min(seconds, 0.1)
     way = SPEED * (0.5 * ramp * ramp / 0.1 + max(0.0, seconds - 0.1))
-    return [min(max(start[0] + side * way, HOME[0] - REACH), HOME[0] + REACH), *start[1:]]
+    return [min(max(start[0] + side * way, START[0] - REACH), START[0] + REACH), *start[1:]]
 
 
 def script(side: int) -> bytes:

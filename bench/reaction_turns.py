@@ -14,7 +14,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from reaction_moves import CLOCK, FOREIGN, HOME, Child, ForeignArm, GuardedArm
+from reaction_moves import CLOCK, FOREIGN, Child, ForeignArm, GuardedArm
+from scenes import START, forearm_scene
 
 from coneskin.errors import ConeSkinError
 from coneskin.replay import read_run
@@ -25,35 +26,13 @@ from coneskin.robot.stop_watch import StopWatch, Way
 from coneskin.scene_reader import parse_scene
 from coneskin.session import Session, guard
 
-SCENE = """\
-[arm]
-model = "UR5e"
-host = "{host}"
-control = "{control}"
-[[link]]
-name = "forearm"
-[[link.sensor]]
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
-[source]
-kind = "virtual"
-[reaction]
-kind = "stop"
-deceleration_rad_s2 = 10
-[watch]
-skin_silence_ms = 250
-skin_late_ms = 250
-arm_silence_ms = 250
-settle_ms = 10
-"""
+WATCH = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nsettle_ms = 10"
 
 
 def chosen(simulated: SimulatedController, mode: str, rng: random.Random) -> tuple[int, float, list[float]]:
     """The side with more room, how long to move before the stop [s], and where the arm is."""
     q = simulated.wait_standing()["q"]
-    side = -1 if q[0] > HOME[0] else 1
+    side = -1 if q[0] > START[0] else 1
     speeding_up = 0.15 if mode == "servoJ" else 0.10  # the arm lags behind its targets
     return side, speeding_up + 0.08 * rng.random(), q
 
@@ -62,9 +41,9 @@ def guarded_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, An
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         host, log = free_host(), folder / "log.jsonl"
-        simulated = stack.enter_context(SimulatedController("UR5e", host, HOME, log=log))
+        simulated = stack.enter_context(SimulatedController("UR5e", host, START, log=log))
         control = "foreign" if mode in FOREIGN else "owner"
-        scene = parse_scene(SCENE.format(host=host, control=control))
+        scene = parse_scene(forearm_scene(host, control, watch=WATCH))
         session = stack.enter_context(guard(scene, recording=folder / "run.rec"))
         arm = ForeignArm(mode, host, stack) if mode in FOREIGN else GuardedArm(session, mode, simulated.state()["tcp"])
         touched, before = [], 0
@@ -137,7 +116,7 @@ def floor_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, Any]
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         host, log = free_host(), folder / "log.jsonl"
-        simulated = stack.enter_context(SimulatedController("UR5e", host, HOME, log=log))
+        simulated = stack.enter_context(SimulatedController("UR5e", host, START, log=log))
         reader = stack.enter_context(StateReader(host))
         child = stack.enter_context(Child("floor", host, mode, json.dumps(simulated.state()["tcp"])))
         samples: list[tuple[float, float]] = []

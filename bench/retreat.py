@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import platform
 import random
-import subprocess
 import sys
-from datetime import date
 from pathlib import Path
+
+from report import head
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -34,11 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=300, help="retreats for each link (default: %(default)s)")
     runs = parser.parse_args().runs
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout
-    print(
-        f"{platform.machine()} {platform.python_implementation()} {platform.python_version()}, {commit.strip()}, "
-        f"{date.today()}; {Reaction()}\n"
-    )
+    print(f"{head()}\n{Reaction()}\n")
     followed(runs)
     print()
     objectives(runs)

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
 import socket
 import subprocess
 import sys
@@ -21,9 +20,10 @@ import threading
 import time
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+from report import head, quantile
 
 from coneskin.robot.rtde_codec import PacketKind, Recipe, pack_outputs_request, pack_start_request, split
 from coneskin.robot.sim_process import SimulatedController, free_host
@@ -197,10 +197,6 @@ def measure(host: str, calls: int, stops: int) -> dict[str, Any]:
     return {"timed": timed, "stopped": stopped}
 
 
-def quantile(values: Sequence[float], share: float) -> float:
-    return sorted(values)[min(len(values) - 1, int(share * len(values)))]
-
-
 def cell(values: Sequence[float]) -> str:
     return f"{1e3 * quantile(values, 0.5):7.2f} /{1e3 * quantile(values, 0.99):7.2f}" if values else "            -   "
 
@@ -254,9 +250,7 @@ def main() -> int:
         }
         print(json.dumps({"at_rest": at_rest, "moving": moving}))
         return 0
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False).stdout
-    print(f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, ", end="")
-    print(f"commit {commit.strip()}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC; ms, median / p99\n")
+    print(f"{head()}; ms, median / p99\n")
     print(f"{'arm at rest':30s} {'n':>4s} {'came':>16s} {'acted on':>16s} {'returned':>16s}")
     for name, delays in table.items():
         print(f"{name:30s} {len(delays[2]):4d} " + " ".join(cell(column) for column in delays))

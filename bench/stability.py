@@ -13,14 +13,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from pathlib import Path
-from platform import machine, platform, python_version
-from subprocess import run
 
 import mpmath as mp
 import numpy as np
 import stability_reference as reference
+from report import head
 
 from coneskin.skin.field_disc import Discs
 from coneskin.skin.field_discs import solve_discs
@@ -226,11 +223,9 @@ def scale_errors(ratio: float) -> tuple[float, float]:
 
 
 def main() -> None:
-    commit = run(["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True)
-    print(f"{platform()} {machine()}, Python {python_version()}, numpy {np.__version__}, mpmath {mp.__version__}")
-    print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC; M = {ORDER}, N = {POINTS} in both\n")
-    head = ("", "|dV|/U0", "dG/G", "dP/P", "cond", "naive Green", "via Y")
-    print(f"{head[0]:28}" + "".join(f"{h:>12}" for h in head[1:]))
+    print(f"{head('numpy', 'mpmath')}; M = {ORDER}, N = {POINTS} in both\n")
+    columns = ("|dV|/U0", "dG/G", "dP/P", "cond", "naive Green", "via Y")
+    print(f"{'':28}" + "".join(f"{column:>12}" for column in columns))
     worst = 0.0
     for case in cases():
         r = measure(case)

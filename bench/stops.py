@@ -19,35 +19,17 @@ import subprocess
 import sys
 import threading
 import time
-from datetime import UTC, datetime
-from pathlib import Path
-from platform import machine, platform, python_version
+
+from report import head
+from scenes import START, forearm_scene, start_with
 
 from coneskin.errors import ConeSkinError
 from coneskin.robot.sim_process import SimulatedController, free_host
 from coneskin.scene_reader import parse_scene
 from coneskin.session import Session, guard
 
-START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
-GOAL = [math.radians(150.0), *START[1:]]
+GOAL = start_with(150.0)
 RAW = f"def users():\n  while True:\n    movej({GOAL}, a=8, v=1)\n    movej({START}, a=8, v=1)\n  end\nend\n"
-SCENE = """\
-[arm]
-model = "UR5e"
-host = "{host}"
-control = "{control}"
-[[link]]
-name = "forearm"
-[[link.sensor]]
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
-[source]
-kind = "virtual"
-[reaction]
-kind = "stop"
-"""
 
 
 def main() -> None:
@@ -55,11 +37,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stops", type=int, default=30)
     args = parser.parse_args()
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True
-    )
-    print(f"{platform()} {machine()}, {os.cpu_count()} cores, Python {python_version()}")
-    print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC, load {os.getloadavg()[0]:.1f}\n")
+    print(head() + "\n")
     print(f"{'ms':34}{'stops':>6}{'slower med':>12}{'worst':>8}{'standing med':>14}{'worst':>8}", end="")
     print(f"{'escalated':>11}{'other':>7}")
     for busy in (False, True):
@@ -88,7 +66,7 @@ def measure(control: str, stops: int) -> tuple[list[float], list[float], int, li
     standing: list[float] = []
     escalated, other = 0, []
     with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
-        scene = parse_scene(SCENE.format(host=simulated.host, control=control))
+        scene = parse_scene(forearm_scene(simulated.host, control))
         with guard(scene) as session:
             for _ in range(stops):
                 seen = len(session.events)

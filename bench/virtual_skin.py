@@ -12,10 +12,8 @@ start of a touch to the device clock of the first frame that shows it.
 import gc
 import time
 from collections.abc import Iterable
-from datetime import UTC, datetime
-from pathlib import Path
-from platform import machine, platform, python_version
-from subprocess import run
+
+from report import head
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.pseudo_terminal import Pacing, play
@@ -28,9 +26,7 @@ SOON = 0.002  # as in coneskin.skin_process
 
 
 def main() -> None:
-    commit = run(["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True)
-    print(f"{platform()} {machine()}, Python {python_version()}")
-    print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC")
+    print(head())
     equal, unequal = Sensor(LINK), Sensor(LINK, lower_sheet_ohms=300.0)
     row("us per frame", ("median", "p99", "worst"))
     for model in ("ladder", "field"):

@@ -11,10 +11,8 @@ import gc
 import random
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
-from pathlib import Path
-from platform import machine, platform, python_version
-from subprocess import run
+
+from report import head
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detector import Detector
@@ -30,9 +28,7 @@ COUNT = 20_000
 
 
 def main() -> None:
-    commit = run(["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True)
-    print(f"{platform()} {machine()}, Python {python_version()}")
-    print(f"commit {commit.stdout.strip()}, {datetime.now(UTC):%F %R} UTC")
+    print(head())
     quiet = [data for _, data in VirtualSkin(SENSOR, duration=COUNT / 1000).packets()]
     held = [data for _, data in VirtualSkin(SENSOR, [ScriptedTouch(0, 1e9, 0.2, 1.0)], duration=COUNT / 1000).packets()]
     frames = [frame for data in quiet if (frame := frame_at(data))]
