@@ -61,7 +61,7 @@ class ArmReaction:
         slider: where the controller's speed slider is, or None.
 
     Raises:
-        RobotRefused: comply without OWNER, or a reaction that moves the arm without a mover.
+        RobotRefused: a reaction moves the arm, and there is no mover.
     """
 
     #: how what the arm's controller sends is read; here, so that a guard without an arm loads neither
@@ -85,14 +85,12 @@ class ArmReaction:
         self._model = model
         self._rules = Rules(reaction, rules)
         self._plain = not rules and reaction.kind in ("stop", "retreat")
-        if Way.OWNER not in ways and "comply" in self._rules.kinds:
-            raise RobotRefused("comply needs the owner of ur_rtde: a program of its own cannot follow a push")
         if mover is None and self._rules.move:
             raise RobotRefused("a reaction that moves the arm away needs a mover")
         self._watch = watch
         self._ways = ways
         self._mover = mover
-        self._first = Way.OWNER if self.owned else Way.SCRIPT
+        self._first = ways[0]
         self._clock = ControllerClock()
         self._stop: StopWatch | None = None
         self._slowing: Slowing | None = None
@@ -110,6 +108,11 @@ class ArmReaction:
     def needs_slider(self) -> bool:
         """Whether a reaction may use the controller's speed slider."""
         return "slow" in self._rules.kinds
+
+    @property
+    def steers(self) -> bool:
+        """Whether a reaction may move an arm that is not ours, through a program that follows."""
+        return self._rules.move and not self.owned
 
     def arm(self, out: Outputs) -> None:
         """Let the program move the arm, and react from now on."""
@@ -210,8 +213,7 @@ class ArmReaction:
         """Why the arm must not be armed, one line each."""
         wrong = []
         if not self.owner_ready:
-            owner = self.owned
-            wrong.append("ur_rtde is not ready" if owner else "the process that watches the guard is not ready")
+            wrong.append("ur_rtde is not ready" if self.owned else "the process that watches the guard is not ready")
         if self.needs_slider and self.slider is None:
             wrong.append("where the controller's speed slider is, is not known")
         if self.state is None or self.silent(now):

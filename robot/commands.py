@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from coneskin.errors import RobotRefused
 from coneskin.geometry.pose import Vector
@@ -12,7 +12,7 @@ from coneskin.geometry.pose import Vector
 if TYPE_CHECKING:
     from .ur_models import Joints
 
-__all__ = ["KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction", "RetreatProgram", "Stop"]
+__all__ = ["KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction", "Stop"]
 
 #: what an arm can do when it is touched, gentlest first
 KINDS = ("slow", "comply", "retreat", "stop")
@@ -140,22 +140,6 @@ class JointVelocity:
     away: float
     progress: float
     clipped_by: tuple[str, ...] = ()
-
-
-class RetreatProgram(NamedTuple):
-    """A whole movement as a program for the script port.
-
-    Attributes:
-        text: URScript.
-        duration: from its first cycle to its stopj [s].
-        progress: how far the touched point should get [m].
-        why: the reason for its end.
-    """
-
-    text: str
-    duration: float
-    progress: float
-    why: str
 
 
 @dataclass(frozen=True, slots=True)

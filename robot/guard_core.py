@@ -115,6 +115,11 @@ class GuardCore:
         """Whether a reaction may use the controller's speed slider."""
         return self._arm is not None and self._arm.needs_slider
 
+    @property
+    def steers(self) -> bool:
+        """Whether a reaction may move an arm that another program moves."""
+        return self._arm is not None and self._arm.steers
+
     def take(self, block: Block, out: Outputs) -> None:
         """Take one input.
 

@@ -20,7 +20,7 @@ from coneskin.skin.recording import Block, encode_block
 from coneskin.skin.source import Source
 
 from .channel import Channel
-from .commands import RetreatProgram
+from .follower import FollowerProgram, Steer
 from .guard_core import GuardCore
 from .journal import GuardEvent, Kind
 from .outputs import Output
@@ -33,11 +33,12 @@ if TYPE_CHECKING:  # opened for it where the scene has an arm
     from .foreign import ForeignStops
     from .speed_slider import SpeedSlider
     from .state_reader import StateReader
+    from .steering import Steering
 
 __all__ = ["GuardLoop", "GuardPorts"]
 
 _ALIVE = Alive().encode()
-_OURS = (Way, RetreatProgram, Slider)
+_OURS = (Way, Steer, FollowerProgram, Slider)
 _TICK = 0.002  # s between two looks at the clocks where nothing else happens
 _OVERRUN = 0.02  # s between two rounds from which on the loop says that it was held up
 _ENDING = 3.0  # s that the arm has to stand when the guard is told to end
@@ -56,6 +57,7 @@ class GuardPorts:
         deceleration: of a stop by script [rad/s2].
         slider: of the controller's speed, open.
         keeper: the process that stops the arm when this one is gone, where there is no owner to do so.
+        steering: the reader once more, where it carries speeds to a follower program.
     """
 
     supervisor: Channel
@@ -66,6 +68,7 @@ class GuardPorts:
     deceleration: float = 10.0
     slider: SpeedSlider | None = None
     keeper: Channel | None = None
+    steering: Steering | None = None
 
 
 class _Outbox:
@@ -90,7 +93,7 @@ class _Outbox:
             taken = ports.owner is not None and ports.owner.send(message)
             self.sent.append((b"owner\n" if taken else b"owner, not sent\n") + message)
 
-    def _append_ours(self, ports: GuardPorts, output: Way | RetreatProgram | Slider) -> None:
+    def _append_ours(self, ports: GuardPorts, output: Way | Steer | FollowerProgram | Slider) -> None:
         """What goes through connections of the guard's own."""
         if isinstance(output, Way):
             name = output.value
@@ -99,7 +102,10 @@ class _Outbox:
             else:
                 taken = ports.foreign is not None and ports.foreign.use(output, ports.deceleration)
             text = "sent" if taken else "not sent"
-        elif isinstance(output, RetreatProgram):
+        elif isinstance(output, Steer):
+            taken = ports.steering is not None and ports.steering.steer(output)
+            name, text = ("steer" if taken else "steer, not sent"), str(output.values)
+        elif isinstance(output, FollowerProgram):
             taken = ports.foreign is not None and ports.foreign.run(output.text)
             name, text = ("script" if taken else "script, not sent"), output.text
         else:

@@ -1,7 +1,6 @@
-"""A movement away from a touch, under way: through the owner of ur_rtde, or as a program of its own. Pure.
+"""A movement away from a touch, under way: in every second control cycle a new target goes out. Pure.
 
-The owner gets a new target in every second control cycle. A program has the whole way in it (``retreat_program``); the
-guard follows the measured arm on it and ends it early where that is needed.
+To the owner of ur_rtde; or, for an arm that another program moves, to a program of ours in the controller.
 """
 
 from __future__ import annotations
@@ -9,7 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .commands import ArmState, ContactOnLink, Done, RetreatProgram
+from .commands import ArmState, ContactOnLink, Done
+from .follower import FollowerProgram, Steer
 from .movement import Movement
 from .outputs import Outputs, tell
 from .owner_messages import Speed
@@ -18,7 +18,7 @@ from .state_reader import ControllerState
 __all__ = ["Leaving"]
 
 _STREAM_EVERY = 0.004  # s between two targets of a retreat: every second controller cycle, so that none queues
-_PROGRAM_LATE = 0.5  # s that a program may need besides its own time: starting it, and braking
+_STARTING = 0.5  # s after which a program that does not run will not start any more
 
 
 class Leaving:
@@ -27,18 +27,15 @@ class Leaving:
     Args:
         movement: what to do.
         now: host time [s].
-        program: that makes the movement; None where the owner does.
+        program: that follows; None where the owner does.
         out: takes what comes of it.
     """
 
-    def __init__(self, movement: Movement, now: float, program: RetreatProgram | None, out: Outputs) -> None:
+    def __init__(self, movement: Movement, now: float, program: FollowerProgram | None, out: Outputs) -> None:
         self._movement = movement
-        self._streams = program is None
+        self._program = program
+        self._began = now
         self._sent = -math.inf
-        self._end = math.inf
-        if program is not None:
-            out.append(program)
-            self._end = now + program.duration + _PROGRAM_LATE
         tell(out, "retreating", now, **({"how": movement.how} if movement.how else {}))
 
     def step(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
@@ -52,11 +49,17 @@ class Leaving:
         step = self._movement.step(ArmState(state.time, state.q, state.qd), contacts)
         if isinstance(step, Done):
             return step
-        if state.time >= self._end:
-            return Done("its program is over", step.progress)
-        if self._streams and state.time - self._sent >= _STREAM_EVERY - 1e-9:
-            out.append(Speed(step.qd, step.acceleration))
-            if step.clipped_by and self._sent == -math.inf:
+        program, first = self._program, self._sent == -math.inf
+        if program is not None and not state.playing and state.time - self._began >= _STARTING:
+            return Done("its program does not run on the controller", step.progress)
+        if state.time - self._sent >= _STREAM_EVERY - 1e-9:
+            if program is None:
+                out.append(Speed(step.qd, step.acceleration))
+            else:
+                out.append(Steer(program.token, step.qd, step.acceleration))
+                if first:
+                    out.append(program)
+            if step.clipped_by and first:
                 tell(out, "clipped", state.time, by=list(step.clipped_by))
             self._sent = state.time
         return None

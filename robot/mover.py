@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .commands import ArmState, ContactOnLink, Done, Reaction
+from .commands import ArmState, ContactOnLink, Reaction
+from .follower import FollowerProgram
 from .leaving import Leaving
 from .movement import choose_movement
 from .outputs import Outputs
-from .retreat_program import retreat_program
 from .space import Space
 from .table import Table
 from .trail import Trail
@@ -22,13 +22,14 @@ class Mover:
 
     Args:
         model: the arm.
-        by_program: whether a movement is a program of its own; otherwise the owner of ur_rtde is streamed to.
+        watchdog_hz: of the program that follows in the controller; None where the owner of ur_rtde moves the arm.
         table: what the arm must not go below while it moves.
     """
 
-    def __init__(self, model: ArmModel, by_program: bool = False, table: Table | None = None) -> None:
+    def __init__(self, model: ArmModel, watchdog_hz: float | None = None, table: Table | None = None) -> None:
         self._model = model
-        self._by_program = by_program
+        self._watchdog_hz = watchdog_hz
+        self._token = 0
         self._space = Space(model, table)
         self._trail = Trail()
 
@@ -56,9 +57,8 @@ class Mover:
         movement = choose_movement(self._model, reaction, at_touch, here, contacts, self._trail, self._space)
         if isinstance(movement, str):
             return movement
-        if not self._by_program:
-            return Leaving(movement, here.time, None, out)
-        program = retreat_program(movement, here, contacts, reaction.deceleration)
-        if isinstance(program, Done):
-            return program.reason
+        program = None
+        if self._watchdog_hz is not None:
+            self._token += 1
+            program = FollowerProgram(self._token, reaction.deceleration, self._watchdog_hz)
         return Leaving(movement, here.time, program, out)

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 from .journal import GuardEvent
 
 if TYPE_CHECKING:  # a guard without an arm loads none of them
-    from .commands import RetreatProgram
+    from .follower import FollowerProgram, Steer
     from .owner_messages import Clear, Halt, Speed, Stop
     from .slowing import Slider
     from .stop_watch import Way
 
 __all__ = ["Command", "Output", "Outputs", "tell"]
 
-Command: TypeAlias = "Stop | Speed | Halt | Clear | Way | RetreatProgram | Slider"
+Command: TypeAlias = "Stop | Speed | Halt | Clear | Way | FollowerProgram | Steer | Slider"
 Output: TypeAlias = "Command | GuardEvent"
 
 

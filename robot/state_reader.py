@@ -93,7 +93,7 @@ class StateReader(RtdeConnection):
 
     def __enter__(self) -> StateReader:
         super().__enter__()
-        self.ask_outputs(_NAMES)
+        self._ask_for()
         self.start()
         return self
 
@@ -105,3 +105,7 @@ class StateReader(RtdeConnection):
             RobotConnectionError: the controller is gone.
         """
         return decode_state(self._clock(), self.wait_data(timeout))
+
+    def _ask_for(self) -> None:
+        """What there is to ask before the data flows."""
+        self.ask_outputs(_NAMES)

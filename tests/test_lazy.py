@@ -134,7 +134,7 @@ def test_a_scene_without_an_arm_loads_no_kinematics_and_no_reaction(tmp_path: Pa
 
 
 def test_a_reaction_that_only_stops_loads_no_retreat(tmp_path: Path) -> None:
-    unneeded = {"mover", "leaving", "movement", "retreat", "comply", "trail", "table", "retreat_program"}
+    unneeded = {"mover", "leaving", "movement", "retreat", "comply", "trail", "table", "follower", "steering"}
     loaded = modules(_STOP, _BUILD, tmp_path / "scene.toml", "")
     assert not {f"coneskin.robot.{name}" for name in unneeded} & loaded
 

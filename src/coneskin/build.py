@@ -76,7 +76,7 @@ def _mover(scene: Scene, arm: ArmModel) -> Mover:
         if index := link_index(link.name):
             compile_contact(arm, index)  # 2 ms that the first touch shall not wait for
     table = None if scene.arm.table_z is None else Table(scene.arm.table_z)
-    return Mover(arm, scene.arm.control == "foreign", table)
+    return Mover(arm, scene.arm.watchdog_hz if scene.arm.control == "foreign" else None, table)
 
 
 @dataclass(frozen=True, slots=True)

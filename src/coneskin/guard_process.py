@@ -70,7 +70,12 @@ def _run(
 
         if (pose := read_pose(scene.arm.host)) is not None:
             check_identity(model(scene.arm.model), pose, scene.arm.host)
-        ports.reader = stack.enter_context(StateReader(scene.arm.host))
+        if core.steers:
+            from .robot.steering import Steering
+
+            ports.reader = ports.steering = stack.enter_context(Steering(scene.arm.host))
+        else:
+            ports.reader = stack.enter_context(StateReader(scene.arm.host))
         ports.foreign = stack.enter_context(ForeignStops(scene.arm.host))
         if scene.reaction is not None:
             ports.deceleration = scene.reaction.deceleration

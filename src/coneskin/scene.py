@@ -36,7 +36,8 @@ class ArmScene:
     Attributes:
         model: such as "UR10e".
         host: the controller's name or address.
-        watchdog_hz: the controller stops its program when it hears nothing for 1 / watchdog_hz.
+        watchdog_hz: the controller stops the program through which coneskin moves the arm when it hears nothing for
+            1 / watchdog_hz.
         control: "owner": this program moves the arm, through ur_rtde; "foreign": something else does.
         table_z: height in the base frame that the arm does not go below while it retreats [m], or None.
     """

@@ -155,8 +155,6 @@ def _arm(tables: Mapping[str, Any], problems: list[str]) -> s.ArmScene | None:
             del values["model"]
     if not values.get("host", "?").strip():
         problems.append("arm.host must name the controller, got an empty text")
-    if values.get("control") == "foreign" and "watchdog_hz" in tables["arm"]:
-        problems.append("arm.watchdog_hz needs control = owner: the watchdog is part of ur_rtde's program; remove it")
     if len(values) < len(_ARM):
         return None
     return s.ArmScene(values["model"], values["host"], values["watchdog"], values["control"], values["table_z"])
@@ -262,9 +260,6 @@ def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, 
     foreign = scene.arm is not None and scene.arm.control == "foreign"
     if foreign and "motion" in named:
         problems.append("[motion] needs arm.control = owner: in a foreign arm another program makes the motion")
-    reactions = [] if scene.reaction is None else [scene.reaction, *(rule.reaction for rule in scene.rules)]
-    if foreign and any(reaction.kind == "comply" for reaction in reactions):
-        problems.append("reaction.kind comply needs arm.control = owner: nothing else can follow a push")
     if "source" in named and isinstance(tables.get("link", []), list) and not count_sensors(tables):
         problems.append("[source] needs a [[link]] with a [[link.sensor]] that its bytes come from")
     if "arm" in named:

@@ -1,10 +1,8 @@
 """A mocked robot: six joints that obey the guard's commands after one cycle, or do not, on a clock of their own."""
 
-import re
-from collections import deque
 from dataclasses import dataclass, field
 
-from coneskin.robot.commands import RetreatProgram
+from coneskin.robot.follower import FollowerProgram, Steer
 from coneskin.robot.owner_messages import Clear, Halt, Speed, Stop
 from coneskin.robot.slowing import Slider
 from coneskin.robot.state_reader import RECIPE
@@ -29,15 +27,18 @@ class MockArm:
     commands: list[object] = field(default_factory=list)
     heeds: bool = True
     slider: float = 1.0
-    program: deque[tuple[list[float], float, int]] = field(default_factory=deque)
+    registers: Steer | None = None
+    following: int = 0
 
     def take(self, command: object) -> None:
         """Obey a command of the guard, if this arm does."""
         self.commands.append(command)
         if isinstance(command, Slider):
             self.slider = command.fraction
-        elif isinstance(command, RetreatProgram):
-            self.program = deque(_lines(command.text))
+        elif isinstance(command, Steer):
+            self.registers = command
+        elif isinstance(command, FollowerProgram):
+            self.following, self.runtime_state = command.token, 2
         elif isinstance(command, Way):
             if command in self.obeys:
                 self._go([0.0] * 6, 10.0)
@@ -56,16 +57,13 @@ class MockArm:
 
     def _go(self, target: list[float], acceleration: float) -> None:
         self.target, self.acceleration = target, acceleration
-        self.program.clear()
+        self.following = 0
 
     def step(self) -> bytes:
         """One control cycle; the payload of its RTDE packet."""
         self.clock += CYCLE
-        if self.program:
-            target, acceleration, left = self.program.popleft()
-            self.target, self.acceleration = target, acceleration
-            if left > 1:
-                self.program.appendleft((target, acceleration, left - 1))
+        if self.following and self.registers is not None and self.registers.token == self.following:
+            self.target, self.acceleration = list(self.registers.qd), self.registers.acceleration
         if self.target is not None:
             target = [self.slider * t if self.heeds else t for t in self.target]
             gap = max(abs(t - v) for t, v in zip(target, self.qd, strict=True))
@@ -75,12 +73,3 @@ class MockArm:
         return RECIPE.pack(
             (self.clock, tuple(self.q), tuple(self.qd), self.robot_mode, self.safety_bits, self.runtime_state)
         )
-
-
-def _lines(text: str) -> list[tuple[list[float], float, int]]:
-    """Speeds, acceleration and control cycles of each line of a retreat's program."""
-    lines = []
-    for speeds, acceleration, seconds in re.findall(r"speedj\(\[(.*)\], ([\d.]+), ([\d.]+)\)", text):
-        lines.append(([float(v) for v in speeds.split(",")], float(acceleration), round(float(seconds) / CYCLE)))
-    stop = re.findall(r"stopj\(([\d.]+)\)", text)
-    return [*lines, *(([0.0] * 6, float(value), 10_000) for value in stop)]

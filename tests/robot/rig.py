@@ -148,5 +148,5 @@ def make_core(
         for s in sensors
     ]
     ways = FOREIGN if foreign else OWNED
-    arm = ArmReaction(MODEL, reaction, watch, ways, rules, Mover(MODEL, foreign, table))
+    arm = ArmReaction(MODEL, reaction, watch, ways, rules, Mover(MODEL, 4.0 if foreign else None, table))
     return GuardCore(Stream(sensors, Detection(stuck_frames=200)), placed, watch, arm)

@@ -22,6 +22,7 @@ from coneskin.session import guard
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
 from coneskin.robot.kinematics import forward  # noqa: E402
+from coneskin.robot.rtde_connection import RtdeConnection  # noqa: E402
 from coneskin.robot.sim_process import SimulatedController, free_host  # noqa: E402
 from coneskin.robot.sim_values import values_of  # noqa: E402
 from coneskin.robot.ur_models import model  # noqa: E402
@@ -166,6 +167,7 @@ def test_whatever_moves_the_arm_is_stopped_and_the_arm_retreats(controller, run,
         assert latched is not None
         events = {event.name: event for event in session.events}
         assert events["standstill"].details["ways"] == ["script"], [e.name for e in session.events]
+        assert "retreated" in events, latched.details
         assert events["retreated"].details["complete"] is True
         # 0.5 mm are left for braking, and one look of 2 ms at 150 mm/s
         assert events["retreated"].details["progress"] == pytest.approx(0.030, abs=0.001)
@@ -177,6 +179,54 @@ def test_whatever_moves_the_arm_is_stopped_and_the_arm_retreats(controller, run,
     run = read_run(path)
     assert replay(run).same
     assert run.events[-1].name == "ending"  # its last word too is in the recording
+
+
+def until_it_moves_away(controller, session):
+    assert session.wait_for(("retreating",), 10.0) is not None, [event.name for event in session.events]
+    until(lambda: any(controller.state()["qd"]))
+
+
+def test_it_gives_way_to_a_push(controller, run):
+    scene = (
+        SCENE.format(host=controller.host).replace("retreat", "comply").replace("distance_mm = 30", "distance_mm = 200")
+    )
+    with guard(parse_scene(scene)) as session:
+        run("raw URScript")
+        session.touch(0.13, 1.55, duration=1.0, force=20.0)
+        until_it_moves_away(controller, session)
+        over = session.wait_for(("retreated",), 10.0)
+        assert over.details["why"] == "the touch is over"
+        assert 0.005 < over.details["progress"] < 0.2
+        controller.wait_standing()
+        assert session.wait_for(("latched",), 5.0) is not None
+
+
+@pytest.mark.parametrize("gone", [("guard",), ("guard", "keeper")])
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_without_its_guard_a_retreat_ends(controller, run, gone, number):
+    scene = SCENE.format(host=controller.host).replace(
+        "distance_mm = 30", "distance_mm = 400\ntime_budget_s = 30\nspeed_mm_s = 50"
+    )
+    with guard(parse_scene(scene)) as session:
+        run("raw URScript")
+        session.touch(0.13, 1.55, duration=0.2)
+        until_it_moves_away(controller, session)
+        for name in gone:
+            os.kill(session._children[name].pid, number)
+        stopped_at = controller.wait_standing()["q"]
+        time.sleep(0.3)
+        assert controller.state()["q"] == stopped_at
+        for name in gone:
+            os.kill(session._children[name].pid, signal.SIGCONT)
+
+
+def test_with_its_registers_taken_it_does_not_start(controller):
+    with RtdeConnection(controller.host) as other:
+        other.ask_inputs(("input_int_register_47",))
+        with pytest.raises(RobotRefused, match="input_int_register_47"):
+            guard(parse_scene(SCENE.format(host=controller.host))).__enter__()
+        with guard(parse_scene(SCENE.format(host=controller.host).replace("retreat", "stop"))):
+            pass  # one that only stops needs none
 
 
 def test_a_program_that_moves_a_latched_arm_is_stopped_again(controller, run):

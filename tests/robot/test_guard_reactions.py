@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from coneskin.errors import RobotRefused
-from coneskin.robot.commands import Reaction, RetreatProgram
+from coneskin.robot.commands import Reaction
+from coneskin.robot.follower import FollowerProgram, Steer
 from coneskin.robot.journal import Kind
 from coneskin.robot.owner_messages import Halt, Speed, Stop
 from coneskin.robot.phase import Phase
@@ -119,8 +119,9 @@ def comply(**settings):
     return Reaction(kind="comply", speed=0.1, distance=0.04, **settings)
 
 
-def test_it_gives_way_while_it_is_pushed_and_stops_with_the_push():
-    rig = Rig(touch(0.5, 1.0), reaction=comply(), speed=1.0).run(0.7)
+@pytest.mark.parametrize("foreign", [False, True])
+def test_it_gives_way_while_it_is_pushed_and_stops_with_the_push(foreign):
+    rig = Rig(touch(0.5, 1.0), reaction=comply(), speed=1.0, foreign=foreign).run(0.7)
     assert rig.core.phase is Phase.RETREATING
     before, normal = rig.point(), rig.normal()
     rig.run(0.2)
@@ -153,15 +154,10 @@ def test_a_harder_rule_ends_it():
     assert rig.core.phase is Phase.HALTING
 
 
-def test_a_foreign_arm_cannot_comply():
-    with pytest.raises(RobotRefused, match="comply needs the owner"):
-        Rig(reaction=comply(), foreign=True)
-
-
 # ---- foreign
 
 
-def test_a_foreign_arm_is_stopped_by_script_and_retreats_by_one_program():
+def test_a_foreign_arm_is_stopped_by_script_and_follows():
     rig = Rig(touch(0.5, 0.7), foreign=True, speed=1.0).run(0.45)
     assert rig.core.phase is Phase.ARMED
     assert rig.arm.commands == []  # nothing is sent before it is needed
@@ -169,8 +165,9 @@ def test_a_foreign_arm_is_stopped_by_script_and_retreats_by_one_program():
     before, normal = rig.point(), rig.normal()
     rig.run(2.0)
     kinds = [command if isinstance(command, Way) else type(command) for command in rig.arm.commands]
-    assert kinds == [Way.SCRIPT, RetreatProgram, Way.SCRIPT]
-    # 0.5 mm left for braking, and 20 ms in which a direction stands; ``before`` is one cycle later at up to 0.3 m/s
+    assert kinds[:4] == [Way.SCRIPT, Steer, FollowerProgram, Steer]  # there are speeds before the program starts
+    assert kinds[-2:] == [Steer, Way.SCRIPT]
+    # 0.5 mm left for braking; ``before`` is one cycle later at up to 0.3 m/s
     assert progress(before, rig.point(), normal) == pytest.approx(0.050, abs=0.002)
     assert rig.event("retreated").details["complete"] is True
     assert rig.core.phase is Phase.LATCHED
@@ -179,10 +176,12 @@ def test_a_foreign_arm_is_stopped_by_script_and_retreats_by_one_program():
 def test_a_program_that_does_not_start_is_not_waited_for():
     rig = Rig(touch(0.5, 0.7), foreign=True, speed=1.0)
     take = rig.arm.take
-    rig.arm.take = lambda command: None if isinstance(command, RetreatProgram) else take(command)
-    rig.run(2.5)
+    rig.arm.take = lambda command: None if isinstance(command, FollowerProgram) else take(command)
+    rig.run(0.5)
+    rig.arm.runtime_state = 1
+    rig.run(2.0)
     assert rig.core.phase is Phase.LATCHED
-    assert rig.event("retreated").details["why"] == "its program is over"
+    assert rig.event("retreated").details["why"] == "its program does not run on the controller"
     assert rig.event("retreated").details["complete"] is False
 
 
@@ -359,4 +358,4 @@ def test_the_same_inputs_give_the_same_run_bit_by_bit(settings):
     for block in rig.blocks:
         again.take(Block(*block), outputs)
     assert [repr(output) for output in outputs] == [repr(output) for output in rig.outputs]
-    assert any(isinstance(output, Halt | Slider | RetreatProgram) for output in outputs)
+    assert any(isinstance(output, Halt | Slider | FollowerProgram) for output in outputs)

@@ -1,20 +1,18 @@
-"""Ways to leave: with the push, back along the path, above the table, as one program; the kinematics judge."""
+"""Ways to leave: with the push, back along the path, above the table; the kinematics judge."""
 
 import math
-import re
 from itertools import pairwise
 
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.commands import STILL, ArmState, ContactOnLink, Done, Reaction, RetreatProgram
+from coneskin.robot.commands import STILL, ArmState, ContactOnLink, Done, Reaction
 from coneskin.robot.comply import DAMPING, begin_compliance, comply_step, wanted_speed
 from coneskin.robot.kinematics import link_pose
 from coneskin.robot.limits import MARGIN
-from coneskin.robot.movement import Retreat, choose_movement
+from coneskin.robot.movement import Retreat
 from coneskin.robot.retreat import plan_retreat
-from coneskin.robot.retreat_program import SEGMENT, retreat_program
 from coneskin.robot.skeleton import skeleton
 from coneskin.robot.space import Space
 from coneskin.robot.table import Table
@@ -226,47 +224,3 @@ def test_the_table_is_named():
     plan = plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(), Space(ARM, Table(1.5)))
     assert plan == Done("the table at 1500 mm is in the way")
     assert not isinstance(plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(), Space(ARM, Table(-1.0))), Done)
-
-
-# ---- one program
-
-
-def program(reaction, q=Q, contact=FOREARM):
-    state = ArmState(0.0, q)
-    movement = choose_movement(ARM, reaction, state, state, [contact], Trail(), None)
-    assert not isinstance(movement, str), movement
-    return retreat_program(movement, state, [contact], 10.0)
-
-
-@given(bent, normals)
-@settings(max_examples=12, deadline=None)
-def test_a_program_does_what_the_guard_would_have_streamed(q, normal):
-    contact = ContactOnLink(3, (0.2, 0.0, 0.0), unit(normal))
-    reaction = Reaction(distance=0.05)
-    assume(not isinstance(plan_retreat(ARM, ArmState(0.0, q), [contact], reaction), Done))
-    made = program(reaction, q, contact)
-    assert isinstance(made, RetreatProgram)
-    end, qd, fastest = q, STILL, 0.0
-    for speeds, acceleration in re.findall(r"speedj\(\[(.*)\], ([\d.]+), 0.02\)", made.text):
-        wanted = tuple(float(value) for value in speeds.split(","))
-        for _ in range(10):
-            qd = ramped(qd, wanted, float(acceleration) * CYCLE)
-            fastest = max(fastest, *(abs(v) / most for v, most in zip(qd, ARM.joint_speed, strict=True)))
-            end = tuple(a + CYCLE * v for a, v in zip(end, qd, strict=True))
-    plan = plan_retreat(ARM, ArmState(0.0, q), [contact], reaction)
-    streamed, _ = follow(lambda state: Retreat(plan).step(state, ()), q)
-    # the direction stands for 20 ms: at 150 mm/s that is 3 mm, of which a turning direction makes a part; and the last
-    # segment may run on for its 20 ms at the speed that is left near the end
-    assert moved(contact, q, end) == pytest.approx(moved(contact, q, streamed[-1].q), abs=1.5e-3)
-    assert made.progress == pytest.approx(moved(contact, q, end), abs=1e-4)
-    assert fastest <= 1.0
-    assert made.duration <= reaction.time_budget + SEGMENT
-
-
-def test_a_program_is_bounded_and_ends_with_a_stop():
-    made = program(Reaction(distance=0.5, speed=0.001, time_budget=60.0))
-    assert made.duration == pytest.approx(8.0)
-    assert made.why == "the program would become too long"
-    assert len(made.text) < 60_000
-    assert made.text.startswith("def coneskin_retreat():\n  speedj(")
-    assert made.text.endswith("  stopj(10.000)\nend\n")
