@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from faults_trial import ARM_SILENCE, CLOCK, GOAL, SKIN_SILENCE, STUCK, Trial
 from scenes import ESCALATE
@@ -17,6 +18,7 @@ BOTH, OWNER, FOREIGN = ("owner", "foreign"), ("owner",), ("foreign",)
 FRAME = 0.001
 WATCHDOG = 0.25  # s: 1 / watchdog_hz
 FEW = 0.02  # s: a fault in the frames themselves shows within a few of them, and the loop has to run
+ASTRAY = 0.35  # s: an arm that takes up its speed may differ from what it is told for 0.25 s and v / a
 LAST = 1.05  # s: the process that started the guard has heard nothing for 1 s, and opens its sockets
 
 
@@ -68,10 +70,11 @@ def killed_controller(t: Trial) -> float:
     return at
 
 
-def another_program(t: Trial) -> float:
-    """Somebody starts a program that moves the arm on, in place of the one that runs; then the skin is touched."""
+def a_program(t: Trial) -> float:
+    """Somebody starts a program that moves the arm on, in place of the one that runs."""
+    at = CLOCK()
     t.send_script(f"def other():\n  movej({GOAL}, a=2, v=1)\nend\n")
-    return t.touch()
+    return at
 
 
 def full_disk(t: Trial) -> float:
@@ -109,6 +112,15 @@ def wires(wiring: str) -> Callable[[Trial], float]:
 
 def shorted(a: str, b: str, touched: bool = False, variant: bool = False) -> FaultKind:
     return FaultKind(f"{a} shorted to {b}", wires(f"short-{a}-{b}"), touched=touched, variant=variant)
+
+
+def away(
+    name: str, inject: Callable[[Trial], float], notice: float = FEW, controls: tuple[str, ...] = BOTH, **more: Any
+) -> FaultKind:
+    """While the arm moves away from a touch."""
+    return FaultKind(
+        f"moving away: {name}", then(Trial.move_away, inject), notice, controls=controls, touched=True, **more
+    )
 
 
 def says(line: str) -> Callable[[Trial], float]:
@@ -184,7 +196,7 @@ KINDS = (
     FaultKind("script ports closed", says("close scripts")),
     FaultKind("protective stop", says("protective stop")),
     FaultKind("emergency stop", says("emergency stop")),
-    FaultKind("another program started, then a touch", another_program, touched=True),
+    FaultKind("another program started, then a touch", then(a_program, touch), touched=True),
     # the processes
     FaultKind("guard killed", kill("guard")),
     FaultKind("guard frozen", halt("guard"), SILENCE, after=Trial.thaw_all),
@@ -261,6 +273,20 @@ KINDS = (
     ),
     FaultKind("script ports and dashboard closed", together(says("close scripts"), says("close dashboard"))),
     FaultKind("skin unplugged and program killed", together(unplug, kill("program")), recorder=False, answers=False),
+    # while it moves away from a touch
+    away("guard killed", kill("guard")),
+    away("guard frozen", halt("guard"), WATCHDOG, after=Trial.thaw_all),
+    away("owner killed", kill("owner"), WATCHDOG, controls=OWNER),
+    away("owner frozen", halt("owner"), WATCHDOG, controls=OWNER, after=Trial.thaw_all),
+    away("guard and owner frozen", together(halt("guard"), halt("owner")), WATCHDOG, OWNER, after=Trial.thaw_all),
+    away("guard and keeper frozen", together(halt("guard"), halt("keeper")), WATCHDOG, FOREIGN, after=Trial.thaw_all),
+    away("guard and keeper killed", together(kill("guard"), kill("keeper")), WATCHDOG, FOREIGN, variant=True),
+    away("program killed", kill("program"), recorder=False, answers=False),
+    away("another program", a_program, ASTRAY),
+    away("skin unplugged", unplug),
+    away("RTDE closed", says("close rtde")),
+    away("script ports closed", says("close scripts")),
+    away("protective stop", says("protective stop"), variant=True),
     # before the guard arms
     FaultKind("refused: skin silent", breaks(stall_after=0), before=True, variant=True),
     FaultKind("refused: skin broken wire", wires("open-A"), before=True),

@@ -191,6 +191,19 @@ class Trial:
         """Touch the skin."""
         return self.skins(touch={"u": 0.13, "phi": 1.55, "duration": 0.2})
 
+    def move_away(self) -> float:
+        """Touch the skin, and let the arm stand and then retreat for a random time."""
+        touched = self.touch()
+        for moving in (False, True):
+            end = CLOCK() + 5.0
+            while self.moves() is not moving:
+                if CLOCK() > end:
+                    raise RuntimeError("the arm does not move away")
+                time.sleep(0.002)
+        time.sleep(0.1 * self.rng.random())
+        self.happened = touched
+        return CLOCK()
+
     def skins(self, **request: Any) -> float:
         """Anything that bench/faults_skin.py can do."""
         return float(self.skin.ask(**request)["at"])

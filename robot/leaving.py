@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .commands import ArmState, ContactOnLink, Done
+from .commands import ArmState, ContactOnLink, Done, JointVelocity
 from .follower import FollowerProgram, Steer
 from .movement import Movement
 from .outputs import Outputs, tell
@@ -19,6 +19,8 @@ __all__ = ["Leaving"]
 
 _STREAM_EVERY = 0.004  # s between two targets of a retreat: every second controller cycle, so that none queues
 _STARTING = 0.5  # s after which a program that does not run will not start any more
+_OTHER = 0.1  # rad/s by which a joint's speed may differ from what it is told
+_ASTRAY = 0.25  # s for which it may differ by more, besides the time in which the arm takes up its speed
 
 
 class Leaving:
@@ -36,6 +38,8 @@ class Leaving:
         self._program = program
         self._began = now
         self._sent = -math.inf
+        self._told: JointVelocity | None = None
+        self._as_told = now
         tell(out, "retreating", now, **({"how": movement.how} if movement.how else {}))
 
     def step(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
@@ -50,8 +54,11 @@ class Leaving:
         if isinstance(step, Done):
             return step
         program, first = self._program, self._sent == -math.inf
-        if program is not None and not state.playing and state.time - self._began >= _STARTING:
+        astray = self._astray(state)
+        if program is not None and not state.playing and (astray or state.time - self._began >= _STARTING):
             return Done("its program does not run on the controller", step.progress)
+        if astray:
+            return Done("the arm does not move as it is told: something else moves it, or holds it", step.progress)
         if state.time - self._sent >= _STREAM_EVERY - 1e-9:
             if program is None:
                 out.append(Speed(step.qd, step.acceleration))
@@ -61,5 +68,12 @@ class Leaving:
                     out.append(program)
             if step.clipped_by and first:
                 tell(out, "clipped", state.time, by=list(step.clipped_by))
-            self._sent = state.time
+            self._sent, self._told = state.time, step
         return None
+
+    def _astray(self, state: ControllerState) -> bool:
+        told = self._told
+        if told is None or max(abs(a - b) for a, b in zip(state.qd, told.qd, strict=True)) <= _OTHER:
+            self._as_told = state.time
+            return False
+        return state.time - self._as_told > _ASTRAY + max(map(abs, told.qd)) / told.acceleration

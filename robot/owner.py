@@ -7,6 +7,7 @@ process ends or hangs, the controller's watchdog stops the arm.
 
 from __future__ import annotations
 
+import math
 import os
 import select
 import signal
@@ -19,7 +20,18 @@ from typing import Any
 from coneskin.errors import ConeSkinError
 
 from .channel import Channel, inherit
-from .owner_messages import SILENCE, Clear, Halt, Note, Speed, Stop, decode_command, decode_json, encode_json
+from .owner_messages import (
+    SILENCE,
+    STEERING_SILENCE,
+    Clear,
+    Halt,
+    Note,
+    Speed,
+    Stop,
+    decode_command,
+    decode_json,
+    encode_json,
+)
 from .ur_rtde import UrArm
 
 __all__ = ["Owner", "main"]
@@ -57,6 +69,7 @@ class Owner:
         self._guard = guard
         self._program = program
         self._allowed = False
+        self._patience = math.inf  # s for which the guard may be silent; while nothing moves, for ever
         self._waiting = False  # the program waits for the end of a move
         self._kicked = -1.0
         self._deceleration = deceleration
@@ -90,8 +103,8 @@ class Owner:
             return False
         if self._waiting and not self._arm.moving():
             self._reply({"ok": True})
-        if self._allowed and now - self._heard > SILENCE:
-            self._forbid(f"the guard has been silent for {SILENCE:g} s")
+        if now - self._heard > self._patience:
+            self._forbid(f"the guard has been silent for {self._patience:g} s")
         if now - self._kicked >= _KICK_EVERY:
             self._arm.kick()
             self._kicked = now
@@ -102,23 +115,23 @@ class Owner:
         try:
             match command:
                 case Stop(deceleration) | Halt(deceleration):
-                    self._allowed = False
+                    self._allowed, self._patience = False, math.inf
                     self._deceleration = deceleration
                     self._refuse_waiting("the guard has stopped the arm")
                     self._arm.stop(deceleration)
                     self._guard.send(Note("done").encode())
                 case Speed(qd, acceleration):
-                    self._allowed = False
+                    self._allowed, self._patience = False, STEERING_SILENCE
                     self._arm.speed_j(qd, acceleration)
                 case Clear():
                     self._arm.revive()
-                    self._allowed = True
+                    self._allowed, self._patience = True, SILENCE
         except ConeSkinError as exc:
             self._guard.send(Note("error", str(exc)).encode())
 
     def _forbid(self, why: str) -> None:
         """Stop the arm because of the guard itself."""
-        self._allowed = False
+        self._allowed, self._patience = False, math.inf
         self._refuse_waiting(why)
         self._guard.send(Note("error", why).encode())
         try:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BEAT",
     "SILENCE",
+    "STEERING_SILENCE",
     "Alive",
     "Clear",
     "Farewell",
@@ -31,6 +32,7 @@ __all__ = [
 
 BEAT = 0.05  #: s between two signs of life of the guard
 SILENCE = 0.5  #: s without one after which the guard counts as dead; a busy machine may hold it up for 0.1 s
+STEERING_SILENCE = 0.1  #: s, while the guard itself moves the arm, with a new ``Speed`` every 4 ms
 
 _ONE = struct.Struct("<d")
 _SEVEN = struct.Struct("<7d")

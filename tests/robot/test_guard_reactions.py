@@ -185,6 +185,27 @@ def test_a_program_that_does_not_start_is_not_waited_for():
     assert rig.event("retreated").details["complete"] is False
 
 
+@pytest.mark.parametrize("foreign", [False, True])
+def test_an_arm_that_something_else_moves_is_not_left_to_it(foreign):
+    """A person starts a program while the arm moves away: it replaces ours."""
+    rig = Rig(touch(0.5, 0.7), foreign=foreign, speed=1.0).run(0.75)
+    assert rig.core.phase is Phase.RETREATING
+    take, ignored = rig.arm.take, (Speed, Steer)
+    rig.arm.take = lambda command: None if isinstance(command, ignored) else take(command)
+    rig.arm.go([-0.5, 0.2, 0.0, 0.0, 0.0, 0.0], 4.0)
+    rig.run(0.7)
+    assert "does not move as it is told" in rig.event("retreated").details["why"]
+    rig.run(0.3)
+    assert rig.core.phase is Phase.LATCHED
+    assert max(map(abs, rig.arm.qd)) < 0.01
+
+
+def test_a_slow_arm_has_its_time_to_take_up_its_speed():
+    reaction = Reaction(acceleration=0.25, speed=0.3, time_budget=10.0)
+    rig = Rig(touch(0.5, 0.7), reaction=reaction, foreign=True, speed=1.0).run(5.0)
+    assert rig.event("retreated").details["complete"] is True
+
+
 def test_a_fault_ends_a_foreign_retreat():
     rig = Rig(touch(0.5, 0.7), foreign=True, speed=1.0).run(0.75)
     assert rig.core.phase is Phase.RETREATING

@@ -11,6 +11,7 @@ from coneskin.robot.channel import Channel, pair
 from coneskin.robot.owner import Owner
 from coneskin.robot.owner_messages import (
     SILENCE,
+    STEERING_SILENCE,
     Alive,
     Clear,
     Farewell,
@@ -309,6 +310,29 @@ def test_a_silent_guard_counts_as_dead():
     move(program)
     served.step(0.0)
     assert answers(program)[0]["stopped"] is True  # alive again is not enough: the guard has to clear it
+    for channel in (guard, guard_end, program, program_end):
+        channel.close()
+
+
+def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on():
+    now = [10.0]
+    made = arm()
+    (guard, guard_end), (program, program_end) = ((Channel(s) for s in pair()) for _ in range(2))
+    served = Owner(made, guard_end, program_end, lambda: now[0])
+    for message in (Clear(), Stop(10.0), Speed((0.1,) * 6, 4.0)):
+        guard.send(message.encode())
+    served.step(0.0)
+    before = len(stops(made._control))
+    now[0] += STEERING_SILENCE - 0.01
+    served.step(0.0)
+    assert len(stops(made._control)) == before
+    now[0] += 0.02
+    served.step(0.0)
+    assert stops(made._control)[before:] == ["speedStop"]
+    assert f"silent for {STEERING_SILENCE:g} s" in Note.decode(guard.receive()[-1]).text
+    now[0] += 100.0  # it stands, and nobody has to say anything any more
+    served.step(0.0)
+    assert stops(made._control)[before:] == ["speedStop"]
     for channel in (guard, guard_end, program, program_end):
         channel.close()
 
