@@ -41,11 +41,6 @@ class Channel:
         """The descriptor, for select and poll; -1 when closed."""
         return self._sock.fileno()
 
-    @property
-    def pending(self) -> int:
-        """Bytes that wait for the other side to read."""
-        return len(self._out)
-
     def send(self, message: bytes) -> bool:
         """Send without waiting.
 

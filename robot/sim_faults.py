@@ -27,7 +27,6 @@ class Faults:
 
     def __init__(self, controller: Controller, server: Server) -> None:
         self._c = controller
-        self._server = server
         self.dashboard_silent = False
         self.rtde_silent = False
         self._lines: dict[str, Callable[[], Any]] = {

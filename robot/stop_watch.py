@@ -123,13 +123,3 @@ class StopWatch:
             self._next = now + self._patience
         self.used += take
         return take
-
-    @property
-    def exhausted(self) -> bool:
-        """Whether no way is left."""
-        return not self._left
-
-    @property
-    def by_first_alone(self) -> bool:
-        """Whether the first way was enough, so that what moves the arm for the guard can be trusted to do so."""
-        return len(self.used) == 1

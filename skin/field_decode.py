@@ -78,12 +78,12 @@ class Decoder:
         passes: fixed-point passes; three leave less than the dipole model itself does.
     """
 
-    __slots__ = ("_arc", "_curvature", "_length", "_lower", "_passes", "_robin", "_taper", "_upper", "_width", "_wrap")
+    __slots__ = ("_arc", "_curvature", "_length", "_lower", "_passes", "_robin", "_taper", "_upper", "_wrap")
 
     def __init__(self, model: FieldModel, passes: int = 3) -> None:
         sheet = model.sheet
         self._robin = Robin(sheet, model.upper_resistance, model.lower_resistance)
-        self._length, self._arc, self._wrap, self._width = sheet.length, sheet.arc, sheet.wrap, sheet.width
+        self._length, self._arc, self._wrap = sheet.length, sheet.arc, sheet.wrap
         self._curvature = sheet.curvature
         self._taper = (model.upper_resistance + model.lower_resistance) * sheet.curvature / (4.0 * math.pi)
         self._upper = sheet.breadth / (model.upper_resistance * sheet.length)

@@ -60,12 +60,6 @@ class Disc:
     radius: float
     conductance: float = math.inf
 
-    @classmethod
-    def of_polar(cls, sheet: SectorSheet, r: float, theta: float, radius: float, conductance: float = math.inf) -> Disc:
-        """A disc whose centre is given as the paper's (r, theta) [m, rad]."""
-        u, phi = sheet.from_polar(r, theta)
-        return cls(float(u), float(phi), radius, conductance)
-
 
 def check_discs(sheet: SectorSheet, u: Floats, phi: Floats, radius: Floats, conductance: Floats) -> None:
     """Refuse discs that cannot be; arrays of shape (n, k), k discs in each of n scenes.

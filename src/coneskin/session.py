@@ -9,17 +9,18 @@ channel. A child that dies is seen as the end of its channel, and ends in a stop
 
 from __future__ import annotations
 
-import contextlib
 import select
 import subprocess
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from .arm_proxy import ArmProxy
 from .errors import ConeSkinError, RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
+from .last_resort import keeping, stop_the_arm
 from .robot.channel import Channel, pair, spawn
 from .robot.journal import GuardEvent
 from .robot.owner_messages import decode_json, encode_json
@@ -208,21 +209,6 @@ class Session:
             return NOT_SEEN
         return STANDS if self.wait_for(("latched",), _END, after=since) else STILL_LEAVING
 
-    def _stop_the_arm(self) -> None:
-        """The guard is gone, and its keeper may be: nobody else is left that can stop a foreign arm."""
-        from .robot.foreign import ForeignStops
-        from .robot.state_reader import StateReader
-        from .robot.stopper import Stopper
-        from .robot.watch import Watch
-
-        keeping = _keeping(self.scene)
-        with (
-            contextlib.suppress(ConeSkinError),
-            ForeignStops(keeping["host"]) as stops,
-            StateReader(keeping["host"]) as reader,
-        ):
-            Stopper(stops, reader, Watch(**keeping["watch"]), keeping["deceleration"]).stop()
-
     # ---- how it starts
 
     def _open(self) -> None:
@@ -246,15 +232,15 @@ class Session:
             if scene.arm.control == "owner":
                 self._children["owner"] = spawn("coneskin.robot.owner", other_guard_end, other_program_end)
                 self._arm = ArmProxy(Channel(program_end), self.check, model(scene.arm.model))
-                self._arm.channel.send(encode_json({**_keeping(scene), "watchdog_hz": scene.arm.watchdog_hz}))
+                self._arm.channel.send(encode_json({**keeping(scene), "watchdog_hz": scene.arm.watchdog_hz}))
             else:
                 self._children["keeper"] = spawn("coneskin.robot.keeper", other_guard_end, other_program_end)
                 self._keeper = Channel(program_end)
-                self._keeper.send(encode_json(_keeping(scene)))
+                self._keeper.send(encode_json(keeping(scene)))
         self._guard = Channel(ours)
         self._children["guard"] = spawn("coneskin.guard_process", *ends)
         self._guard.send(encode_json({**start, "port": port}))
-        self._log.listen(self._guard, self._stop_the_arm if self._keeper is not None else None)
+        self._log.listen(self._guard, partial(stop_the_arm, scene) if self._keeper is not None else None)
 
     def _spawn(self, name: str, module: str, hello: bytes) -> Channel:
         ours, theirs = pair()
@@ -300,15 +286,3 @@ class Session:
         if self._log.ended and not any(event.name == "ending" for event in self.events[-20:]):
             return RobotConnectionError("the guard's process has ended; what it leaves behind stops the arm")
         return None
-
-
-def _keeping(scene: Scene) -> dict[str, Any]:
-    """What the owner, or the keeper, has to know to stop the arm when the guard is gone."""
-    from dataclasses import asdict
-
-    from .robot.commands import Reaction
-    from .robot.watch import Watch
-
-    assert scene.arm is not None
-    deceleration = (scene.reaction or Reaction(kind="stop")).deceleration
-    return {"host": scene.arm.host, "watch": asdict(scene.watch or Watch()), "deceleration": deceleration}

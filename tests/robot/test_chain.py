@@ -4,12 +4,9 @@ The arm is a simulated controller in a process of its own; what it measures deci
 """
 
 import json
-import math
-import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import pytest
@@ -19,87 +16,18 @@ from coneskin.replay import read_run, replay
 from coneskin.scene_reader import parse_scene
 from coneskin.session import guard
 
+from .guarded import GOAL, START, assert_stopped_on_the_way, fast, kill, run_until_moving, scene_for, scene_text, until
+
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
 
 from coneskin.robot.sim_process import SimulatedController, free_host  # noqa: E402
-
-START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
-GOAL = [math.radians(60.0), *START[1:]]
-# long silences: the machine that runs the tests may stall a pseudo-terminal; the limits themselves are tested in
-# virtual time (test_guard_core)
-SCENE = """\
-[arm]
-model = "UR5e"
-host = "{host}"
-[[link]]
-name = "forearm"
-[[link.sensor]]
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
-[source]
-kind = "virtual"
-[reaction]
-kind = "retreat"
-distance_mm = 30
-[watch]
-skin_silence_ms = 400
-skin_late_ms = 400
-arm_silence_ms = 300
-"""
 
 
 @pytest.fixture
 def controller():
     with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
         yield simulated
-
-
-def scene_for(simulated, **changes):
-    text = SCENE.format(host=simulated.host)
-    for old, new in changes.items():
-        text = text.replace(old, new)
-    return parse_scene(text)
-
-
-def moving(session):
-    """Start the long move from a thread; what it raised is in the list that is returned."""
-    raised = []
-
-    def move():
-        try:
-            session.arm.move_j(GOAL, speed=1.0, acceleration=4.0)
-            raised.append(None)
-        except Exception as exc:
-            raised.append(exc)
-
-    thread = threading.Thread(target=move)
-    thread.start()
-    return thread, raised
-
-
-def until(what, seconds=10.0):
-    end = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.005)
-
-
-def fast(simulated):
-    return max(map(abs, simulated.state()["qd"])) > 0.9
-
-
-def run_until_moving(simulated, session):
-    thread, raised = moving(session)
-    until(lambda: fast(simulated))
-    return thread, raised
-
-
-def assert_stopped_on_the_way(simulated):
-    state = simulated.wait_standing()
-    assert state["q"][0] < GOAL[0] - 0.1, "the arm went on to its goal"
 
 
 def test_the_demo(tmp_path):
@@ -131,10 +59,6 @@ def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tm
     run = read_run(path)
     assert run.missing == ""
     assert replay(run).same
-
-
-def kill(session, name, number=signal.SIGKILL):
-    os.kill(session._children[name].pid, number)
 
 
 def test_the_guard_killed_the_owner_stops_the_arm(controller, tmp_path):
@@ -216,7 +140,7 @@ def test_a_controller_that_stays_frozen_is_told_as_an_arm_that_nobody_saw_stand(
 
 def test_the_program_killed_the_arm_stops(controller, tmp_path):
     """Program and supervisor in one process, killed with SIGKILL: guard and owner see their channels end."""
-    (tmp_path / "scene.toml").write_text(SCENE.format(host=controller.host))
+    (tmp_path / "scene.toml").write_text(scene_text(controller.host))
     code = (
         "import sys\nfrom coneskin.session import guard\n"
         "with guard(sys.argv[1]) as g:\n"
@@ -243,20 +167,20 @@ def test_a_protective_stop_is_never_unlocked(controller):
 
 
 def test_a_controller_that_is_not_there_is_one_clear_line():
-    scene = parse_scene(SCENE.format(host=free_host()))
+    scene = parse_scene(scene_text(free_host()))
     with pytest.raises(RobotConnectionError, match=r"cannot reach the controller 127\..*Connection refused"):
         guard(scene, start_timeout=10.0).__enter__()
 
 
 def test_a_port_that_is_not_there_is_one_clear_line(controller):
-    scene = scene_for(controller, **{'kind = "virtual"': 'kind = "serial"\nport = "/dev/ttyNOWHERE"'})
+    scene = scene_for(controller, {'kind = "virtual"': 'kind = "serial"\nport = "/dev/ttyNOWHERE"'})
     with pytest.raises(SkinConnectionError, match="/dev/ttyNOWHERE"):
         guard(scene, start_timeout=10.0).__enter__()
 
 
 def test_a_touched_skin_does_not_arm(controller):
     touched = "[source.touch]]\nstart_s = 0\nend_s = 100\nu_mm = 100\nphi_deg = 10\n[reaction]"
-    scene = scene_for(controller, **{"[reaction]": "[" + touched})
+    scene = scene_for(controller, {"[reaction]": "[" + touched})
     with pytest.raises(RobotRefused, match="it is touched"):
         guard(scene, start_timeout=3.0).__enter__()
 
@@ -272,7 +196,7 @@ def test_a_second_guard_on_the_same_arm_gives_up_at_once(controller):
 
 def test_another_arm_than_the_scenes_is_refused(controller):
     with pytest.raises(RobotRefused, match=r"is no UR10e: .* UR5e"):
-        guard(scene_for(controller, UR5e="UR10e"), start_timeout=20.0).__enter__()
+        guard(scene_for(controller, {"UR5e": "UR10e"}), start_timeout=20.0).__enter__()
 
 
 def test_a_target_in_degrees_is_refused_before_anything_moves(controller):

@@ -16,8 +16,9 @@ import pytest
 
 from coneskin.errors import Collision, RobotRefused
 from coneskin.replay import read_run, replay
-from coneskin.scene_reader import parse_scene
 from coneskin.session import guard
+
+from .guarded import START, fast, kill, scene_for, scene_text, until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
@@ -27,31 +28,8 @@ from coneskin.robot.sim_process import SimulatedController, free_host  # noqa: E
 from coneskin.robot.sim_values import values_of  # noqa: E402
 from coneskin.robot.ur_models import model  # noqa: E402
 
-START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
 GOAL = [math.radians(150.0), *START[1:]]
-SCENE = """\
-[arm]
-model = "UR5e"
-host = "{host}"
-control = "foreign"
-[[link]]
-name = "forearm"
-[[link.sensor]]
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
-[source]
-kind = "virtual"
-[reaction]
-kind = "retreat"
-distance_mm = 30
-[watch]
-skin_silence_ms = 400
-skin_late_ms = 400
-arm_silence_ms = 300
-escalate_ms = 60
-"""
+PATIENT = {"[watch]": "[watch]\nescalate_ms = 60"}
 RAW = f"def users():\n  while True:\n    movej({GOAL}, a=4, v=1)\n    movej({START}, a=4, v=1)\n  end\nend\n"
 POSE = list(values_of(forward(model("UR5e"), [START[0] + 1.2, *START[1:]])))
 RTDE = "import sys, rtde_control\nc = rtde_control.RTDEControlInterface(sys.argv[1])\n"
@@ -70,15 +48,8 @@ def controller(tmp_path):
         yield simulated
 
 
-def until(what, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.005)
-
-
-def fast(simulated):
-    return max(map(abs, simulated.state()["qd"])) > 0.9
+def foreign(simulated, changes=None):
+    return scene_for(simulated, {**PATIENT, **(changes or {})}, "foreign")
 
 
 def send(host, port, text):
@@ -159,7 +130,7 @@ def run(controller):
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, (_, marks) in PROGRAMS.items()])
 def test_whatever_moves_the_arm_is_stopped_and_the_arm_retreats(controller, run, name, tmp_path):
     path = tmp_path / "run.rec"
-    with guard(parse_scene(SCENE.format(host=controller.host)), recording=path) as session:
+    with guard(foreign(controller), recording=path) as session:
         assert controller.state()["runtime"] == "STOPPED"  # the guard is armed before there is any program
         run(name)
         session.touch(0.13, 1.55, duration=0.2)
@@ -187,10 +158,7 @@ def until_it_moves_away(controller, session):
 
 
 def test_it_gives_way_to_a_push(controller, run):
-    scene = (
-        SCENE.format(host=controller.host).replace("retreat", "comply").replace("distance_mm = 30", "distance_mm = 200")
-    )
-    with guard(parse_scene(scene)) as session:
+    with guard(foreign(controller, {"retreat": "comply", "distance_mm = 30": "distance_mm = 200"})) as session:
         run("raw URScript")
         session.touch(0.13, 1.55, duration=1.0, force=20.0)
         until_it_moves_away(controller, session)
@@ -204,33 +172,31 @@ def test_it_gives_way_to_a_push(controller, run):
 @pytest.mark.parametrize("gone", [("guard",), ("guard", "keeper")])
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_without_its_guard_a_retreat_ends(controller, run, gone, number):
-    scene = SCENE.format(host=controller.host).replace(
-        "distance_mm = 30", "distance_mm = 400\ntime_budget_s = 30\nspeed_mm_s = 50"
-    )
-    with guard(parse_scene(scene)) as session:
+    far = "distance_mm = 400\ntime_budget_s = 30\nspeed_mm_s = 50"
+    with guard(foreign(controller, {"distance_mm = 30": far})) as session:
         run("raw URScript")
         session.touch(0.13, 1.55, duration=0.2)
         until_it_moves_away(controller, session)
         for name in gone:
-            os.kill(session._children[name].pid, number)
+            kill(session, name, number)
         stopped_at = controller.wait_standing()["q"]
         time.sleep(0.3)
         assert controller.state()["q"] == stopped_at
         for name in gone:
-            os.kill(session._children[name].pid, signal.SIGCONT)
+            kill(session, name, signal.SIGCONT)
 
 
 def test_with_its_registers_taken_it_does_not_start(controller):
     with RtdeConnection(controller.host) as other:
         other.ask_inputs(("input_int_register_47",))
         with pytest.raises(RobotRefused, match="input_int_register_47"):
-            guard(parse_scene(SCENE.format(host=controller.host))).__enter__()
-        with guard(parse_scene(SCENE.format(host=controller.host).replace("retreat", "stop"))):
+            guard(foreign(controller)).__enter__()
+        with guard(foreign(controller, {"retreat": "stop"})):
             pass  # one that only stops needs none
 
 
 def test_a_program_that_moves_a_latched_arm_is_stopped_again(controller, run):
-    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+    with guard(foreign(controller)) as session:
         run("raw URScript")
         session.touch(0.13, 1.55, duration=0.2)
         assert session.wait_for(("latched",), 20.0) is not None
@@ -246,12 +212,12 @@ def test_a_program_that_moves_a_latched_arm_is_stopped_again(controller, run):
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_without_its_guard_the_keeper_stops_the_arm(controller, run, number):
-    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+    with guard(foreign(controller)) as session:
         run("raw URScript")
-        os.kill(session._children["guard"].pid, number)
+        kill(session, "guard", number)
         controller.wait_standing()
         if number is signal.SIGSTOP:
-            os.kill(session._children["guard"].pid, signal.SIGCONT)
+            kill(session, "guard", signal.SIGCONT)
             latched = session.wait_for(("latched",), 10.0)
             # what it misses first depends on how much the sockets and the port kept for it
             assert any(word in latched.details["why"] for word in ("no ", "silent", "more frames are missing"))
@@ -261,21 +227,21 @@ def test_without_its_guard_the_keeper_stops_the_arm(controller, run, number):
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_without_both_the_guarding_program_stops_the_arm(controller, run, number):
-    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+    with guard(foreign(controller)) as session:
         run("raw URScript")
         for name in ("keeper", "guard"):
-            os.kill(session._children[name].pid, number)
+            kill(session, name, number)
         controller.wait_standing()
         time.sleep(0.3)
         assert not any(controller.state()["qd"])
         for name in ("keeper", "guard"):
-            os.kill(session._children[name].pid, signal.SIGCONT)
+            kill(session, name, signal.SIGCONT)
 
 
 def test_without_its_keeper_the_guard_stops_the_arm_and_does_not_arm_again(controller, run):
-    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+    with guard(foreign(controller)) as session:
         run("raw URScript")
-        os.kill(session._children["keeper"].pid, signal.SIGKILL)
+        kill(session, "keeper")
         latched = session.wait_for(("latched",), 10.0)
         assert "watches the guard has ended" in latched.details["why"]
         controller.wait_standing()
@@ -285,7 +251,7 @@ def test_without_its_keeper_the_guard_stops_the_arm_and_does_not_arm_again(contr
 
 @pytest.mark.parametrize(("fault", "left"), [("close scripts", "dashboard"), ("close dashboard", "script")])
 def test_a_way_to_stop_that_is_gone_stops_the_arm_by_another(controller, run, fault, left):
-    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+    with guard(foreign(controller)) as session:
         run("raw URScript")
         controller.call(fault)
         standing = session.wait_for(("standstill",), 10.0)
@@ -297,7 +263,7 @@ def test_a_way_to_stop_that_is_gone_stops_the_arm_by_another(controller, run, fa
 
 
 def test_with_all_connections_gone_at_once_the_keeper_opens_new_ones(controller, run):
-    with guard(parse_scene(SCENE.format(host=controller.host))) as session:
+    with guard(foreign(controller)) as session:
         run("raw URScript")
         guarding = session._children["guard"].pid
         os.kill(guarding, signal.SIGSTOP)  # so that it sees both at once
@@ -311,14 +277,14 @@ def test_with_all_connections_gone_at_once_the_keeper_opens_new_ones(controller,
 
 
 def test_leaving_the_guard_stops_the_arm(controller, run):
-    with guard(parse_scene(SCENE.format(host=controller.host))):
+    with guard(foreign(controller)):
         run("dashboard play")
     assert not any(controller.state()["qd"])
 
 
 def test_the_arm_is_not_ours_to_move(controller):
     with (
-        guard(parse_scene(SCENE.format(host=controller.host))) as session,
+        guard(foreign(controller)) as session,
         pytest.raises(RobotRefused, match="another program moves the arm"),
     ):
         session.arm.move_j(GOAL)
@@ -327,7 +293,7 @@ def test_the_arm_is_not_ours_to_move(controller):
 def test_the_command_line_beside_a_program(controller, tmp_path):
     """``coneskin guard`` as a user runs it; its exit code says that a collision ended it."""
     touched = "[[source.touch]]\nstart_s = 6\nend_s = 6.3\nu_mm = 130\nphi_deg = 89\n[reaction]"
-    (tmp_path / "scene.toml").write_text(SCENE.format(host=controller.host).replace("[reaction]", touched))
+    (tmp_path / "scene.toml").write_text(scene_text(controller.host, {**PATIENT, "[reaction]": touched}, "foreign"))
     command = [sys.executable, "-m", "coneskin", "guard", str(tmp_path / "scene.toml"), "--once", "--json"]
     child = subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

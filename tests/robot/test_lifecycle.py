@@ -13,7 +13,7 @@ from coneskin.replay import read_run, replay
 from coneskin.robot import channel
 from coneskin.session import guard
 
-from .test_chain import GOAL, START, assert_stopped_on_the_way, fast, kill, run_until_moving, scene_for, until
+from .guarded import GOAL, START, assert_stopped_on_the_way, fast, kill, run_until_moving, scene_for, until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
@@ -36,7 +36,7 @@ def controller():
 
 
 def test_slow_by_the_controllers_own_slider_and_back(controller):
-    scene = scene_for(controller, **{RETREAT: 'kind = "slow"\nslow_to = 0.3'})
+    scene = scene_for(controller, {RETREAT: 'kind = "slow"\nslow_to = 0.3'})
     with guard(scene) as session:
         thread, raised = run_until_moving(controller, session)
         session.touch(0.13, 1.55, duration=0.3)
@@ -54,7 +54,7 @@ def test_a_slider_that_somebody_else_owns_is_one_clear_line(controller):
 
     other = rtde_io.RTDEIOInterface(controller.host)
     try:
-        scene = scene_for(controller, **{RETREAT: 'kind = "slow"'})
+        scene = scene_for(controller, {RETREAT: 'kind = "slow"'})
         with pytest.raises(RobotRefused, match=r"a slow reaction needs the speed slider .* in use"):
             guard(scene, start_timeout=5.0).__enter__()
     finally:
@@ -62,7 +62,7 @@ def test_a_slider_that_somebody_else_owns_is_one_clear_line(controller):
 
 
 def test_comply_gives_way_and_latches_when_the_push_ends(controller):
-    scene = scene_for(controller, **{RETREAT: 'kind = "comply"\nspeed_mm_s = 60'})
+    scene = scene_for(controller, {RETREAT: 'kind = "comply"\nspeed_mm_s = 60'})
     with guard(scene) as session:
         thread, raised = run_until_moving(controller, session)
         session.touch(0.13, 1.55, duration=0.5)
@@ -155,7 +155,7 @@ def test_an_owner_that_hangs_does_not_let_the_guard_arm(controller, monkeypatch)
 
 
 def test_a_controller_that_dies_while_the_guard_arms_is_a_refusal(controller):
-    scene = scene_for(controller, **{"[watch]": "[watch]\nsettle_ms = 1500"})
+    scene = scene_for(controller, {"[watch]": "[watch]\nsettle_ms = 1500"})
     session = guard(scene, start_timeout=5.0)
     open_ = session._open
 

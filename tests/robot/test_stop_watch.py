@@ -19,7 +19,7 @@ def test_a_stop_that_works_needs_one_way():
         now = 0.002 * (k + 1)
         stop.sample(now, max(0.0, 1.0 - 10.0 * max(0.0, now - 0.004)))
         assert stop.next_ways(now) == []
-    assert stop.by_first_alone
+    assert stop.used == [Way.OWNER]
     # 1 rad/s at 10 rad/s2 after 4 ms: 0.05 rad/s less at 10 ms (or one cycle later by rounding), standing at 104 ms
     assert 0.0099 < stop.slowed_at < 0.0121
     assert 0.104 <= stop.standing_at <= 0.104 + 0.002 * STEADY
@@ -49,7 +49,6 @@ def test_ways_come_one_by_one_without_slowdown_and_at_once_after_the_budget():
     assert late.next_ways(0.029) == []
     assert late.next_ways(0.031) == [Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE]
     assert late.next_ways(1.0) == []
-    assert late.exhausted
 
 
 def test_without_any_measurement_every_way_is_tried():
