@@ -35,8 +35,9 @@ from coneskin.robot.phase import Phase
 from coneskin.robot.state_reader import RECIPE
 from coneskin.scene_reader import parse_scene
 from coneskin.skin.recording import Block, encode_block
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.skin.wire import Frame, encode
 
 RATE_HZ = 1000

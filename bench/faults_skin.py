@@ -25,9 +25,10 @@ from typing import Any
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.faults import Faults, FaultyLine
 from coneskin.skin.pseudo_terminal import open_raw_terminal, wait_for_reader, write_all
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sim_command import parse_fault
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 
 RADIUS1, RADIUS2, HEIGHT = 0.0376, 0.0372, 0.26
 CLOCK = time.monotonic

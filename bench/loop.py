@@ -44,10 +44,11 @@ from coneskin.robot.stop_watch import Way
 from coneskin.robot.ur_models import model
 from coneskin.robot.watch import Watch
 from coneskin.skin.pseudo_terminal import open_raw_terminal
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.serial_port import SerialPort
 from coneskin.skin.stream import Stream
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.skin.wire import encode
 
 SENSOR = Sensor(Frustum(0.0376, 0.0372, 0.26))

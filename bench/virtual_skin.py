@@ -17,8 +17,9 @@ from report import head
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.pseudo_terminal import Pacing, play
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.skin.wire import frame_at
 
 LINK = Frustum(0.03762, 0.0373, 0.24)

@@ -18,9 +18,10 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detector import Detector
 from coneskin.skin.memory_source import MemorySource
 from coneskin.skin.reading import read
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.stream import Stream
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.skin.wire import FRAME_LENGTH, Decoder, encode, frame_at
 
 SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))

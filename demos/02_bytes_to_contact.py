@@ -8,7 +8,8 @@ from coneskin.robot.kinematics import link_pose
 from coneskin.robot.ur_models import model
 from coneskin.scene_reader import parse_scene
 from coneskin.skin.reading import read
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.skin.wire import Decoder, encode
 
 SCENE = """

@@ -8,10 +8,11 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.events import TouchMoved
 from coneskin.skin.faults import Faults
 from coneskin.skin.pseudo_terminal import PseudoTerminal
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.serial_port import SerialPort
 from coneskin.skin.stream import Stream
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 
 sensor = Sensor(Frustum(0.054, 0.054, 0.434), name="tube skin")
 touch = ScriptedTouch(start=0.2, end=0.4, u=0.200, phi=math.radians(90))

@@ -17,7 +17,8 @@ from coneskin.robot.arm_reaction import Output
 from coneskin.robot.journal import GuardEvent, Kind
 from coneskin.scene_reader import parse_scene
 from coneskin.skin.recording import Block, Recorder
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.timeline import describe
 
 SCENE = """

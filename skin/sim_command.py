@@ -20,8 +20,10 @@ from coneskin.geometry.frustum import Frustum
 
 from .circuit import Wiring
 from .faults import Faults
+from .imperfections import Imperfections
+from .scripted_touch import ScriptedTouch
 from .sensor import Sensor
-from .virtual import MODELS, Imperfections, ScriptedTouch, VirtualSkin
+from .virtual import MODELS, VirtualSkin
 
 __all__ = ["EXAMPLE", "HELP", "add_arguments", "parse_fault", "parse_touch", "play_skin", "run"]
 

@@ -10,24 +10,23 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from coneskin.errors import SensorError
 
 from .circuit import Contact, ContactModel, Matrix, Volts, measure
 from .faults import Faults, FaultyLine
+from .imperfections import Imperfections
+from .scripted_touch import ScriptedTouch
 from .sensor import Sensor
-from .substrate import Foam, Layers
 from .wire import VERSION, Frame
 
-__all__ = ["MODELS", "Imperfections", "ScriptedTouch", "VirtualSkin"]
+__all__ = ["MODELS", "VirtualSkin"]
 
 MODELS = ("field", "ladder")
 _CURRENTS = (2, 5, 8)  # places of the drive currents in Volts
 _FORCE_DIGITS = 6  # of a seated force in newtons: far below a count, and a relaxing touch comes to rest
 _AHEAD = 8  # frames that are solved at once while touches change
-_FORGOTTEN = 40.0  # relaxation times, after which nothing is left of a touch
 # Conductance of 1 S spread evenly over the rectangle of the field: the mean of f f^T, f = (x, 1 - x, -y, y - 1)
 _SPREAD = (
     (1 / 3, 1 / 6, -1 / 4, -1 / 4),
@@ -35,98 +34,6 @@ _SPREAD = (
     (-1 / 4, -1 / 4, 1 / 3, 1 / 6),
     (-1 / 4, -1 / 4, 1 / 6, 1 / 3),
 )
-
-
-@dataclass(frozen=True, slots=True)
-class ScriptedTouch:
-    """One touch of the script.
-
-    Attributes:
-        start: when it begins [s].
-        end: when it ends [s]; may be infinite.
-        u: slant distance from end 1 [m].
-        phi: azimuth [rad].
-        force: at its firmest [N].
-        rise: time in which the force rises, and falls again [s].
-        radius: of a flat body's face [m]; 0 for a round body, whose contact grows with the force.
-        sensor: name of the sensor touched; empty: the first.
-
-    Raises:
-        SensorError: it ends before it begins, or a value is negative or not finite.
-    """
-
-    start: float
-    end: float
-    u: float
-    phi: float
-    force: float = 5.0
-    rise: float = 0.01
-    radius: float = 0.0
-    sensor: str = ""
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.start) and self.end > self.start):
-            raise SensorError(f"a touch must end after it starts, got {self.start!r} s to {self.end!r} s")
-        for name in ("u", "phi", "force", "rise", "radius"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise SensorError(f"touch.{name} must be finite and not negative, got {value!r}")
-
-    def force_at(self, time: float) -> float:
-        """Force at a time [N]: it rises and falls along half a cosine."""
-        since = min(time - self.start, self.end - time)
-        if since <= 0.0:
-            return 0.0
-        return self.force if since >= self.rise else 0.5 * self.force * (1.0 - math.cos(math.pi * since / self.rise))
-
-    def seated_at(self, time: float, foam: Foam) -> float:
-        """Force that would in the end press the foam as far as it is pressed at a time [N]."""
-        since, length = time - self.start, self.end - self.start
-        if since <= 0.0 or since > length + _FORGOTTEN * foam.relaxation_time:
-            return 0.0
-        swing, state = 0.5 * self.force, 0.0
-        ramp = min(self.rise, 0.5 * length)  # a short touch turns back on its way up
-        if ramp > 0.0:
-            rate = math.pi / self.rise
-            state = foam.advance_swing(state, swing, swing, rate, 0.0, min(since, ramp))
-        state = foam.advance(state, self.force, min(max(since - ramp, 0.0), length - 2.0 * ramp))
-        if ramp > 0.0 and since > length - ramp:
-            state = foam.advance_swing(state, swing, swing, -rate, rate * ramp, min(since - length, 0.0) + ramp)
-        state = foam.advance(state, 0.0, max(since - length, 0.0))
-        return foam.seated(state, self.force_at(time))
-
-
-@dataclass(frozen=True, slots=True)
-class Imperfections:
-    """What distinguishes a sensor from its drawing.
-
-    Attributes:
-        noise_counts: standard deviation of each count.
-        settling_time: time constant with which a wire follows when the drive is switched [s]; it is read at the end of
-            its phase.
-        leak: conductance between the layers without any touch, spread evenly [S]; much less than the sheets conduct.
-        leak_drift: its growth [S/s], as from damp.
-        foam: how the substrate yields.
-        layers: how the layers touch.
-        supply_ratio: actual over nominal supply.
-        clock_ratio: speed of the device clock over true time.
-
-    Raises:
-        SensorError: settling_time is negative or not finite.
-    """
-
-    noise_counts: float = 0.7
-    settling_time: float = 2e-6
-    leak: float = 0.0
-    leak_drift: float = 0.0
-    foam: Foam = field(default_factory=Foam)
-    layers: Layers = field(default_factory=Layers)
-    supply_ratio: float = 1.0
-    clock_ratio: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.settling_time) and self.settling_time >= 0.0):
-            raise SensorError(f"settling_time must be finite and not negative, got {self.settling_time!r} s")
 
 
 class _Placed(NamedTuple):

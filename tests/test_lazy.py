@@ -59,8 +59,12 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "double cone, its touches scripted": (
         DOUBLE_CONE,
         _BUILD,
-        {*LOADED, "coneskin.robot.link_frames", "coneskin.skin.virtual"},
-        HEAVY | FIELD | SIMULATOR | {"coneskin.session", "coneskin.skin.serial_port", "coneskin.robot.ur_rtde"},
+        {*LOADED, "coneskin.robot.link_frames", "coneskin.skin.scripted_touch"},
+        HEAVY
+        | VIRTUAL
+        | FIELD
+        | SIMULATOR
+        | {"coneskin.session", "coneskin.skin.serial_port", "coneskin.robot.ur_rtde"},
     ),
     "no mesh": (
         _NO_MESH_FRAME,

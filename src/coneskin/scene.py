@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .robot.rules import Rule
     from .robot.watch import Watch
     from .skin.sensor import Sensor
-    from .skin.virtual import ScriptedTouch
+    from .skin.scripted_touch import ScriptedTouch
 
 __all__ = [
     "ArmScene",

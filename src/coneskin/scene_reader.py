@@ -18,7 +18,7 @@ from .schema import Key, check
 if TYPE_CHECKING:
     from .robot.watch import Watch
     from .skin.sensor import Sensor
-    from .skin.virtual import ScriptedTouch
+    from .skin.scripted_touch import ScriptedTouch
 
 __all__ = ["parse_scene", "read_scene"]
 
@@ -187,7 +187,7 @@ def _touch(
     sensors: Sequence[Sensor | None], table: Mapping[str, Any], where: str, problems: list[str]
 ) -> ScriptedTouch | None:
     """A touch of the script; None stands among the sensors for each that has a mistake."""
-    from .skin.virtual import ScriptedTouch
+    from .skin.scripted_touch import ScriptedTouch
 
     before = len(problems)
     values = check(table, _TOUCH, where, problems)

@@ -15,7 +15,8 @@ from .robot.channel import Channel, inherit
 from .robot.owner_messages import decode_json, encode_json
 from .scene import Scene
 from .scene_reader import parse_scene
-from .skin.virtual import ScriptedTouch, VirtualSkin
+from .skin.scripted_touch import ScriptedTouch
+from .skin.virtual import VirtualSkin
 
 __all__ = ["main", "virtual_skin"]
 

@@ -14,10 +14,11 @@ from coneskin.errors import SkinConnectionError, SkinTimeout
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.faults import Faults
 from coneskin.skin.memory_source import MemorySource
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.serial_port import SerialPort
 from coneskin.skin.source import Source
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.skin.wire import FRAME_LENGTH, Decoder
 
 SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))

@@ -24,11 +24,13 @@ from coneskin.robot.ur_models import model
 from coneskin.robot.watch import Watch
 from coneskin.skin.detector import Detection
 from coneskin.skin.faults import Faults
+from coneskin.skin.imperfections import Imperfections
 from coneskin.skin.recording import Block
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.stream import Stream
 from coneskin.skin.substrate import Foam
-from coneskin.skin.virtual import Imperfections, ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 
 from .mock_arm import MockArm
 

@@ -14,7 +14,8 @@ from coneskin.robot.owner_messages import Note
 from coneskin.scene import Scene
 from coneskin.scene_reader import parse_scene
 from coneskin.skin.recording import Block, Recorder
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual import VirtualSkin
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "scene.md"
 SKIN_ONLY, SERIAL_RETREAT, DOUBLE_CONE = re.findall(

@@ -12,9 +12,11 @@ from coneskin.skin.detector import Detection, Detector
 from coneskin.skin.diagnosis import Fault
 from coneskin.skin.events import Event, SkinFault, TouchBegan, TouchEnded, TouchMoved
 from coneskin.skin.faults import Faults
+from coneskin.skin.imperfections import Imperfections
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.stream import Stream
-from coneskin.skin.virtual import Imperfections, ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.skin.wire import Decoder, Frame
 
 from .bench_top import UR10, measured

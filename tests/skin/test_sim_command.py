@@ -14,10 +14,11 @@ from coneskin.errors import SensorError, SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin import sim_command
 from coneskin.skin.events import TouchBegan
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.serial_port import SerialPort
 from coneskin.skin.stream import Stream
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 
 PROGRAM = """
 import argparse, sys

@@ -10,9 +10,10 @@ from coneskin.errors import SensorError, SkinConnectionError
 from coneskin.skin.diagnosis import Fault
 from coneskin.skin.events import Event, SkinFault, TouchBegan
 from coneskin.skin.faults import Faults
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.stream import Stream
-from coneskin.skin.virtual import ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import VirtualSkin
 from coneskin.skin.wire import FRAME_LENGTH, SYNC, encode
 
 from .bench_top import CONE, UR10, measured

@@ -13,11 +13,13 @@ from coneskin.skin.faults import Faults
 from coneskin.skin.field_disc import Disc
 from coneskin.skin.field_model import FieldModel
 from coneskin.skin.field_sheet import SectorSheet
+from coneskin.skin.imperfections import Imperfections
 from coneskin.skin.memory_source import ManualClock, MemorySource
 from coneskin.skin.reading import read
+from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.substrate import Foam
-from coneskin.skin.virtual import MODELS, Imperfections, ScriptedTouch, VirtualSkin
+from coneskin.skin.virtual import MODELS, VirtualSkin
 from coneskin.skin.wire import FRAME_LENGTH, Decoder, Frame
 
 from .bench_top import CONE, UR10
