@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from .robot.commands import Reaction
     from .robot.rules import Rule
     from .robot.watch import Watch
-    from .skin.sensor import Sensor
     from .skin.scripted_touch import ScriptedTouch
+    from .skin.sensor import Sensor
 
 __all__ = [
     "ArmScene",

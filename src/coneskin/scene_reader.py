@@ -17,8 +17,8 @@ from .schema import Key, check
 
 if TYPE_CHECKING:
     from .robot.watch import Watch
-    from .skin.sensor import Sensor
     from .skin.scripted_touch import ScriptedTouch
+    from .skin.sensor import Sensor
 
 __all__ = ["parse_scene", "read_scene"]
 
