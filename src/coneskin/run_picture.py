@@ -120,7 +120,7 @@ def _draw_arm(axes: Any, scene: Scene, states: list[ControllerState], contact: G
             normal = base_link.rotate(contact.details["normal"])
             axes.scatter(*([value] for value in point), color="tab:red", s=30, label="touch and normal")
             axes.quiver(*point, *normal, length=0.2, color="tab:red", lw=1.5)
-    axes.set_box_aspect((1, 1, 1))
+    axes.set_box_aspect((1, 1, 1), zoom=0.88)  # room for the label of z, which the layout does not know
     reach = 0.6 * (abs(arm.a[1]) + abs(arm.a[2]))
     middle = [0.5 * (min(c) + max(c)) for c in zip(*skeleton(arm, touched.q), strict=True)]
     for centre, setter in zip(middle, (axes.set_xlim, axes.set_ylim, axes.set_zlim), strict=True):
