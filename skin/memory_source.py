@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from types import TracebackType
-from typing import Self
 
 from coneskin.errors import SkinConnectionError, SkinTimeout
 
+from .source import Source
 from .virtual import VirtualSkin
 
 __all__ = ["ManualClock", "MemorySource"]
@@ -32,7 +31,7 @@ class ManualClock:
         self._now += max(0.0, duration)
 
 
-class MemorySource:
+class MemorySource(Source):
     """Source of a virtual skin's bytes.
 
     By default time is simulated and a day passes as fast as it can be computed. With ``clock=time.monotonic`` and
@@ -119,14 +118,3 @@ class MemorySource:
                 self._gone = SkinConnectionError(f"{self.name} is gone: {error}")
                 self._next = (self.clock(), b"")
         return self._next
-
-    def __enter__(self) -> Self:
-        """Open it."""
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close it."""
-        self.close()

@@ -8,11 +8,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
 
 from coneskin.errors import SkinConnectionError
 
+from .source import Openable
 from .virtual import VirtualSkin
 
 __all__ = ["Pacing", "PseudoTerminal", "open_raw_terminal", "play", "wait_for_reader", "write_all"]
@@ -72,7 +71,7 @@ def play(
         return  # unplugged, on purpose
 
 
-class PseudoTerminal:
+class PseudoTerminal(Openable):
     """Plays a virtual skin into a pseudo-terminal, from a thread of its own.
 
     A guard loop that is to be timed should not share its process with this thread: use ``coneskin sim-skin`` there.
@@ -147,17 +146,6 @@ class PseudoTerminal:
             if descriptor is not None:
                 os.close(descriptor)
         self._slave = self._master = None
-
-    def __enter__(self) -> Self:
-        """Open it."""
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close it."""
-        self.close()
 
 
 def open_raw_terminal() -> tuple[int, int, str]:

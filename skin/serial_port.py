@@ -13,10 +13,11 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from coneskin.errors import MissingExtra, SkinConnectionError, SkinTimeout
+
+from .source import Source
 
 __all__ = ["SerialPort", "list_ports"]
 
@@ -24,7 +25,7 @@ _MOST = 4096
 _GONE = {errno.EIO, errno.ENXIO, errno.ENODEV, errno.EBADF, errno.ECONNRESET, errno.ENOTCONN}
 
 
-class SerialPort:
+class SerialPort(Source):
     """Source of bytes from a serial port.
 
     Args:
@@ -122,17 +123,6 @@ class SerialPort:
         except OSError as error:  # SerialException is one
             raise SkinConnectionError(f"{self.name} is gone: {error}") from error
         raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
-
-    def __enter__(self) -> Self:
-        """Open it."""
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close it."""
-        self.close()
 
 
 def list_ports() -> list[str]:

@@ -5,12 +5,37 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
-__all__ = ["Source"]
+__all__ = ["Openable", "Source"]
+
+
+class Openable(Protocol):
+    """Something that is opened and closed by ``with``. Nothing happens before ``open``."""
+
+    def open(self) -> None:
+        """Open it; what is open stays so.
+
+        Raises:
+            SkinConnectionError: it cannot be opened; the message says which one and why.
+        """
+
+    def close(self) -> None:
+        """Give everything back. May be called twice, and before ``open``."""
+
+    def __enter__(self) -> Self:
+        """Open it."""
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        self.close()
 
 
 @runtime_checkable
-class Source(Protocol):
-    """A stream of bytes from a sensor; opened and closed by ``with``. Nothing happens before ``open``.
+class Source(Openable, Protocol):
+    """A stream of bytes from a sensor.
 
     Attributes:
         name: what to call it in a message, for instance the port.
@@ -18,21 +43,8 @@ class Source(Protocol):
 
     name: str
 
-    def open(self) -> None:
-        """Open it; a source that is open stays so.
-
-        Raises:
-            SkinConnectionError: it cannot be opened; the message says which one and why.
-        """
-        ...
-
-    def close(self) -> None:
-        """Give everything back. May be called twice, and before ``open``."""
-        ...
-
     def fileno(self) -> int | None:
         """The descriptor that becomes readable when bytes arrive, or None where there is none."""
-        ...
 
     def read(self, timeout: float) -> bytes:
         """Wait for bytes.
@@ -47,14 +59,4 @@ class Source(Protocol):
             SkinTimeout: nothing arrived in time; the source stays open.
             SkinConnectionError: it is gone, or not open.
         """
-        ...
-
-    def __enter__(self) -> Self:
-        """Open it."""
-        ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close it."""
         ...
