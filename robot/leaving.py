@@ -14,12 +14,13 @@ from .movement import Movement
 from .outputs import Outputs, tell
 from .owner_messages import Speed
 from .state_reader import ControllerState
+from .ur_models import Joints
 
 __all__ = ["Leaving"]
 
 _STREAM_EVERY = 0.004  # s between two targets of a retreat: every second controller cycle, so that none queues
 _STARTING = 0.5  # s after which a program that does not run will not start any more
-_OTHER = 0.1  # rad/s by which a joint's speed may differ from what it is told
+_OTHER = 0.1  # rad/s by which a joint's speed may differ from what it is told, or a part of that
 _ASTRAY = 0.25  # s for which it may differ by more, besides the time in which the arm takes up its speed
 
 
@@ -58,7 +59,7 @@ class Leaving:
         if program is not None and not state.playing and (astray or state.time - self._began >= _STARTING):
             return Done("its program does not run on the controller", step.progress)
         if astray:
-            return Done("the arm does not move as it is told: something else moves it, or holds it", step.progress)
+            return Done("the arm does not move as it is told: something else moves it", step.progress)
         if state.time - self._sent >= _STREAM_EVERY - 1e-9:
             if program is None:
                 out.append(Speed(step.qd, step.acceleration))
@@ -72,8 +73,16 @@ class Leaving:
         return None
 
     def _astray(self, state: ControllerState) -> bool:
+        """Whether the arm moves in another way than it is told; slower is none, as the speed slider makes it."""
         told = self._told
-        if told is None or max(abs(a - b) for a, b in zip(state.qd, told.qd, strict=True)) <= _OTHER:
+        if told is None or _difference(state.qd, told.qd) <= _OTHER:
             self._as_told = state.time
             return False
         return state.time - self._as_told > _ASTRAY + max(map(abs, told.qd)) / told.acceleration
+
+
+def _difference(qd: Joints, told: Joints) -> float:
+    """Largest difference of a joint's speed from the part of what it is told that fits best [rad/s]."""
+    square = sum(b * b for b in told)
+    part = min(1.0, max(0.0, sum(a * b for a, b in zip(qd, told, strict=True)) / square)) if square else 0.0
+    return max(abs(a - part * b) for a, b in zip(qd, told, strict=True))

@@ -206,6 +206,13 @@ def test_a_slow_arm_has_its_time_to_take_up_its_speed():
     assert rig.event("retreated").details["complete"] is True
 
 
+def test_an_arm_that_its_speed_slider_slows_is_not_something_else():
+    rig = Rig(touch(0.5, 0.7), reaction=Reaction(time_budget=10.0), foreign=True, speed=1.0).run(0.45)
+    rig.arm.slider = 0.1
+    rig.run(8.0)
+    assert rig.event("retreated").details["complete"] is True
+
+
 def test_a_fault_ends_a_foreign_retreat():
     rig = Rig(touch(0.5, 0.7), foreign=True, speed=1.0).run(0.75)
     assert rig.core.phase is Phase.RETREATING
