@@ -39,6 +39,7 @@ __all__ = ["GuardLoop", "GuardPorts"]
 
 _ALIVE = Alive().encode()
 _OURS = (Way, Steer, FollowerProgram, Slider)
+_PORTS = {"skin": "source", "controller": "reader", "slider": "slider", "keeper": "keeper", "owner": "owner"}
 _TICK = 0.002  # s between two looks at the clocks where nothing else happens
 _OVERRUN = 0.02  # s between two rounds from which on the loop says that it was held up
 _ENDING = 3.0  # s that the arm has to stand when the guard is told to end
@@ -271,16 +272,7 @@ class GuardLoop:
 
     def _lose(self, what: str, why: str, fileobj: object) -> None:
         self._forget(fileobj)
-        if what == "skin":
-            self._ports.source = None
-        elif what == "controller":
-            self._ports.reader = None
-        elif what == "slider":
-            self._ports.slider = None
-        elif what == "keeper":
-            self._ports.keeper = None
-        else:
-            self._ports.owner = None
+        setattr(self._ports, _PORTS[what], None)
         self._take(Kind.LOST, f"{what}\n{why}".encode())
         if what == "controller" and (owner := self._ports.owner) is not None:
             # ur_rtde would connect again by itself, and its program start with whatever command is still there
