@@ -33,7 +33,7 @@ GOAL = start_with(140.0)
 SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
 SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
 STUCK = 200  # frames
-REACTION = 'kind = "retreat"\ndistance_mm = 30'
+REACTION = 'kind = "retreat"\ndistance_mm = 60'
 WATCH = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nstuck_frames = 200"
 #: v / a, and four times the patience: what docs/safety.md promises once the fault is known
 STOP = SPEED / DECELERATION + 4.0 * ESCALATE
@@ -194,12 +194,11 @@ class Trial:
     def move_away(self) -> float:
         """Touch the skin, and let the arm stand and then retreat for a random time."""
         touched = self.touch()
-        for moving in (False, True):
-            end = CLOCK() + 5.0
-            while self.moves() is not moving:
-                if CLOCK() > end:
-                    raise RuntimeError("the arm does not move away")
-                time.sleep(0.002)
+        end = CLOCK() + 5.0
+        while self.stood_at(touched) is None or not self.moves():  # it stands for 10 ms, which a look may miss
+            if CLOCK() > end:
+                raise RuntimeError("the arm does not move away")
+            time.sleep(0.002)
         time.sleep(0.1 * self.rng.random())
         self.happened = touched
         return CLOCK()
