@@ -14,6 +14,8 @@ __all__ = ["FOREIGN", "OWNED", "STEADY", "StopWatch", "Way"]
 
 STEADY = 5  #: samples in a row below the standstill speed that count as standing
 _SLOWER = 0.05  # rad/s; a drop by this much, or by a tenth, is a slowdown and not noise of the measurement
+_FASTER = 0.1  # rad/s; an arm that has slowed down and is this much faster again is moved by something new
+_PROTECTED = 4.0  # of the patience: a protective stop is left to work for so long
 
 
 class Way(Enum):
@@ -32,21 +34,23 @@ FOREIGN = (Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE, Way.KEEPER)
 
 
 class StopWatch:
-    """Follows one stop.
+    """Follows one stop, and does not give up: the ways are named one after the other, again and again, until it stands.
 
     Args:
         now: when it was commanded [s].
         speed: largest joint speed then [rad/s]; None where it is not known.
         ways: those that there are, the first of which has been used.
         patience: without slowdown for this long, the next way is taken [s].
-        budget: time after which the arm should stand; beyond it every way is taken [s].
+        budget: time after which the arm should stand; beyond it a slowdown is no reason to wait, and the next way is the
+            protective stop [s].
         standstill: joint speed below which the arm stands [rad/s].
         silence: without any sample for this long, the host's clock counts [s].
 
     Attributes:
         slowed_at: when the measured speed first showed a slowdown, or None.
         standing_at: when the arm was first seen standing, or None.
-        used: the ways used so far.
+        used: the ways used so far, each once.
+        rounds: how often all of them have been used.
     """
 
     def __init__(
@@ -60,6 +64,7 @@ class StopWatch:
         silence: float = 0.0,
     ) -> None:
         self._top = speed
+        self._ways = tuple(way for way in ways if way is not Way.OWNER)  # whose stop is not repeated
         self._left = list(ways[1:])
         self._patience = patience
         self._standstill = standstill
@@ -67,9 +72,12 @@ class StopWatch:
         self._began = self._newest = self._arrived = now
         self._last = -math.inf
         self._next = now + patience
+        self._budget = budget
         self._deadline = now + budget
         self._steady = 0
+        self._lowest = math.inf  # speed since it slowed down
         self.used = list(ways[:1])
+        self.rounds = 0
         self.slowed_at: float | None = None
         self.standing_at: float | None = None
 
@@ -91,7 +99,11 @@ class StopWatch:
             self._top = speed  # it may still have been speeding up when the stop was commanded
         slower = self._top - speed >= min(_SLOWER, 0.1 * self._top)
         if self.slowed_at is None and (slower or speed < self._standstill):
-            self.slowed_at = time
+            self.slowed_at, self._lowest = time, speed
+        self._lowest = min(self._lowest, speed)
+        if self.slowed_at is not None and speed > self._lowest + _FASTER:
+            self.slowed_at, self._top = None, speed
+            self._next, self._deadline = measured_at + self._patience, measured_at + self._budget
         self._steady = self._steady + 1 if speed < self._standstill else 0
         if self._steady >= STEADY and self.standing_at is None:
             self.standing_at = time
@@ -105,21 +117,27 @@ class StopWatch:
 
     def forget(self, ways: frozenset[Way], now: float) -> None:
         """These ways are gone; where one of them is in use, take the next at once."""
+        self._ways = tuple(way for way in self._ways if way not in ways)
         self._left = [way for way in self._left if way not in ways]
         if self.used and self.used[-1] in ways:
             self.hurry(now)
 
     def next_ways(self, now: float) -> list[Way]:
-        """The ways to take now [s]; each is named once."""
+        """The way to take now [s], if it is time for one."""
         if self.standing_at is not None:
             return []
         silent = now - self._arrived > self._silence
         seen = now if silent else max(self._newest, now - self._silence)  # a controller's clock may stand still
-        take: list[Way] = []
-        if seen >= self._deadline:
-            take, self._left = self._left, []
-        elif self.slowed_at is None and seen >= self._next and self._left:
-            take = [self._left.pop(0)]
-            self._next = now + self._patience
-        self.used += take
-        return take
+        late = seen >= self._deadline
+        strongest = late and Way.PROTECTIVE in self._left and Way.PROTECTIVE not in self.used
+        if not strongest and (seen < self._next or (self.slowed_at is not None and not late)):
+            return []
+        if not self._left:
+            self._left, self.rounds = list(self._ways), self.rounds + 1
+        if not self._left:
+            return []
+        way = self._left.pop(self._left.index(Way.PROTECTIVE) if strongest else 0)
+        self._next = now + self._patience * (_PROTECTED if way is Way.PROTECTIVE else 1.0)
+        if way not in self.used:
+            self.used.append(way)
+        return [way]
