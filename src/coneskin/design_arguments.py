@@ -18,6 +18,7 @@ from .geometry.pdf import Page
 from .geometry.pen import Side
 from .geometry.placed import PlacedFrustum, double_cone
 from .geometry.stack import PAPER_STACK, Assembly, Stack
+from .link_numbers import check_numbers
 
 __all__ = ["EXAMPLE", "add_arguments", "choices_of", "links_by_numbers", "refuse_numbers", "wrap_of"]
 
@@ -170,16 +171,13 @@ def links_by_numbers(args: argparse.Namespace) -> tuple[PlacedFrustum, ...]:
         raise GeometryError("name a mesh file, or give --radius1-mm and --height-mm")
     if (args.radius3_mm is None) != (args.height2_mm is None):
         raise GeometryError("a second cone needs both --radius3-mm and --height2-mm")
-    for name in ("radius1", "radius2", "height", "radius3", "height2"):
-        value = getattr(args, f"{name}_mm")
-        if value is not None and not (math.isfinite(value) and 0.0 <= value <= 10_000.0):
-            raise GeometryError(f"--{name}-mm must be from 0 to 10000 mm, got {value!r}")
-    wrap = wrap_of(args) or 2.0 * math.pi
-    radius1, height = args.radius1_mm * 1e-3, args.height_mm * 1e-3
-    radius2 = radius1 if args.radius2_mm is None else args.radius2_mm * 1e-3
-    if args.radius3_mm is None:
+    values = check_numbers(args)
+    wrap = values.get("wrap", 2.0 * math.pi)
+    radius1, height = values["radius1"], values["height"]
+    radius2 = values.get("radius2", radius1)
+    if "radius3" not in values:
         return (PlacedFrustum(Frustum(radius1, radius2, height, wrap)),)
-    return double_cone(radius1, radius2, args.radius3_mm * 1e-3, height, args.height2_mm * 1e-3, wrap)
+    return double_cone(radius1, radius2, values["radius3"], height, values["height2"], wrap)
 
 
 def refuse_numbers(args: argparse.Namespace) -> None:

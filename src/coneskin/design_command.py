@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from .design import SheetDesign, design_sheets
 from .design_arguments import add_arguments, choices_of, links_by_numbers, refuse_numbers, wrap_of
-from .design_files import FileOptions, new_folder, write_sheets
+from .design_files import FileOptions, check_target, new_folder, write_sheets
 from .design_link import LinkMesh, load_link
 from .design_report import report
 from .design_summary import sensor_toml, summary
@@ -39,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
     def say(step: str) -> None:
         print(f"{time.perf_counter() - began:6.2f} s  {step}", file=sys.stderr, flush=True)
 
+    check_target(args.output, args.force)
     choices = choices_of(args)
     options = FileOptions(args.arcs, args.cut_tolerance_mm * 1e-3, args.page)
     source: LinkMesh | None = None

@@ -22,7 +22,7 @@ from .geometry.dxf import Arcs, to_dxf
 from .geometry.pdf import Page, to_pdf
 from .geometry.svg import to_svg
 
-__all__ = ["FileOptions", "new_folder", "sheet_folder", "write_sheets"]
+__all__ = ["FileOptions", "check_target", "new_folder", "sheet_folder", "write_sheets"]
 
 _MARK = "design.json"  # only a folder with this file may be replaced
 
@@ -42,6 +42,23 @@ class FileOptions:
     page: Page = "A4"
 
 
+def check_target(target: Path, replace: bool = False) -> None:
+    """Refuse a folder that a design may not take the place of.
+
+    Args:
+        target: the folder to be.
+        replace: whether an earlier design may be there already.
+
+    Raises:
+        GeometryError: the target is there already, and is no earlier design or may not be replaced.
+    """
+    if target.exists() and not (target.is_dir() and not any(target.iterdir())):
+        if not replace:
+            raise GeometryError(f"{target} is there already: choose another folder, or --force to replace a design")
+        if not (target / _MARK).is_file():
+            raise GeometryError(f"{target} is not a design (no {_MARK} in it), so it is not replaced")
+
+
 @contextmanager
 def new_folder(target: Path, replace: bool = False) -> Iterator[Path]:
     """A temporary folder that takes the place of the target where the block ends well, and vanishes where not.
@@ -54,11 +71,7 @@ def new_folder(target: Path, replace: bool = False) -> Iterator[Path]:
         GeometryError: the target is there already, or cannot be made.
     """
     target = Path(os.path.abspath(target))
-    if target.exists() and not (target.is_dir() and not any(target.iterdir())):
-        if not replace:
-            raise GeometryError(f"{target} is there already: choose another folder, or --force to replace a design")
-        if not (target / _MARK).is_file():
-            raise GeometryError(f"{target} is not a design (no {_MARK} in it), so it is not replaced")
+    check_target(target, replace)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))

@@ -44,6 +44,7 @@ class Key:
         choices: the words allowed.
         length: how many numbers a list has.
         above: whether low itself is forbidden.
+        or_zero: whether 0 is allowed below low.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Key:
     choices: Sequence[str] = ()
     length: int | None = None
     above: bool = False
+    or_zero: bool = False
 
     @property
     def suffix(self) -> str:
@@ -147,6 +149,7 @@ def _number(key: Key, value: Any, where: str, complain: Callable[[str], None]) -
         complain(f"{where} must be {_range(key, unit)}, got {_show(value)}")
         return None
     inside = math.isfinite(value) and key.low <= value <= key.high and not (key.above and value == key.low)
+    inside = inside or (key.or_zero and value == 0.0)
     if not inside:
         hint = ""
         if unit in ("mm", "mm/s") and math.isfinite(value) and key.low <= 1e3 * value <= key.high:
@@ -169,7 +172,8 @@ def _range(key: Key, unit: str) -> str:
     unit = f" {unit}" if unit else ""
     low, high = math.isfinite(key.low), math.isfinite(key.high)
     if low and high:
-        return f"{'above' if key.above else 'from'} {key.low:g} to {key.high:g}{unit}"
+        start = "above" if key.above else "0 or from" if key.or_zero else "from"
+        return f"{start} {key.low:g} to {key.high:g}{unit}"
     if low:
         return f"{'above' if key.above else 'at least'} {key.low:g}{unit}"
     return f"at most {key.high:g}{unit}" if high else f"finite{unit and f' [{unit.strip()}]'}"

@@ -19,7 +19,7 @@ __all__ = ["SENSOR_KEYS", "build_sensor", "with_file"]
 _SHAPE = (
     Key("radius1_mm", float, low=1.0, high=5000.0),
     Key("radius2_mm", float, low=1.0, high=5000.0),
-    Key("height_mm", float, low=0.0, high=10_000.0),
+    Key("height_mm", float, low=1.0, high=10_000.0, or_zero=True),  # 0 is a flat ring
     Key("wrap_deg", float, 6.283185307179586, low=0.0, high=360.0, above=True),
 )
 _PLACE = (

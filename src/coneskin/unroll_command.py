@@ -31,20 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the sector."""
-    from .errors import SceneError
     from .geometry.frustum import Frustum
     from .geometry.sector import unroll
-    from .schema import Key, check
+    from .link_numbers import check_numbers
 
-    given = {name: getattr(args, name) for name in ("radius1_mm", "radius2_mm", "height_mm", "wrap_deg")}
-    if given["radius2_mm"] is None:
-        del given["radius2_mm"]
-    problems: list[str] = []
-    lengths = [Key(name, low=0.0, high=1e6) for name in given if name.endswith("_mm")]
-    keys = (*lengths, Key("wrap_deg", low=0.0, high=360.0, above=True))
-    values = check(given, keys, "--", problems)
-    if problems:
-        raise SceneError([line.replace("--.", "--").replace("_", "-", 1) for line in problems], "the link")
+    values = check_numbers(args)
     cone = Frustum(values["radius1"], values.get("radius2", values["radius1"]), values["height"], values["wrap"])
     sector = unroll(cone)
     facts = {

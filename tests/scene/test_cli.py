@@ -110,9 +110,11 @@ def test_unroll_a_cylinder(capsys: Output) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--radius1-mm", "nan", "--height-mm", 1), "--radius1-mm must be from 0 to 1e+06 mm, got nan mm"),
-        (("--radius1-mm", -1, "--height-mm", 1), "--radius1-mm must be from 0 to 1e+06 mm, got -1.0 mm"),
-        (("--radius1-mm", 1, "--height-mm", "inf"), "--height-mm must be from 0 to 1e+06 mm, got inf mm"),
+        (("--radius1-mm", "nan", "--height-mm", 1), "--radius1-mm must be 0 or from 1 to 5000 mm, got nan mm"),
+        (("--radius1-mm", -1, "--height-mm", 1), "--radius1-mm must be 0 or from 1 to 5000 mm, got -1.0 mm"),
+        (("--radius1-mm", 0.04, "--height-mm", 150), "got 0.04 mm: is that in metres? Then write 40"),
+        (("--radius1-mm", 40, "--height-mm", 0.15), "got 0.15 mm: is that in metres? Then write 150"),
+        (("--radius1-mm", 1, "--height-mm", "inf"), "--height-mm must be 0 or from 1 to 10000 mm, got inf mm"),
         (("--radius1-mm", 1, "--height-mm", 1, "--wrap-deg", 361), "--wrap-deg must be above 0 to 360 deg, got 361.0"),
         (("--radius1-mm", 0, "--height-mm", 1), "radius1 and radius2 must not both be 0 m"),
         (("--radius1-mm", 5, "--height-mm", 0), "height must be above 0 m where both radii are equal"),

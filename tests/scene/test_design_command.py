@@ -132,13 +132,15 @@ def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
     ("words", "line"),
     [
         (["--height-mm", "100"], "name a mesh file, or give --radius1-mm and --height-mm"),
-        ([*CYLINDER, "--wrap-deg", "361"], "--wrap-deg must be above 0 and at most 360 deg, got 361.0"),
-        ([*CYLINDER, "--wrap-deg", "nan"], "--wrap-deg must be above 0 and at most 360 deg, got nan"),
+        ([*CYLINDER, "--wrap-deg", "361"], "--wrap-deg must be above 0 to 360 deg, got 361.0"),
+        ([*CYLINDER, "--wrap-deg", "nan"], "--wrap-deg must be above 0 to 360 deg, got nan"),
         ([*CYLINDER, "--margin-mm", "150"], "the sheet measures 200 mm from end to end; margins of 150 mm"),
         ([*CYLINDER, "--margin-mm", "94"], "of 94 mm and electrodes of 6 mm on both sides leave less than 1 mm active"),
-        ([*CYLINDER, "--radius1-mm", "-5"], "--radius1-mm must be from 0 to 10000 mm, got -5.0"),
-        ([*CYLINDER, "--radius1-mm", "nan"], "--radius1-mm must be from 0 to 10000 mm, got nan"),
-        ([*CYLINDER, "--radius1-mm", "1e300"], "--radius1-mm must be from 0 to 10000 mm, got 1e+300"),
+        ([*CYLINDER, "--radius1-mm", "-5"], "--radius1-mm must be 0 or from 1 to 5000 mm, got -5.0 mm"),
+        ([*CYLINDER, "--radius1-mm", "nan"], "--radius1-mm must be 0 or from 1 to 5000 mm, got nan mm"),
+        ([*CYLINDER, "--radius1-mm", "1e300"], "--radius1-mm must be 0 or from 1 to 5000 mm, got 1e+300 mm"),
+        ([*CYLINDER, "--radius1-mm", "0.054"], "got 0.054 mm: is that in metres? Then write 54"),
+        ([*CYLINDER, "--height-mm", "0.2"], "got 0.2 mm: is that in metres? Then write 200"),
         ([*CYLINDER, "--radius2-mm", "0"], "sheet 1: a sheet cannot reach an apex"),
         ([*CYLINDER, "--height-mm", "0"], "height must be above 0 m where both radii are equal"),
         ([*CYLINDER, "--radius3-mm", "30"], "a second cone needs both --radius3-mm and --height2-mm"),
@@ -210,6 +212,16 @@ def test_a_folder_is_replaced_only_by_force_and_only_if_it_is_a_design(tmp_path,
     empty = tmp_path / "empty"
     empty.mkdir()
     assert design(*CYLINDER, "-o", str(empty)) == 0
+
+
+def test_a_folder_that_is_there_is_refused_before_any_work(tmp_path, monkeypatch, capsys):
+    """Reading and fitting a mesh takes seconds; the folder is known before."""
+    (tmp_path / "thesis.tex").write_text("years of work")
+    assert design("nowhere.stl", "-o", str(tmp_path)) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "is there already" in line
+    assert design("nowhere.stl", "--force", "-o", str(tmp_path)) == 1
+    assert "is not a design" in capsys.readouterr().err
 
 
 def test_missing_packages_are_named(tmp_path, monkeypatch, capsys):

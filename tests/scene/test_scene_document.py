@@ -111,7 +111,7 @@ def test_unit_range_and_default(section: str, key: Key) -> None:
     if key.choices:
         assert bounds == ", ".join(key.choices)
     elif math.isfinite(key.low) and math.isfinite(key.high):
-        start = f"above {key.low:g}" if key.above else f"{key.low:g}"
+        start = f"above {key.low:g}" if key.above else f"0 or {key.low:g}" if key.or_zero else f"{key.low:g}"
         end = f"{key.high}" if key.kind is int else f"{key.high:g}"
         assert bounds == f"{start} to {end}"
     elif math.isfinite(key.low):

@@ -62,6 +62,14 @@ def test_a_sensor_that_cannot_be_is_a_problem_not_an_exception() -> None:
     assert problems == ["s: height must be above 0 m where both radii are equal: the side has no length"]
 
 
+def test_a_height_in_metres_is_said_to_be_one() -> None:
+    problems: list[str] = []
+    assert build_sensor({**SHAPE, "height_mm": 0.24}, "s", problems) is None
+    assert problems == ["s.height_mm must be 0 or from 1 to 10000 mm, got 0.24 mm: is that in metres? Then write 240"]
+    ring = {**SHAPE, "height_mm": 0, "current_full_scale_ma": 50}
+    assert build_sensor(ring, "s", []) is not None
+
+
 def test_a_file_gives_keys_and_the_table_wins(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("radius1_mm = 1\nheight_mm = 2\n")
     problems: list[str] = []
