@@ -4,9 +4,10 @@
      |  ^              ^ |                                                                     |    ^
      |  +-- free --+   | +-- standing, and no movement is wanted or possible ------------------|----+
      +-- slow --> SLOWED --not slower, too long, a harder touch, a fault                       |
-                       +--------------------- something moves the arm again -------------------+
+                       +---------- something moves the arm again, or nobody can see it --------+
 
-A stop counts when measured joint speed says so. Nothing but a person's reset leaves LATCHED for good.
+A stop counts when measured joint speed says so, and is not given up before. Nothing but a person's reset leaves LATCHED
+for good, and the arm is watched until it is armed again.
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from coneskin.errors import RobotRefused
 from .arm_checks import arm_faults
 from .commands import ArmState, ContactOnLink, Reaction
 from .controller_clock import ControllerClock
+from .latch import Latch
 from .outputs import Command, Output, Outputs, tell
 from .owner_messages import Clear, Halt, Stop
 from .phase import Phase
 from .rules import Rule, Rules
-from .slowing import Slider, Slowing
+from .slowing import HOLD, Slider, Slowing
 from .speed_slider import decode_fraction
 from .state_reader import ControllerState, decode_state
-from .stop_watch import STEADY, StopWatch, Way
+from .stop_watch import StopWatch, Use, Way
 from .ur_models import ArmModel
 from .watch import Watch
 
@@ -38,7 +40,7 @@ if TYPE_CHECKING:  # a reaction that only stops loads neither
 __all__ = ["ArmReaction", "Command", "Output", "Outputs", "Phase"]
 
 _SLACK = 4.0  # of the patience: what a stop may take besides v / a before every way is used
-_MOVES = 0.05  # rad/s; a latched arm that a program moves faster is stopped again
+_RESTARTS = 3  # times that a latched arm was moved again, from which on it is stopped by the strongest way
 
 
 class ArmReaction:
@@ -102,7 +104,10 @@ class ArmReaction:
         self._contacts: Sequence[ContactOnLink] = ()  # now
         self._placed: Sequence[ContactOnLink] = ()  # as last seen while the arm stopped
         self._fresh = -math.inf  # host time of the newest state that was a new one
-        self._may_move, self._again, self._why = False, 0, ""
+        self._may_move, self._why = False, ""
+        self._latch: Latch | None = None
+        self._restarts = 0  # since it was armed
+        self._slider_before: tuple[float, float] | None = None  # when it was put back to where
 
     @property
     def needs_slider(self) -> bool:
@@ -117,12 +122,9 @@ class ArmReaction:
     def arm(self, out: Outputs) -> None:
         """Let the program move the arm, and react from now on."""
         self.phase, self._reaction = Phase.ARMED, self._rules.default
+        self._latch, self._restarts = None, 0
         if Way.OWNER in self._ways:
             out.append(Clear())
-
-    def reset(self) -> None:
-        """Leave LATCHED, because a person says so."""
-        self.phase = Phase.STARTING
 
     def touch(self, now: float, link: int, level: float, began: bool, out: Outputs) -> None:
         """A touch of a link has begun, or has changed, at a host time [s] and with a level."""
@@ -185,25 +187,26 @@ class ArmReaction:
             self._follow(self._stop, state, measured_at, out)
         elif self._leaving is not None:
             self._move(state, self._leaving, out)
-        elif self._slowing is not None:
-            self._slowing.sample(state.speed)
-        elif self.phase is Phase.LATCHED:
-            self._keep_standing(state, out)
+        elif self.phase is Phase.SLOWED and self._slowing is not None:
+            self._slowing.sample(state.time, state.speed)
+        elif self._latch is not None and self._latch.moved(state, bool(self._contacts)):
+            self._restarts += 1
+            self._stop_now(state.time, self._again("something moved the arm"), False, out)
 
     def look(self, now: float, out: Outputs) -> None:
         """What only the passing of time shows."""
-        if self._stop is not None:
-            for way in self._stop.next_ways(now):
-                out.append(way)
-                tell(out, "escalated", now, way=way.value)
-        elif (slowing := self._slowing) is not None:
+        if (stop := self._stop) is not None:
+            self._escalate(now, stop, out)
+        elif self.phase is Phase.SLOWED and (slowing := self._slowing) is not None:
             slowing.touched(now, bool(self._contacts))
-            if why := slowing.trouble(now):
+            if why := slowing.trouble(now, self.slider):
                 self._stop_now(now, why, False, out)
             elif slowing.over(now):
-                self._slowing, self.phase = None, Phase.ARMED
-                out.append(Slider(slowing.before))
-                tell(out, "resumed", now, slider=slowing.before)
+                self.phase = Phase.ARMED
+                self._put_slider_back(now, out)
+                tell(out, "resumed", now, slider=self.slider)
+        elif self.phase is Phase.LATCHED and self.silent(now):
+            self._stop_now(now, self._again("the controller fell silent"), False, out)
 
     def silent(self, now: float) -> bool:
         """Whether the controller's newest state is too old; one that repeats itself is."""
@@ -222,7 +225,29 @@ class ArmReaction:
 
     # ---- what it does
 
+    def _again(self, what: str) -> str:
+        """Why a latched arm is stopped once more: what it was first, and this."""
+        return f"{self._why.partition('; then ')[0]}; then {what}"
+
+    def _escalate(self, now: float, stop: StopWatch, out: Outputs) -> None:
+        rounds, used = stop.rounds, len(stop.used)
+        for way in stop.next_ways(now):
+            out.append(Use(way, self._reaction.deceleration))
+            if len(stop.used) > used:
+                tell(out, "escalated", now, way=way.value)
+        if stop.rounds > rounds and (stop.rounds & rounds) == 0:  # the first, second, fourth ... time
+            tell(out, "not_standing", now, rounds=stop.rounds, speed=None if self.state is None else self.state.speed)
+
+    def _put_slider_back(self, now: float, out: Outputs) -> None:
+        """Where it was before a touch slowed the arm, unless a person has moved it since."""
+        slowing, self._slowing = self._slowing, None
+        if slowing is not None and slowing.put_back(self.slider):
+            out.append(Slider(slowing.before))
+            self.slider, self._slider_before = slowing.before, (now, slowing.before)
+
     def _slow(self, now: float, reaction: Reaction, slider: float, out: Outputs) -> None:
+        if self._slider_before is not None and now - self._slider_before[0] < HOLD:
+            slider = self._slider_before[1]  # what is read may be older than what was set
         budget = self._touch_speed / reaction.deceleration + _SLACK * self._watch.escalate
         slowing = Slowing(now, self._touch_speed, slider, reaction.slow_to, budget, reaction.time_budget)
         out.append(Slider(slowing.fraction))
@@ -242,13 +267,18 @@ class ArmReaction:
         tell(out, "stopping", now, why=why)
 
     def _begin(self, now: float, phase: Phase, command: Stop | Halt, out: Outputs) -> None:
-        for first in self._ways[:1]:
-            out.append(command if first is Way.OWNER else first)
+        ways = self._ways
+        if self._restarts >= _RESTARTS and Way.PROTECTIVE in ways:
+            ways = (Way.PROTECTIVE, *(way for way in ways if way is not Way.PROTECTIVE))
+        for first in ways[:1]:
+            out.append(command if first is Way.OWNER else Use(first, command.deceleration))
+        if self._leaving is not None:
+            self._leaving.end(out)
         state, watch = self.state, self._watch
         speed = None if state is None or self.silent(now) else state.speed
         budget = (speed or 0.0) / command.deceleration + _SLACK * watch.escalate
-        self._stop = StopWatch(now, speed, self._ways, watch.escalate, budget, watch.standstill, watch.arm_silence)
-        self._leaving = None
+        self._stop = StopWatch(now, speed, ways, watch.escalate, budget, watch.standstill, watch.arm_silence)
+        self._leaving = self._latch = None
         self.phase = phase
 
     def _follow(self, stop: StopWatch, state: ControllerState, measured_at: float, out: Outputs) -> None:
@@ -260,15 +290,16 @@ class ArmReaction:
             return
         tell(out, "standstill", state.time, speed=state.speed, ways=[way.value for way in stop.used])
         self._stop = None
+        self._put_slider_back(state.time, out)
         if self.phase is Phase.HALTING or not (self._may_move and self._placed):
-            self._latch(state.time, self._why, out)
+            self._stay(state.time, self._why, out)
             return
         self._reaction = self._rules.hardest(self._levels.items(), self._touch_speed)  # how firm it was shows by now
         if self._reaction.kind in ("stop", "slow"):
-            self._latch(state.time, self._why, out)
+            self._stay(state.time, self._why, out)
         elif stop.used != [self._first]:
             who = "ur_rtde" if self.owned else "a program"
-            self._latch(state.time, f"{self._why}; no retreat: {who} did not stop the arm", out)
+            self._stay(state.time, f"{self._why}; no retreat: {who} did not stop the arm", out)
         else:
             self._begin_movement(state, out)
 
@@ -277,7 +308,7 @@ class ArmReaction:
         here = ArmState(state.time, state.q, state.qd)
         leaving = self._mover.begin(self._reaction, self._at_touch or here, here, self._placed, out)
         if isinstance(leaving, str):
-            self._latch(state.time, f"{self._why}; no retreat: {leaving}", out)
+            self._stay(state.time, f"{self._why}; no retreat: {leaving}", out)
             return
         self.phase, self._leaving = Phase.RETREATING, leaving
         self._move(state, leaving, out)
@@ -289,15 +320,7 @@ class ArmReaction:
             self._begin(state.time, Phase.HALTING, Halt(self._reaction.deceleration), out)
             tell(out, "retreated", state.time, progress=over.progress, complete=over.complete, why=over.reason)
 
-    def _keep_standing(self, state: ControllerState, out: Outputs) -> None:
-        """A program that moves a latched arm is stopped; a person who pushes it, or jogs it, is not."""
-        self._again = self._again + 1 if state.playing and state.speed > _MOVES else 0
-        if self._again >= STEADY:
-            self._again = 0
-            self._stop_now(state.time, f"{self._why}; then something moved the arm", False, out)
-
-    def _latch(self, now: float, why: str, out: Outputs) -> None:
-        if self._slowing is not None:
-            out.append(Slider(self._slowing.before))
-        self.phase, self._leaving, self._slowing, self._why, self._again = Phase.LATCHED, None, None, why, 0
+    def _stay(self, now: float, why: str, out: Outputs) -> None:
+        self.phase, self._leaving, self._why = Phase.LATCHED, None, why
+        self._latch = Latch(self._watch.standstill)
         tell(out, "latched", now, why=why)

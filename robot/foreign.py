@@ -89,7 +89,7 @@ class ForeignStops:
         """
         if way is Way.DASHBOARD:
             return self._send("dashboard", b"stop\n")
-        call = f"stopj({deceleration:.3f})" if way is Way.SCRIPT else "protective_stop()"
+        call = "protective_stop()" if way is Way.PROTECTIVE else f"stopj({deceleration:.3f})"
         return self.run(f"def coneskin_stop():\n  {call}\nend\n")
 
     def run(self, program: str) -> bool:

@@ -93,6 +93,7 @@ class GuardCore:
         self._faults: dict[str, str] = {}  # since the last reset
         self._lost: dict[str, str] = {}  # what is gone for good
         self._sound_since: float | None = None
+        self._resetting: float | None = None  # since when
         self._played = False
         self._told: float | None = None
         self._waiting_for: list[str] = []
@@ -189,6 +190,8 @@ class GuardCore:
         self._arm.sample(state, out)
         if state.stopped_by_safety and self.phase.watched:
             self._fault(block.time, "the controller's own safety system has stopped the arm", out)
+        elif not state.running and self.phase.watched:
+            self._fault(block.time, "the arm is not powered any more, or its brakes are closed", out)
         self._watch_program(block.time, state.playing, out)
 
     def _watch_program(self, now: float, playing: bool, out: Outputs) -> None:
@@ -236,8 +239,8 @@ class GuardCore:
         if wrong := self.unsound(block.time):
             tell(out, "refused", block.time, what="reset", reasons=wrong)
             return
-        self._arm.reset()
-        self._sound_since = None
+        self._stream.forget_faults()
+        self._resetting = block.time
         tell(out, "reset", block.time)
 
     # ---- what is decided
@@ -248,11 +251,26 @@ class GuardCore:
             self._skin_event(event, out)
         arm = self._arm
         if arm is not None:
-            if arm.phase.watched and arm.silent(now):
+            if arm.phase is not Phase.STARTING and arm.silent(now):
                 self._fault(now, f"the controller has sent no state for {1e3 * self._watch.arm_silence:g} ms", out)
             arm.look(now, out)
         if self.phase is Phase.STARTING:
             self._start(now, out)
+        elif arm is not None and self._resetting is not None:
+            self._settle(now, self._resetting, arm, out)
+
+    def _settle(self, now: float, since: float, arm: ArmReaction, out: Outputs) -> None:
+        """A person has reset: the arm stays latched until everything has been sound for a while without a break."""
+        wrong = self.unsound(now)
+        if arm.phase is not Phase.LATCHED:
+            wrong.append("something has moved the arm, or it is not seen to stand")
+        if wrong:
+            self._resetting = None
+            tell(out, "refused", now, what="reset", reasons=wrong)
+        elif now - since >= self._watch.settle:
+            self._resetting = None
+            arm.arm(out)
+            tell(out, "armed", now)
 
     def _start(self, now: float, out: Outputs) -> None:
         if wrong := self.unsound(now):

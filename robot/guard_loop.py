@@ -27,7 +27,7 @@ from .outputs import Output
 from .owner_messages import BEAT, Alive, Farewell, Stop
 from .phase import Phase
 from .slowing import Slider
-from .stop_watch import Way
+from .stop_watch import Use, Way
 
 if TYPE_CHECKING:  # opened for it where the scene has an arm
     from .foreign import ForeignStops
@@ -38,7 +38,7 @@ if TYPE_CHECKING:  # opened for it where the scene has an arm
 __all__ = ["GuardLoop", "GuardPorts"]
 
 _ALIVE = Alive().encode()
-_OURS = (Way, Steer, FollowerProgram, Slider)
+_OURS = (Use, Steer, FollowerProgram, Slider)
 _PORTS = {"skin": "source", "controller": "reader", "slider": "slider", "keeper": "keeper", "owner": "owner"}
 _TICK = 0.002  # s between two looks at the clocks where nothing else happens
 _OVERRUN = 0.02  # s between two rounds from which on the loop says that it was held up
@@ -55,7 +55,6 @@ class GuardPorts:
         reader: of the controller's state, open.
         owner: of ur_rtde.
         foreign: stops that do not need ur_rtde, open.
-        deceleration: of a stop by script [rad/s2].
         slider: of the controller's speed, open.
         keeper: the process that stops the arm when this one is gone, where there is no owner to do so.
         steering: the reader once more, where it carries speeds to a follower program.
@@ -66,7 +65,6 @@ class GuardPorts:
     reader: StateReader | None = None
     owner: Channel | None = None
     foreign: ForeignStops | None = None
-    deceleration: float = 10.0
     slider: SpeedSlider | None = None
     keeper: Channel | None = None
     steering: Steering | None = None
@@ -94,14 +92,14 @@ class _Outbox:
             taken = ports.owner is not None and ports.owner.send(message)
             self.sent.append((b"owner\n" if taken else b"owner, not sent\n") + message)
 
-    def _append_ours(self, ports: GuardPorts, output: Way | Steer | FollowerProgram | Slider) -> None:
+    def _append_ours(self, ports: GuardPorts, output: Use | Steer | FollowerProgram | Slider) -> None:
         """What goes through connections of the guard's own."""
-        if isinstance(output, Way):
-            name = output.value
-            if output is Way.KEEPER:
-                taken = ports.keeper is not None and ports.keeper.send(Stop(ports.deceleration).encode())
+        if isinstance(output, Use):
+            name = output.way.value
+            if output.way is Way.KEEPER:
+                taken = ports.keeper is not None and ports.keeper.send(Stop(output.deceleration).encode())
             else:
-                taken = ports.foreign is not None and ports.foreign.use(output, ports.deceleration)
+                taken = ports.foreign is not None and ports.foreign.use(*output)
             text = "sent" if taken else "not sent"
         elif isinstance(output, Steer):
             taken = ports.steering is not None and ports.steering.steer(output)

@@ -8,20 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .commands import ArmState, ContactOnLink, Done, JointVelocity
+from .commands import STILL, ArmState, ContactOnLink, Done
 from .follower import FollowerProgram, Steer
 from .movement import Movement
+from .obedience import Obedience
 from .outputs import Outputs, tell
 from .owner_messages import Speed
 from .state_reader import ControllerState
-from .ur_models import Joints
 
 __all__ = ["Leaving"]
 
 _STREAM_EVERY = 0.004  # s between two targets of a retreat: every second controller cycle, so that none queues
 _STARTING = 0.5  # s after which a program that does not run will not start any more
-_OTHER = 0.1  # rad/s by which a joint's speed may differ from what it is told, or a part of that
-_ASTRAY = 0.25  # s for which it may differ by more, besides the time in which the arm takes up its speed
 
 
 class Leaving:
@@ -39,8 +37,7 @@ class Leaving:
         self._program = program
         self._began = now
         self._sent = -math.inf
-        self._told: JointVelocity | None = None
-        self._as_told = now
+        self._obedience = Obedience(now)
         tell(out, "retreating", now, **({"how": movement.how} if movement.how else {}))
 
     def step(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
@@ -55,7 +52,7 @@ class Leaving:
         if isinstance(step, Done):
             return step
         program, first = self._program, self._sent == -math.inf
-        astray = self._astray(state)
+        astray = self._obedience.strays(state, step.progress)
         if program is not None and not state.playing and (astray or state.time - self._began >= _STARTING):
             return Done("its program does not run on the controller", step.progress)
         if astray:
@@ -69,20 +66,11 @@ class Leaving:
                     out.append(program)
             if step.clipped_by and first:
                 tell(out, "clipped", state.time, by=list(step.clipped_by))
-            self._sent, self._told = state.time, step
+            self._sent = state.time
+            self._obedience.tell(step)
         return None
 
-    def _astray(self, state: ControllerState) -> bool:
-        """Whether the arm moves in another way than it is told; slower is none, as the speed slider makes it."""
-        told = self._told
-        if told is None or _difference(state.qd, told.qd) <= _OTHER:
-            self._as_told = state.time
-            return False
-        return state.time - self._as_told > _ASTRAY + max(map(abs, told.qd)) / told.acceleration
-
-
-def _difference(qd: Joints, told: Joints) -> float:
-    """Largest difference of a joint's speed from the part of what it is told that fits best [rad/s]."""
-    square = sum(b * b for b in told)
-    part = min(1.0, max(0.0, sum(a * b for a, b in zip(qd, told, strict=True)) / square)) if square else 0.0
-    return max(abs(a - part * b) for a, b in zip(qd, told, strict=True))
+    def end(self, out: Outputs) -> None:
+        """Let what was told count no more, after a stop has been sent."""
+        if self._program is not None:
+            out.append(Steer(0, STILL, 0.0))

@@ -10,11 +10,11 @@ if TYPE_CHECKING:  # a guard without an arm loads none of them
     from .follower import FollowerProgram, Steer
     from .owner_messages import Clear, Halt, Speed, Stop
     from .slowing import Slider
-    from .stop_watch import Way
+    from .stop_watch import Use
 
 __all__ = ["Command", "Output", "Outputs", "tell"]
 
-Command: TypeAlias = "Stop | Speed | Halt | Clear | Way | FollowerProgram | Steer | Slider"
+Command: TypeAlias = "Stop | Speed | Halt | Clear | Use | FollowerProgram | Steer | Slider"
 Output: TypeAlias = "Command | GuardEvent"
 
 

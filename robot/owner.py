@@ -23,7 +23,9 @@ from .channel import Channel, inherit
 from .owner_messages import (
     SILENCE,
     STEERING_SILENCE,
+    Alive,
     Clear,
+    GuardCommand,
     Halt,
     Note,
     Speed,
@@ -36,6 +38,7 @@ from .ur_rtde import UrArm
 
 __all__ = ["Owner", "main"]
 
+_MOTIONS = (Stop, Halt, Speed)
 _LEAVING = 2.0  # s for the last stop and the goodbye; ur_rtde can block both for minutes
 _KICK_EVERY = 0.02  # well within the watchdog's period, and no load for the controller
 
@@ -92,9 +95,14 @@ class Owner:
         """Wait for messages [s] and serve them; False once a channel has ended."""
         select.select([self._guard, self._program], [], [], timeout)
         now = self._clock()
-        for message in self._guard.receive():
-            self._heard = now
-            self._serve_guard(message)
+        commands = [decode_command(message) for message in self._guard.receive()]
+        newest = max((n for n, command in enumerate(commands) if isinstance(command, _MOTIONS)), default=0)
+        for number, command in enumerate(commands):
+            if isinstance(command, Speed) and number < newest:
+                continue  # the guard has thought better of it meanwhile
+            if self._patience != STEERING_SILENCE or not isinstance(command, Alive):
+                self._heard = now
+            self._serve_guard(command)
         if self._guard.closed:
             return False
         for message in self._program.receive():
@@ -110,8 +118,7 @@ class Owner:
             self._kicked = now
         return True
 
-    def _serve_guard(self, message: bytes) -> None:
-        command = decode_command(message)
+    def _serve_guard(self, command: GuardCommand) -> None:
         try:
             match command:
                 case Stop(deceleration) | Halt(deceleration):

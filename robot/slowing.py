@@ -1,7 +1,8 @@
 """Follow an arm that goes on slowly while it is touched. Pure.
 
 The controller's speed slider does it, so it works for whatever moves the arm; servoj does not heed it. So the slider's
-word is not taken for it: measured joint speed has to fall, or to be slow anyway, within the budget of a stop.
+word is not taken for it: measured joint speed has to fall, or to be slow anyway, within the budget of a stop, and to
+stay so. What a person does with the slider meanwhile is theirs: it is not put back over it.
 """
 
 from __future__ import annotations
@@ -10,9 +11,12 @@ __all__ = ["HOLD", "SLOW_ENOUGH", "Slider", "Slowing"]
 
 from typing import NamedTuple
 
+from .stop_watch import STEADY
+
 HOLD = 0.5  #: s without a touch after which the arm goes on at the speed it had
 SLOW_ENOUGH = 0.25  #: rad/s; at a metre's reach, 250 mm/s, the reduced speed of ISO 10218-1
 _PART = 0.9  # of its speed at the touch, to which the arm must have slowed down
+_STEP = 0.02  # by which the slider may read otherwise than it was set
 
 
 class Slider(NamedTuple):
@@ -44,13 +48,13 @@ class Slowing:
         self._deadline = now + budget
         self._end = now + longest
         self._free_since: float | None = None
-        self._slower = speed <= SLOW_ENOUGH
+        self._fast = 0  # samples in a row
 
-    def sample(self, speed: float) -> None:
-        """Take the measured speed of the leading joint [rad/s]."""
-        if not self._slower:
-            self._top = max(self._top, speed)
-            self._slower = speed <= max(_PART * self._top, SLOW_ENOUGH)
+    def sample(self, time: float, speed: float) -> None:
+        """Take the measured speed of the leading joint at a time [s, rad/s]."""
+        if time < self._deadline:
+            self._top = max(self._top, speed)  # it may still have been speeding up
+        self._fast = self._fast + 1 if speed > max(_PART * self._top, SLOW_ENOUGH) else 0
 
     def touched(self, now: float, touched: bool) -> None:
         """Say whether anything touches."""
@@ -59,13 +63,29 @@ class Slowing:
         elif self._free_since is None:
             self._free_since = now
 
-    def trouble(self, now: float) -> str:
-        """Why the arm has to be stopped after all; empty where it has not."""
-        if not self._slower and now >= self._deadline:
-            return "the arm did not become slower"
+    def trouble(self, now: float, slider: float | None) -> str:
+        """Why the arm has to be stopped after all; empty where it has not.
+
+        Args:
+            now: [s].
+            slider: where it is.
+        """
+        if now >= self._deadline:
+            if self._fast >= STEADY:
+                return "the arm did not become slower"
+            if self._free_since is None and slider is not None and slider > self.fraction + _STEP:
+                return f"the speed slider is at {slider:.0%} again while the skin is touched"
         if self._free_since is None and now >= self._end:
             return "the touch lasts too long"
         return ""
+
+    def put_back(self, slider: float | None) -> bool:
+        """Whether the slider still is where it was set, so that it may be put back.
+
+        Args:
+            slider: where it is.
+        """
+        return slider is not None and abs(slider - self.fraction) <= _STEP
 
     def over(self, now: float) -> bool:
         """Whether the arm may go on as before."""

@@ -7,7 +7,10 @@ newest state also knows how old it is.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
+
+from coneskin.errors import RobotConnectionError
 
 from . import rtde_codec as rtde
 from .rtde_connection import RtdeConnection
@@ -18,7 +21,7 @@ __all__ = ["RECIPE", "ControllerState", "StateReader", "decode_state"]
 _NAMES = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
 #: what the reader asks for
 RECIPE = rtde.Recipe(_NAMES)
-_SAFETY_STOPS = 0b11111110100  # protective, safeguard, emergency, violation, fault, stopped: bits 2 and 4 to 10
+_SAFETY_STOPS = 0b11111111100  # protective, recovery, safeguard, emergency, violation, fault, stopped: bits 2 to 10
 _PLAYING = 2
 _ROBOT_RUNNING = 7
 
@@ -73,9 +76,12 @@ def decode_state(time: float, payload: bytes) -> ControllerState:
         payload: recipe id and values.
 
     Raises:
-        RobotConnectionError: the payload has another length.
+        RobotConnectionError: the payload has another length, or a position or speed is not finite.
     """
-    return ControllerState(time, *RECIPE.unpack(payload))  # type: ignore[arg-type]
+    state = ControllerState(time, *RECIPE.unpack(payload))  # type: ignore[arg-type]
+    if not math.isfinite(sum(state.q) + sum(state.qd)):
+        raise RobotConnectionError(f"its joint positions or speeds are not finite: {state.q} rad, {state.qd} rad/s")
+    return state
 
 
 class StateReader(RtdeConnection):

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from enum import Enum
+from typing import NamedTuple
 
-__all__ = ["FOREIGN", "OWNED", "STEADY", "StopWatch", "Way"]
+__all__ = ["FOREIGN", "OWNED", "STEADY", "StopWatch", "Use", "Way"]
 
 STEADY = 5  #: samples in a row below the standstill speed that count as standing
 _SLOWER = 0.05  # rad/s; a drop by this much, or by a tenth, is a slowdown and not noise of the measurement
@@ -28,6 +29,18 @@ class Way(Enum):
     KEEPER = "keeper"  #: the keeper's stop, which opens new connections where the controller has closed the others
 
 
+class Use(NamedTuple):
+    """Take a way.
+
+    Attributes:
+        way: which; OWNER is taken by ``Stop`` and ``Halt``.
+        deceleration: of the leading joint, where the way can have one [rad/s2].
+    """
+
+    way: Way
+    deceleration: float
+
+
 #: the ways that there are where ur_rtde is ours, and where another program moves the arm
 OWNED = (Way.OWNER, Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE)
 FOREIGN = (Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE, Way.KEEPER)
@@ -41,8 +54,8 @@ class StopWatch:
         speed: largest joint speed then [rad/s]; None where it is not known.
         ways: those that there are, the first of which has been used.
         patience: without slowdown for this long, the next way is taken [s].
-        budget: time after which the arm should stand; beyond it a slowdown is no reason to wait, and the next way is the
-            protective stop [s].
+        budget: time after which the arm should stand; beyond it a slowdown is no reason to wait, and the protective
+            stop is next [s].
         standstill: joint speed below which the arm stands [rad/s].
         silence: without any sample for this long, the host's clock counts [s].
 
@@ -71,7 +84,7 @@ class StopWatch:
         self._silence = silence
         self._began = self._newest = self._arrived = now
         self._last = -math.inf
-        self._next = now + patience
+        self._next = now + patience * (_PROTECTED if ways[:1] == (Way.PROTECTIVE,) else 1.0)
         self._budget = budget
         self._deadline = now + budget
         self._steady = 0

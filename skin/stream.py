@@ -38,7 +38,17 @@ class Stream:
         SensorError: there is no sensor, or two have the same numbers or the same name.
     """
 
-    __slots__ = ("_bad", "_by_number", "_corrupt", "_skipped", "_versions", "decoder", "detectors", "unknown")
+    __slots__ = (
+        "_bad",
+        "_by_number",
+        "_corrupt",
+        "_skipped",
+        "_told_version",
+        "_versions",
+        "decoder",
+        "detectors",
+        "unknown",
+    )
 
     def __init__(self, sensors: Sequence[Sensor], detection: Detection | None = None) -> None:
         if not sensors:
@@ -52,7 +62,7 @@ class Stream:
             raise SensorError(f"sensors on one stream must differ in name and in (device_id, sensor_id), got {listing}")
         self.unknown: dict[tuple[int, int], int] = {}
         self._bad = self._skipped = self._versions = 0
-        self._corrupt = False
+        self._corrupt = self._told_version = False
 
     @property
     def ready(self) -> bool:
@@ -87,7 +97,8 @@ class Stream:
         if self.decoder.bytes_skipped != self._skipped or self._bad:
             self._watch_bytes(events, len(frames), now)
         if self.decoder.unknown_versions != self._versions:
-            if not self._versions:
+            if not self._told_version:
+                self._told_version = True
                 detail = f"version {self.decoder.last_unknown_version}"
                 events.append(SkinFault("", now, 0, 0, Fault.UNKNOWN_VERSION, detail))
             self._versions = self.decoder.unknown_versions
@@ -100,6 +111,11 @@ class Stream:
             if detector.age(now) > longest:
                 events += detector.silence(now, longest)
         return events
+
+    def forget_faults(self) -> None:
+        """Report faults of the line anew if they go on: a person has reset the guard."""
+        self._corrupt = self._told_version = False
+        self.unknown.clear()
 
     def _note_unknown(self, events: list[Event], frame: Frame, now: float) -> None:
         key = (frame.device, frame.sensor)

@@ -77,8 +77,6 @@ def _run(
         else:
             ports.reader = stack.enter_context(StateReader(scene.arm.host))
         ports.foreign = stack.enter_context(ForeignStops(scene.arm.host))
-        if scene.reaction is not None:
-            ports.deceleration = scene.reaction.deceleration
         if core.needs_slider:
             from .robot.speed_slider import SpeedSlider
 

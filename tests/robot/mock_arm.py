@@ -6,7 +6,7 @@ from coneskin.robot.follower import FollowerProgram, Steer
 from coneskin.robot.owner_messages import Clear, Halt, Speed, Stop
 from coneskin.robot.slowing import Slider
 from coneskin.robot.state_reader import RECIPE
-from coneskin.robot.stop_watch import Way
+from coneskin.robot.stop_watch import Use, Way
 
 CYCLE = 0.002
 
@@ -32,6 +32,8 @@ class MockArm:
 
     def take(self, command: object) -> None:
         """Obey a command of the guard, if this arm does."""
+        if isinstance(command, Use):
+            command = command.way
         self.commands.append(command)
         if isinstance(command, Slider):
             self.slider = command.fraction

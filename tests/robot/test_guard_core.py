@@ -104,8 +104,11 @@ def test_every_fault_of_the_skin_stops_and_latches(faults, words):
 def test_a_silent_controller_is_a_fault_and_every_way_is_tried():
     rig = Rig(speed=1.0).run(0.5)
     rig.mute_arm = True
-    rig.run(0.5)
-    assert [o for o in rig.arm.commands if isinstance(o, Way)] == [Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE]
+    rig.run(2.0)
+    ways = [o for o in rig.arm.commands if isinstance(o, Way)]
+    assert ways[:6] == [Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE] * 2  # and it is not given up
+    assert rig.names.count("escalated") == 3
+    assert [e.details["rounds"] for e in rig.events if e.name == "not_standing"] == [1, 2, 4, 8]
     assert isinstance(rig.arm.commands[1], Stop)
     assert rig.core.phase is Phase.STOPPING  # nobody has seen it stand, so nobody says so
     assert "has sent no state for 50 ms" in rig.event("stopping").details["why"]
@@ -131,7 +134,9 @@ def test_an_arm_that_nothing_stops_is_never_called_standing():
     rig.run(3.0)
     assert rig.core.phase is Phase.STOPPING
     assert "standstill" not in rig.names
-    assert [o for o in rig.arm.commands if isinstance(o, Way)] == [Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE]
+    ways = [o for o in rig.arm.commands if isinstance(o, Way)]
+    assert ways[:6] == [Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE] * 2
+    assert len(ways) > 30
 
 
 def test_a_dead_owner_is_not_waited_for():
@@ -179,13 +184,118 @@ def test_reset_needs_a_person_and_a_free_skin():
     rig.run(3.0)
     assert rig.core.phase is Phase.LATCHED  # free again, but nobody has reset it
     rig.feed(Kind.RESET)
-    assert rig.core.phase is Phase.STARTING
+    rig.run(0.09)
+    assert rig.core.phase is Phase.LATCHED  # until everything has been sound for a while
     rig.arm.target = None
     rig.run(0.3)
     assert rig.core.phase is Phase.ARMED
     assert rig.names.count("armed") == 2
     rig.feed(Kind.RESET)
     assert "nothing to reset" in rig.event("message").details["what"]
+
+
+def reset(*touches, **settings):
+    """A rig that has stopped for a touch at 0.5 s, and was reset at 1.5 s."""
+    rig = Rig(touch(0.5, 0.7), *touches, reaction=Reaction(kind="stop"), speed=1.0, **settings).run(1.5)
+    assert rig.core.phase is Phase.LATCHED
+    rig.feed(Kind.RESET)
+    return rig
+
+
+def test_a_touch_while_a_reset_settles_refuses_it():
+    rig = reset(touch(1.52, 1.8)).run(2.0)
+    assert rig.core.phase is Phase.LATCHED
+    assert any("it is touched" in reason for reason in rig.event("refused").details["reasons"])
+    assert rig.names.count("armed") == 1
+
+
+def test_a_fault_while_a_reset_settles_refuses_it_for_good():
+    rig = reset()
+    rig.run(0.02)
+    rig.mute_skin = True
+    rig.run(1.0)
+    assert any("no valid frame" in reason for reason in rig.event("refused").details["reasons"])
+    rig.mute_skin = False
+    rig.run(2.0)
+    assert rig.core.phase is Phase.LATCHED  # sound again, but nobody has reset it since
+
+
+def test_an_arm_that_moves_while_a_reset_settles_is_stopped():
+    rig = reset()
+    rig.run(0.02)
+    rig.arm.go([0.5, 0, 0, 0, 0, 0], 10.0)
+    rig.run(1.0)
+    assert rig.core.phase is Phase.LATCHED
+    assert "something has moved the arm" in rig.event("refused").details["reasons"][-1]
+    assert max(map(abs, rig.arm.qd)) < 0.01
+
+
+def test_a_fault_of_the_line_that_goes_on_is_reported_after_a_reset_again():
+    rig = reset()
+    rig.run(0.3)
+    assert rig.core.phase is Phase.ARMED
+    for number in (1, 2):
+        for _ in range(100):
+            rig.feed(Kind.SKIN, bytes(200))
+            rig.run(0.001)
+        assert rig.core.phase in (Phase.STOPPING, Phase.LATCHED)
+        assert sum("skipped" in str(event.details.get("what")) for event in rig.events) == number
+        rig.run(0.5)
+        rig.feed(Kind.RESET)
+
+
+def test_a_latched_arm_that_nobody_sees_is_stopped_until_it_is_seen_to_stand():
+    rig = Rig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
+    rig.mute_arm = True
+    rig.run(1.0)
+    assert rig.core.phase is Phase.STOPPING
+    assert rig.events[-1].name == "not_standing"
+    assert any("no state" in str(event.details.get("what")) for event in rig.events)
+    rig.mute_arm = False
+    rig.run(1.0)
+    assert rig.core.phase is Phase.LATCHED
+    assert [e.details["why"] for e in rig.events if e.name == "latched"][-1] == "touch; then the controller fell silent"
+
+
+@pytest.mark.parametrize(("speed", "touched"), [(0.03, False), (0.03, True), (0.3, False)])
+def test_a_latched_arm_does_not_creep(speed, touched):
+    again = (touch(1.5, 9.0),) if touched else ()
+    rig = Rig(touch(0.5, 0.7), *again, reaction=Reaction(kind="stop"), speed=1.0).run(1.6)
+    at = rig.arm.q[0]
+    rig.arm.go([speed, 0, 0, 0, 0, 0], 10.0)
+    rig.run(3.0)
+    assert abs(rig.arm.q[0] - at) < (0.001 if touched else 0.03)
+    assert rig.core.phase is Phase.LATCHED
+
+
+def test_an_arm_that_is_moved_again_and_again_gets_a_protective_stop():
+    rig = Rig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
+    for number in range(4):
+        assert Way.PROTECTIVE not in rig.arm.commands, number
+        rig.arm.go([0.5, 0, 0, 0, 0, 0], 10.0)
+        rig.run(0.5)
+        if rig.arm.safety_bits != 1:
+            break
+    assert number == 2
+    assert rig.core.phase is Phase.LATCHED
+
+
+def test_a_state_that_is_no_number_is_no_standstill():
+    rig = Rig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0, obeys=frozenset()).run(0.502)
+    rig.arm.qd[1] = math.nan
+    rig.run(1.0)
+    assert rig.core.phase is Phase.STOPPING
+    armed = Rig(speed=1.0).run(0.5)
+    armed.arm.q[3] = math.nan
+    armed.run(0.01)
+    assert "not finite" in armed.event("stopping").details["why"]
+
+
+def test_an_arm_without_power_is_a_fault():
+    rig = Rig(speed=1.0).run(0.5)
+    rig.arm.robot_mode = 3
+    rig.run(0.01)
+    assert "not powered" in rig.event("stopping").details["why"]
 
 
 def test_what_is_lost_stays_lost():

@@ -11,9 +11,10 @@ from coneskin.robot.owner_messages import Halt, Speed, Stop
 from coneskin.robot.phase import Phase
 from coneskin.robot.rules import Rule
 from coneskin.robot.slowing import Slider
-from coneskin.robot.stop_watch import Way
+from coneskin.robot.stop_watch import Use, Way
 from coneskin.robot.table import Table
 from coneskin.skin.recording import Block
+from coneskin.skin.scripted_touch import ScriptedTouch
 
 from .rig import LINK, MODEL, Rig, make_core, touch
 
@@ -166,7 +167,8 @@ def test_a_foreign_arm_is_stopped_by_script_and_follows():
     rig.run(2.0)
     kinds = [command if isinstance(command, Way) else type(command) for command in rig.arm.commands]
     assert kinds[:4] == [Way.SCRIPT, Steer, FollowerProgram, Steer]  # there are speeds before the program starts
-    assert kinds[-2:] == [Steer, Way.SCRIPT]
+    assert kinds[-3:] == [Steer, Way.SCRIPT, Steer]
+    assert rig.arm.commands[-1].token == 0  # the speeds count no more, even if the stop were lost
     # 0.5 mm left for braking; ``before`` is one cycle later at up to 0.3 m/s
     assert progress(before, rig.point(), normal) == pytest.approx(0.050, abs=0.002)
     assert rig.event("retreated").details["complete"] is True
@@ -218,9 +220,62 @@ def test_a_fault_ends_a_foreign_retreat():
     assert rig.core.phase is Phase.RETREATING
     rig.mute_skin = True
     rig.run(0.5)
-    assert rig.arm.commands[-1] is Way.SCRIPT
+    assert rig.arm.commands[-2] is Way.SCRIPT
     assert rig.core.phase is Phase.LATCHED
     assert max(map(abs, rig.arm.qd)) < 0.01
+
+
+def slow_first(kind="retreat", **settings):
+    """Slow, but retreat or comply where the touch is firm."""
+    harder = Rule(Reaction(kind=kind, **settings), level_above=0.5)
+    return {"reaction": Reaction(kind="slow", slow_to=0.2), "rules": (harder,)}
+
+
+@pytest.mark.parametrize("foreign", [False, True])
+@pytest.mark.parametrize("speed", [0.15, 1.0])
+def test_from_slow_to_retreat_the_slider_is_back_before_the_arm_moves_away(foreign, speed):
+    firm = ScriptedTouch(0.5, 1.5, 0.13, 1.57, rise=0.3, force=30.0)
+    rig = Rig(firm, foreign=foreign, speed=speed, **slow_first()).run(4.0)
+    order = [name for name in rig.names if name in ("slowing", "stopping", "standstill", "retreating", "latched")]
+    assert order == ["slowing", "stopping", "standstill", "retreating", "standstill", "latched"]
+    assert rig.event("retreated").details["complete"] is True
+    assert rig.arm.slider == 1.0
+    assert rig.event("retreated").time - rig.event("retreating").time < 1.0  # at its own speed, not at a fifth of it
+    assert "resumed" not in rig.names
+
+
+def test_a_second_touch_ends_a_retreat_that_began_slow():
+    firm = ScriptedTouch(0.5, 1.0, 0.13, 1.57, rise=0.3, force=30.0)
+    rig = Rig(firm, speed=1.0, sensors=2, **slow_first(distance=0.3, time_budget=10.0)).run(0.9)
+    assert rig.core.phase is Phase.RETREATING
+    rig.core._arm.touch(rig.now, LINK, 0.2, True, [])
+    assert rig.core.phase is Phase.HALTING
+
+
+def test_a_person_who_slows_the_arm_further_is_not_overruled():
+    rig = Rig(touch(0.5, 0.8), reaction=Reaction(kind="slow", slow_to=0.2), speed=1.0).run(0.7)
+    rig.arm.slider = 0.05
+    rig.run(2.0)
+    assert "resumed" in rig.names
+    assert rig.arm.slider == 0.05
+
+
+def test_a_rules_deceleration_is_that_of_the_stop_in_foreign_mode_too():
+    rule = Rule(Reaction(kind="stop", deceleration=20.0), speed_above=0.1)
+    rig = Rig(touch(0.5), reaction=Reaction(kind="stop", deceleration=1.0), rules=(rule,), foreign=True, speed=1.0)
+    rig.run(1.0)
+    assert [output for output in rig.outputs if isinstance(output, Use)] == [Use(Way.SCRIPT, 20.0)]
+
+
+@pytest.mark.parametrize("acceleration", [0.1, 4.0])
+def test_something_faster_than_it_was_told_is_not_waited_for(acceleration):
+    reaction = Reaction(acceleration=acceleration, time_budget=30.0)
+    rig = Rig(touch(0.5, 0.7), reaction=reaction, foreign=True, speed=1.0).run(0.75)
+    take = rig.arm.take
+    rig.arm.take = lambda command: None if isinstance(command, Steer) else take(command)
+    rig.arm.go([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 20.0)
+    rig.run(0.12)
+    assert "does not move as it is told" in rig.event("retreated").details["why"]
 
 
 @pytest.mark.parametrize(

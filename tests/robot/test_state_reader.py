@@ -42,7 +42,7 @@ def test_safety_bits_and_modes_mean_what_the_manual_says():
 
     assert state().speed == 3
     assert not state(bits=0b11).stopped_by_safety  # normal and reduced
-    assert [bit for bit in range(11) if state(bits=1 << bit).stopped_by_safety] == [2, 4, 5, 6, 7, 8, 9, 10]
+    assert [bit for bit in range(11) if state(bits=1 << bit).stopped_by_safety] == [*range(2, 11)]
     assert not state(mode=5).running
     assert state().playing
     assert not state(runtime=4).playing
