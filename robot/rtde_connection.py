@@ -17,6 +17,10 @@ from . import rtde_codec as rtde
 __all__ = ["PORT", "RtdeConnection"]
 
 PORT = 30004
+_CHECK = (
+    "check the address (arm.host), that the controller is on, that RTDE is enabled on it (Settings, Security, "
+    "Services), and that it is in remote control"
+)
 
 
 class RtdeConnection:
@@ -47,12 +51,12 @@ class RtdeConnection:
             raise self._silent() from exc
         except OSError as exc:
             raise RobotConnectionError(
-                f"cannot reach the controller {self.host}:{PORT}: {exc.strerror or exc}"
+                f"cannot reach the controller {self.host}:{PORT}: {exc.strerror or exc}; {_CHECK}"
             ) from exc
         self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if self._ask(rtde.pack_version_request(), rtde.PacketKind.PROTOCOL_VERSION) != b"\x01":
             self.close()
-            raise RobotConnectionError(f"{self.host} does not speak RTDE version {rtde.PROTOCOL_VERSION}")
+            raise RobotConnectionError(f"{self.host}:{PORT} does not speak RTDE version {rtde.PROTOCOL_VERSION}")
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -84,7 +88,7 @@ class RtdeConnection:
         """Let the data flow; from now on nothing waits."""
         if self._ask(rtde.pack_start_request(), rtde.PacketKind.START) != b"\x01":
             self.close()
-            raise RobotConnectionError(f"{self.host} does not start its RTDE output")
+            raise RobotConnectionError(f"{self.host}:{PORT} does not start its RTDE output")
         if self._sock is not None:
             self._sock.setblocking(False)
 
@@ -154,7 +158,10 @@ class RtdeConnection:
                     raise TimeoutError
                 data = self._sock.recv(1 << 16)
                 if not data:
-                    raise RobotConnectionError(f"the controller {self.host} has closed the connection during set-up")
+                    raise RobotConnectionError(
+                        f"the controller {self.host}:{PORT} has closed the connection during set-up, so perhaps "
+                        f"something else answers there; {_CHECK}"
+                    )
                 packets, self._rest = rtde.split(self._rest + data)
                 for packet in packets:
                     if packet.kind is kind and reply is None:
@@ -168,10 +175,10 @@ class RtdeConnection:
             self.close()
             if isinstance(exc, RobotConnectionError):
                 raise
-            raise RobotConnectionError(f"the controller {self.host}:{PORT} is gone: {exc.strerror or exc}") from exc
+            raise RobotConnectionError(
+                f"the controller {self.host}:{PORT} is gone: {exc.strerror or exc}; {_CHECK}"
+            ) from exc
         return reply
 
     def _silent(self) -> RobotTimeout:
-        return RobotTimeout(
-            f"no answer from the controller {self.host}:{PORT} within {self._timeout:g} s: is it on, and RTDE enabled?"
-        )
+        return RobotTimeout(f"no answer from the controller {self.host}:{PORT} within {self._timeout:g} s; {_CHECK}")

@@ -16,7 +16,7 @@ from coneskin.errors import ConeSkinError, RobotRefused
 from .sim_controller import Controller
 from .sim_options import START_Q, Options, Version
 from .sim_server import PORTS, Server
-from .ur_models import MODEL_NAMES
+from .ur_models import MODEL_NAMES, model
 
 __all__ = ["EXAMPLE", "add_arguments", "main", "run"]
 
@@ -82,7 +82,7 @@ def _serve(args: argparse.Namespace) -> int:
     options = Options(
         model=args.model,
         version=_version(args.version),
-        start_q=[math.radians(q) for q in args.start_q_deg],
+        start_q=_start_q(args.model, args.start_q_deg),
         quirks=args.quirks,
         wrong_size=args.wrong_size,
         start_delay=args.start_delay_ms / 1000.0,
@@ -128,6 +128,19 @@ def _announce(args: argparse.Namespace, controller: Controller, server: Server) 
             f"dashboard {PORTS['dashboard']}, scripts {PORTS['primary']}-{PORTS['realtime']}; Ctrl-C stops it",
             flush=True,
         )
+
+
+def _start_q(name: str, degrees: Sequence[float]) -> list[float]:
+    """Joint positions [rad], within the limits of the arm."""
+    arm = model(name)
+    start = [math.radians(q) for q in degrees]
+    for joint, (low, q, high) in enumerate(zip(arm.joint_lower, start, arm.joint_upper, strict=True), 1):
+        if not low <= q <= high:
+            raise RobotRefused(
+                f"--start-q-deg: joint {joint} of the {arm.name} must be from {math.degrees(low):g} to "
+                f"{math.degrees(high):g} deg, got {math.degrees(q):g} deg"
+            )
+    return start
 
 
 def _version(text: str) -> Version:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import os
 import sys
@@ -46,6 +47,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             module = importlib.import_module(module_name)
             module.add_arguments(child)
             run = module.run
+    if not words:
+        parser.print_help(sys.stderr)
+        return 2
+    if chosen is not None and run is None and chosen == words[0]:
+        near = difflib.get_close_matches(chosen, COMMANDS, 1, 0.5)
+        parser.error(
+            f"there is no command {chosen}; "
+            + (f"did you mean {near[0]}?" if near else f"there are {', '.join(COMMANDS)}")
+        )
     args = parser.parse_args(words)
     assert run is not None  # argparse has ended the program otherwise
     try:

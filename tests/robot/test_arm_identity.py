@@ -1,10 +1,12 @@
 """Whether the arm is the scene's: every model of the family is told from the others, with and without a tool."""
 
 import math
+import socket
+import threading
 
 import pytest
 
-from coneskin.errors import RobotRefused
+from coneskin.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.arm_identity import ArmPose, check_identity, flange_distance, read_pose
 from coneskin.robot.kinematics import forward
 from coneskin.robot.sim_process import SimulatedController, free_host
@@ -41,6 +43,20 @@ def test_a_model_is_itself_and_no_other(name):
                 continue  # the two cannot be told apart at this pose, and then points are as close
             with pytest.raises(RobotRefused, match=rf"is no {model(other).name}: .*correct arm.model"):
                 check_identity(model(other), pose, "host")
+
+
+@pytest.mark.parametrize("listens", [False, True])
+def test_where_no_controller_answers_the_message_says_what_to_check(listens):
+    """Nobody, or something that is no controller, as a proxy is."""
+    host = free_host()
+    with socket.socket() as sock:
+        sock.bind((host, 30004))
+        if listens:
+            sock.listen()
+            threading.Thread(target=lambda: sock.accept()[0].close(), daemon=True).start()
+        words = rf"{host}:30004.*check the address \(arm.host\).*is on.*RTDE is enabled.*remote control"
+        with pytest.raises(RobotConnectionError, match=words):
+            read_pose(host)
 
 
 def test_an_unknown_arm_fits_no_model():

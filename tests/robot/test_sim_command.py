@@ -117,7 +117,14 @@ def test_a_taken_port_is_one_line_that_names_it() -> None:
     [
         (["--model", "ur99"], "arm must be one of"),
         (["--version", "five"], "--version must be MAJOR.MINOR such as 5.25, got 'five'"),
-        (["--start-q-deg", "0", "0", "200", "0", "0", "0"], "start position of joint 3 must be in"),
+        (
+            ["--start-q-deg", "0", "0", "200", "0", "0", "0"],
+            "--start-q-deg: joint 3 of the UR10e must be from -180 to 180 deg, got 200 deg",
+        ),
+        (
+            ["--start-q-deg", "0", "nan", "0", "0", "0", "0"],
+            "joint 2 of the UR10e must be from -360 to 360 deg, got nan",
+        ),
         (["--log", "/nowhere/at/all"], "--log /nowhere/at/all cannot be written"),
         (["--program", "/nowhere/at/all"], "--program /nowhere/at/all cannot be read"),
         (["--host", "not a host"], "cannot listen on not a host"),

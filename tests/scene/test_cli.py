@@ -73,6 +73,22 @@ def test_wrong_words_end_with_2_and_the_usage(words: tuple[str, ...], capsys: Ou
     assert capsys.readouterr().err.startswith("usage: coneskin")
 
 
+@pytest.mark.parametrize(
+    ("word", "near"), [("unrol", "unroll"), ("simur", "sim-ur"), ("gaurd", "guard"), ("designs", "design")]
+)
+def test_a_command_with_a_slip_is_named(word: str, near: str, capsys: Output) -> None:
+    assert run(word, "--radius1-mm", "40") == 2
+    assert capsys.readouterr().err.endswith(f"there is no command {word}; did you mean {near}?\n")
+
+
+@pytest.mark.parametrize("words", [(), ("xyz",)])
+def test_without_a_command_all_are_named(words: tuple[str, ...], capsys: Output) -> None:
+    assert run(*words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert all(command in err for command in COMMANDS)
+
+
 UNROLL = ("unroll", "--radius1-mm", 40, "--radius2-mm", 70, "--height-mm", 150)
 
 
