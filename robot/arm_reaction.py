@@ -107,7 +107,7 @@ class ArmReaction:
         self._may_move, self._why = False, ""
         self._latch: Latch | None = None
         self._restarts = 0  # since it was armed
-        self._slider_before: tuple[float, float] | None = None  # when it was put back to where
+        self._slowed: tuple[float, Slowing] | None = None  # until when the arm was slow last
 
     @property
     def needs_slider(self) -> bool:
@@ -243,11 +243,11 @@ class ArmReaction:
         slowing, self._slowing = self._slowing, None
         if slowing is not None and slowing.put_back(self.slider):
             out.append(Slider(slowing.before))
-            self.slider, self._slider_before = slowing.before, (now, slowing.before)
+            self.slider, self._slowed = slowing.before, (now, slowing)
 
     def _slow(self, now: float, reaction: Reaction, slider: float, out: Outputs) -> None:
-        if self._slider_before is not None and now - self._slider_before[0] < HOLD:
-            slider = self._slider_before[1]  # what is read may be older than what was set
+        if self._slowed is not None and now - self._slowed[0] < HOLD:  # slider and speed may not yet be as before
+            slider, self._touch_speed = self._slowed[1].before, max(self._touch_speed, self._slowed[1].top)
         budget = self._touch_speed / reaction.deceleration + _SLACK * self._watch.escalate
         slowing = Slowing(now, self._touch_speed, slider, reaction.slow_to, budget, reaction.time_budget)
         out.append(Slider(slowing.fraction))

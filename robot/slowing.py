@@ -39,12 +39,17 @@ class Slowing:
         fraction: where it is to be.
         budget: within which the arm must be slower [s].
         longest: that the touch may last [s].
+
+    Attributes:
+        before: where the slider was.
+        fraction: where it is to be.
+        top: largest speed of the leading joint around the touch [rad/s].
     """
 
     def __init__(self, now: float, speed: float, before: float, fraction: float, budget: float, longest: float) -> None:
         self.before = before
         self.fraction = min(before, fraction)
-        self._top = speed
+        self.top = speed
         self._deadline = now + budget
         self._end = now + longest
         self._free_since: float | None = None
@@ -53,8 +58,8 @@ class Slowing:
     def sample(self, time: float, speed: float) -> None:
         """Take the measured speed of the leading joint at a time [s, rad/s]."""
         if time < self._deadline:
-            self._top = max(self._top, speed)  # it may still have been speeding up
-        self._fast = self._fast + 1 if speed > max(_PART * self._top, SLOW_ENOUGH) else 0
+            self.top = max(self.top, speed)  # it may still have been speeding up
+        self._fast = self._fast + 1 if speed > max(_PART * self.top, SLOW_ENOUGH) else 0
 
     def touched(self, now: float, touched: bool) -> None:
         """Say whether anything touches."""

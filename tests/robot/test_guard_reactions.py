@@ -260,6 +260,17 @@ def test_a_person_who_slows_the_arm_further_is_not_overruled():
     assert rig.arm.slider == 0.05
 
 
+@pytest.mark.parametrize("later", [0.001, 0.006, 0.02, 0.1])
+def test_touched_again_as_it_goes_on_it_is_slow_again(later):
+    first = Rig(touch(0.5, 1.0), reaction=Reaction(kind="slow", slow_to=0.2), speed=2.0).run(2.0)
+    resumed = round(first.event("resumed").time - 100.0, 3)
+    again = touch(resumed + later, resumed + 0.5)
+    rig = Rig(touch(0.5, 1.0), again, reaction=Reaction(kind="slow", slow_to=0.2), speed=2.0).run(4.0)
+    assert "stopping" not in rig.names
+    assert rig.names.count("resumed") == 2
+    assert rig.arm.slider == 1.0
+
+
 def test_a_rules_deceleration_is_that_of_the_stop_in_foreign_mode_too():
     rule = Rule(Reaction(kind="stop", deceleration=20.0), speed_above=0.1)
     rig = Rig(touch(0.5), reaction=Reaction(kind="stop", deceleration=1.0), rules=(rule,), foreign=True, speed=1.0)

@@ -337,6 +337,36 @@ def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on():
         channel.close()
 
 
+def test_a_sign_of_life_is_no_new_speed():
+    now = [10.0]
+    made = arm()
+    (guard, guard_end), (program, program_end) = ((Channel(s) for s in pair()) for _ in range(2))
+    served = Owner(made, guard_end, program_end, lambda: now[0])
+    for message in (Clear(), Stop(10.0), Speed((0.1,) * 6, 4.0)):
+        guard.send(message.encode())
+    served.step(0.0)
+    before = len(stops(made._control))
+    for _ in range(4):
+        now[0] += 0.03
+        guard.send(Alive().encode())
+        served.step(0.0)
+    assert stops(made._control)[before:] == ["speedStop"]
+    for channel in (guard, guard_end, program, program_end):
+        channel.close()
+
+
+def test_speeds_that_waited_are_overtaken_by_what_came_later(owner):
+    served, made, guard, _ = owner
+    for message in (Clear(), Stop(10.0), *[Speed((0.1 * k,) * 6, 4.0) for k in range(9)], Alive()):
+        guard.send(message.encode())
+    served.step(0.0)
+    assert [call[1] for call in made._control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
+    for message in (*[Speed((0.1 * k,) * 6, 4.0) for k in range(9)], Halt(10.0)):
+        guard.send(message.encode())
+    served.step(0.0)
+    assert [call[0] for call in made._control.calls if call[0].startswith("speed")] == ["speedJ", "speedStop"]
+
+
 def test_it_leaves_when_told_and_arms_its_own_end_first(owner):
     served, made, guard, program = owner
     order = []
