@@ -85,7 +85,7 @@ class FakeWheel:
 
     def speedJ(self, qd, a, t):
         assert t == 0.002  # a new target in the next cycle
-        return self._note("speedJ", a)
+        return self._note("speedJ", a, qd[0])
 
     def servoJ(self, q, *rest):
         return self._note("servoJ")
@@ -360,7 +360,7 @@ def test_speeds_that_waited_are_overtaken_by_what_came_later(owner):
     for message in (Clear(), Stop(10.0), *[Speed((0.1 * k,) * 6, 4.0) for k in range(9)], Alive()):
         guard.send(message.encode())
     served.step(0.0)
-    assert [call[1] for call in made._control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
+    assert [call[2] for call in made._control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
     for message in (*[Speed((0.1 * k,) * 6, 4.0) for k in range(9)], Halt(10.0)):
         guard.send(message.encode())
     served.step(0.0)
