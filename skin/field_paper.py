@@ -19,11 +19,28 @@ from .field_fourport import angular_phase, radial_phase
 from .field_model import FieldModel
 from .field_sheet import SectorSheet
 
-__all__ = ["ErrorMap", "Row", "decode_errors", "error_map", "influence_of_area", "paper_model", "rows"]
+__all__ = [
+    "FIGURES",
+    "ErrorMap",
+    "Row",
+    "decode_errors",
+    "error_map",
+    "influence_of_area",
+    "largest_errors",
+    "paper_model",
+    "rows",
+]
 
 Floats = NDArray[np.float64]
 
 _GRID = "depends on the grid of places, which is unpublished"
+
+#: Figures 11 and 12, a and b: radius of the contacts [mm], the largest errors in the paper [mm] and [deg], and two areas
+#: that its grid may have had, by their distance from the edges [mm] and [deg].
+FIGURES = (
+    ("a", 1.0, 0.06, 0.018, ((10.0, 5.0), (2.0, 2.0))),
+    ("b", 15.0, 3.5, 1.9, ((20.0, 15.0), (15.0, 10.0))),
+)
 
 #: Paper, Table 2: (r [mm], theta [deg]) applied, error (mm, deg); contact radius 9.5 mm.
 TABLE_2 = (
@@ -112,26 +129,26 @@ def influence_of_area(model: FieldModel, radii_mm: Floats, r_mm: float, theta_de
     return np.array([float(e[0][0]) * 1e3 for e in errors]), np.array([math.degrees(float(e[1][0])) for e in errors])
 
 
+def largest_errors(
+    model: FieldModel, radius_mm: float, margin_mm: float, margin_deg: float
+) -> tuple[float, float, float]:
+    """Largest error of r [mm] and of theta [deg] so far from the edges, and the part of the r errors below zero."""
+    grid = error_map(
+        model,
+        radius_mm,
+        np.linspace(100.0 + margin_mm, 200.0 - margin_mm, 41),
+        np.linspace(margin_deg, 90.0 - margin_deg, 41),
+    )
+    smaller = float((grid.r_error_mm < 0.0).mean())
+    return float(np.nanmax(np.abs(grid.r_error_mm))), float(np.nanmax(np.abs(grid.theta_error_deg))), smaller
+
+
 def rows(model: FieldModel) -> list[Row]:
     """The paper's numbers beside ours, for its inferred geometry (r from 100 to 200 mm, 90 deg)."""
-
-    def largest(radius_mm: float, margin_mm: float, margin_deg: float) -> tuple[float, float, float]:
-        grid = error_map(
-            model,
-            radius_mm,
-            np.linspace(100.0 + margin_mm, 200.0 - margin_mm, 41),
-            np.linspace(margin_deg, 90.0 - margin_deg, 41),
-        )
-        smaller = float((grid.r_error_mm < 0.0).mean())
-        return float(np.nanmax(np.abs(grid.r_error_mm))), float(np.nanmax(np.abs(grid.theta_error_deg))), smaller
-
     out = []
-    for letter, radius, paper_r, paper_t, grids in (
-        ("a", 1.0, 0.06, 0.018, ((10.0, 5.0), (2.0, 2.0))),
-        ("b", 15.0, 3.5, 1.9, ((20.0, 15.0), (15.0, 10.0))),
-    ):
-        for margin_mm, margin_deg in grids:
-            r_error, t_error, smaller = largest(radius, margin_mm, margin_deg)
+    for letter, radius, paper_r, paper_t, areas in FIGURES:
+        for margin_mm, margin_deg in areas:
+            r_error, t_error, smaller = largest_errors(model, radius, margin_mm, margin_deg)
             at = f"radius {radius:g} mm, {margin_mm:g} mm and {margin_deg:g} deg from the edges"
             out.append(Row(f"fig. 11{letter}: largest r error, {at}", paper_r, r_error, "mm", _GRID))
             out.append(Row(f"fig. 12{letter}: largest theta error, {at}", paper_t, t_error, "deg", _GRID))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,25 @@ from .field_map import FieldMap
 from .field_paper import ErrorMap
 from .field_sheet import SectorSheet
 
-__all__ = ["draw_curves", "draw_error", "draw_potential"]
+__all__ = ["Area", "draw_curves", "draw_error", "draw_potential"]
 
 Floats = NDArray[np.float64]
+
+
+class Area(NamedTuple):
+    """A part of a sheet in an error map.
+
+    Attributes:
+        label: what it is.
+        margin_mm: its distance from the arcs [mm].
+        margin_deg: its distance from the straight edges [deg].
+        largest: error in it, in the unit of the map.
+    """
+
+    label: str
+    margin_mm: float
+    margin_deg: float
+    largest: float
 
 
 def _figure(width: float, height: float) -> tuple[Any, Any]:
@@ -141,8 +157,29 @@ def _cell_edges(middles: Floats) -> Floats:
     return np.concatenate([middles[:1], 0.5 * (middles[1:] + middles[:-1]), middles[-1:]])
 
 
-def draw_error(path: Path, model_sheet: SectorSheet, grid: ErrorMap, radial: bool, title: str) -> None:
+def _frame(sheet: SectorSheet, area: Area) -> tuple[Floats, Floats]:
+    """The line around an area, in flat coordinates [mm]."""
+    r = np.array([float(sheet.polar(u, 0.0)[0]) * 1e3 for u in (0.0, sheet.width)])
+    inner, outer = float(r.min()) + area.margin_mm, float(r.max()) - area.margin_mm
+    start, end = math.radians(area.margin_deg), sheet.angle - math.radians(area.margin_deg)
+    along = np.linspace(start, end, 100)
+    theta = np.concatenate([along, along[::-1], along[:1]])
+    radius = np.concatenate([np.full(100, inner), np.full(100, outer), [inner]])
+    return radius * np.cos(theta), radius * np.sin(theta)
+
+
+def draw_error(
+    path: Path, model_sheet: SectorSheet, grid: ErrorMap, radial: bool, title: str, areas: Sequence[Area] = ()
+) -> None:
     """An error map on the sector; blank where the disc would not fit.
+
+    Args:
+        path: of the PNG.
+        model_sheet: the sheet.
+        grid: what to draw.
+        radial: the error of r; otherwise that of theta.
+        title: of the picture; the largest error that is drawn is put after it.
+        areas: parts of the sheet to frame.
 
     Raises:
         MissingExtra: matplotlib is not installed.
@@ -156,31 +193,41 @@ def draw_error(path: Path, model_sheet: SectorSheet, grid: ErrorMap, radial: boo
     label = "decoded minus true " + ("r [mm]" if radial else "theta [deg]")
     figure.colorbar(picture, ax=axes, label=label, shrink=0.85)
     _outline(axes, model_sheet, {})
-    axes.set_title(f"{title}\nlargest {limit:.3g} {'mm' if radial else 'deg'}", fontsize=10)
+    unit = "mm" if radial else "deg"
+    for area, style in zip(areas, ("-", "--", ":"), strict=False):
+        frame = _frame(model_sheet, area)
+        axes.plot(*frame, style, color="black", lw=1.0, label=f"{area.label}: largest {area.largest:.4f} {unit}")
+    if areas:
+        figure.legend(loc="outside lower center", fontsize=8, frameon=False)
+    axes.set_title(f"{title}: largest {limit:.3g} {unit}", fontsize=10)
     figure.savefig(path, dpi=130)
 
 
 def draw_curves(
-    path: Path, x: Floats, curves: Sequence[tuple[str, Floats, str]], labels: tuple[str, str], title: str
+    path: Path, x: Floats, panels: Sequence[Sequence[tuple[str, Floats, str]]], labels: tuple[str, str], title: str
 ) -> None:
     """Curves over one axis.
 
     Args:
         path: of the PNG.
         x: abscissa.
-        curves: (label, ordinate, matplotlib format).
+        panels: one above the other, each with a scale of its own; their curves as (label, ordinate, matplotlib format).
         labels: of the axes.
         title: of the picture.
 
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    figure, axes = _figure(5.6, 4.0)
-    for label, y, style in curves:
-        axes.plot(x, y, style, label=label, lw=1.4)
+    figure, axes = _figure(5.6, 4.0 if len(panels) == 1 else 2.7 * len(panels))
+    axes.remove()
+    for number, curves in enumerate(panels):
+        axes = figure.add_subplot(len(panels), 1, number + 1)
+        for label, y, style in curves:
+            axes.plot(x, y, style, label=label, lw=1.4)
+        axes.set_ylabel(labels[1])
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8)
+        if number == 0:
+            axes.set_title(title, fontsize=10)
     axes.set_xlabel(labels[0])
-    axes.set_ylabel(labels[1])
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
-    axes.set_title(title, fontsize=10)
     figure.savefig(path, dpi=130)

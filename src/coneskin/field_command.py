@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import math
 import sys
@@ -16,13 +17,13 @@ from .skin.field_fourport import angular_phase, radial_phase
 from .skin.field_law import area_error
 from .skin.field_map import FieldMap
 from .skin.field_model import FieldModel
-from .skin.field_paper import Row, error_map, influence_of_area, paper_model, rows
+from .skin.field_paper import FIGURES, Row, error_map, influence_of_area, largest_errors, paper_model, rows
 
 __all__ = ["add_arguments", "run"]
 
 _EPILOG = """\
 example:
-  coneskin field -o figures            figures 4, 6, 9, 10, 11a-c, 12a-c of the paper and the table
+  coneskin field -o figures            figures 4, 6, 9, 10, 11a-c, 12a-c of the paper, and the table (table.csv)
   coneskin field --json --no-pictures  the table for a program
 
 The paper does not give its sector; r1 = 100 mm, r2 = 200 mm, 90 deg are inferred from its figures. The sheets are
@@ -35,24 +36,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = "Solve the paper's sensor exactly: potential maps, error maps, and a table beside its numbers."
     parser.epilog = _EPILOG
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("-o", "--output", type=Path, default=Path("field"), metavar="DIR", help="for the pictures")
-    parser.add_argument("--no-pictures", action="store_true", help="only the table")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("field"), metavar="DIR", help="for pictures and table (default field)"
+    )
+    parser.add_argument("--no-pictures", action="store_true", help="only print the table")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
     parser.add_argument("--ratio", type=float, default=1.0, help="lower over upper sheet resistance (default 1)")
     parser.add_argument("--grid", type=int, default=61, help="points along each side of an error map (default 61)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0, or 2 for a user's mistake."""
-    try:
-        if args.grid < 2:
-            raise FieldError(f"--grid must be at least 2, got {args.grid}")
-        model = paper_model(ratio=args.ratio)
+    """Run the command; 0.
+
+    Raises:
+        FieldError: a value that cannot be, or a folder that cannot be made.
+        MissingExtra: matplotlib is not installed.
+    """
+    if args.grid < 2:
+        raise FieldError(f"--grid must be at least 2, got {args.grid}")
+    model = paper_model(ratio=args.ratio)
+    pictures: list[Path] = []
+    if args.no_pictures:
         table = rows(model)
-        pictures = [] if args.no_pictures else _draw(model, args.output, args.grid, quiet=args.json)
-    except (FieldError, ImportError, OSError) as error:
-        print(f"coneskin field: {error}", file=sys.stderr)
-        return 2
+    else:
+        _make(args.output)
+        table = rows(model)
+        _write_table(args.output / "table.csv", table)
+        pictures = _draw(model, args.output, args.grid, quiet=args.json)
     if args.json:
         listed = [
             {
@@ -71,6 +81,22 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as exc:
+        raise FieldError(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
+
+
+def _write_table(path: Path, table: list[Row]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["what", "paper", "ours", "unit", "verdict"])
+        for row in table:
+            paper = "" if math.isnan(row.paper) else row.paper
+            writer.writerow([row.what, paper, round(row.ours, 9) + 0.0, row.unit, row.verdict])
+
+
 def _print_table(table: list[Row], ratio: float) -> None:
     print("Inferred, not given by the paper: r1 = 100 mm, r2 = 200 mm, theta0 = 90 deg,", end=" ")
     print(f"sheets {ratio:g} : 1, perfect bond.")
@@ -84,9 +110,8 @@ def _print_table(table: list[Row], ratio: float) -> None:
 
 
 def _draw(model: FieldModel, folder: Path, points: int, quiet: bool) -> list[Path]:
-    from .skin.field_picture import draw_curves, draw_error, draw_potential
+    from .skin.field_picture import Area, draw_curves, draw_error, draw_potential
 
-    folder.mkdir(parents=True, exist_ok=True)
     made: list[Path] = []
 
     def at(name: str) -> Path:
@@ -105,14 +130,21 @@ def _draw(model: FieldModel, folder: Path, points: int, quiet: bool) -> list[Pat
             at(angular_name), angular, False, f"lower sheet, C at {live}, D at 0", {"C": "C", "D": "D"}, filled
         )
     started, count = time.perf_counter(), 0
-    for letter, radius in (("a", 1.0), ("b", 15.0)):
+    for letter, radius, _, _, margins in FIGURES:
         margin = 2.0 if radius == 1.0 else radius
         grid = error_map(
             model, radius, np.linspace(100.0 + margin, 200.0 - margin, points), np.linspace(1.0, 89.0, points)
         )
         count += int(np.isfinite(grid.r_error_mm).sum())
-        draw_error(at(f"fig11{letter}"), model.sheet, grid, True, f"error of r, contact radius {radius:g} mm")
-        draw_error(at(f"fig12{letter}"), model.sheet, grid, False, f"error of theta, contact radius {radius:g} mm")
+        found = [(item, largest_errors(model, radius, *item)) for item in margins]
+        for which, name, symbol in ((0, f"fig11{letter}", "r"), (1, f"fig12{letter}", "theta")):
+            areas = [
+                Area(f"{mm:g} mm, {deg:g} deg from the edges", mm, deg, error[which]) for (mm, deg), error in found
+            ]
+            title = (
+                f"error of {symbol}, contact radius {radius:g} mm\nall that is drawn, to {margin:g} mm from the edges"
+            )
+            draw_error(at(name), model.sheet, grid, which == 0, title, areas)
     if not quiet:
         print(f"{count} contacts solved and drawn in {time.perf_counter() - started:.2f} s", file=sys.stderr)
     radii = np.linspace(0.5, 20.0, 40)
@@ -121,13 +153,13 @@ def _draw(model: FieldModel, folder: Path, points: int, quiet: bool) -> list[Pat
     law = area_error(model, np.full(40, float(u)), np.full(40, float(phi)), radii * 1e-3)
     label = ("contact radius [mm]", "error of r [mm]")
     curves = [("exact", r_error, "-"), ("law: -a^2/(2r)", law[0] * 1e3, "--")]
-    draw_curves(at("fig11c"), radii, curves, label, "influence of the contact area at (150 mm, 45 deg)")
+    draw_curves(at("fig11c"), radii, [curves], label, "influence of the contact area at (150 mm, 45 deg)")
     _, off_theta = influence_of_area(model, radii, 150.0, 30.0)
-    curves = [
-        ("at (150 mm, 45 deg)", theta_error, "-"),
-        ("at (150 mm, 30 deg), for comparison", off_theta, "--"),
-        ("paper: within 0.0014 deg", np.full(40, 0.0014), ":"),
+    middle = [
+        ("at (150 mm, 45 deg): zero by symmetry", theta_error, "-"),
+        ("paper: within 0.0014 deg", np.full(40, 0.0014), "k:"),
     ]
+    beside = [("at (150 mm, 30 deg), for comparison", off_theta, "--")]
     label = ("contact radius [mm]", "error of theta [deg]")
-    draw_curves(at("fig12c"), radii, curves, label, "influence of the contact area")
+    draw_curves(at("fig12c"), radii, [middle, beside], label, "influence of the contact area")
     return made

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import math
 import sys
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from coneskin import field_command
+from coneskin.cli import main
 from coneskin.skin.field_paper import error_map, influence_of_area, paper_model, rows
 
 
@@ -53,19 +55,52 @@ def test_command_draws_every_figure(tmp_path, capsys: pytest.CaptureFixture[str]
     pytest.importorskip("matplotlib")
     assert field_command.run(arguments("-o", str(tmp_path / "new"), "--grid", "5")) == 0
     names = sorted(p.name for p in (tmp_path / "new").iterdir())
-    assert names == [f"fig{n}.png" for n in ("04", "06", "09", "10", "11a", "11b", "11c", "12a", "12b", "12c")]
+    figures = [f"fig{n}.png" for n in ("04", "06", "09", "10", "11a", "11b", "11c", "12a", "12b", "12c")]
+    assert names == [*figures, "table.csv"]
+    with (tmp_path / "new" / "table.csv").open(newline="") as file:
+        table = {row["what"]: row for row in csv.DictReader(file)}
+    assert [(row.what, row.verdict) for row in rows(paper_model())] == [(w, r["verdict"]) for w, r in table.items()]
+    (line,) = [row for what, row in table.items() if what.startswith("fig. 11b") and "15 mm and 10 deg" in what]
+    assert (line["paper"], line["unit"], round(float(line["ours"]), 4)) == ("3.5", "mm", 3.0051)
     out = capsys.readouterr()
     assert "Inferred, not given by the paper" in out.out
     assert "drawing" in out.err
 
 
+def test_each_error_map_frames_the_areas_of_the_table(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The picture reaches closer to the edges than the table, so it says both: its own largest error and theirs."""
+    figure_module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
+    figures = {}
+    monkeypatch.setattr(figure_module.Figure, "savefig", lambda self, path, **_: figures.update({path.stem: self}))
+    assert field_command.run(arguments("-o", str(tmp_path), "--grid", "5")) == 0
+    for row in (row for row in rows(paper_model()) if " error, radius " in row.what):
+        figure = figures[row.what[:8].replace(". ", "")]
+        margins = row.what.rsplit(", ", 1)[1].replace(" and ", ", ")
+        lines = {line.get_label(): line for line in figure.axes[0].lines}
+        line = lines[f"{margins}: largest {row.ours:.4f} {row.unit}"]
+        radius = np.hypot(*line.get_data())
+        assert [radius.min(), radius.max()] == pytest.approx(
+            [100 + float(margins.split()[0]), 200 - float(margins.split()[0])]
+        )
+        assert row.what.split(": ")[1].startswith(f"largest {'r' if row.unit == 'mm' else 'theta'} error")
+    middle, beside = figures["fig12c"].axes
+    assert np.ptp(middle.get_ylim()) < 0.01 < np.ptp(beside.get_ylim())  # deg: the zero and the paper's 0.0014 apart
+
+
 def test_command_names_a_mistake_without_a_traceback(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path
 ) -> None:
-    assert field_command.run(arguments("--ratio", "-1", "--no-pictures")) == 2
-    assert "lower_resistance must be positive" in capsys.readouterr().err
-    assert field_command.run(arguments("--grid", "1", "--no-pictures")) == 2
-    assert "--grid must be at least 2" in capsys.readouterr().err
+    (tmp_path / "file").touch()
+    for words, message in (
+        (("--ratio", "-1", "--no-pictures"), "lower_resistance must be positive"),
+        (("--grid", "1", "--no-pictures"), "--grid must be at least 2"),
+        (
+            ("-o", str(tmp_path / "file" / "x")),
+            f"cannot make the folder {tmp_path}/file/x: Not a directory; name another",
+        ),
+    ):
+        assert main(["field", *words]) == 1
+        assert message in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    assert field_command.run(arguments("-o", str(tmp_path))) == 2
+    assert main(["field", "-o", str(tmp_path)]) == 1
     assert "pip install 'coneskin[pictures]'" in capsys.readouterr().err
