@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from coneskin.errors import RecordingError
 from coneskin.skin.recording import Block
 
-__all__ = ["INPUTS", "GuardEvent", "Kind", "decode_event"]
+__all__ = ["ABOUT", "INPUTS", "GuardEvent", "Kind", "decode_event"]
 
 
 class Kind(IntEnum):
@@ -34,13 +34,18 @@ class Kind(IntEnum):
 INPUTS = frozenset({Kind.SKIN, Kind.ARM, Kind.TICK, Kind.OWNER, Kind.RESET, Kind.LOST, Kind.SLIDER})
 
 
+#: events about the guard, not by it, so that a replay does not make them: it died, hangs, is heard again; the arm was
+#: kept standing without it; blocks are missing
+ABOUT = frozenset({"died", "hung", "heard", "kept", "missing"})
+
+
 class GuardEvent(NamedTuple):
     """Something that a person, or a test, wants to know about.
 
     Attributes:
         name: "waiting", "armed", "contact", "contact_placed", "touch_ended", "fault", "stopping", "slower",
             "standstill", "escalated", "retreating", "clipped", "retreated", "slowing",
-            "resumed", "latched", "refused", "reset", "message", "ending", "died".
+            "resumed", "latched", "refused", "reset", "message", "ending"; and those of ``ABOUT``.
         time: host clock [s].
         details: numbers and words that belong to it; SI and radians.
     """

@@ -1,8 +1,8 @@
 """Stops the arm when the guard is gone, where no owner of ur_rtde is there to do so: a process of its own.
 
 Its sockets are open before they are needed, and it imports nothing that can block. It acts when the guard's channel
-ends without a farewell, brings no sign of life, or asks for a stop because its own sockets are gone; then it stops the
-arm by one way after the other, until it stands.
+ends without a farewell, brings no sign of life, or asks for a stop because its own sockets are gone. From then on it
+keeps the arm standing, until the guard lives again or the guarded program has left.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from .foreign import ForeignStops
 from .owner_messages import SILENCE, Farewell, Note, Stop, decode_command, decode_json
 from .state_reader import StateReader
 from .stopper import Stopper
+from .vigil import Vigil
 from .watch import Watch
 
 __all__ = ["Keeper", "main"]
@@ -31,15 +32,20 @@ class Keeper:
 
     Args:
         guard: the guard's channel.
-        stopper: of the arm.
+        session: the guarded program's channel, which ends when the program leaves.
+        vigil: over the arm.
         clock: monotonic seconds.
     """
 
-    def __init__(self, guard: Channel, stopper: Stopper, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, guard: Channel, session: Channel, vigil: Vigil, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._guard = guard
-        self._stopper = stopper
+        self._session = session
+        self._vigil = vigil
         self._clock = clock
         self._heard: float | None = None  # None until the guard's first sign of life
+        self._alone = False  # the guard is gone, or hangs
 
     def run(self) -> None:
         """Serve until the guard has left and the arm stands."""
@@ -48,27 +54,33 @@ class Keeper:
 
     def step(self, timeout: float) -> bool:
         """Wait for messages [s] and serve them; False once there is nothing left to do."""
-        inputs: list[Channel | StateReader] = [self._guard]
-        if (reader := self._stopper.reader) is not None:
+        inputs: list[Channel | StateReader] = [one for one in (self._guard, self._session) if not one.closed]
+        if (reader := self._vigil.reader) is not None:
             inputs.append(reader)
         select.select(inputs, [], [], timeout)
         now = self._clock()
+        self._session.receive()
         for message in self._guard.receive():
-            self._heard = now
+            self._heard, self._alone = now, False
             match decode_command(message):
                 case Farewell():
                     return False
-                case Stop():
-                    self._stopper.stop()
-        self._stopper.read()
-        if self._guard.closed:
-            self._stopper.stop()
-            return False
-        if self._heard is not None and now - self._heard > SILENCE:
+                case Stop(deceleration):
+                    self._vigil.begin(deceleration)
+        gone = self._guard.closed
+        if not gone and (self._heard is None or now - self._heard <= SILENCE):
+            self._vigil.rest()
+        elif not self._alone:
+            self._alone = True
             self._guard.send(Note("error", f"the guard was silent for {SILENCE:g} s, the arm was stopped").encode())
-            self._stopper.stop()
-            self._heard = None
-        return True
+            self._vigil.begin()
+        else:
+            self._vigil.look()
+        if not (gone and self._session.closed):
+            return True
+        if not self._vigil.stands:
+            self._vigil.begin()
+        return False
 
 
 def main(arguments: list[str]) -> int:
@@ -79,10 +91,12 @@ def main(arguments: list[str]) -> int:
     if not hello:
         return 1
     settings = decode_json(hello[0])
+    watch = Watch(**settings["watch"])
     try:
         with ForeignStops(settings["host"]) as stops, StateReader(settings["host"]) as reader:
             guard.send(Note("ready").encode())
-            Keeper(guard, Stopper(stops, reader, Watch(**settings["watch"]), settings["deceleration"])).run()
+            stopper = Stopper(stops, watch, settings["deceleration"], reader)
+            Keeper(guard, session, Vigil(stopper, watch.standstill)).run()
     except ConeSkinError as exc:
         guard.send(Note("error", str(exc)).encode())
         return 1

@@ -1,87 +1,157 @@
-"""Stops an arm by one way after the other until it is measured to stand, and waits for it: when the guard is gone."""
+"""Stops an arm by one way after the other until it is measured to stand, when its guard is gone.
+
+The first stop goes out by whatever port is open, before anything that may block; what is missing is opened meanwhile,
+the reader of the state too. Without any state nobody can see the arm stand: then a stop ends after a while, and whoever
+keeps watch (``Vigil``) repeats it.
+"""
 
 from __future__ import annotations
 
+import math
 import select
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from coneskin.errors import ConeSkinError
 
 from .foreign import ForeignStops
-from .state_reader import StateReader, decode_state
+from .state_reader import ControllerState, StateReader, decode_state
 from .stop_watch import StopWatch, Way
 from .watch import Watch
 
 __all__ = ["Stopper"]
 
-WAYS = (Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE)
+_WAYS = (Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE)
+_QUIET = 4.0  # of the patience: a protective stop is left to work for so long
 _REOPEN = 0.05  # s between two looks whether a connection is gone and can be opened again
-_LONGEST = 5.0  # s that a stop may take before it is given up
+_BLIND = 2.0  # s without a state after which a stop is given up, and the reader opened anew
+_CONNECT = 0.5  # s that opening the reader may take
+
+
+def _never() -> bool:
+    return False
 
 
 class Stopper:
     """See the module.
 
     Args:
-        stops: open.
-        reader: of the controller's state, open.
+        stops: open, or to be opened as far as that is possible.
         watch: the limits.
         deceleration: of the stop [rad/s2].
+        reader: of the controller's state, open; None where there is none yet.
         clock: monotonic seconds.
     """
 
     def __init__(
         self,
         stops: ForeignStops,
-        reader: StateReader,
         watch: Watch,
         deceleration: float,
+        reader: StateReader | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._stops = stops
-        self._reader: StateReader | None = reader
         self._watch = watch
         self._deceleration = deceleration
+        self._reader = reader
         self._clock = clock
-        self._speed: float | None = None
+        self._state: ControllerState | None = None  # the newest
+        self._fresh = -math.inf  # when it came
+        self._opened = -math.inf if reader is None else clock()  # when the reader was last opened, or tried
+        self._quiet_until = -math.inf
 
     @property
     def reader(self) -> StateReader | None:
-        """What tells of new states; None once it is gone."""
+        """What tells of new states; None while there is none."""
         return self._reader
 
-    def stop(self) -> bool:
-        """Stop the arm; whether it was seen standing."""
-        now = start = self._clock()
-        reopen_at = now + _REOPEN
+    def blind(self) -> bool:
+        """Whether no new state has come for so long that nobody knows what the arm does."""
+        return self._clock() - self._fresh > max(2.0 * self._watch.arm_silence, _CONNECT)
+
+    def stop(self, deceleration: float | None = None, over: Callable[[], bool] = _never) -> bool:
+        """Stop the arm.
+
+        Args:
+            deceleration: of the stop [rad/s2]; by default the stopper's.
+            over: asked all the time; True ends the stop as it is.
+
+        Returns:
+            whether the arm was seen standing. While states show that it moves, the stop is not given up.
+        """
+        gentle = self._deceleration if deceleration is None else deceleration
+        watch = self._watch
         self.read()
-        self._stops.reopen()
-        watch, budget = self._watch, (self._speed or 0.0) / self._deceleration + 4.0 * self._watch.escalate
-        stop = StopWatch(now, self._speed, WAYS, watch.escalate, budget, watch.standstill, watch.arm_silence)
-        self._stops.use(WAYS[0], self._deceleration)
-        while stop.standing_at is None and now - start < _LONGEST:
-            select.select([self._reader] if self._reader else [], [], [], 0.002)
+        self._use(Way.SCRIPT, gentle)
+        now = start = self._clock()
+        speed = None if self._state is None or self.blind() else self._state.speed
+        budget = (speed or 0.0) / gentle + 4.0 * watch.escalate
+        stop = StopWatch(now, speed, _WAYS, watch.escalate, budget, watch.standstill, watch.arm_silence)
+        look_at = now
+        while stop.standing_at is None and now - max(start, self._fresh) < _BLIND and not over():
+            if now >= look_at:
+                self.mend(gentle)
+                look_at = self._clock() + _REOPEN
+            select.select([] if self._reader is None else [self._reader], [], [], 0.002)
             self.read(stop)
             now = self._clock()
             for way in stop.next_ways(now):
-                self._stops.use(way, self._deceleration)
-            if now >= reopen_at:
-                reopen_at = now + _REOPEN
-                if self._stops.reopen():  # what was sent to the old ones may be lost
-                    self._stops.use(WAYS[0], self._deceleration)
+                self._use(way, gentle)
         return stop.standing_at is not None
 
-    def read(self, stop: StopWatch | None = None) -> None:
-        """Take the states that have come; never waits."""
+    def repeat(self) -> None:
+        """Send a gentle stop once more, by both ports, without looking what becomes of it."""
+        self.mend(self._deceleration)
+        for way in (Way.SCRIPT, Way.DASHBOARD):
+            self._use(way, self._deceleration)
+
+    def mend(self, deceleration: float) -> None:
+        """Open what is missing: where a way to stop comes back, a stop with this deceleration goes through it."""
+        if self._stops.reopen():  # what was sent to the old ones may be lost
+            self._use(Way.SCRIPT, deceleration)
+        now = self._clock()
+        if now - max(self._fresh, self._opened) < (_BLIND if self._reader is not None else _CONNECT):
+            return
+        self._close_reader()
+        reader = StateReader(self._stops.host, _CONNECT)
+        with suppress(ConeSkinError):  # the next look tries again
+            self._reader = reader.__enter__()
+        self._opened = self._clock()
+
+    def read(self, stop: StopWatch | None = None) -> list[ControllerState]:
+        """Take the states that have come, oldest first; never waits."""
+        states = []
         try:
-            payloads = [] if self._reader is None else self._reader.read()
-            for payload in payloads:
+            for payload in [] if self._reader is None else self._reader.read():
                 state = decode_state(self._clock(), payload)
-                self._speed = state.speed
-                if stop is not None:
-                    stop.sample(state.time, state.speed)
-        except ConeSkinError:
-            self._reader = None  # whoever else reads says so; here only the stops are left
+                states.append(state)
+                if self._state is None or state.controller_time != self._state.controller_time:
+                    self._fresh = state.time
+                    if stop is not None:
+                        stop.sample(state.time, state.speed)
+                self._state = state
+        except ConeSkinError:  # whoever else reads says so; here only the stops are left, until it can be opened again
+            self._close_reader()
         for _, sock in self._stops.drain():
             sock.close()
+        return states
+
+    def close(self) -> None:
+        """Close all connections; may be called again."""
+        self._close_reader()
+        self._stops.close()
+
+    def _close_reader(self) -> None:
+        if self._reader is not None:
+            self._reader.close()
+            self._reader = None
+
+    def _use(self, way: Way, deceleration: float) -> None:
+        """Send a stop, unless it would replace the program of a protective stop that has only just been sent."""
+        now = self._clock()
+        if now < self._quiet_until:
+            return
+        if self._stops.use(way, deceleration) and way is Way.PROTECTIVE:
+            self._quiet_until = now + _QUIET * self._watch.escalate

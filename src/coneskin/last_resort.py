@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from .errors import ConeSkinError
-
 if TYPE_CHECKING:
+    from .robot.vigil import Vigil
     from .scene import Scene
 
-__all__ = ["keeping", "stop_the_arm"]
+__all__ = ["LastResort", "keeping"]
+
+_CONNECT = 0.5  # s for each port; a controller that takes longer is tried again
 
 
 def keeping(scene: Scene) -> dict[str, Any]:
@@ -24,17 +25,51 @@ def keeping(scene: Scene) -> dict[str, Any]:
     return {"host": scene.arm.host, "watch": asdict(scene.watch or Watch()), "deceleration": deceleration}
 
 
-def stop_the_arm(scene: Scene) -> None:
-    """The guard is gone, and its keeper may be: nobody else is left that can stop an arm that is not ours."""
-    from .robot.foreign import ForeignStops
-    from .robot.state_reader import StateReader
-    from .robot.stopper import Stopper
-    from .robot.watch import Watch
+class LastResort:
+    """Keeps an arm that is not ours standing, from this process: its guard is gone, and its keeper may be.
 
-    known = keeping(scene)
-    with (
-        contextlib.suppress(ConeSkinError),
-        ForeignStops(known["host"]) as stops,
-        StateReader(known["host"]) as reader,
-    ):
-        Stopper(stops, reader, Watch(**known["watch"]), known["deceleration"]).stop()
+    A stop from two sides at once does no harm, so nobody asks whether the keeper acts. Nothing is opened before it is
+    needed, and a port that does not answer keeps no other from being used.
+
+    Args:
+        scene: whose arm it is.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._known = keeping(scene)
+        self._vigil: Vigil | None = None
+        self._close: Callable[[], None] = lambda: None
+
+    def look(self, over: Callable[[], bool]) -> bool:
+        """Call it all the time: stop the arm the first time, and whenever something moves it.
+
+        Args:
+            over: asked while a stop is under way; True ends it as it is.
+
+        Returns:
+            whether there was a stop; ``stands`` says what became of it.
+        """
+        return self._watch().look(over)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the arm was seen standing after the newest stop."""
+        return self._vigil is not None and self._vigil.stands
+
+    def end(self) -> None:
+        """The guard lives again, or nothing is left to do: close the connections. ``look`` opens new ones."""
+        self._close()
+        self._vigil = None
+
+    def _watch(self) -> Vigil:
+        if self._vigil is None:
+            from .robot.foreign import ForeignStops
+            from .robot.stopper import Stopper
+            from .robot.vigil import Vigil
+            from .robot.watch import Watch
+
+            watch = Watch(**self._known["watch"])
+            stopper = Stopper(ForeignStops(self._known["host"], _CONNECT), watch, self._known["deceleration"])
+            self._close = stopper.close
+            self._vigil = Vigil(stopper, watch.standstill)
+        return self._vigil

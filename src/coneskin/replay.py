@@ -10,7 +10,7 @@ from typing import Any
 
 from .errors import RecordingError
 from .robot.arm_reaction import Output
-from .robot.journal import INPUTS, GuardEvent, Kind, decode_event
+from .robot.journal import ABOUT, INPUTS, GuardEvent, Kind, decode_event
 from .scene import Scene
 from .skin.recording import Block, read_recording
 
@@ -116,7 +116,7 @@ def replay(run: Run, scene: Scene | None = None) -> Replay:
     events = [output for output in outputs if isinstance(output, GuardEvent)]
     recorded = run.events
     again = [_plain(event) for event in events]
-    then = [_plain(event) for event in recorded if event.name != "died"]  # said of the guard, not by it
+    then = [_plain(event) for event in recorded if event.name not in ABOUT]
     if run.missing:  # an input is recorded before its events, so a run that was cut off may lack the last of these
         again = again[: len(then)]
     differences = list(_differences(again, then))

@@ -13,14 +13,13 @@ import select
 import subprocess
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from .arm_proxy import ArmProxy
 from .errors import ConeSkinError, RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
-from .last_resort import keeping, stop_the_arm
+from .last_resort import LastResort, keeping
 from .robot.channel import Channel, pair, spawn
 from .robot.journal import GuardEvent
 from .robot.owner_messages import decode_json, encode_json
@@ -178,6 +177,16 @@ class Session:
         self._skin.send(encode_json({"u": u, "phi": phi, "force": force, "duration": duration, "sensor": name}))
         return float(self._ask_skin("touched"))
 
+    def check_guard(self) -> None:
+        """Raise where nobody guards: the guard hangs, or is gone. What it has stopped is no matter here.
+
+        Raises:
+            RobotConnectionError: a process is gone, or says nothing.
+            ConeSkinError: what the guard died of.
+        """
+        if (trouble := self._trouble()) is not None:
+            raise trouble
+
     def wait_for(self, names: tuple[str, ...], timeout: float, after: int = 0) -> GuardEvent | None:
         """The first event of one of these names from position ``after`` on; None after the timeout [s]."""
         return self._log.wait_for(names, timeout, after)
@@ -191,12 +200,11 @@ class Session:
         Raises:
             Collision: the skin was touched and the arm has reacted.
             RobotRefused: a fault has stopped the arm.
-            RobotConnectionError: a process is gone.
+            RobotConnectionError: a process is gone, or the guard hangs.
         """
         since = max((i for i, event in enumerate(self.events) if event.name == "armed"), default=-1) + 1
         stop = self.wait_for(("stopping",), 1.0 if stopped else 0.0, after=since)
-        if (trouble := self._trouble()) is not None:
-            raise trouble
+        self.check_guard()
         if stop is None:
             return
         outcome = self._outcome(since)
@@ -204,10 +212,21 @@ class Session:
         raise stop_error(stop, contact, outcome)
 
     def _outcome(self, since: int) -> str:
-        """What has become of a stop, as far as it is known in time."""
-        if self.wait_for(("standstill", "latched"), braking_time(self.scene), after=since) is None:
-            return NOT_SEEN
-        return STANDS if self.wait_for(("latched",), _END, after=since) else STILL_LEAVING
+        """What has become of the newest stop, as far as it is known in time."""
+        end = time.monotonic() + braking_time(self.scene) + _END
+        while True:
+            newest = self._newest_stop(since)
+            if self.wait_for(("standstill", "latched"), braking_time(self.scene), after=newest) is None:
+                return NOT_SEEN
+            latched = self.wait_for(("latched",), max(end - time.monotonic(), 0.0), after=newest)
+            events = self.events[self._newest_stop(since) :]
+            if any(event.name == "latched" for event in events):
+                return STANDS
+            if latched is None or time.monotonic() >= end:
+                return STILL_LEAVING if any(event.name == "standstill" for event in events) else NOT_SEEN
+
+    def _newest_stop(self, since: int) -> int:
+        return max((i for i, event in enumerate(self.events) if event.name == "stopping" and i >= since), default=since)
 
     # ---- how it starts
 
@@ -240,7 +259,7 @@ class Session:
         self._guard = Channel(ours)
         self._children["guard"] = spawn("coneskin.guard_process", *ends)
         self._guard.send(encode_json({**start, "port": port}))
-        self._log.listen(self._guard, partial(stop_the_arm, scene) if self._keeper is not None else None)
+        self._log.listen(self._guard, LastResort(scene) if self._keeper is not None else None)
 
     def _spawn(self, name: str, module: str, hello: bytes) -> Channel:
         ours, theirs = pair()
@@ -279,10 +298,12 @@ class Session:
         raise SkinConnectionError("the process of the virtual skin does not answer")
 
     def _trouble(self) -> ConeSkinError | None:
-        """Why there is no guard any more, if there is none."""
+        """Why there is no guard, or none that is heard, if that is so."""
         for event in self.events:
             if event.name == "died":
                 return death(event)
+        if self._log.lost:
+            return RobotConnectionError(self._log.lost)
         if self._log.ended and not any(event.name == "ending" for event in self.events[-20:]):
             return RobotConnectionError("the guard's process has ended; what it leaves behind stops the arm")
         return None

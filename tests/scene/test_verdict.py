@@ -23,11 +23,14 @@ ARMED = GuardEvent("armed", 0.5, {})
         (["standstill"], STILL_LEAVING),
         (["slower"], NOT_SEEN),
         ([], NOT_SEEN),
+        (["standstill", "latched", "stopping"], NOT_SEEN),  # something moved it again: the newest stop counts
+        (["standstill", "latched", "stopping", "standstill", "latched"], STANDS),
+        (["standstill", "retreating", "retreated", "stopping", "standstill", "latched"], STANDS),
     ],
 )
 def test_check_says_what_was_measured(names, outcome):
     session = Session(parse_scene(SERIAL_RETREAT), None, None, 1.0)
-    session._log.events += [ARMED, TOUCH, PLACE, *(GuardEvent(name, 1.1, {}) for name in names)]
+    session._log.events += [ARMED, TOUCH, PLACE, *(GuardEvent(name, 1.1, {"why": "again"}) for name in names)]
     session._log.ended = True  # nothing more will come, so nothing is waited for
     session._log.events.append(GuardEvent("ending", 2.0, {}))
     with pytest.raises(Collision, match=f"cuff on the forearm was touched at u = 123.4 mm, phi = 90.0 deg; {outcome}"):
