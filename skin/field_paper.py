@@ -35,8 +35,8 @@ Floats = NDArray[np.float64]
 
 _GRID = "depends on the grid of places, which is unpublished"
 
-#: Figures 11 and 12, a and b: radius of the contacts [mm], the largest errors in the paper [mm] and [deg], and two areas
-#: that its grid may have had, by their distance from the edges [mm] and [deg].
+#: Figures 11 and 12, a and b: radius of the contacts [mm], the largest errors in the paper [mm] and [deg], and two
+#: areas that its grid may have had, by their distance from the edges [mm] and [deg].
 FIGURES = (
     ("a", 1.0, 0.06, 0.018, ((10.0, 5.0), (2.0, 2.0))),
     ("b", 15.0, 3.5, 1.9, ((20.0, 15.0), (15.0, 10.0))),

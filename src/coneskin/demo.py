@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .replay import Run
+    from .robot.journal import GuardEvent
     from .scene import Scene
 
 __all__ = ["SCENE", "add_arguments", "run"]
@@ -68,6 +69,7 @@ _FROM_DEG = (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)
 _TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)
 _SPEED, _ACCELERATION = 1.0, 2.0  # rad/s, rad/s2
 _TOUCH_AFTER = 0.9  # s after the start of the second move: in the middle of it, at full speed
+_PATIENCE = 2.0  # s for an event to be heard that has happened
 _U = 0.13  # m along the sensor
 
 
@@ -118,15 +120,44 @@ def run(args: argparse.Namespace) -> int:
     return 0 if facts["standstill_ms"] is not None and again.same and facts["contacts"] == 1 else 1
 
 
+class _Told:
+    """Lines of the guard, which come through a thread of their own, and of the program, in the order of their times.
+
+    Args:
+        say: prints a line.
+    """
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._start = time.monotonic()
+        self._seen: set[str] = set()
+        self._changed = threading.Condition()
+
+    def event(self, event: GuardEvent) -> None:
+        """Say what the guard tells."""
+        from .timeline import describe
+
+        self._say(describe(event, self._start))
+        with self._changed:
+            self._seen.add(event.name)
+            self._changed.notify_all()
+
+    def line(self, text: str, after: str) -> None:
+        """Say what the program does now, once the event after which it does it has been said."""
+        now = time.monotonic()
+        with self._changed:
+            self._changed.wait_for(lambda: after in self._seen, _PATIENCE)
+        self._say(f"{now - self._start:9.4f} s  {text}")
+
+
 def _collide(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
     """Move, touch on the way, and see what the guard does; when the touch began [s]."""
     from .session import guard
-    from .timeline import describe
 
-    start = time.monotonic()
     touches: list[float] = []
-    with guard(scene, recording=folder / "run.rec", on_event=lambda event: say(describe(event, start))) as session:
-        say(f"{time.monotonic() - start:9.4f} s  the arm moves")
+    told = _Told(say)
+    with guard(scene, recording=folder / "run.rec", on_event=told.event) as session:
+        told.line("the arm moves", after="armed")
         phi = _leading_side(scene)
         timer = threading.Timer(_TOUCH_AFTER, lambda: touches.append(session.touch(_U, phi, duration=0.25)))
         timer.start()
@@ -134,7 +165,7 @@ def _collide(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
             session.arm.move_j([math.radians(q) for q in _TO_DEG], _SPEED, _ACCELERATION)
             print("coneskin demo: the arm arrived although it was touched", file=sys.stderr)
         except Collision as exc:
-            say(f"{time.monotonic() - start:9.4f} s  the program gets Collision: {exc}")
+            told.line(f"the program gets Collision: {exc}", after="latched")
         finally:
             timer.join()
     if not touches:
@@ -198,7 +229,7 @@ def _draw(recorded: Run, folder: Path, say: Callable[[str], None]) -> str | None
     except MissingExtra as exc:
         say(f"no picture: {exc}")
         return None
-    return str(folder / "run.png")
+    return "run.png"
 
 
 def _report(facts: dict[str, Any], folder: Path, missing: str) -> None:

@@ -8,6 +8,10 @@ from .robot.journal import GuardEvent
 
 __all__ = ["describe"]
 
+_ENDED = "the guard was told to end"  # on purpose: nobody needs to reset it
+_RELEASED = "the touch is over"  # ends a movement only where the arm gives way to it
+_PUSH = {"level", "damping", "place"}  # what slows only an arm that gives way
+
 
 def describe(event: GuardEvent, start: float) -> str:
     """One line for an event.
@@ -33,13 +37,20 @@ def describe(event: GuardEvent, start: float) -> str:
         case "standstill":
             text = f"standing: {d['speed']:.4f} rad/s, by {', '.join(d['ways'])}"
         case "retreated":
-            text = f"retreated {1e3 * d['progress']:.1f} mm: {d['why']}"
+            gave_way = d.get("how") == "push" or d["why"] == _RELEASED
+            text = f"{'gave way' if gave_way else 'retreated'} {1e3 * d['progress']:.1f} mm: {d['why']}"
+        case "latched" if d["why"].startswith(_ENDED):
+            text = f"the arm stands and the guard ends: {d['why']}"
         case "latched":
             text = f"latched until a person resets: {d['why']}"
         case "escalated":
             text = f"no slowdown: next way to stop, {d['way']}"
+        case "not_standing":
+            speed = "its speed is not known" if d["speed"] is None else f"{d['speed']:.3f} rad/s"
+            text = f"NOT standing, {speed}: round {d['rounds']} of all ways to stop is over; use the emergency stop"
         case "clipped":
-            text = f"retreat slower than set, because of {', '.join(d['by'])}"
+            what = "giving way" if _PUSH & set(d["by"]) else "retreat"
+            text = f"{what} slower than set, because of {', '.join(d['by'])}"
         case "slowing":
             text = f"slower: speed slider from {100.0 * d['before']:.0f} % to {100.0 * d['slider']:.0f} %"
         case "resumed":
@@ -50,7 +61,7 @@ def describe(event: GuardEvent, start: float) -> str:
             text = "waiting: " + "; ".join(d["reasons"])
         case "refused":
             text = f"{d['what']} refused: " + "; ".join(d["reasons"])
-        case "fault" | "message" | "died" | "ending":
+        case "fault" | "message" | "died" | "ending" | "hung" | "heard" | "kept" | "missing":
             text = f"{event.name}: {d['what']}"
         case _:
             text = event.name

@@ -41,6 +41,11 @@ def test_the_demo(tmp_path):
     assert facts["retreat_mm"] == pytest.approx(50.0, abs=1.0)  # 0.5 mm are left for braking
     assert facts["u_mm"] == pytest.approx(130.0, abs=2.0)  # 12 bits and 0.7 counts of noise: 0.1 mm
     assert {p.name for p in (tmp_path / "run").iterdir()} >= {"run.rec", "scene.toml", "summary.json"}
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["picture"] in (
+        None,
+        "run.png",
+    )  # in its own folder: that may be moved, and the reader stand elsewhere
 
 
 def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tmp_path):

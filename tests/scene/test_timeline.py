@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from coneskin import timeline
 from coneskin.robot.journal import GuardEvent
 from coneskin.timeline import describe
 
@@ -24,6 +25,10 @@ LINES: dict[str, tuple[dict[str, Any], str]] = {
     "slower": ({"speed": 0.81234}, "joint speed falling: 0.812 rad/s"),
     "standstill": ({"speed": 0.001, "ways": ["owner", "dashboard"]}, "standing: 0.0010 rad/s, by owner, dashboard"),
     "escalated": ({"way": "dashboard"}, "no slowdown: next way to stop, dashboard"),
+    "not_standing": (
+        {"rounds": 2, "speed": 0.25},
+        "NOT standing, 0.250 rad/s: round 2 of all ways to stop is over; use the emergency stop",
+    ),
     "retreating": ({}, "retreating"),
     "slowing": ({"slider": 0.2, "before": 1.0}, "slower: speed slider from 100 % to 20 %"),
     "resumed": ({"slider": 1.0}, "free again: speed slider back to 100 %"),
@@ -75,6 +80,31 @@ def test_its_line(name: str) -> None:
 )
 def test_how_it_leaves(how: str, words: str) -> None:
     assert describe(GuardEvent("retreating", 1.0, {"how": how}), 1.0).endswith(f"  {words}")
+
+
+@pytest.mark.parametrize(
+    ("name", "details", "words"),
+    [
+        ("clipped", {"by": ["damping", "level"]}, "giving way slower than set, because of damping, level"),
+        ("retreated", {"progress": 0.0395, "why": "the touch is over"}, "gave way 39.5 mm: the touch is over"),
+        ("retreated", {"progress": 0.05, "why": "the distance is made", "how": "push"}, "gave way 50.0 mm: the dist"),
+        (
+            "latched",
+            {"why": "the guard was told to end"},
+            "the arm stands and the guard ends: the guard was told to end",
+        ),
+    ],
+)
+def test_what_is_no_retreat_is_not_called_one(name: str, details: dict[str, Any], words: str) -> None:
+    assert describe(GuardEvent(name, 1.0, details), 1.0).startswith(f"   0.0000 s  {words}")
+
+
+def test_the_words_are_those_of_the_robot() -> None:
+    assert timeline._ENDED in (ROOT / "robot" / "guard_loop.py").read_text(encoding="utf-8")
+    comply = (ROOT / "robot" / "comply.py").read_text(encoding="utf-8")
+    assert all(f'"{word}"' in comply for word in (timeline._RELEASED, *timeline._PUSH))
+    others = [path for path in (ROOT / "robot").glob("*.py") if path.name != "comply.py"]
+    assert not [path.name for path in others if timeline._RELEASED in path.read_text(encoding="utf-8")]
 
 
 def test_a_place_that_is_not_sure_says_so() -> None:
