@@ -26,7 +26,7 @@ from .outputs import Command, Output, Outputs, tell
 from .owner_messages import Clear, Halt, Stop
 from .phase import Phase
 from .rules import Rule, Rules
-from .slowing import HOLD, Slider, Slowing
+from .slow_down import SlowDown
 from .speed_slider import decode_fraction
 from .state_reader import ControllerState, decode_state
 from .stop_watch import StopWatch, Use, Way
@@ -60,7 +60,7 @@ class ArmReaction:
         state: newest measured state, or None before the first.
         owner_ready: whether the process is ready that stops the arm when this one is gone: the owner, or the keeper.
         owned: whether ur_rtde moves the arm, in a process of ours.
-        slider: where the controller's speed slider is, or None.
+        slow_down: of the slow reaction; it has to know where the controller's speed slider is.
 
     Raises:
         RobotRefused: a reaction moves the arm, and there is no mover.
@@ -82,7 +82,7 @@ class ArmReaction:
         self.phase = Phase.STARTING
         self.state: ControllerState | None = None
         self.owner_ready = False
-        self.slider: float | None = None
+        self.slow_down = SlowDown()
         self.owned = Way.OWNER in ways
         self._model = model
         self._rules = Rules(reaction, rules)
@@ -95,7 +95,6 @@ class ArmReaction:
         self._first = ways[0]
         self._clock = ControllerClock()
         self._stop: StopWatch | None = None
-        self._slowing: Slowing | None = None
         self._leaving: Leaving | None = None
         self._reaction = reaction  # the one that is under way
         self._at_touch: ArmState | None = None
@@ -107,7 +106,6 @@ class ArmReaction:
         self._may_move, self._why = False, ""
         self._latch: Latch | None = None
         self._restarts = 0  # since it was armed
-        self._slowed: tuple[float, Slowing] | None = None  # until when the arm was slow last
 
     @property
     def needs_slider(self) -> bool:
@@ -136,8 +134,9 @@ class ArmReaction:
             if self._plain:
                 return
             reaction = self._reaction = self._rules.choose(link, level, self._touch_speed)
-            if reaction.kind == "slow" and self.slider is not None:
-                self._slow(now, reaction, self.slider, out)
+            slows, patience = reaction.kind == "slow", _SLACK * self._watch.escalate
+            if slows and self.slow_down.begin(now, self._touch_speed, reaction, patience, out):
+                self.phase = Phase.SLOWED
             else:
                 self._stop_now(now, "touch", True, out)
             return
@@ -187,8 +186,8 @@ class ArmReaction:
             self._follow(self._stop, state, measured_at, out)
         elif self._leaving is not None:
             self._move(state, self._leaving, out)
-        elif self.phase is Phase.SLOWED and self._slowing is not None:
-            self._slowing.sample(state.time, state.speed)
+        elif self.slow_down.now is not None:
+            self.slow_down.now.sample(state.time, state.speed)
         elif self._latch is not None and self._latch.moved(state, bool(self._contacts)):
             self._restarts += 1
             self._stop_now(state.time, self._again("something moved the arm"), False, out)
@@ -197,14 +196,13 @@ class ArmReaction:
         """What only the passing of time shows."""
         if (stop := self._stop) is not None:
             self._escalate(now, stop, out)
-        elif self.phase is Phase.SLOWED and (slowing := self._slowing) is not None:
-            slowing.touched(now, bool(self._contacts))
-            if why := slowing.trouble(now, self.slider):
+        elif self.phase is Phase.SLOWED:
+            if why := self.slow_down.look(now, bool(self._contacts)):
                 self._stop_now(now, why, False, out)
-            elif slowing.over(now):
+            elif self.slow_down.over(now):
                 self.phase = Phase.ARMED
-                self._put_slider_back(now, out)
-                tell(out, "resumed", now, slider=self.slider)
+                self.slow_down.put_back(now, out)
+                tell(out, "resumed", now, slider=self.slow_down.slider)
         elif self.phase is Phase.LATCHED and self.silent(now):
             self._stop_now(now, self._again("the controller fell silent"), False, out)
 
@@ -217,7 +215,7 @@ class ArmReaction:
         wrong = []
         if not self.owner_ready:
             wrong.append("ur_rtde is not ready" if self.owned else "the process that watches the guard is not ready")
-        if self.needs_slider and self.slider is None:
+        if self.needs_slider and self.slow_down.slider is None:
             wrong.append("where the controller's speed slider is, is not known")
         if self.state is None or self.silent(now):
             return [*wrong, "the controller is silent"]
@@ -237,22 +235,6 @@ class ArmReaction:
                 tell(out, "escalated", now, way=way.value)
         if stop.rounds > rounds and (stop.rounds & rounds) == 0:  # the first, second, fourth ... time
             tell(out, "not_standing", now, rounds=stop.rounds, speed=None if self.state is None else self.state.speed)
-
-    def _put_slider_back(self, now: float, out: Outputs) -> None:
-        """Where it was before a touch slowed the arm, unless a person has moved it since."""
-        slowing, self._slowing = self._slowing, None
-        if slowing is not None and slowing.put_back(self.slider):
-            out.append(Slider(slowing.before))
-            self.slider, self._slowed = slowing.before, (now, slowing)
-
-    def _slow(self, now: float, reaction: Reaction, slider: float, out: Outputs) -> None:
-        if self._slowed is not None and now - self._slowed[0] < HOLD:  # slider and speed may not yet be as before
-            slider, self._touch_speed = self._slowed[1].before, max(self._touch_speed, self._slowed[1].top)
-        budget = self._touch_speed / reaction.deceleration + _SLACK * self._watch.escalate
-        slowing = Slowing(now, self._touch_speed, slider, reaction.slow_to, budget, reaction.time_budget)
-        out.append(Slider(slowing.fraction))
-        self._slowing, self.phase = slowing, Phase.SLOWED
-        tell(out, "slowing", now, slider=slowing.fraction, before=slider)
 
     def _stop_now(self, now: float, why: str, may_move: bool, out: Outputs) -> None:
         self._begin(now, Phase.STOPPING, Stop(self._reaction.deceleration), out)
@@ -290,7 +272,7 @@ class ArmReaction:
             return
         tell(out, "standstill", state.time, speed=state.speed, ways=[way.value for way in stop.used])
         self._stop = None
-        self._put_slider_back(state.time, out)
+        self.slow_down.put_back(state.time, out)
         if self.phase is Phase.HALTING or not (self._may_move and self._placed):
             self._stay(state.time, self._why, out)
             return

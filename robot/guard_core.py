@@ -17,6 +17,7 @@ from coneskin.skin.events import Event, SkinFault, Touch, TouchBegan, TouchEnded
 from coneskin.skin.recording import Block
 from coneskin.skin.stream import Stream
 
+from .arming import Arming
 from .commands import ContactOnLink
 from .journal import Kind
 from .outputs import Outputs, tell
@@ -37,7 +38,6 @@ _WAYS: Mapping[str, frozenset[Way]] = {
     "dashboard": frozenset({Way.DASHBOARD}),
     "keeper": frozenset({Way.KEEPER}),
 }
-_TELL_EVERY = 0.5  # s between two lists of what the guard waits for
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +92,8 @@ class GuardCore:
         self._contacts: dict[str, _Contact] = {}
         self._faults: dict[str, str] = {}  # since the last reset
         self._lost: dict[str, str] = {}  # what is gone for good
-        self._sound_since: float | None = None
-        self._resetting: float | None = None  # since when
+        self._arming = Arming(watch.settle)
         self._played = False
-        self._told: float | None = None
-        self._waiting_for: list[str] = []
         self._takers: Mapping[int, Callable[[Block, Outputs], None]] = {
             Kind.SKIN: self._take_skin,
             Kind.ARM: self._take_arm,
@@ -227,7 +224,7 @@ class GuardCore:
         if self._arm is None:
             return
         try:
-            self._arm.slider = self._arm.decode_slider(block.payload)
+            self._arm.slow_down.slider = self._arm.decode_slider(block.payload)
         except RobotConnectionError as exc:
             self._fault(block.time, f"the speed slider cannot be read: {exc}", out)
 
@@ -240,7 +237,7 @@ class GuardCore:
             tell(out, "refused", block.time, what="reset", reasons=wrong)
             return
         self._stream.forget_faults()
-        self._resetting = block.time
+        self._arming.reset(block.time)
         tell(out, "reset", block.time)
 
     # ---- what is decided
@@ -255,39 +252,21 @@ class GuardCore:
                 self._fault(now, f"the controller has sent no state for {1e3 * self._watch.arm_silence:g} ms", out)
             arm.look(now, out)
         if self.phase is Phase.STARTING:
-            self._start(now, out)
-        elif arm is not None and self._resetting is not None:
-            self._settle(now, self._resetting, arm, out)
+            if self._arming.starts(now, self.unsound(now), out):
+                self._arm_now(now, out)
+        elif self._arming.resetting:
+            wrong = self.unsound(now)
+            if self.phase is not Phase.LATCHED:
+                wrong.append("something has moved the arm, or it is not seen to stand")
+            if self._arming.settles(now, wrong, out):
+                self._arm_now(now, out)
 
-    def _settle(self, now: float, since: float, arm: ArmReaction, out: Outputs) -> None:
-        """A person has reset: the arm stays latched until everything has been sound for a while without a break."""
-        wrong = self.unsound(now)
-        if arm.phase is not Phase.LATCHED:
-            wrong.append("something has moved the arm, or it is not seen to stand")
-        if wrong:
-            self._resetting = None
-            tell(out, "refused", now, what="reset", reasons=wrong)
-        elif now - since >= self._watch.settle:
-            self._resetting = None
-            arm.arm(out)
-            tell(out, "armed", now)
-
-    def _start(self, now: float, out: Outputs) -> None:
-        if wrong := self.unsound(now):
-            self._sound_since = None
-            if self._told is None:
-                self._told = now
-            elif wrong != self._waiting_for and now - self._told >= _TELL_EVERY:
-                self._told, self._waiting_for = now, wrong
-                tell(out, "waiting", now, reasons=wrong)
-        elif self._sound_since is None:
-            self._sound_since = now
-        elif now - self._sound_since >= self._watch.settle:
-            if self._arm is None:
-                self._phase = Phase.ARMED
-            else:
-                self._arm.arm(out)
-            tell(out, "armed", now)
+    def _arm_now(self, now: float, out: Outputs) -> None:
+        if self._arm is None:
+            self._phase = Phase.ARMED
+        else:
+            self._arm.arm(out)
+        tell(out, "armed", now)
 
     def _fault(self, now: float, what: str, out: Outputs) -> None:
         if what in self._faults:

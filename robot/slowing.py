@@ -84,13 +84,13 @@ class Slowing:
             return "the touch lasts too long"
         return ""
 
-    def put_back(self, slider: float | None) -> bool:
-        """Whether the slider still is where it was set, so that it may be put back.
+    def puts_back(self, slider: float | None) -> bool:
+        """Whether the slider is where it was set, or not yet seen to be there, so that nobody has moved it since.
 
         Args:
             slider: where it is.
         """
-        return slider is not None and abs(slider - self.fraction) <= _STEP
+        return slider is not None and min(abs(slider - self.fraction), abs(slider - self.before)) <= _STEP
 
     def over(self, now: float) -> bool:
         """Whether the arm may go on as before."""

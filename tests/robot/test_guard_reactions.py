@@ -260,6 +260,19 @@ def test_a_person_who_slows_the_arm_further_is_not_overruled():
     assert rig.arm.slider == 0.05
 
 
+def test_a_stop_just_after_it_slowed_leaves_no_slider_low():
+    rig = Rig(ScriptedTouch(0.5, 1.0, 0.13, 1.57, force=1.0), speed=0.02, **slow_first("stop"))
+    while "slowing" not in rig.names:
+        rig.run(0.001)
+    out = []
+    rig.core._arm.touch(rig.now, LINK, 0.9, False, out)
+    assert isinstance(out[0], Stop)
+    rig.arm.take(out[0])
+    rig.run(1.0)
+    assert rig.core.phase is Phase.LATCHED
+    assert rig.arm.slider == 1.0
+
+
 @pytest.mark.parametrize("later", [0.001, 0.006, 0.02, 0.1])
 def test_touched_again_as_it_goes_on_it_is_slow_again(later):
     first = Rig(touch(0.5, 1.0), reaction=Reaction(kind="slow", slow_to=0.2), speed=2.0).run(2.0)
