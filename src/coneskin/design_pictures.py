@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from .design import SheetDesign
 from .errors import MissingExtra
-from .geometry.outline import Outline
-from .geometry.pen import Corner, draw, draw_circle, flat_point
-from .geometry.sector import unroll
 from .geometry.stack import parallel
+from .layout_picture import FOIL, INK, draw_layout
 
 if TYPE_CHECKING:
     from .geometry.mesh import Mesh
 
 __all__ = ["draw_pictures"]
 
-_INK, _FOIL, _ACTIVE, _SHEET = "#222222", "#c27c0e", "#9fd3c7", ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
+_SHEET = ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
 _MOST_FACES = 12000  # drawn by matplotlib in a second
 
 
@@ -67,7 +65,7 @@ def draw_pictures(
     for design in designs:
         progress(f"{design.name}: drawing the layout")
         figure = Figure(figsize=(9, 7), layout="constrained")
-        _draw_layout(figure, design)
+        draw_layout(figure, design)
         name = design.name.replace(" ", "-")
         save(figure, f"{name}-layout.png", f"{design.name.capitalize()}, flat, seen from outside; dimensions in mm.")
         if mesh is not None:
@@ -81,78 +79,6 @@ def draw_pictures(
                 "bridges it.",
             )
     return done
-
-
-def _xy(outline: Outline) -> tuple[list[float], list[float]]:
-    """Points of an outline [mm], closed."""
-    flat = outline.flattened(5e-5)
-    points = [(x * 1e3, y * 1e3) for x, y, _ in flat.vertices]
-    points += points[:1] if outline.closed else []
-    return [x for x, _ in points], [y for _, y in points]
-
-
-def _draw_layout(figure: Any, design: SheetDesign) -> None:
-    """All that is on a sheet, on the cone of its upper conductive layer, with dimensions."""
-    axes = figure.add_subplot()
-    layout = design.layout
-    cone = design.cuts[4].surface
-    box = layout.active
-    active = tuple(
-        Corner(u, p) for u, p in ((box.u1, box.phi1), (box.u1, box.phi2), (box.u2, box.phi2), (box.u2, box.phi1))
-    )
-    axes.fill(*_xy(draw(cone, active)), color=_ACTIVE, alpha=0.6, lw=0)
-    axes.plot(*_xy(draw(cone, layout.rim)), color=_INK, lw=1.4)
-    axes.plot(*_xy(draw(cone, layout.upper)), color=_INK, lw=0.5, ls="--")
-    axes.plot(*_xy(draw(cone, layout.lower)), color=_INK, lw=0.5, ls=":")
-    for name, foil in layout.foils.items():
-        axes.fill(*_xy(draw(cone, foil)), facecolor=_FOIL, alpha=0.45 if name in "AB" else 0.8, edgecolor=_INK, lw=0.4)
-    for u, phi in layout.holes:
-        axes.fill(*_xy(draw_circle(cone, u, phi, layout.plan.hole)), facecolor="white", edgecolor=_INK, lw=0.8)
-    _dimensions(axes, design, cone)
-    axes.margins(0.08)
-    axes.set_aspect("equal")
-    axes.axis("off")
-
-
-def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
-    """Arc lengths at both ends, the slant, the sector, and the names of the electrodes."""
-    wrap, slant, layout = cone.wrap, cone.slant, design.layout
-    lift = 0.06 * max(slant, 0.3 * wrap * max(cone.radius1, cone.radius2))
-    style = {"ha": "center", "va": "center", "fontsize": 9, "color": _INK}
-
-    def at(u: float, phi: float) -> tuple[float, float]:
-        x, y = flat_point(cone, u, phi)
-        return x * 1e3, y * 1e3
-
-    x0, y0, x1, y1 = draw(cone, layout.rim).bounds
-    far = 1.5e3 * lift
-    bottom, right = y0 * 1e3 - far - 12.0 * bool(layout.plan.wires == "end1"), x1 * 1e3 + far
-    arrow = {"arrowstyle": "<->", "color": _INK, "lw": 0.7, "shrinkA": 0, "shrinkB": 0}
-    axes.plot([x0 * 1e3, x1 * 1e3, right], [bottom - 0.6e3 * lift, bottom, bottom], lw=0.0)  # arrows make no room
-    axes.annotate("", (x0 * 1e3, bottom), (x1 * 1e3, bottom), arrowprops=arrow)
-    axes.text(500.0 * (x0 + x1), bottom, f"{(x1 - x0) * 1e3:.2f}", **style, backgroundcolor="white")
-    axes.annotate("", (right, y0 * 1e3), (right, y1 * 1e3), arrowprops=arrow)
-    axes.text(right, 500.0 * (y0 + y1), f"{(y1 - y0) * 1e3:.2f}", rotation=90, **style, backgroundcolor="white")
-    flat = unroll(cone)
-    lines = [
-        f"{design.name}, upper conductive layer",
-        f"slant {slant * 1e3:.3f}",
-        f"arcs {flat.arc1 * 1e3:.3f} (end 1), {flat.arc2 * 1e3:.3f} (end 2)",
-    ]
-    if math.isfinite(flat.r1):
-        lines.append(f"r1 {flat.r1 * 1e3:.3f}, r2 {flat.r2 * 1e3:.3f}, theta0 {math.degrees(flat.theta0):.4f} deg")
-    lines.append(f"active {1e4 * layout.active.area(layout.sheet):.1f} cm2 ({layout.active_share:.0%})")
-    axes.text(*at(0.5 * slant, 0.5 * wrap), "\n".join(lines), **style)
-    half = 0.5 * layout.plan.electrode
-    narrow = min(layout.sheet.radius1, layout.sheet.radius2)
-    field = layout.field
-    for name, u, phi in (
-        ("A", field.u2 + half, 0.42 * wrap),
-        ("B", field.u1 - half, 0.42 * wrap),
-        ("C", 0.5 * slant, field.phi2 + half / narrow),
-        ("D", 0.5 * slant, field.phi1 - half / narrow),
-    ):
-        axes.text(*at(u, phi), name, **{**style, "fontweight": "bold"})
 
 
 def _draw_link(figure: Any, designs: Sequence[SheetDesign], mesh: Mesh | None) -> None:
@@ -226,12 +152,12 @@ def _draw_electrodes(axes: Any, design: SheetDesign, view: Any) -> None:
     along, around = np.linspace(0.0, 1.0, 2), np.linspace(0.0, 1.0, 121)
     rotation = np.array(design.place.link_frustum.rotation)
     for name, u, phi, colour in (
-        ("B", [(box.u1 - half) / side.slant], around, _FOIL),
-        ("A", [(box.u2 + half) / side.slant], around, _FOIL),
-        ("D", along, [(box.phi1 - turn) / side.wrap], _FOIL),
-        ("C", along, [(box.phi2 + turn) / side.wrap], _FOIL),
-        ("", along, [0.0], _INK),
-        ("", along, [1.0], _INK),
+        ("B", [(box.u1 - half) / side.slant], around, FOIL),
+        ("A", [(box.u2 + half) / side.slant], around, FOIL),
+        ("D", along, [(box.phi1 - turn) / side.wrap], FOIL),
+        ("C", along, [(box.phi2 + turn) / side.wrap], FOIL),
+        ("", along, [0.0], INK),
+        ("", along, [1.0], INK),
     ):
         points = _outer_face(design, u, phi).reshape(-1, 3)
         facing = side.normals(np.broadcast_to(phi, points.shape[:1]) * side.wrap) @ rotation.T @ view > 0.02

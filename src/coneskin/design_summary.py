@@ -150,8 +150,8 @@ def _shape(cone: Frustum) -> dict[str, Any]:
 def _pose(placed: PlacedFrustum) -> dict[str, list[float]]:
     pose = placed.link_frustum
     return {
-        "xyz_mm": [1e3 * value + 0.0 for value in pose.translation],
-        "rpy_deg": [math.degrees(value) + 0.0 for value in pose.rpy],
+        "xyz_mm": [_round(1e3 * value) for value in pose.translation],
+        "rpy_deg": [_round(math.degrees(value)) for value in pose.rpy],
     }
 
 
@@ -166,5 +166,8 @@ def _sizes(cut: CutSheet) -> dict[str, float]:
 
 
 def _round(value: float, digits: int = 4) -> float:
-    """Rounded for people; the drawings and the sensor file keep every digit."""
+    """Rounded for people; the drawings keep every digit, and so does the shape in the sensor file.
+
+    The pose does not: a tenth of a micrometre, or of a thousandth of a degree, is less than anybody can place a sheet.
+    """
     return round(value, digits) + 0.0
