@@ -61,7 +61,7 @@ def run_trial(kind: FaultKind, control: str, seed: str, slack: float) -> Outcome
 def _try(kind: FaultKind, control: str, seed: str, slack: float) -> Outcome:
     outcome = Outcome()
     try:
-        with Trial(control, seed) as trial:
+        with Trial(control, seed, kind.reaction) as trial:
             if kind.before:
                 _refused(kind, trial, outcome)
             else:

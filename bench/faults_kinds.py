@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from faults_trial import ARM_SILENCE, CLOCK, GOAL, SKIN_SILENCE, STUCK, Trial
+from faults_trial import ARM_SILENCE, CLOCK, GOAL, RETREAT, SKIN_SILENCE, SLOW, STUCK, Trial
 from scenes import ESCALATE
 
 from coneskin.robot.owner_messages import SILENCE
@@ -19,6 +19,9 @@ FRAME = 0.001
 WATCHDOG = 0.25  # s: 1 / watchdog_hz
 FEW = 0.02  # s: a fault in the frames themselves shows within a few of them, and the loop has to run
 ASTRAY = 0.35  # s: an arm that takes up its speed may differ from what it is told for 0.25 s and v / a
+SLOWER = 0.2  # s: a touched arm that becomes faster again is given the time of a slowdown
+STARTS = 0.05  # s: a program needs 10 ms to start, and five states have to show that the arm moves
+SILENT = 0.25  # s: a latched arm that nobody sees is stopped again and again, at least every 0.2 s
 LAST = 1.05  # s: the process that started the guard has heard nothing for 1 s, and opens its sockets
 
 
@@ -39,6 +42,7 @@ class FaultKind:
         arm: there is an arm left whose standstill can be measured; otherwise time runs until the guard sends its stop.
         after: what happens once the arm stands; nothing of it may move the arm.
         variant: close to another kind; a quick campaign leaves it out.
+        reaction: of the scene.
     """
 
     name: str
@@ -53,6 +57,7 @@ class FaultKind:
     arm: bool = True
     after: Callable[[Trial], object] | None = None
     variant: bool = False
+    reaction: str = RETREAT
 
 
 def frozen_controller(t: Trial) -> float:
@@ -123,6 +128,14 @@ def away(
     )
 
 
+def slow(
+    name: str, inject: Callable[[Trial], float], notice: float = FEW, controls: tuple[str, ...] = BOTH, **more: Any
+) -> FaultKind:
+    """While the arm goes on slowly under a touch."""
+    injects = then(Trial.go_slow, inject)
+    return FaultKind(f"slow: {name}", injects, notice, controls=controls, touched=True, reaction=SLOW, **more)
+
+
 def says(line: str) -> Callable[[Trial], float]:
     return lambda t: t.controller(line)
 
@@ -137,6 +150,11 @@ def halt(who: str) -> Callable[[Trial], float]:
 
 def end(who: str) -> Callable[[Trial], float]:
     return lambda t: t.signal(who, signal.SIGTERM)
+
+
+def pause(_: Trial) -> float:
+    time.sleep(0.5)
+    return CLOCK()
 
 
 def unplug(t: Trial) -> float:
@@ -287,6 +305,24 @@ KINDS = (
     away("RTDE closed", says("close rtde")),
     away("script ports closed", says("close scripts")),
     away("protective stop", says("protective stop"), variant=True),
+    # while it goes on slowly under a touch
+    slow("guard killed", kill("guard")),
+    slow("guard frozen", halt("guard"), SILENCE, after=Trial.thaw_all),
+    slow("owner killed", kill("owner"), WATCHDOG, controls=OWNER),
+    slow("owner frozen", halt("owner"), WATCHDOG, controls=OWNER, after=Trial.thaw_all),
+    slow("skin unplugged", unplug),
+    slow("RTDE closed", says("close rtde")),
+    slow("program killed", kill("program"), recorder=False, answers=False),
+    slow("another program", a_program, SLOWER, controls=OWNER),  # a foreign one just goes on slowly as well
+    # while it stands latched
+    FaultKind("latched: a program starts", then(Trial.latch, a_program), STARTS, touched=True),
+    FaultKind(
+        "latched: RTDE silent, then a program",
+        then(Trial.latch, says("rtde silent"), pause, a_program),
+        SILENT,
+        controls=FOREIGN,
+        touched=True,
+    ),
     # before the guard arms
     FaultKind("refused: skin silent", breaks(stall_after=0), before=True, variant=True),
     FaultKind("refused: skin broken wire", wires("open-A"), before=True),

@@ -33,7 +33,8 @@ GOAL = start_with(140.0)
 SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
 SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
 STUCK = 200  # frames
-REACTION = 'kind = "retreat"\ndistance_mm = 60'
+RETREAT = 'kind = "retreat"\ndistance_mm = 60'
+SLOW = 'kind = "slow"\nslow_to = 0.5\ntime_budget_s = 30'
 WATCH = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nstuck_frames = 200"
 #: v / a, and four times the patience: what docs/safety.md promises once the fault is known
 STOP = SPEED / DECELERATION + 4.0 * ESCALATE
@@ -145,8 +146,9 @@ class Trial:
     _starting = threading.Lock()  # two trials must not choose the same address
     _hosts: ClassVar[set[str]] = set()  # a killed controller's address must stay dead while its trial lasts
 
-    def __init__(self, control: str, seed: str) -> None:
+    def __init__(self, control: str, seed: str, reaction: str = RETREAT) -> None:
         self.control = control
+        self._reaction = reaction
         self.rng = random.Random(seed)
         self.pids: dict[str, int] = {}
         self.happened: float | None = None
@@ -168,7 +170,7 @@ class Trial:
             if not self.skin.hear(10.0):
                 raise RuntimeError(f"the skin did not start: {self.skin.errors}")
             (self.folder / "scene.toml").write_text(
-                forearm_scene(self.host, self.control, port, REACTION, WATCH), encoding="utf-8"
+                forearm_scene(self.host, self.control, port, self._reaction, WATCH), encoding="utf-8"
             )
         except BaseException:
             self._stack.close()
@@ -201,6 +203,25 @@ class Trial:
             time.sleep(0.002)
         time.sleep(0.1 * self.rng.random())
         self.happened = touched
+        return CLOCK()
+
+    def go_slow(self) -> float:
+        """Touch the skin for long, and let the arm go on slowly for a random time."""
+        self.happened = self.skins(touch={"u": 0.13, "phi": 1.55, "duration": 20.0})
+        end = CLOCK() + 5.0
+        while not 0.0 < self.simulated.state()["qd"][0] < 0.7 * SPEED:
+            if CLOCK() > end:
+                raise RuntimeError("the arm does not go slower")
+            time.sleep(0.005)
+        time.sleep(0.3 + 0.2 * self.rng.random())
+        return CLOCK()
+
+    def latch(self) -> float:
+        """Touch the skin, and let the arm stand, retreat and latch."""
+        self.move_away()
+        if self.await_standing(5.0) is None:
+            raise RuntimeError("the arm does not latch")
+        time.sleep(0.5 + 0.2 * self.rng.random())
         return CLOCK()
 
     def skins(self, **request: Any) -> float:
