@@ -232,6 +232,8 @@ class GuardCore:
         if self.phase is not Phase.LATCHED or self._arm is None:
             tell(out, "message", block.time, what=f"nothing to reset: the guard is {self.phase.value}")
             return
+        if self._arming.resetting:
+            return  # what comes of it will be told
         self._faults.clear()
         if wrong := self.unsound(block.time):
             tell(out, "refused", block.time, what="reset", reasons=wrong)

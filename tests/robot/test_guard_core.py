@@ -202,6 +202,14 @@ def reset(*touches, **settings):
     return rig
 
 
+def test_a_reset_again_and_again_arms_no_later():
+    rig = reset()
+    for _ in range(4):
+        rig.run(0.03)
+        rig.feed(Kind.RESET)
+    assert rig.core.phase is Phase.ARMED
+
+
 def test_a_touch_while_a_reset_settles_refuses_it():
     rig = reset(touch(1.52, 1.8)).run(2.0)
     assert rig.core.phase is Phase.LATCHED
