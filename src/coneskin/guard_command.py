@@ -12,9 +12,10 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .errors import Collision, RobotRefused
+from .verdict import NOT_SEEN, STANDS, exit_code, stands
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -27,7 +28,8 @@ example:
   coneskin guard scene.toml              until Ctrl-C; type "reset" and Enter after a collision
   coneskin guard scene.toml --check      read the scene, say what is in it, touch nothing
 
-The scene's keys: docs/scene.md. exit code: 0 nothing has happened, 1 a mistake or a fault, 3 a collision.
+The scene's keys: docs/scene.md. exit code: 0 nothing has happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
+SIGTERM do not change it. With --check: 0 a guard can start with this scene, 1 it has mistakes or lacks something.
 coneskin is not a safety-rated device: docs/safety.md.
 """
 
@@ -37,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EXAMPLE
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    parser.add_argument("--check", action="store_true", help="read the scene and stop there")
+    parser.add_argument("--check", action="store_true", help="say what is in the scene, and stop there")
     parser.add_argument("--once", action="store_true", help="end after the first collision or fault")
     parser.add_argument("--duration-s", type=_positive, help="end after so long, and after the move under way")
     parser.add_argument("--json", action="store_true", help="print each event as a JSON object, one a line")
@@ -56,8 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
     scene = load(args.scene)
     if args.check:
-        print(json.dumps(_facts(scene)) if args.json else "\n".join(f"{k:<9} {v}" for k, v in _facts(scene).items()))
-        return 0
+        return _check(scene, args.json)
     from .robot.journal import GuardEvent
     from .session import guard
     from .timeline import describe
@@ -73,16 +74,42 @@ def run(args: argparse.Namespace) -> int:
             print(describe(event, start), flush=True)
 
     signal.signal(signal.SIGTERM, _as_interrupt)
-    code = 0
+    session = guard(scene, on_event=show)
+    work = _Work(session, math.inf if args.duration_s is None else args.duration_s, args.once)
     try:
-        with guard(scene, on_event=show) as session:
+        with session:
             if session.recording and not args.json:
                 print(f"recording to {session.recording}", flush=True)
-            end = math.inf if args.duration_s is None else time.monotonic() + args.duration_s
-            code = _guard(session, _Person(), end, args.once)
+            work.run()
     except KeyboardInterrupt:
-        print("coneskin guard: ended by you; the arm was stopped first", file=sys.stderr)
-    return code
+        print(f"coneskin guard: ended by you; {_last_words(session)}", file=sys.stderr)
+    else:
+        if scene.arm is not None and not stands(session.events):
+            print(f"coneskin guard: {_last_words(session)}", file=sys.stderr)
+    return max(work.code, exit_code(session.events))
+
+
+def _check(scene: Scene, as_json: bool) -> int:
+    """Say what is in a scene; 1 where a guard would refuse it."""
+    from .scene_facts import facts, lacks
+
+    found, missing = facts(scene), lacks(scene)
+    if as_json:
+        print(json.dumps({**found, "cannot_guard_yet": missing} if missing else found))
+    else:
+        print("\n".join(f"{key:<9} {value}" for key, value in found.items()))
+    for line in missing:
+        print(f"coneskin guard: {scene.name} cannot guard yet: {line}", file=sys.stderr)
+    return 1 if missing else 0
+
+
+def _last_words(session: Session) -> str:
+    """What is known of the arm when everything has ended."""
+    if session.scene.arm is None:
+        return "there is no arm in the scene"
+    if not any(event.name == "armed" for event in session.events):
+        return "it had not armed, and has not moved the arm"
+    return STANDS if stands(session.events) else f"{NOT_SEEN}: look at it"
 
 
 def _as_interrupt(_signal: int, _frame: object) -> None:
@@ -90,45 +117,62 @@ def _as_interrupt(_signal: int, _frame: object) -> None:
     raise KeyboardInterrupt
 
 
-def _guard(session: Session, person: _Person, end: float, once: bool) -> int:
-    """Guard until the end [s]; the exit code says whether anything has happened."""
-    code = 0
-    while time.monotonic() < end:
-        try:
-            _watch(session, person, end)
-            break
-        except (Collision, RobotRefused) as exc:
-            print(f"coneskin guard: {exc}", file=sys.stderr, flush=True)
-            code = 3 if isinstance(exc, Collision) else max(code, 1)
-            if once:
-                break
+class _Work:
+    """What the command does while it guards.
+
+    Args:
+        session: entered before ``run``.
+        duration: of the whole [s].
+        once: end after the first collision or fault.
+
+    Attributes:
+        code: what the errors so far amount to.
+    """
+
+    def __init__(self, session: Session, duration: float, once: bool) -> None:
+        self.code = 0
+        self._session = session
+        self._duration = duration
+        self._once = once
+        self._end = math.inf
+
+    def run(self) -> None:
+        """Guard until the end."""
+        session, person = self._session, _Person()
+        self._end = time.monotonic() + self._duration
+        while time.monotonic() < self._end:
+            try:
+                self._watch(person)
+                return
+            except (Collision, RobotRefused) as exc:
+                self.code = 3 if isinstance(exc, Collision) else max(self.code, 1)
+                print(f"coneskin guard: {exc}", file=sys.stderr, flush=True)
+            if self._once:
+                return
             again = "; its motion then goes on" if session.scene.motion else ""
             print(f'type "reset" and Enter to let the arm move again{again}', file=sys.stderr, flush=True)
-            while time.monotonic() < end and not person.serve(session, 0.2):
-                pass
-    return code
+            while time.monotonic() < self._end and not person.serve(session, 0.2):
+                session.check_guard()
 
+    def _watch(self, person: _Person) -> None:
+        """Make the scene's motion, or wait, until the end or until the guard stops the arm."""
+        moves = self._moves() if self._session.scene.motion else None
+        while time.monotonic() < self._end:
+            self._session.check()
+            if moves is None:
+                person.serve(self._session, 0.1)
+            elif next(moves, None) is None:
+                return
 
-def _watch(session: Session, person: _Person, end: float) -> None:
-    """Make the scene's motion, or wait, until the end or until the guard stops the arm."""
-    moves = _moves(session) if session.scene.motion else None
-    while time.monotonic() < end:
-        session.check()
-        if moves is None:
-            person.serve(session, 0.1)
-        elif next(moves, None) is None:
-            return
-
-
-def _moves(session: Session) -> Iterator[tuple[float, ...]]:
-    """The scene's motion, one move at a time."""
-    motion, done = session.scene.motion, 0
-    assert motion is not None
-    while motion.rounds == 0 or done < motion.rounds:
-        for point in motion.waypoints:
-            session.arm.move_j(point, motion.speed, motion.acceleration)
-            yield point
-        done += 1
+    def _moves(self) -> Iterator[tuple[float, ...]]:
+        """The scene's motion, one move at a time."""
+        motion, done = self._session.scene.motion, 0
+        assert motion is not None
+        while motion.rounds == 0 or done < motion.rounds:
+            for point in motion.waypoints:
+                self._session.arm.move_j(point, motion.speed, motion.acceleration)
+                yield point
+            done += 1
 
 
 class _Person:
@@ -157,31 +201,3 @@ class _Person:
             print(exc, file=sys.stderr, flush=True)
             return False
         return True
-
-
-def _facts(scene: Scene) -> dict[str, Any]:
-    """What the scene has, for people and programs."""
-    facts: dict[str, Any] = {"scene": scene.name}
-    if scene.arm:
-        facts["arm"] = f"{scene.arm.model} at {scene.arm.host}, control {scene.arm.control}"
-    for link in scene.links:
-        for item in link.sensors:
-            sensor, cone, pose = item.sensor, item.sensor.frustum, item.placed.link_frustum
-            place = ", ".join(f"{1e3 * x:g}" for x in pose.translation)
-            turn = ", ".join(f"{math.degrees(x):g}" for x in pose.rpy)
-            facts[f"sensor {sensor.name}"] = (
-                f"id {sensor.device_id}/{sensor.sensor_id} on the {link.name}: radius {1e3 * cone.radius1:g} to "
-                f"{1e3 * cone.radius2:g} mm, height {1e3 * cone.height:g} mm, wrap {math.degrees(cone.wrap):g} deg, "
-                f"at ({place}) mm, rpy ({turn}) deg, in the {link.frame} frame"
-            )
-    if scene.source:
-        facts["source"] = scene.source.kind + (f" {scene.source.port}" if scene.source.port else "")
-    if scene.reaction:
-        facts["reaction"] = scene.reaction.kind
-    if scene.source and scene.source.touches:
-        facts["touches"] = str(len(scene.source.touches))
-    if scene.motion:
-        facts["motion"] = f"{len(scene.motion.waypoints)} waypoints, {scene.motion.rounds or 'endless'} rounds"
-    if scene.recording:
-        facts["recording"] = str(scene.recording.folder)
-    return facts

@@ -75,6 +75,11 @@ def read_scene(path: Path) -> s.Scene:
     """
     try:
         text = path.read_text(encoding="utf-8-sig")  # some editors put a mark in front
+    except UnicodeDecodeError as exc:
+        raise SceneError(
+            [f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8; save the scene as UTF-8 text"],
+            str(path),
+        ) from exc
     except (OSError, ValueError) as exc:
         why = getattr(exc, "strerror", None) or exc
         raise SceneError([f"the file cannot be read: {why}"], str(path)) from exc

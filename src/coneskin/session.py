@@ -9,24 +9,28 @@ channel. A child that dies is seen as the end of its channel, and ends in a stop
 
 from __future__ import annotations
 
-import select
 import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING
 
 from .arm_proxy import ArmProxy
-from .errors import ConeSkinError, RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
+from .errors import RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
 from .last_resort import LastResort, keeping
 from .robot.channel import Channel, pair, spawn
 from .robot.journal import GuardEvent
-from .robot.owner_messages import decode_json, encode_json
+from .robot.owner_messages import encode_json
 from .robot.ur_models import model
 from .run_log import RunLog, new_recording
 from .scene import Scene, load
-from .verdict import NOT_SEEN, STANDS, STILL_LEAVING, braking_time, death, reasons, stop_error
+from .scene_facts import lacks
+from .uninterrupted import uninterrupted
+from .verdict import NOT_SEEN, STANDS, STILL_LEAVING, braking_time, death, reasons, stands, stop_error
+
+if TYPE_CHECKING:
+    from .skin_proxy import SkinProxy
 
 __all__ = ["Session", "guard"]
 
@@ -73,8 +77,7 @@ class Session:
         on_event: Callable[[GuardEvent], None] | None,
         start_timeout: float,
     ) -> None:
-        there = {"[source]": scene.source, "[[link]] with a [[link.sensor]]": scene.sensors}
-        if missing := [f"a guard needs a {name}" for name, part in there.items() if not part]:
+        if missing := lacks(scene):
             raise SceneError(missing, scene.name)
         self.scene = scene
         self.recording = recording
@@ -83,8 +86,8 @@ class Session:
         self._log = RunLog(None, None)
         self._children: dict[str, subprocess.Popen[bytes]] = {}
         self._guard: Channel | None = None
-        self._skin: Channel | None = None
-        self._keeper: Channel | None = None
+        self._skin: SkinProxy | None = None
+        self._lifelines: list[Channel] = []  # to the children besides the guard, which end when these do
         self._arm: ArmProxy | None = None
 
     @property
@@ -120,23 +123,30 @@ class Session:
         self.close()
 
     def close(self) -> None:
-        """Stop the arm, end the children and close the recording; may be called again."""
+        """Stop the arm, end the children and close the recording; may be called again.
+
+        Raises:
+            KeyboardInterrupt: a person has interrupted meanwhile; all of it is done nevertheless.
+        """
+        uninterrupted(self._close)
+
+    def _close(self) -> None:
         if self._guard is not None:
             self._guard.send(b"quit")
         for name in ("guard", "owner", "keeper", "skin"):
-            child = self._children.get(name)
+            child = self._children.pop(name, None)
             if child is None:
                 continue
             if name != "guard":  # the others end when their channels do, after the guard has stopped the arm
-                for channel in (self._arm.channel if self._arm else None, self._keeper, self._skin):
-                    if channel is not None:
-                        channel.close()
+                for channel in self._lifelines:
+                    channel.close()
             try:
                 child.wait(_END)
             except subprocess.TimeoutExpired:
+                if name == "keeper" and not stands(self.events):
+                    continue  # it is still stopping the arm, and ends when that stands
                 child.kill()
                 child.wait()
-        self._children.clear()
         self._log.close()
         if self._guard is not None:
             self._guard.close()
@@ -146,7 +156,9 @@ class Session:
 
         Raises:
             RobotRefused: something is still wrong; the reasons are listed.
+            RobotConnectionError: the guard hangs, or is gone.
         """
+        self.check_guard()
         seen = len(self.events)
         assert self._guard is not None
         self._guard.send(b"reset")
@@ -155,7 +167,7 @@ class Session:
             why = "the guard did not arm in time" if event is None else "; ".join(reasons(event))
             raise RobotRefused(f"reset refused: {why}")
 
-    def touch(self, u: float, phi: float, force: float = 5.0, duration: float = 0.3, sensor: str = "") -> float:
+    def touch(self, u: float, phi: float, force: float = 5.0, duration: float = 0.3, sensor: str | int = "") -> float:
         """Touch the scene's virtual skin now.
 
         Args:
@@ -163,19 +175,18 @@ class Session:
             phi: azimuth [rad].
             force: [N].
             duration: [s].
-            sensor: its name; by default the first.
+            sensor: its name or its id; by default the first.
 
         Returns:
             when the touch begins, on the clock of the events [s].
 
         Raises:
+            SensorError: there is no such sensor, the place is off it, or a value cannot be.
             SkinConnectionError: the scene's skin is not virtual, or is gone.
         """
         if self._skin is None:
             raise SkinConnectionError("only a virtual skin can be touched by a program")
-        name = sensor or self.scene.sensors[0].sensor.name
-        self._skin.send(encode_json({"u": u, "phi": phi, "force": force, "duration": duration, "sensor": name}))
-        return float(self._ask_skin("touched"))
+        return self._skin.touch(u, phi, force, duration, sensor)
 
     def check_guard(self) -> None:
         """Raise where nobody guards: the guard hangs, or is gone. What it has stopped is no matter here.
@@ -184,8 +195,13 @@ class Session:
             RobotConnectionError: a process is gone, or says nothing.
             ConeSkinError: what the guard died of.
         """
-        if (trouble := self._trouble()) is not None:
-            raise trouble
+        for event in self.events:
+            if event.name == "died":
+                raise death(event)
+        if self._log.lost:
+            raise RobotConnectionError(self._log.lost)
+        if self._log.ended and not any(event.name == "ending" for event in self.events[-20:]):
+            raise RobotConnectionError("the guard's process has ended; what it leaves behind stops the arm")
 
     def wait_for(self, names: tuple[str, ...], timeout: float, after: int = 0) -> GuardEvent | None:
         """The first event of one of these names from position ``after`` on; None after the timeout [s]."""
@@ -213,20 +229,17 @@ class Session:
 
     def _outcome(self, since: int) -> str:
         """What has become of the newest stop, as far as it is known in time."""
-        end = time.monotonic() + braking_time(self.scene) + _END
+        patience = braking_time(self.scene)
+        end = time.monotonic() + patience + _END
         while True:
-            newest = self._newest_stop(since)
-            if self.wait_for(("standstill", "latched"), braking_time(self.scene), after=newest) is None:
+            newest = max(i for i, event in enumerate(self.events) if i >= since and event.name == "stopping")
+            if self.wait_for(("standstill", "latched"), patience, after=newest) is None:
                 return NOT_SEEN
             latched = self.wait_for(("latched",), max(end - time.monotonic(), 0.0), after=newest)
-            events = self.events[self._newest_stop(since) :]
-            if any(event.name == "latched" for event in events):
-                return STANDS
-            if latched is None or time.monotonic() >= end:
-                return STILL_LEAVING if any(event.name == "standstill" for event in events) else NOT_SEEN
-
-    def _newest_stop(self, since: int) -> int:
-        return max((i for i, event in enumerate(self.events) if event.name == "stopping" and i >= since), default=since)
+            if not any(event.name == "stopping" for event in self.events[newest + 1 :]):
+                return STANDS if latched else STILL_LEAVING
+            if time.monotonic() >= end:
+                return NOT_SEEN
 
     # ---- how it starts
 
@@ -240,33 +253,33 @@ class Session:
         self._log.open(start)
         port = scene.source.port
         if scene.source.kind == "virtual":
-            self._skin = self._spawn("skin", "coneskin.skin_process", encode_json(start))
-            port = str(self._ask_skin("port"))
+            from .skin_proxy import SkinProxy
+
+            self._skin = SkinProxy(start, [item.sensor for item in scene.sensors])
+            self._children["skin"] = self._skin.process
+            self._lifelines.append(self._skin.channel)
+            port = self._skin.port()
+        resort = None
         ours, theirs = pair()
         ends = [theirs]
         if scene.arm is not None:
             guard_end, other_guard_end = pair()
             program_end, other_program_end = pair()
+            channel = Channel(program_end)
+            self._lifelines.append(channel)
             ends.append(guard_end)
-            if scene.arm.control == "owner":
-                self._children["owner"] = spawn("coneskin.robot.owner", other_guard_end, other_program_end)
-                self._arm = ArmProxy(Channel(program_end), self.check, model(scene.arm.model))
-                self._arm.channel.send(encode_json({**keeping(scene), "watchdog_hz": scene.arm.watchdog_hz}))
+            owned = scene.arm.control == "owner"
+            name = "owner" if owned else "keeper"
+            self._children[name] = spawn(f"coneskin.robot.{name}", other_guard_end, other_program_end)
+            channel.send(encode_json({**keeping(scene), "watchdog_hz": scene.arm.watchdog_hz}))
+            if owned:
+                self._arm = ArmProxy(channel, self.check, model(scene.arm.model))
             else:
-                self._children["keeper"] = spawn("coneskin.robot.keeper", other_guard_end, other_program_end)
-                self._keeper = Channel(program_end)
-                self._keeper.send(encode_json(keeping(scene)))
+                resort = LastResort(scene)
         self._guard = Channel(ours)
         self._children["guard"] = spawn("coneskin.guard_process", *ends)
         self._guard.send(encode_json({**start, "port": port}))
-        self._log.listen(self._guard, LastResort(scene) if self._keeper is not None else None)
-
-    def _spawn(self, name: str, module: str, hello: bytes) -> Channel:
-        ours, theirs = pair()
-        channel = Channel(ours)
-        self._children[name] = spawn(module, theirs)
-        channel.send(hello)
-        return channel
+        self._log.listen(self._guard, resort)
 
     def _await_armed(self) -> None:
         end = time.monotonic() + self._start_timeout
@@ -278,32 +291,9 @@ class Session:
             if event is not None or self._log.ended or (owner is not None and owner.poll() is not None):
                 break  # waiting longer would not help
         self.wait_for(("fault",), 0.5)
-        if (trouble := self._trouble()) is not None:
-            raise trouble
+        self.check_guard()
         waiting = next((event for event in reversed(self.events) if event.name == "waiting"), None)
         faults = [str(event.details["what"]) for event in self.events if event.name in ("fault", "died")]
         waited_for = reasons(waiting) if waiting else []
         listed = list(dict.fromkeys([*faults, *waited_for])) or ["its process sent nothing"]
         raise RobotRefused("the guard did not arm:\n" + "\n".join(f"  {line}" for line in listed))
-
-    def _ask_skin(self, key: str) -> Any:
-        assert self._skin is not None
-        end = time.monotonic() + 10.0
-        while time.monotonic() < end and not self._skin.closed:
-            select.select([self._skin], [], [], 0.1)
-            for message in self._skin.receive():
-                answer = decode_json(message)
-                if key in answer:
-                    return answer[key]
-        raise SkinConnectionError("the process of the virtual skin does not answer")
-
-    def _trouble(self) -> ConeSkinError | None:
-        """Why there is no guard, or none that is heard, if that is so."""
-        for event in self.events:
-            if event.name == "died":
-                return death(event)
-        if self._log.lost:
-            return RobotConnectionError(self._log.lost)
-        if self._log.ended and not any(event.name == "ending" for event in self.events[-20:]):
-            return RobotConnectionError("the guard's process has ended; what it leaves behind stops the arm")
-        return None

@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+from .errors import ConeSkinError
 from .robot.channel import Channel, inherit
 from .robot.owner_messages import decode_json, encode_json
 from .scene import Scene
@@ -67,20 +68,17 @@ def main(arguments: list[str]) -> int:
 
 
 def _serve(channel: Channel, skin: VirtualSkin, began: float) -> None:
+    """Make the touches that are asked for; one that cannot be is refused, and the skin goes on."""
     for message in channel.receive():
-        request = decode_json(message)
         start = time.monotonic() - began + _SOON
-        skin.touch(
-            ScriptedTouch(
-                start,
-                start + request["duration"],
-                request["u"],
-                request["phi"],
-                force=request["force"],
-                sensor=request["sensor"],
-            )
-        )
-        channel.send(encode_json({"touched": began + start}))
+        try:
+            request = decode_json(message)
+            end, place = start + request["duration"], (request["u"], request["phi"])
+            skin.touch(ScriptedTouch(start, end, *place, force=request["force"], sensor=request["sensor"]))
+        except (ConeSkinError, ValueError, TypeError, KeyError) as exc:
+            channel.send(encode_json({"refused": str(exc)}))
+        else:
+            channel.send(encode_json({"touched": began + start}))
 
 
 if __name__ == "__main__":

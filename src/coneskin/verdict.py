@@ -9,14 +9,27 @@ from . import errors
 from .errors import Collision, ConeSkinError, MissingExtra, RobotConnectionError, RobotRefused, SceneError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from .robot.journal import GuardEvent
     from .scene import Scene
 
-__all__ = ["NOT_SEEN", "STANDS", "STILL_LEAVING", "braking_time", "death", "reasons", "stop_error"]
+__all__ = [
+    "NOT_SEEN",
+    "STANDS",
+    "STILL_LEAVING",
+    "braking_time",
+    "death",
+    "exit_code",
+    "reasons",
+    "stands",
+    "stop_error",
+]
 
 STANDS = "the arm stands"
 STILL_LEAVING = "the arm has stood and still moves away from the touch"
 NOT_SEEN = "the arm was NOT seen to stand"
+_MOVING = ("armed", "slowing", "resumed", "stopping", "retreating")
 _MARGIN = 0.5  # s for the events to come, on a busy machine
 
 
@@ -63,3 +76,25 @@ def reasons(event: GuardEvent) -> list[str]:
     """Why a guard waits or refuses, one line each."""
     details = event.details
     return [str(reason) for reason in details.get("reasons", [details.get("what", event.name)])]
+
+
+def stands(events: Sequence[GuardEvent]) -> bool:
+    """Whether the arm was seen standing at last, and nothing has let it move since."""
+    for event in reversed(events):
+        if event.name in ("standstill", "latched"):
+            return True
+        if event.name == "kept":
+            return bool(event.details["stands"])
+        if event.name in _MOVING:
+            return False
+    return False
+
+
+def exit_code(events: Sequence[GuardEvent]) -> int:
+    """What a program that has guarded ends with: 0 nothing has happened, 1 a fault, 3 a collision."""
+    on_purpose = {event.details["what"] for event in events if event.name == "ending"}
+    stops = [event.details["why"] for event in events if event.name == "stopping"]
+    if "touch" in stops:
+        return 3
+    lost = [event.name for event in events if event.name in ("died", "hung")]
+    return 1 if lost or not on_purpose.issuperset(stops) else 0

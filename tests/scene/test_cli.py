@@ -175,6 +175,7 @@ def test_guard_check_says_what_is_in_a_scene(tmp_path: Path, capsys: Output) -> 
         "sensor sensor 0/0": "id 0/0 on the tube: radius 54 to 54 mm, height 434 mm, wrap 360 deg, at (0, 0, 0) mm, "
         "rpy (0, 0, 0) deg, in the mesh frame",
         "source": "virtual",
+        "watch": "skin silent for 50 ms or late by 50 ms or without noise for 1000 frames: a fault",
         "touches": "1",
     }
     assert run("guard", scene, "--check") == 0
