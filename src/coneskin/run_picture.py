@@ -1,19 +1,23 @@
-"""A picture of a recorded run: joint speeds and the touch over time, and the arm with the point and its normal."""
+"""A picture of a recorded run: joint speeds, speed slider and touch over time, and the arm with the point touched."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from .errors import MissingExtra
+from .errors import MissingExtra, RecordingError
 from .replay import Run
 from .robot.journal import GuardEvent, Kind
+from .robot.speed_slider import decode_fraction
 from .robot.state_reader import ControllerState, decode_state
 from .scene import Scene
 
 __all__ = ["draw_run"]
 
-_MARKS = {"standstill": "stands", "latched": "latched"}
+_SUFFIXES = (".png", ".svg", ".pdf")
+_MARKS = {"slowing": "slows", "resumed": "goes on", "standstill": "stands", "latched": "latched"}
+_NEAR = 0.08  # of the width; marks that are closer share a label
+_JOINTS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:cyan")  # red is the touch
 
 
 def draw_run(run: Run, path: Path) -> None:
@@ -21,7 +25,12 @@ def draw_run(run: Run, path: Path) -> None:
 
     Raises:
         MissingExtra: matplotlib is not installed.
+        RecordingError: the file cannot be written, or its suffix is another.
     """
+    if path.suffix.lower() not in _SUFFIXES:
+        raise RecordingError(f"the picture of a run is a {', '.join(_SUFFIXES)} file, got {path}")
+    if not path.parent.is_dir():
+        raise RecordingError(f"the picture {path} cannot be written: there is no folder {path.parent}; make it first")
     try:
         import matplotlib
     except ImportError as exc:
@@ -33,20 +42,58 @@ def draw_run(run: Run, path: Path) -> None:
     states = [decode_state(block.time, block.payload) for block in run.blocks if block.kind == Kind.ARM]
     contact = _first(run.events, "contact")
     zero = contact.time if contact else (run.blocks[0].time if run.blocks else 0.0)
-    latched = _first(run.events, "latched", zero)
-    window = (zero - 0.3, (latched.time if latched else zero + 1.0) + 0.2)
+    window = (zero - 0.3, _last(run.events, zero) + 0.2)
     contact = _first(run.events, "contact_placed", zero) or contact
-    figure = Figure(figsize=(12.0, 6.4), layout="constrained")
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.5, 1.0))
+    slider = [(block.time, decode_fraction(block.payload)) for block in run.blocks if block.kind == Kind.SLIDER]
+    figure = Figure(figsize=(12.0, 7.6 if slider else 6.4), layout="constrained")
+    heights = (1.0, 0.4, 1.0) if slider else (1.0, 1.0)
+    grid = figure.add_gridspec(len(heights), 2, width_ratios=(1.5, 1.0), height_ratios=heights)
     _draw_speeds(figure.add_subplot(grid[0, 0]), states, run.events, zero, window)
-    _draw_touch(figure.add_subplot(grid[1, 0]), run, scene, zero, window)
+    if slider:
+        _draw_slider(figure.add_subplot(grid[1, 0]), slider, zero, window)
+    _draw_touch(figure.add_subplot(grid[-1, 0]), run, scene, zero, window)
     if scene.arm is not None and states:
         _draw_arm(figure.add_subplot(grid[:, 1], projection="3d"), scene, states, contact, zero)
-    figure.savefig(path, dpi=130)
+    try:
+        figure.savefig(path, dpi=130)
+    except OSError as exc:
+        raise RecordingError(f"the picture {path} cannot be written: {exc.strerror or exc}; name another file") from exc
 
 
 def _first(events: list[GuardEvent], name: str, since: float = 0.0) -> GuardEvent | None:
     return next((event for event in events if event.name == name and event.time >= since), None)
+
+
+def _last(events: list[GuardEvent], zero: float) -> float:
+    """When what the touch has set off is over [s]: the arm is latched, or goes on; a guard that ends does not count."""
+    latched, ending = _first(events, "latched", zero), _first(events, "ending", zero)
+    if latched is not None and ending is not None and latched.time >= ending.time:
+        latched = None
+    over = latched or _first(events, "resumed", zero)
+    return zero + 1.0 if over is None else over.time
+
+
+def _marks(events: list[GuardEvent], zero: float, window: tuple[float, float]) -> list[tuple[float, str]]:
+    """Moments after the touch [s] in the window and their labels; one label for those that would hide each other."""
+    found = [(event.time, words) for name, words in _MARKS.items() if (event := _first(events, name, zero)) is not None]
+    marks: list[tuple[float, str]] = []
+    for time, words in sorted((item for item in found if item[0] <= window[1]), key=lambda item: item[0]):
+        if marks and time - marks[-1][0] < _NEAR * (window[1] - window[0]):
+            marks[-1] = (marks[-1][0], f"{marks[-1][1]}, {words}")
+        else:
+            marks.append((time, words))
+    return marks
+
+
+def _draw_slider(axes: Any, slider: list[tuple[float, float]], zero: float, window: tuple[float, float]) -> None:
+    axes.plot(
+        [1e3 * (t - zero) for t, _ in slider], [100.0 * f for _, f in slider], drawstyle="steps-post", color="0.2"
+    )
+    axes.axvline(0.0, color="tab:red", lw=1.0)
+    axes.set_ylabel("speed slider [%]")
+    axes.set_ylim(0.0, 105.0)
+    axes.set_xlim(*(1e3 * (t - zero) for t in window))
+    axes.grid(alpha=0.3)
 
 
 def _draw_speeds(
@@ -55,15 +102,14 @@ def _draw_speeds(
     shown = [state for state in states if window[0] <= state.time <= window[1]]
     times = [1e3 * (state.time - zero) for state in shown]
     for joint in range(6):
-        axes.plot(times, [state.qd[joint] for state in shown], lw=1.3, label=f"joint {joint + 1}")
+        speeds = [state.qd[joint] for state in shown]
+        axes.plot(times, speeds, lw=1.3, color=_JOINTS[joint], label=f"joint {joint + 1}")
     axes.axvline(0.0, color="tab:red", lw=1.0)
-    shown_marks = [("touch ", 0.0, "right", "tab:red")]
-    for name, words in _MARKS.items():
-        if (event := _first(events, name, zero)) is not None:
-            shown_marks.append((f" {words}", 1e3 * (event.time - zero), "left", "0.3"))
-            axes.axvline(1e3 * (event.time - zero), color="0.6", lw=0.7, ls=":")
-    for words, at, side, colour in shown_marks:
-        axes.text(at, 1.01, words, color=colour, transform=axes.get_xaxis_transform(), ha=side, fontsize=8)
+    style = {"transform": axes.get_xaxis_transform(), "fontsize": 8}
+    axes.text(0.0, 1.01, "touch ", color="tab:red", ha="right", **style)
+    for time, words in _marks(events, zero, window):
+        axes.axvline(1e3 * (time - zero), color="0.6", lw=0.7, ls=":")
+        axes.text(1e3 * (time - zero), 1.01, f" {words}", color="0.3", ha="left", **style)
     axes.set_ylabel("joint speed [rad/s]")
     axes.set_xlim(*(1e3 * (t - zero) for t in window))
     axes.legend(fontsize=7, ncols=2, loc="best")
@@ -109,12 +155,14 @@ def _draw_arm(axes: Any, scene: Scene, states: list[ControllerState], contact: G
     touched = min(states, key=lambda state: abs(state.time - zero))
     for state, colour, label in ((states[-1], "0.7", "at the end"), (touched, "tab:blue", "at the touch")):
         axes.plot(*zip(*skeleton(arm, state.q), strict=True), "-o", ms=3, lw=3, color=colour, label=label)
+    label = "sensor: ends and middle"
     for placed in place_on_arm(scene):
         base_link = link_pose(arm, touched.q, placed.link)
         for u in (0.0, 0.5, 1.0):
             frustum = placed.frustum.frustum
             ring = [base_link.apply(placed.frustum.point(u * frustum.slant, frustum.wrap * k / 48)) for k in range(49)]
-            axes.plot(*zip(*ring, strict=True), lw=0.8, color="tab:green")
+            axes.plot(*zip(*ring, strict=True), lw=0.8, color="tab:green", label=label)
+            label = "_"  # once is enough
         if contact is not None and contact.details["sensor"] == placed.name:
             point = base_link.apply(contact.details["point"])
             normal = base_link.rotate(contact.details["normal"])

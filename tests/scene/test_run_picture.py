@@ -6,12 +6,14 @@ from typing import Any
 
 import pytest
 
-from coneskin.errors import MissingExtra
+from coneskin.errors import MissingExtra, RecordingError
 from coneskin.replay import Run, read_run
-from coneskin.robot.journal import Kind
+from coneskin.robot.journal import GuardEvent, Kind
 from coneskin.robot.kinematics import link_pose
+from coneskin.robot.rtde_codec import Recipe
 from coneskin.robot.ur_models import model
 from coneskin.run_picture import draw_run
+from coneskin.skin.recording import Block
 
 from .scenes import SKIN_ONLY, Q, record
 
@@ -58,6 +60,77 @@ def test_a_collision_with_an_arm(run: Run, tmp_path: Path, figures: list[Any]) -
     placed = next(event for event in run.events if event.name == "contact_placed")
     base_link = link_pose(model("UR5e"), Q, 3)  # the forearm's DH frame is the third
     assert drawn == pytest.approx(base_link.apply(placed.details["point"]), abs=1e-12)
+
+
+def test_colours_and_the_legend_tell_all_apart(run: Run, tmp_path: Path, figures: list[Any]) -> None:
+    draw_run(run, tmp_path / "run.png")
+    speeds, _, arm = figures[0].axes
+    joints = [line.get_color() for line in speeds.lines if line.get_label().startswith("joint")]
+    assert len(joints) == len(set(joints)) == 6
+    assert "tab:red" not in joints  # the touch
+    rings = [line for line in arm.lines if line.get_color() == "tab:green"]
+    assert len(rings) == 6  # three for each of two sensors
+    assert arm.get_legend_handles_labels()[1].count("sensor: ends and middle") == 1
+
+
+def slow(run: Run, latched: float = 1002.9) -> Run:
+    """The run with the events of an arm that was slowed, went on, and stood when the guard ended."""
+    contact = next(event.time for event in run.events if event.name == "contact")
+    happened = [
+        GuardEvent("slowing", contact, {"slider": 0.2, "before": 1.0}),
+        *(event for event in run.events if event.name in ("contact", "contact_placed")),
+        GuardEvent("resumed", contact + 0.8, {"slider": 1.0}),
+        GuardEvent("ending", latched, {"what": "the guard was told to end"}),
+        GuardEvent("standstill", latched, {"speed": 0.0, "ways": ["owner"]}),
+        GuardEvent("latched", latched, {"why": "the guard was told to end"}),
+    ]
+    inputs = [block for block in run.blocks if block.kind != Kind.EVENT]
+    fractions = [(contact + 0.02 * k, 0.2 if 0 <= k < 40 else 1.0) for k in range(-10, 60)]
+    read = [Block(Kind.SLIDER, t, Recipe(("target_speed_fraction",)).pack((f,))) for t, f in fractions]
+    blocks = sorted([*inputs, *read, *(event.block() for event in happened)], key=lambda block: block.time)
+    return changed(run, blocks=tuple(blocks))
+
+
+def test_a_slow_run_shows_its_slider_and_ends_where_the_arm_goes_on(
+    run: Run, tmp_path: Path, figures: list[Any]
+) -> None:
+    draw_run(slow(run), tmp_path / "run.png")
+    speeds, slider, _, _ = figures[0].axes
+    assert slider.get_ylabel() == "speed slider [%]"
+    times, fractions = slider.lines[0].get_data()
+    low = [t for t, f in zip(times, fractions, strict=True) if f == pytest.approx(20.0)]
+    assert (min(low), max(low)) == pytest.approx((0.0, 780.0))  # ms since the touch
+    assert [text.get_text() for text in speeds.texts] == ["touch ", " slows", " goes on"]
+    assert speeds.get_xlim() == pytest.approx((-300.0, 1000.0))
+
+
+def test_marks_that_would_hide_each_other_share_a_label(run: Run, tmp_path: Path, figures: list[Any]) -> None:
+    """After a stop, the arm is latched where it stands."""
+    contact = next(event for event in run.events if event.name == "contact")
+    happened = [
+        contact,
+        GuardEvent("standstill", contact.time + 0.1, {"speed": 0.0, "ways": ["owner"]}),
+        GuardEvent("latched", contact.time + 0.1, {"why": "touch"}),
+    ]
+    blocks = [block for block in run.blocks if block.kind != Kind.EVENT]
+    draw_run(changed(run, blocks=(*blocks, *(event.block() for event in happened))), tmp_path / "run.png")
+    assert [text.get_text() for text in figures[0].axes[0].texts] == ["touch ", " stands, latched"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("run.gif", r"is a \.png, \.svg, \.pdf file, got .*run\.gif"),
+        ("run", r"is a \.png, \.svg, \.pdf file"),
+        ("no/run.png", r"cannot be written: there is no folder .*no; make it first"),
+        ("folder.png", r"cannot be written: Is a directory; name another file"),
+    ],
+)
+def test_a_file_that_cannot_be_is_refused(run: Run, tmp_path: Path, name: str, words: str) -> None:
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(RecordingError, match=words):
+        draw_run(run, tmp_path / name)
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
 
 
 def test_a_skin_without_an_arm(tmp_path: Path, figures: list[Any]) -> None:
