@@ -12,7 +12,9 @@ from .geometry.sector import unroll
 
 __all__ = ["FOIL", "INK", "draw_layout"]
 
-INK, FOIL, _ACTIVE = "#222222", "#c27c0e", "#9fd3c7"
+INK = "#222222"
+FOIL = "#c27c0e"
+_ACTIVE = "#9fd3c7"
 
 
 def _xy(outline: Outline) -> tuple[list[float], list[float]]:
