@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import Collision, RobotRefused
+from .errors import Collision, ConeSkinError, RobotRefused
 from .verdict import NOT_SEEN, STANDS, exit_code, stands
 
 if TYPE_CHECKING:
@@ -138,21 +138,55 @@ class _Work:
 
     def run(self) -> None:
         """Guard until the end."""
-        session, person = self._session, _Person()
+        person, stopped = _Person(), False
         self._end = time.monotonic() + self._duration
         while time.monotonic() < self._end:
             try:
+                if stopped:
+                    self._offer_reset(person)
+                    stopped = False
                 self._watch(person)
                 return
-            except (Collision, RobotRefused) as exc:
+            except ConeSkinError as exc:
                 self.code = 3 if isinstance(exc, Collision) else max(self.code, 1)
+                lost, stopped = self._lost(), isinstance(exc, Collision | RobotRefused)
+                if (lost and (self._once or not self._foreign)) or not (lost or stopped):
+                    raise
                 print(f"coneskin guard: {exc}", file=sys.stderr, flush=True)
-            if self._once:
-                return
-            again = "; its motion then goes on" if session.scene.motion else ""
-            print(f'type "reset" and Enter to let the arm move again{again}', file=sys.stderr, flush=True)
-            while time.monotonic() < self._end and not person.serve(session, 0.2):
-                session.check_guard()
+                if self._once:
+                    return
+                if lost:
+                    self._hold()
+
+    @property
+    def _foreign(self) -> bool:
+        arm = self._session.scene.arm
+        return arm is not None and arm.control == "foreign"
+
+    def _lost(self) -> bool:
+        """Whether the guard hangs, or is gone."""
+        try:
+            self._session.check_guard()
+        except ConeSkinError:
+            return True
+        return False
+
+    def _offer_reset(self, person: _Person) -> None:
+        """Wait for a person to let the arm move again."""
+        again = "; its motion then goes on" if self._session.scene.motion else ""
+        print(f'type "reset" and Enter to let the arm move again{again}', file=sys.stderr, flush=True)
+        while time.monotonic() < self._end and not person.serve(self._session, 0.2):
+            self._session.check_guard()
+
+    def _hold(self) -> None:
+        """An arm that another program moves has lost its guard: stay, so that it is kept standing."""
+        print(
+            "the arm is kept standing from here until the guard lives again, or you end this with Ctrl-C",
+            file=sys.stderr,
+            flush=True,
+        )
+        while time.monotonic() < self._end and self._lost():
+            time.sleep(0.1)
 
     def _watch(self, person: _Person) -> None:
         """Make the scene's motion, or wait, until the end or until the guard stops the arm."""

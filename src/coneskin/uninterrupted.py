@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Callable
 
@@ -13,24 +14,18 @@ def uninterrupted(job: Callable[[], None]) -> None:
 
     Raises:
         KeyboardInterrupt: a person, or SIGTERM, has interrupted meanwhile; the job is done nevertheless.
-        BaseException: what the job has raised.
     """
-    raised: list[BaseException] = []
-
-    def do() -> None:
-        try:
-            job()
-        except BaseException as exc:
-            raised.append(exc)
-
-    thread = threading.Thread(target=do, name="coneskin closing")  # an interrupt is raised in the main thread only
-    thread.start()
-    interrupt: KeyboardInterrupt | None = None
-    while thread.is_alive():
-        try:
-            thread.join()
-        except KeyboardInterrupt as exc:
-            interrupt = exc
-    for error in (*raised, interrupt):
-        if error is not None:
-            raise error
+    noted: list[int] = []
+    before = {}
+    if threading.current_thread() is threading.main_thread():  # nowhere else an interrupt is raised, or can be caught
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if callable(handler := signal.getsignal(number)):  # what the system does by default is not ours
+                before[number] = handler
+                signal.signal(number, lambda number, _: noted.append(number))
+    try:
+        job()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if noted:
+        raise KeyboardInterrupt

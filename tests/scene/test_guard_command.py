@@ -3,7 +3,6 @@
 import json
 import signal
 import sys
-import threading
 
 import pytest
 
@@ -111,7 +110,8 @@ class FakeSession:
 
     recording = None
 
-    def __init__(self, scene, told, at_close, check):
+    def __init__(self, scene, told, at_close, check, gone=()):
+        self.gone = list(gone)  # for each look at the guard: what is raised, or None
         self.scene, self.events, self._at_close, self._check = scene, told, at_close, check
 
     def __enter__(self):
@@ -124,18 +124,19 @@ class FakeSession:
         self._check(self)
 
     def check_guard(self):
-        raise RobotConnectionError("the guard hangs")
+        if self.gone and (error := self.gone.pop(0)):
+            raise error
 
 
 @pytest.fixture
 def command(tmp_path, monkeypatch, capsys):
     """Run ``coneskin guard`` on a session of our own; its exit code and what it says."""
-    (tmp_path / "scene.toml").write_text(SERIAL_RETREAT)
     monkeypatch.setattr(sys, "stdin", [])
     handler = signal.getsignal(signal.SIGTERM)
 
-    def run(told, at_close, check):
-        session = FakeSession(parse_scene(SERIAL_RETREAT), events(*told), events(*at_close), check)
+    def run(told, at_close, check, gone=(), text=SERIAL_RETREAT):
+        (tmp_path / "scene.toml").write_text(text)
+        session = FakeSession(parse_scene(text), events(*told), events(*at_close), check, gone)
         monkeypatch.setattr("coneskin.session.guard", lambda *_, **__: session)
         return main(["guard", str(tmp_path / "scene.toml")]), capsys.readouterr().err
 
@@ -163,40 +164,50 @@ def test_ctrl_c_keeps_the_exit_code_and_says_what_is_known(command, told, at_clo
     assert said in words
 
 
-def test_a_guard_that_is_gone_is_noticed_while_it_waits_for_a_reset(command):
-    def collide(session):
-        raise Collision("the cuff was touched")
+def collide(session):
+    raise Collision("the cuff was touched")
 
-    code, said = command(["armed", "stopping: touch"], [], collide)
+
+HANGS = RobotConnectionError("the guard hangs")
+
+
+def test_a_guard_that_is_gone_is_noticed_while_it_waits_for_a_reset(command):
+    code, said = command(["armed", "stopping: touch"], [], collide, gone=[None, HANGS, HANGS])
     assert code == 1
     assert 'type "reset"' in said
     assert said.endswith("coneskin guard: the guard hangs\n")
 
 
+def test_beside_a_foreign_arm_it_stays_until_the_guard_lives_again(command):
+    """Whoever ends with its guard would leave an arm that moves to nobody."""
+    checks = iter([HANGS, KeyboardInterrupt()])
+
+    def check(session):
+        raise next(checks)
+
+    foreign = SERIAL_RETREAT.replace("[arm]", '[arm]\ncontrol = "foreign"')
+    code, said = command(["armed", "hung", "kept: yes"], [], check, gone=[HANGS, HANGS, None], text=foreign)
+    assert code == 1
+    assert "the guard hangs\nthe arm is kept standing from here until the guard lives again" in said
+    assert said.endswith("ended by you; the arm stands\n")
+
+
 # ---- a second Ctrl-C
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a thread cannot be sent a signal")
 def test_a_job_is_done_although_a_person_interrupts_it_twice():
-    begun, pressed, done = threading.Event(), threading.Event(), []
+    done = []
 
     def job():
-        begun.set()
-        pressed.wait(10.0)
+        for _ in range(2):
+            signal.raise_signal(signal.SIGINT)
         done.append(True)
 
-    def press():
-        begun.wait(10.0)
-        for _ in range(2):
-            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
-        threading.Timer(0.05, pressed.set).start()  # a wait that is aborted has ended by then
-
-    presser = threading.Thread(target=press)
-    presser.start()
     with pytest.raises(KeyboardInterrupt):
         uninterrupted(job)
     assert done == [True]
-    presser.join()
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)  # as before
 
 
 def test_what_a_job_raises_is_raised():
