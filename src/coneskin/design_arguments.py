@@ -158,11 +158,7 @@ def choices_of(args: argparse.Namespace) -> Choices:
 
 def wrap_of(args: argparse.Namespace) -> float | None:
     """The wrap asked for [rad], or None."""
-    if args.wrap_deg is None:
-        return None
-    if not 0.0 < args.wrap_deg <= 360.0:
-        raise GeometryError(f"--wrap-deg must be above 0 and at most 360 deg, got {args.wrap_deg!r}")
-    return min(math.radians(args.wrap_deg), 2.0 * math.pi)
+    return check_numbers(argparse.Namespace(wrap_deg=args.wrap_deg)).get("wrap")
 
 
 def links_by_numbers(args: argparse.Namespace) -> tuple[PlacedFrustum, ...]:
