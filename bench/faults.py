@@ -108,7 +108,7 @@ def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> 
     until = min(fault_at, began) if trial.happened is None else trial.happened
     touched = kind.touched or kind.tolerated
     outcome.failures += judge_recording(trial.recording, until, armed["armed"], touched)
-    outcome.skin_late = max(outcome.skin_late, longest_gap(trial.recording, armed["armed"], until))
+    outcome.skin_late = max(outcome.skin_late, longest_gap(trial.recording, armed["armed"], fault_at))
     with suppress(ConeSkinError):
         run = read_run(trial.recording)
         stops = [event for event in run.events if event.name == "stopping"]
@@ -124,6 +124,8 @@ def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> 
 def _see_it_stand(kind: FaultKind, trial: Trial, outcome: Outcome, began: float, budget: float) -> None:
     q = trial.await_standing(budget + PATIENCE)
     stood = trial.stood_at(began)
+    if kind.still and q is not None and stood is None:
+        stood = began
     if q is None or stood is None:
         outcome.failures.append("the arm did not stand" if q is None else "the arm stood before the fault")
         return

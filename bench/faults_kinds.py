@@ -43,6 +43,7 @@ class FaultKind:
         after: what happens once the arm stands; nothing of it may move the arm.
         variant: close to another kind; a quick campaign leaves it out.
         reaction: of the scene.
+        still: the arm stands already, and may not move at all.
     """
 
     name: str
@@ -58,6 +59,7 @@ class FaultKind:
     after: Callable[[Trial], object] | None = None
     variant: bool = False
     reaction: str = RETREAT
+    still: bool = False
 
 
 def frozen_controller(t: Trial) -> float:
@@ -315,13 +317,14 @@ KINDS = (
     slow("program killed", kill("program"), recorder=False, answers=False),
     slow("another program", a_program, SLOWER, controls=OWNER),  # a foreign one just goes on slowly as well
     # while it stands latched
-    FaultKind("latched: a program starts", then(Trial.latch, a_program), STARTS, touched=True),
+    FaultKind("latched: a program starts", then(Trial.latch, a_program), STARTS, touched=True, still=True),
     FaultKind(
         "latched: RTDE silent, then a program",
         then(Trial.latch, says("rtde silent"), pause, a_program),
         SILENT,
         controls=FOREIGN,
         touched=True,
+        still=True,
     ),
     # before the guard arms
     FaultKind("refused: skin silent", breaks(stall_after=0), before=True, variant=True),
