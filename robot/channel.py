@@ -1,8 +1,8 @@
 """Messages between the processes of one guard, over a connected pair of stream sockets.
 
 A message is its length (u32, little endian) and its bytes. Sending never waits: what the other side does not take is
-kept, up to a bound; beyond it ``send`` says False and the message is not sent. A pair is given to a child process by
-its descriptor, so no port is opened and nobody else can join.
+kept, up to a bound; beyond it ``send`` says False and the message is not sent, or what ``spill`` leaves of it. A pair
+is given to a child process by its descriptor, so no port is opened and nobody else can join.
 """
 
 from __future__ import annotations
@@ -11,13 +11,18 @@ import socket
 import struct
 import subprocess
 import sys
+from typing import TYPE_CHECKING
 
 from coneskin.errors import RobotConnectionError
+
+if TYPE_CHECKING:
+    from .spill import Spill
 
 __all__ = ["Channel", "inherit", "pair", "spawn"]
 
 _LENGTH = struct.Struct("<I")
 _LONGEST = 1 << 24
+_RESERVE = 2  # bounds; what lies behind the first is for what is left of a message
 
 
 class Channel:
@@ -25,7 +30,8 @@ class Channel:
 
     Attributes:
         closed: True once the other side is gone.
-        dropped: messages that were not sent because the other side does not read.
+        dropped: messages that were not sent, or not whole, because the other side does not read.
+        spill: shortens what does not fit, and says so as soon as there is room again; None drops it.
     """
 
     def __init__(self, sock: socket.socket, limit: int = 1 << 22) -> None:
@@ -36,6 +42,8 @@ class Channel:
         self._in = b""
         self.closed = False
         self.dropped = 0
+        self.spill: Spill | None = None
+        self._full = False
 
     def fileno(self) -> int:
         """The descriptor, for select and poll; -1 when closed."""
@@ -49,11 +57,17 @@ class Channel:
         """
         if self.closed:
             return False
-        if len(self._out) + len(message) > self._limit:
+        if self._full or len(self._out) + len(message) > self._limit:
             self.flush()
-            if len(self._out) + len(message) > self._limit:
+            # once full it stays so until half of it has gone, so that few gaps come of it, not many
+            self._full = len(self._out) + len(message) > self._limit // (2 if self._full else 1)
+            if self._full:
                 self.dropped += 1
-                return False
+                message = b"" if self.spill is None else self.spill.shorten(message)
+                if not message or len(self._out) + len(message) > _RESERVE * self._limit:
+                    return False
+            elif self.spill is not None and (notice := self.spill.notice()):
+                self._out += _LENGTH.pack(len(notice)) + notice
         self._out += _LENGTH.pack(len(message)) + message
         return self.flush()
 

@@ -60,13 +60,16 @@ class Keeper:
         select.select(inputs, [], [], timeout)
         now = self._clock()
         self._session.receive()
+        asked: Stop | None = None
         for message in self._guard.receive():
             self._heard, self._alone = now, False
             match decode_command(message):
                 case Farewell():
                     return False
-                case Stop(deceleration):
-                    self._vigil.begin(deceleration)
+                case Stop() as stop:
+                    asked = stop  # of several that have waited the newest
+        if asked is not None:
+            self._vigil.begin(asked.deceleration)
         gone = self._guard.closed
         if not gone and (self._heard is None or now - self._heard <= SILENCE):
             self._vigil.rest()

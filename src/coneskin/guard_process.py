@@ -17,6 +17,7 @@ from .robot.channel import Channel, inherit
 from .robot.guard_loop import GuardLoop, GuardPorts
 from .robot.journal import GuardEvent
 from .robot.owner_messages import decode_json
+from .robot.spill import Spill
 from .scene import Scene
 from .scene_reader import parse_scene
 from .skin.recording import encode_block
@@ -27,6 +28,7 @@ __all__ = ["main"]
 def main(arguments: list[str]) -> int:
     """Take the channels and the scene, open what it names, and run until told to end."""
     supervisor, *rest = inherit(arguments)
+    supervisor.spill = Spill()
     other = rest[0] if rest else None
     while not (hello := supervisor.receive()) and not supervisor.closed:
         select.select([supervisor], [], [], 1.0)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +28,17 @@ class Run:
     Attributes:
         header: scene, versions and times; see ``coneskin.session``.
         blocks: all that was recorded after it.
-        missing: what the recording lacks, in a sentence; empty where it was closed.
+        missing: what the recording lacks, in a sentence; empty where it was closed and whole.
     """
 
     header: dict[str, Any]
     blocks: tuple[Block, ...]
     missing: str
+
+    @property
+    def gap(self) -> float:
+        """From when on blocks are missing [s]: what follows cannot be the same again. Infinite where none are."""
+        return min((event.details["since"] for event in self.events if event.name == "missing"), default=math.inf)
 
     @property
     def events(self) -> list[GuardEvent]:
@@ -57,7 +63,7 @@ class Replay:
     Attributes:
         events: what happened this time.
         recorded: what happened then.
-        same: whether the two are equal, bit by bit.
+        same: whether the two are equal, bit by bit; up to the first gap, where blocks are missing.
         differences: the first pairs that are not, for people.
         frames: bytes of skin that were replayed.
         duration: of the recording [s].
@@ -93,7 +99,11 @@ def read_run(path: Path) -> Run:
             raise ValueError(f"{', '.join(wrong)} of another kind")
     except (ValueError, TypeError, KeyError) as exc:
         raise RecordingError(f"{path} has a header that this coneskin cannot read: {exc}") from exc
-    return Run(header, recording.blocks[1:], recording.missing)
+    run = Run(header, recording.blocks[1:], recording.missing)
+    start = recording.blocks[0].time
+    gaps = [event.details for event in run.events if event.name == "missing"]
+    said = [f"{gap['what']}, from {gap['since'] - start:.3f} s to {gap['until'] - start:.3f} s" for gap in gaps]
+    return replace(run, missing="; ".join([*said, *([run.missing] if run.missing else [])]))
 
 
 def replay(run: Run, scene: Scene | None = None) -> Replay:
@@ -115,8 +125,8 @@ def replay(run: Run, scene: Scene | None = None) -> Replay:
             core.take(block, outputs)
     events = [output for output in outputs if isinstance(output, GuardEvent)]
     recorded = run.events
-    again = [_plain(event) for event in events]
-    then = [_plain(event) for event in recorded if event.name not in ABOUT]
+    again = [_plain(event) for event in events if event.time < run.gap]
+    then = [_plain(event) for event in recorded if event.name not in ABOUT and event.time < run.gap]
     if run.missing:  # an input is recorded before its events, so a run that was cut off may lack the last of these
         again = again[: len(then)]
     differences = list(_differences(again, then))

@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 from coneskin.errors import RobotConnectionError
 from coneskin.robot import channel as module
 from coneskin.robot.channel import Channel, inherit, pair, spawn
+from coneskin.robot.journal import GuardEvent, Kind, decode_event
+from coneskin.robot.spill import Spill
+from coneskin.skin.recording import Block, decode_blocks, encode_block
 
 
 def ends():
@@ -98,3 +101,47 @@ def test_a_child_that_cannot_start_is_said(monkeypatch):
     b.close()
     assert sys.executable == "/nowhere/python"
     assert inherit([]) == []
+
+
+# ---- a program that does not read, and goes on
+
+
+def test_no_event_is_lost_and_the_gap_is_told_once():
+    sender, reader = ends()
+    sender._limit, sender.spill = 1 << 18, Spill()
+    bulk = encode_block(Block(Kind.SKIN, 1.0, bytes(5000)))
+    for number in range(3000):
+        event = GuardEvent("contact", float(number), {"number": number}).block() if number % 100 == 0 else None
+        sender.send(
+            encode_block(Block(Kind.SKIN, float(number), bytes(5000))) + (encode_block(event) if event else b"")
+        )
+    lost = sender.dropped
+    assert lost > 1000
+    got = []
+    for _ in range(2000):
+        got += [block for message in reader.receive() for _, block in decode_blocks(message)]
+        sender.flush()
+    assert len(got) < 3000
+    sender.send(bulk)
+    got += [block for message in reader.receive() for _, block in decode_blocks(message)]
+    events = [decode_event(block) for block in got if block.kind == Kind.EVENT]
+    assert [event.details["number"] for event in events if event.name == "contact"] == list(range(0, 3000, 100))
+    (gap,) = [event.details for event in events if event.name == "missing"]
+    assert gap["blocks"] == lost
+    assert (gap["since"], gap["until"]) == (3000.0 - lost, 2999.0)
+    assert f"{lost} blocks of {lost - 1:.3f} s are not recorded" in gap["what"]
+    assert [block.kind for block in got[-2:]] == [Kind.EVENT, Kind.SKIN]  # said before what follows the gap
+    sender.close()
+    reader.close()
+
+
+def test_even_events_have_a_bound():
+    sender, reader = ends()
+    sender._limit, sender.spill = 1 << 12, Spill()
+    event = encode_block(GuardEvent("contact", 0.0, {"why": "x" * 1000}).block())
+    for _ in range(2000):
+        sender.send(event)
+    assert len(sender._out) <= (2 << 12) + 8
+    assert not sender.send(event)
+    sender.close()
+    reader.close()
