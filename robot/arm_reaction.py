@@ -298,9 +298,11 @@ class ArmReaction:
     def _move(self, state: ControllerState, leaving: Leaving, out: Outputs) -> None:
         over = leaving.step(state, self._contacts, out)
         if over is not None:
-            self._why += f"; retreat {1e3 * over.progress:.1f} mm: {over.reason}"
+            made = "gave way" if leaving.how == "push" else "retreat"
+            self._why += f"; {made} {1e3 * over.progress:.1f} mm: {over.reason}"
+            details = {"progress": over.progress, "complete": over.complete, "why": over.reason, **leaving.details}
             self._begin(state.time, Phase.HALTING, Halt(self._reaction.deceleration), out)
-            tell(out, "retreated", state.time, progress=over.progress, complete=over.complete, why=over.reason)
+            tell(out, "retreated", state.time, **details)
 
     def _stay(self, now: float, why: str, out: Outputs) -> None:
         self.phase, self._leaving, self._why = Phase.LATCHED, None, why

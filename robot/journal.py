@@ -44,8 +44,8 @@ class GuardEvent(NamedTuple):
 
     Attributes:
         name: "waiting", "armed", "contact", "contact_placed", "touch_ended", "fault", "stopping", "slower",
-            "standstill", "escalated", "retreating", "clipped", "retreated", "slowing",
-            "resumed", "latched", "refused", "reset", "message", "ending"; and those of ``ABOUT``.
+            "not_standing", "standstill", "escalated", "retreating", "clipped", "retreated", "slowing", "resumed",
+            "latched", "refused", "reset", "message", "ending"; and those of ``ABOUT``.
         time: host clock [s].
         details: numbers and words that belong to it; SI and radians.
     """

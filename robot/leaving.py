@@ -30,15 +30,24 @@ class Leaving:
         now: host time [s].
         program: that follows; None where the owner does.
         out: takes what comes of it.
+
+    Attributes:
+        how: as of the movement.
     """
 
     def __init__(self, movement: Movement, now: float, program: FollowerProgram | None, out: Outputs) -> None:
         self._movement = movement
+        self.how = movement.how
         self._program = program
         self._began = now
         self._sent = -math.inf
         self._obedience = Obedience(now)
-        tell(out, "retreating", now, **({"how": movement.how} if movement.how else {}))
+        tell(out, "retreating", now, **self.details)
+
+    @property
+    def details(self) -> dict[str, str]:
+        """What the events of this movement say of how the arm leaves."""
+        return {"how": self.how} if self.how else {}
 
     def step(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
         """Go on; Done where it is over.
