@@ -92,6 +92,8 @@ def _stopped(kind: FaultKind, trial: Trial, outcome: Outcome, budget: float) -> 
         raise
     outcome.skin_late = float(trial.skin.ask(report=True).get("late", 0.0))
     fault_at = began = kind.inject(trial)
+    if trial.happened is not None:  # it took a while until the fault
+        outcome.skin_late = max(outcome.skin_late, float(trial.skin.ask(report=True).get("late", 0.0)))
     if kind.tolerated:
         time.sleep(0.3)
         if trial.moves():
