@@ -205,7 +205,7 @@ def test_a_recorded_scene_does_without_its_mesh(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"\xff\xfe\x00bad", "the file cannot be read: "),
+        (b"\xff\xfe\x00bad", "this is not a TOML text: byte 0 "),
         (b"\x00\x01\x02", "not TOML: "),
         (b"key = ", "not TOML: "),
     ],
