@@ -15,7 +15,7 @@ CAMPAIGN = Path(__file__).parents[2] / "bench" / "faults.py"
 
 def campaign(*options):
     command = [sys.executable, str(CAMPAIGN), "--times", "1", "--json", *options]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     return done, [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
 
 
@@ -24,7 +24,7 @@ def test_after_every_kind_of_fault_the_arm_stands():
 
     A kind that fails is tried again alone, because such a machine may also hold up the skin that was to fail later.
     """
-    done, lines = campaign("--quick", "--parallel", "2", "--slack-ms", "2000")
+    done, lines = campaign("--quick", "--parallel", "3", "--slack-ms", "2000")
     assert len({line["kind"] for line in lines}) >= 30, done.stdout + done.stderr
     assert {line["control"] for line in lines} == {"owner", "foreign"}
     for line in lines:
