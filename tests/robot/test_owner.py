@@ -159,10 +159,16 @@ def test_what_the_wheel_refuses_is_an_error():
 
 
 @pytest.fixture
-def owner():
+def now():
+    """The owner's clock, to be set."""
+    return [10.0]
+
+
+@pytest.fixture
+def owner(now):
     made = arm()
     (guard, guard_end), (program, program_end) = ((Channel(s) for s in pair()) for _ in range(2))
-    served = Owner(made, guard_end, program_end)
+    served = Owner(made, guard_end, program_end, lambda: now[0])
     yield served, made, guard, program
     for channel in (guard, guard_end, program, program_end):
         channel.close()
@@ -285,11 +291,8 @@ def test_a_program_that_does_not_start_again_is_an_error(owner):
     assert answers(program)[0]["stopped"] is True
 
 
-def test_a_silent_guard_counts_as_dead():
-    now = [10.0]
-    made = arm()
-    (guard, guard_end), (program, program_end) = ((Channel(s) for s in pair()) for _ in range(2))
-    served = Owner(made, guard_end, program_end, lambda: now[0])
+def test_a_silent_guard_counts_as_dead(owner, now):
+    served, made, guard, program = owner
     guard.send(Clear().encode())
     move(program)
     served.step(0.0)
@@ -310,15 +313,10 @@ def test_a_silent_guard_counts_as_dead():
     move(program)
     served.step(0.0)
     assert answers(program)[0]["stopped"] is True  # alive again is not enough: the guard has to clear it
-    for channel in (guard, guard_end, program, program_end):
-        channel.close()
 
 
-def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on():
-    now = [10.0]
-    made = arm()
-    (guard, guard_end), (program, program_end) = ((Channel(s) for s in pair()) for _ in range(2))
-    served = Owner(made, guard_end, program_end, lambda: now[0])
+def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(owner, now):
+    served, made, guard, _ = owner
     for message in (Clear(), Stop(10.0), Speed((0.1,) * 6, 4.0)):
         guard.send(message.encode())
     served.step(0.0)
@@ -333,15 +331,10 @@ def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on():
     now[0] += 100.0  # it stands, and nobody has to say anything any more
     served.step(0.0)
     assert stops(made._control)[before:] == ["speedStop"]
-    for channel in (guard, guard_end, program, program_end):
-        channel.close()
 
 
-def test_a_sign_of_life_is_no_new_speed():
-    now = [10.0]
-    made = arm()
-    (guard, guard_end), (program, program_end) = ((Channel(s) for s in pair()) for _ in range(2))
-    served = Owner(made, guard_end, program_end, lambda: now[0])
+def test_a_sign_of_life_is_no_new_speed(owner, now):
+    served, made, guard, _ = owner
     for message in (Clear(), Stop(10.0), Speed((0.1,) * 6, 4.0)):
         guard.send(message.encode())
     served.step(0.0)
@@ -351,8 +344,6 @@ def test_a_sign_of_life_is_no_new_speed():
         guard.send(Alive().encode())
         served.step(0.0)
     assert stops(made._control)[before:] == ["speedStop"]
-    for channel in (guard, guard_end, program, program_end):
-        channel.close()
 
 
 def test_speeds_that_waited_are_overtaken_by_what_came_later(owner):
