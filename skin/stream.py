@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 from coneskin.errors import SensorError
 
-from .detector import Detection, Detector
+from .detection import Detection
+from .detector import Detector
 from .diagnosis import Fault
 from .events import Event, SkinFault
 from .sensor import Sensor

@@ -35,7 +35,7 @@ def build_core(scene: Scene) -> GuardCore:
         raise SceneError(["a guard needs a [[link]] with a [[link.sensor]]"], scene.name)
     from .robot.guard_core import GuardCore, GuardedSensor
     from .robot.watch import Watch
-    from .skin.detector import Detection
+    from .skin.detection import Detection
     from .skin.stream import Stream
     from .skin.timing import TimingLimits
 

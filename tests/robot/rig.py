@@ -22,7 +22,7 @@ from coneskin.robot.stop_watch import FOREIGN, OWNED, Way
 from coneskin.robot.table import Table
 from coneskin.robot.ur_models import model
 from coneskin.robot.watch import Watch
-from coneskin.skin.detector import Detection
+from coneskin.skin.detection import Detection
 from coneskin.skin.faults import Faults
 from coneskin.skin.imperfections import Imperfections
 from coneskin.skin.recording import Block

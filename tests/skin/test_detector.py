@@ -8,7 +8,8 @@ import pytest
 from coneskin.errors import SensorError, SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.circuit import Contact, Wiring
-from coneskin.skin.detector import Detection, Detector
+from coneskin.skin.detection import Detection
+from coneskin.skin.detector import Detector
 from coneskin.skin.diagnosis import Fault
 from coneskin.skin.events import Event, SkinFault, TouchBegan, TouchEnded, TouchMoved
 from coneskin.skin.faults import Faults
