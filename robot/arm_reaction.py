@@ -39,7 +39,6 @@ if TYPE_CHECKING:  # a reaction that only stops loads neither
 
 __all__ = ["ArmReaction", "Command", "Output", "Outputs", "Phase"]
 
-_SLACK = 4.0  # of the patience: what a stop may take besides v / a before every way is used
 _RESTARTS = 3  # times that a latched arm was moved again, from which on it is stopped by the strongest way
 
 
@@ -134,8 +133,8 @@ class ArmReaction:
             if self._plain:
                 return
             reaction = self._reaction = self._rules.choose(link, level, self._touch_speed)
-            slows, patience = reaction.kind == "slow", _SLACK * self._watch.escalate
-            if slows and self.slow_down.begin(now, self._touch_speed, reaction, patience, out):
+            slows = reaction.kind == "slow"
+            if slows and self.slow_down.begin(now, self._touch_speed, reaction, self._watch, out):
                 self.phase = Phase.SLOWED
             else:
                 self._stop_now(now, "touch", True, out)
@@ -215,7 +214,7 @@ class ArmReaction:
         wrong = []
         if not self.owner_ready:
             wrong.append("ur_rtde is not ready" if self.owned else "the process that watches the guard is not ready")
-        if self.needs_slider and self.slow_down.slider is None:
+        if self.needs_slider and not self.slow_down.knows(now):
             wrong.append("where the controller's speed slider is, is not known")
         if self.state is None or self.silent(now):
             return [*wrong, "the controller is silent"]
@@ -258,7 +257,7 @@ class ArmReaction:
             self._leaving.end(out)
         state, watch = self.state, self._watch
         speed = None if state is None or self.silent(now) else state.speed
-        budget = (speed or 0.0) / command.deceleration + _SLACK * watch.escalate
+        budget = watch.stop_budget(speed or 0.0, command.deceleration)
         self._stop = StopWatch(now, speed, ways, watch.escalate, budget, watch.standstill, watch.arm_silence)
         self._leaving = self._latch = None
         self.phase = phase
@@ -266,7 +265,7 @@ class ArmReaction:
     def _follow(self, stop: StopWatch, state: ControllerState, measured_at: float, out: Outputs) -> None:
         before = stop.slowed_at
         stop.sample(state.time, state.speed, measured_at)
-        if before is None and stop.slowed_at is not None:
+        if before is None and stop.slowed_at is not None and not stop.rippled:
             tell(out, "slower", state.time, speed=state.speed)
         if stop.standing_at is None:
             return

@@ -22,6 +22,11 @@ class Arming:
         self._told: float | None = None
         self._waiting_for: list[str] = []
         self._reset_at: float | None = None
+        self._disturbed = False
+
+    def disturb(self) -> None:
+        """A touch has begun, however short it is."""
+        self._disturbed = True
 
     @property
     def resetting(self) -> bool:
@@ -30,10 +35,12 @@ class Arming:
 
     def reset(self, now: float) -> None:
         """A person has reset the guard at a time [s]."""
-        self._reset_at = now
+        self._reset_at, self._disturbed = now, False
 
     def starts(self, now: float, wrong: list[str], out: Outputs) -> bool:
         """Whether to arm for the first time; it waits as long as something is wrong."""
+        if self._disturbed:
+            self._sound_since, self._disturbed = None, False
         if wrong:
             self._sound_since = None
             if self._told is None:
@@ -50,6 +57,8 @@ class Arming:
         """Whether to arm after a reset; anything wrong meanwhile refuses it, and a person has to reset again."""
         if self._reset_at is None:
             return False
+        if self._disturbed:
+            wrong = [*wrong, "it was touched meanwhile"]
         if wrong:
             self._reset_at = None
             tell(out, "refused", now, what="reset", reasons=wrong)

@@ -7,10 +7,12 @@ is given to a child process by its descriptor, so no port is opened and nobody e
 
 from __future__ import annotations
 
+import select
 import socket
 import struct
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 from coneskin.errors import RobotConnectionError
@@ -82,6 +84,15 @@ class Channel:
             self.closed = True
             self._out.clear()
         return not self.closed
+
+    def finish(self, seconds: float) -> bool:
+        """Hand over all that waits, and say what was left out; whether it was taken within this time [s]."""
+        if self.spill is not None and (notice := self.spill.notice()):
+            self._out += _LENGTH.pack(len(notice)) + notice
+        end = time.monotonic() + seconds
+        while self.flush() and self._out and (left := end - time.monotonic()) > 0.0:
+            select.select([], [self], [], left)
+        return not (self.closed or self._out)
 
     def receive(self) -> list[bytes]:
         """Every whole message that has arrived; sets ``closed`` where the other side is gone. Never waits."""

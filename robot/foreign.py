@@ -15,6 +15,7 @@ from .stop_watch import Way
 
 __all__ = ["ForeignStops"]
 
+_REOPENING = 0.2  # s for each port: a stop by another one waits meanwhile
 _PORTS = {"script": 30003, "dashboard": 29999}
 
 
@@ -97,12 +98,12 @@ class ForeignStops:
         return self._send("script", program.encode())
 
     def reopen(self) -> bool:
-        """Open again what is gone, waiting for each no longer than the timeout; whether any was opened."""
+        """Open again what is gone, waiting for each no longer than 0.2 s; whether any was opened."""
         opened = False
         for name, port in _PORTS.items():
             if name not in self._open_ones:
                 with suppress(RobotConnectionError):
-                    self._open_ones[name] = self._open(port)
+                    self._open_ones[name] = self._open(port, min(self._timeout, _REOPENING))
                     opened = True
         return opened
 
@@ -116,9 +117,9 @@ class ForeignStops:
             pass
         return False
 
-    def _open(self, port: int) -> socket.socket:
+    def _open(self, port: int, timeout: float | None = None) -> socket.socket:
         try:
-            sock = socket.create_connection((self.host, port), self._timeout)
+            sock = socket.create_connection((self.host, port), self._timeout if timeout is None else timeout)
         except OSError as exc:
             raise RobotConnectionError(
                 f"cannot reach port {port} of the controller {self.host}, which a stop may need: {exc.strerror or exc}"

@@ -162,6 +162,8 @@ class GuardCore:
             tell(out, "touch_ended", event.time, sensor=event.sensor)
             return
         began = isinstance(event, TouchBegan)
+        if began:
+            self._arming.disturb()
         where, before = self._sensors[event.sensor], self._contacts.get(event.sensor)
         if self._arm is not None:
             self._arm.touch(event.time, where.link, event.level, began, out)
@@ -217,6 +219,8 @@ class GuardCore:
         if self._arm is not None:
             self._arm.owner_ready &= what not in ("owner", "keeper")
             self._arm.lose(_WAYS.get(what, frozenset()), block.time)
+            if what == "slider":
+                self._arm.slow_down.note(block.time, None)
         self._react(block.time, why, out)
         tell(out, "ending" if what == "supervisor" else "fault", block.time, what=why)
 
@@ -224,7 +228,7 @@ class GuardCore:
         if self._arm is None:
             return
         try:
-            self._arm.slow_down.slider = self._arm.decode_slider(block.payload)
+            self._arm.slow_down.note(block.time, self._arm.decode_slider(block.payload))
         except RobotConnectionError as exc:
             self._fault(block.time, f"the speed slider cannot be read: {exc}", out)
 

@@ -42,6 +42,7 @@ _OURS = (Use, Steer, FollowerProgram, Slider)
 _PORTS = {"skin": "source", "controller": "reader", "slider": "slider", "keeper": "keeper", "owner": "owner"}
 _TICK = 0.002  # s between two looks at the clocks where nothing else happens
 _OVERRUN = 0.02  # s between two rounds from which on the loop says that it was held up
+_LAST_WORDS = 1.0  # s that the recorder has to take what waits for it
 _ENDING = 3.0  # s that the arm has to stand when the guard is told to end
 
 
@@ -128,6 +129,7 @@ class GuardLoop:
         self._clock = clock
         self._selector = selectors.DefaultSelector()
         self._quit = False
+        self._took = False  # anything, in this step
         self._beat = -BEAT
         self._out: list[bytes] = []
         self._outbox = _Outbox(ports)
@@ -196,8 +198,10 @@ class GuardLoop:
                     self._quit = True
         if ports.supervisor.closed:
             self._quit = True
-        if not ready:
+            self._forget(ports.supervisor)  # its end would be ready for ever
+        if not self._took:
             self._take(Kind.TICK, b"")
+        self._took = False
         self._tell()
 
     def _tell(self) -> None:
@@ -252,6 +256,7 @@ class GuardLoop:
 
     def _take(self, kind: Kind, payload: bytes) -> None:
         """Feed the core, which sends its commands at once; then note all of it for the recorder."""
+        self._took = True
         block = Block(kind, self._clock(), payload)
         outbox = self._outbox
         self._core.take(block, outbox)
@@ -290,4 +295,4 @@ class GuardLoop:
         if self._ports.keeper is not None and not (self._core.phase.stopping or self._core.phase is Phase.RETREATING):
             self._ports.keeper.send(Farewell().encode())
         self._tell()
-        self._ports.supervisor.flush()
+        self._ports.supervisor.finish(_LAST_WORDS)

@@ -71,6 +71,8 @@ class Keeper:
         if asked is not None:
             self._vigil.begin(asked.deceleration)
         gone = self._guard.closed
+        if gone and self._heard is None:
+            return False  # it never guarded anything
         if not gone and (self._heard is None or now - self._heard <= SILENCE):
             self._vigil.rest()
         elif not self._alone:

@@ -6,7 +6,7 @@ round; so a scene that does not slow leaves the slider alone.
 
 from __future__ import annotations
 
-from coneskin.errors import RobotRefused
+from coneskin.errors import RobotConnectionError, RobotRefused
 
 from . import rtde_codec as rtde
 from .rtde_connection import RtdeConnection
@@ -23,10 +23,12 @@ def decode_fraction(payload: bytes) -> float:
     """Where the slider is, 0..1, from the payload of a data packet of ``SpeedSlider.read``.
 
     Raises:
-        RobotConnectionError: the payload has another length.
+        RobotConnectionError: the payload has another length, or the slider cannot be there.
     """
     (fraction,) = _OUT.unpack(payload)
     assert isinstance(fraction, float)
+    if not 0.0 <= fraction <= 1.0:
+        raise RobotConnectionError(f"target_speed_fraction must be from 0 to 1, got {fraction!r}")
     return fraction
 
 

@@ -76,11 +76,14 @@ def decode_state(time: float, payload: bytes) -> ControllerState:
         payload: recipe id and values.
 
     Raises:
-        RobotConnectionError: the payload has another length, or a position or speed is not finite.
+        RobotConnectionError: the payload has another length, or its time, a position or a speed is not finite.
     """
     state = ControllerState(time, *RECIPE.unpack(payload))  # type: ignore[arg-type]
-    if not math.isfinite(sum(state.q) + sum(state.qd)):
-        raise RobotConnectionError(f"its joint positions or speeds are not finite: {state.q} rad, {state.qd} rad/s")
+    if not math.isfinite(state.controller_time + sum(state.q) + sum(state.qd)):
+        raise RobotConnectionError(
+            f"its time, joint positions or speeds are not finite: {state.controller_time} s, {state.q} rad, "
+            f"{state.qd} rad/s"
+        )
     return state
 
 

@@ -11,12 +11,12 @@ import math
 from enum import Enum
 from typing import NamedTuple
 
-__all__ = ["FOREIGN", "OWNED", "STEADY", "StopWatch", "Use", "Way"]
+__all__ = ["FOREIGN", "OWNED", "PROTECTED", "STEADY", "StopWatch", "Use", "Way"]
 
 STEADY = 5  #: samples in a row below the standstill speed that count as standing
 _SLOWER = 0.05  # rad/s; a drop by this much, or by a tenth, is a slowdown and not noise of the measurement
 _FASTER = 0.1  # rad/s; an arm that has slowed down and is this much faster again is moved by something new
-_PROTECTED = 4.0  # of the patience: a protective stop is left to work for so long
+PROTECTED = 4.0  #: of the patience: a protective stop is left to work for so long
 
 
 class Way(Enum):
@@ -64,6 +64,7 @@ class StopWatch:
         standing_at: when the arm was first seen standing, or None.
         used: the ways used so far, each once.
         rounds: how often all of them have been used.
+        rippled: whether the arm has become faster again since the newest way was taken.
     """
 
     def __init__(
@@ -84,13 +85,15 @@ class StopWatch:
         self._silence = silence
         self._began = self._newest = self._arrived = now
         self._last = -math.inf
-        self._next = now + patience * (_PROTECTED if ways[:1] == (Way.PROTECTIVE,) else 1.0)
+        self._next = now + patience * (PROTECTED if ways[:1] == (Way.PROTECTIVE,) else 1.0)
         self._budget = budget
         self._deadline = now + budget
         self._steady = 0
         self._lowest = math.inf  # speed since it slowed down
         self.used = list(ways[:1])
         self.rounds = 0
+        self.rippled = False
+        self._current = ways[0] if ways else None
         self.slowed_at: float | None = None
         self.standing_at: float | None = None
 
@@ -116,7 +119,10 @@ class StopWatch:
         self._lowest = min(self._lowest, speed)
         if self.slowed_at is not None and speed > self._lowest + _FASTER:
             self.slowed_at, self._top = None, speed
-            self._next, self._deadline = measured_at + self._patience, measured_at + self._budget
+            if not self.rippled:  # once for each way, or an arm that shakes would put the next one off for ever
+                self.rippled = True
+                self._next = max(self._next, measured_at + self._patience)
+                self._deadline = measured_at + self._budget
         self._steady = self._steady + 1 if speed < self._standstill else 0
         if self._steady >= STEADY and self.standing_at is None:
             self.standing_at = time
@@ -132,7 +138,7 @@ class StopWatch:
         """These ways are gone; where one of them is in use, take the next at once."""
         self._ways = tuple(way for way in self._ways if way not in ways)
         self._left = [way for way in self._left if way not in ways]
-        if self.used and self.used[-1] in ways:
+        if self._current in ways:
             self.hurry(now)
 
     def next_ways(self, now: float) -> list[Way]:
@@ -150,7 +156,8 @@ class StopWatch:
         if not self._left:
             return []
         way = self._left.pop(self._left.index(Way.PROTECTIVE) if strongest else 0)
-        self._next = now + self._patience * (_PROTECTED if way is Way.PROTECTIVE else 1.0)
+        self._next = now + self._patience * (PROTECTED if way is Way.PROTECTIVE else 1.0)
+        self._current, self.rippled = way, False
         if way not in self.used:
             self.used.append(way)
         return [way]

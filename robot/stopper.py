@@ -17,13 +17,12 @@ from coneskin.errors import ConeSkinError
 
 from .foreign import ForeignStops
 from .state_reader import ControllerState, StateReader, decode_state
-from .stop_watch import StopWatch, Way
+from .stop_watch import PROTECTED, StopWatch, Way
 from .watch import Watch
 
 __all__ = ["Stopper"]
 
 _WAYS = (Way.SCRIPT, Way.DASHBOARD, Way.PROTECTIVE)
-_QUIET = 4.0  # of the patience: a protective stop is left to work for so long
 _REOPEN = 0.05  # s between two looks whether a connection is gone and can be opened again
 _BLIND = 2.0  # s without a state after which a stop is given up, and the reader opened anew
 _CONNECT = 0.5  # s that opening the reader may take
@@ -84,10 +83,11 @@ class Stopper:
         gentle = self._deceleration if deceleration is None else deceleration
         watch = self._watch
         self.read()
-        self._use(Way.SCRIPT, gentle)
+        if not self._use(Way.SCRIPT, gentle):
+            self._use(Way.DASHBOARD, gentle)
         now = start = self._clock()
         speed = None if self._state is None or self.blind() else self._state.speed
-        budget = (speed or 0.0) / gentle + 4.0 * watch.escalate
+        budget = watch.stop_budget(speed or 0.0, gentle)
         stop = StopWatch(now, speed, _WAYS, watch.escalate, budget, watch.standstill, watch.arm_silence)
         look_at = now
         while stop.standing_at is None and now - max(start, self._fresh) < _BLIND and not over():
@@ -148,10 +148,16 @@ class Stopper:
             self._reader.close()
             self._reader = None
 
-    def _use(self, way: Way, deceleration: float) -> None:
-        """Send a stop, unless it would replace the program of a protective stop that has only just been sent."""
+    def _use(self, way: Way, deceleration: float) -> bool:
+        """Send a stop, unless it would replace the program of a protective stop that has only just been sent.
+
+        Returns:
+            whether this way is there.
+        """
         now = self._clock()
         if now < self._quiet_until:
-            return
-        if self._stops.use(way, deceleration) and way is Way.PROTECTIVE:
-            self._quiet_until = now + _QUIET * self._watch.escalate
+            return True
+        taken = self._stops.use(way, deceleration)
+        if taken and way is Way.PROTECTIVE:
+            self._quiet_until = now + PROTECTED * self._watch.escalate
+        return taken

@@ -29,3 +29,12 @@ class Watch:
     escalate: float = 0.025
     standstill: float = 0.01
     settle: float = 0.1
+
+    def stop_budget(self, speed: float, deceleration: float) -> float:
+        """Time within which an arm should stand after a stop: braking, and four times the patience [s].
+
+        Args:
+            speed: of the leading joint [rad/s].
+            deceleration: of the stop [rad/s2].
+        """
+        return speed / deceleration + 4.0 * self.escalate

@@ -43,7 +43,7 @@ def braking_time(scene: Scene) -> float:
     reactions = [scene.reaction or Reaction(kind="stop"), *(rule.reaction for rule in scene.rules)]
     slowest = min(reaction.deceleration for reaction in reactions)
     fastest = max(model(scene.arm.model).joint_speed)
-    return fastest / slowest + 4.0 * (scene.watch or Watch()).escalate + _MARGIN
+    return (scene.watch or Watch()).stop_budget(fastest, slowest) + _MARGIN
 
 
 def stop_error(stop: GuardEvent, contact: GuardEvent | None, outcome: str) -> Collision | RobotRefused:

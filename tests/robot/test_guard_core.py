@@ -299,6 +299,25 @@ def test_a_state_that_is_no_number_is_no_standstill():
     assert "not finite" in armed.event("stopping").details["why"]
 
 
+def test_a_controller_whose_time_is_no_number_is_silent():
+    rig = Rig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0, obeys=frozenset()).run(0.4)
+    rig.arm.clock = math.nan
+    rig.run(1.0)
+    assert "not finite" in rig.event("stopping").details["why"]
+    assert Way.PROTECTIVE in rig.arm.commands
+
+
+def test_a_touch_that_came_and_went_within_one_read_refuses_a_reset():
+    rig = reset(touch(1.51, 1.53))
+    late = b"".join([next(rig._packets)[1] for _ in range(60)])
+    rig.now += 0.04  # held up: what has come meanwhile is read at once
+    rig.feed(Kind.ARM, rig.arm.step())
+    rig.feed(Kind.SKIN, late)
+    rig.run(0.5)
+    assert rig.core.phase is Phase.LATCHED
+    assert "it was touched meanwhile" in rig.event("refused").details["reasons"]
+
+
 def test_an_arm_without_power_is_a_fault():
     rig = Rig(speed=1.0).run(0.5)
     rig.arm.robot_mode = 3

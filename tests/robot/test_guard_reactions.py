@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from coneskin.errors import RobotConnectionError
 from coneskin.robot.commands import Reaction
 from coneskin.robot.follower import FollowerProgram, Steer
 from coneskin.robot.journal import Kind
@@ -11,12 +12,13 @@ from coneskin.robot.owner_messages import Halt, Speed, Stop
 from coneskin.robot.phase import Phase
 from coneskin.robot.rules import Rule
 from coneskin.robot.slowing import Slider
+from coneskin.robot.speed_slider import decode_fraction
 from coneskin.robot.stop_watch import Use, Way
 from coneskin.robot.table import Table
 from coneskin.skin.recording import Block
 from coneskin.skin.scripted_touch import ScriptedTouch
 
-from .rig import LINK, MODEL, Rig, make_core, touch
+from .rig import LINK, MODEL, SLIDER, Rig, make_core, touch
 
 SLOW = Reaction(kind="slow", slow_to=0.2, time_budget=1.0)
 
@@ -250,6 +252,19 @@ def test_a_second_touch_ends_a_retreat_that_began_slow():
     assert rig.core.phase is Phase.RETREATING
     rig.core._arm.touch(rig.now, LINK, 0.2, True, [])
     assert rig.core.phase is Phase.HALTING
+
+
+def test_a_slider_that_was_not_heard_for_long_is_not_known():
+    rig = Rig(touch(1.5), reaction=Reaction(kind="slow", slow_to=0.5), speed=1.0).run(0.5)
+    rig.feed(Kind.SLIDER, SLIDER.pack((1.0,)))
+    feed = rig.feed
+    rig.feed = lambda kind, payload=b"": [] if kind is Kind.SLIDER else feed(kind, payload)
+    rig.run(1.5)
+    assert "slowing" not in rig.names  # it might raise a slider that somebody has lowered
+    assert rig.core.phase is Phase.LATCHED
+    rig.feed = feed
+    with pytest.raises(RobotConnectionError, match="from 0 to 1"):
+        decode_fraction(SLIDER.pack((math.nan,)))
 
 
 def test_a_person_who_slows_the_arm_further_is_not_overruled():

@@ -1,5 +1,8 @@
 """A stop counts when measured speed says so."""
 
+import itertools
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -81,6 +84,33 @@ def test_a_program_that_starts_again_and_again_ends_in_a_protective_stop():
     _, named, ended = stubborn()
     assert named[-1][1] is Way.PROTECTIVE
     assert ended < 0.8
+
+
+@pytest.mark.parametrize("hertz", [2, 8, 20, 60])
+@pytest.mark.parametrize("swing", [0.06, 0.1, 0.2])
+def test_an_arm_that_shakes_as_it_goes_on_gets_a_protective_stop(hertz, swing):
+    stop = StopWatch(0.0, 1.0, FOREIGN, 0.025, 0.2, 0.01)
+    named = []
+    for k in range(1, 500):
+        now = 0.002 * k
+        stop.sample(now, 0.9 + swing * math.sin(2.0 * math.pi * hertz * now))
+        named += [(now, way) for way in stop.next_ways(now)]
+    assert next(now for now, way in named if way is Way.PROTECTIVE) < 0.7
+    for (now, way), (after, _) in itertools.pairwise(named):
+        assert after - now >= (0.099 if way is Way.PROTECTIVE else 0.024)
+
+
+def test_a_way_that_is_lost_in_a_later_round_is_not_waited_for():
+    stop = watch(ways=FOREIGN)
+    named = []
+    now = 0.0
+    while len(named) < 5:  # the second round: script, dashboard
+        now += 0.001
+        stop.sample(now, 1.0)
+        named += stop.next_ways(now)
+    assert named[-1] is Way.DASHBOARD
+    stop.forget(frozenset({Way.DASHBOARD}), now)
+    assert stop.next_ways(now) == [Way.PROTECTIVE]
 
 
 def test_a_stop_is_tried_again_and_again_while_the_arm_moves():
