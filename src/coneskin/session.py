@@ -195,7 +195,7 @@ class Session:
             RobotConnectionError: a process is gone, or says nothing.
             ConeSkinError: what the guard died of.
         """
-        for event in self.events:
+        for event in self.events[self._since_armed() :]:
             if event.name == "died":
                 raise death(event)
         if self._log.lost:
@@ -218,7 +218,7 @@ class Session:
             RobotRefused: a fault has stopped the arm.
             RobotConnectionError: a process is gone, or the guard hangs.
         """
-        since = max((i for i, event in enumerate(self.events) if event.name == "armed"), default=-1) + 1
+        since = self._since_armed()
         stop = self.wait_for(("stopping",), 1.0 if stopped else 0.0, after=since)
         self.check_guard()
         if stop is None:
@@ -226,6 +226,11 @@ class Session:
         outcome = self._outcome(since)
         contact = self.wait_for(("contact_placed",), 0.0, after=since) or self.wait_for(("contact",), 0.0, after=since)
         raise stop_error(stop, contact, outcome)
+
+    def _since_armed(self) -> int:
+        """Position after the newest "armed"; found from the end, because a program asks with each of its commands."""
+        events = self.events
+        return next((at + 1 for at in range(len(events) - 1, -1, -1) if events[at].name == "armed"), 0)
 
     def _outcome(self, since: int) -> str:
         """What has become of the newest stop, as far as it is known in time."""
