@@ -35,7 +35,8 @@ from coneskin.geometry.placed import PlacedFrustum
 from coneskin.robot.arm_reaction import ArmReaction, Phase
 from coneskin.robot.channel import Channel, pair
 from coneskin.robot.commands import Reaction
-from coneskin.robot.guard_core import GuardCore, GuardedSensor
+from coneskin.robot.contact import GuardedSensor
+from coneskin.robot.guard_core import GuardCore
 from coneskin.robot.guard_loop import GuardLoop, GuardPorts
 from coneskin.robot.journal import Kind
 from coneskin.robot.owner_messages import Note

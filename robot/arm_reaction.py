@@ -133,8 +133,7 @@ class ArmReaction:
             if self._plain:
                 return
             reaction = self._reaction = self._rules.choose(link, level, self._touch_speed)
-            slows = reaction.kind == "slow"
-            if slows and self.slow_down.begin(now, self._touch_speed, reaction, self._watch, out):
+            if reaction.kind == "slow" and self.slow_down.begin(now, self._touch_speed, reaction, self._watch, out):
                 self.phase = Phase.SLOWED
             else:
                 self._stop_now(now, "touch", True, out)
@@ -304,6 +303,6 @@ class ArmReaction:
             tell(out, "retreated", state.time, **details)
 
     def _stay(self, now: float, why: str, out: Outputs) -> None:
-        self.phase, self._leaving, self._why = Phase.LATCHED, None, why
+        self.phase, self._why = Phase.LATCHED, why
         self._latch = Latch(self._watch.standstill)
         tell(out, "latched", now, why=why)

@@ -8,17 +8,15 @@ It arms itself once everything has been sound for a while; a touch or a fault th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from coneskin.errors import RobotConnectionError
-from coneskin.geometry.pose import Vector
 from coneskin.skin.events import Event, SkinFault, Touch, TouchBegan, TouchEnded
 from coneskin.skin.recording import Block
 from coneskin.skin.stream import Stream
 
 from .arming import Arming
-from .commands import ContactOnLink
+from .contact import Contact, GuardedSensor
 from .journal import Kind
 from .outputs import Outputs, tell
 from .owner_messages import Note
@@ -29,7 +27,7 @@ from .watch import Watch
 if TYPE_CHECKING:
     from .arm_reaction import ArmReaction
 
-__all__ = ["GuardCore", "GuardedSensor"]
+__all__ = ["GuardCore"]
 
 #: what can be lost -> the ways to stop that go with it
 _WAYS: Mapping[str, frozenset[Way]] = {
@@ -38,37 +36,6 @@ _WAYS: Mapping[str, frozenset[Way]] = {
     "dashboard": frozenset({Way.DASHBOARD}),
     "keeper": frozenset({Way.KEEPER}),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class GuardedSensor:
-    """A sensor on a link.
-
-    Attributes:
-        name: the sensor's.
-        link_name: of the link, for people.
-        link: index of the link's DH frame.
-        place: (u [m], phi [rad]) -> point [m] and outward unit normal, in the link's DH frame.
-        threshold: level from which it is touched.
-    """
-
-    name: str
-    link_name: str
-    link: int
-    place: Callable[[float, float], tuple[Vector, Vector]]
-    threshold: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Contact:
-    touch: Touch
-    where: GuardedSensor
-    point: Vector
-    normal: Vector
-
-    def on_link(self) -> ContactOnLink:
-        touch, where = self.touch, self.where
-        return ContactOnLink(where.link, self.point, self.normal, touch.level, touch.location_valid, where.threshold)
 
 
 class GuardCore:
@@ -89,7 +56,7 @@ class GuardCore:
         self._watch = watch
         self._arm = arm
         self._phase = Phase.STARTING
-        self._contacts: dict[str, _Contact] = {}
+        self._contacts: dict[str, Contact] = {}
         self._faults: dict[str, str] = {}  # since the last reset
         self._lost: dict[str, str] = {}  # what is gone for good
         self._arming = Arming(watch.settle)
@@ -162,17 +129,17 @@ class GuardCore:
             tell(out, "touch_ended", event.time, sensor=event.sensor)
             return
         began = isinstance(event, TouchBegan)
-        if began:
-            self._arming.disturb()
         where, before = self._sensors[event.sensor], self._contacts.get(event.sensor)
         if self._arm is not None:
             self._arm.touch(event.time, where.link, event.level, began, out)
-        contact = self._contacts[event.sensor] = _Contact(event, where, *where.place(event.u, event.phi))
+        if began:
+            self._arming.disturb()
+        contact = self._contacts[event.sensor] = Contact(event, where, *where.place(event.u, event.phi))
         self._locate()
         if began:
-            tell(out, "contact", event.time, **_describe(contact))
+            tell(out, "contact", event.time, **contact.details())
         elif event.location_valid and not (before and before.touch.location_valid):
-            tell(out, "contact_placed", event.time, **_describe(contact))
+            tell(out, "contact_placed", event.time, **contact.details())
 
     def _locate(self) -> None:
         if self._arm is not None:
@@ -284,19 +251,3 @@ class GuardCore:
     def _react(self, now: float, why: str, out: Outputs) -> None:
         if self._arm is not None:
             self._arm.fault(now, why, out)
-
-
-def _describe(contact: _Contact) -> dict[str, Any]:
-    touch = contact.touch
-    return {
-        "sensor": touch.sensor,
-        "link": contact.where.link_name,
-        "u": touch.u,
-        "phi": touch.phi,
-        "point": contact.point,
-        "normal": contact.normal,
-        "level": touch.level,
-        "location_valid": touch.location_valid,
-        "clock_us": touch.clock_us,
-        "sequence": touch.sequence,
-    }

@@ -33,7 +33,8 @@ def build_core(scene: Scene) -> GuardCore:
     """
     if not scene.sensors:
         raise SceneError(["a guard needs a [[link]] with a [[link.sensor]]"], scene.name)
-    from .robot.guard_core import GuardCore, GuardedSensor
+    from .robot.contact import GuardedSensor
+    from .robot.guard_core import GuardCore
     from .robot.watch import Watch
     from .skin.detection import Detection
     from .skin.stream import Stream

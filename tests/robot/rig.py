@@ -9,7 +9,8 @@ from coneskin.geometry.placed import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm_reaction import ArmReaction
 from coneskin.robot.commands import Reaction
-from coneskin.robot.guard_core import GuardCore, GuardedSensor
+from coneskin.robot.contact import GuardedSensor
+from coneskin.robot.guard_core import GuardCore
 from coneskin.robot.journal import GuardEvent, Kind
 from coneskin.robot.kinematics import link_pose
 from coneskin.robot.link_frames import LINK_INDEX, dh_mesh
