@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from .robot.guard_core import GuardCore
     from .robot.mover import Mover
     from .robot.ur_models import ArmModel
-    from .robot.watch import Watch
     from .scene import Scene
 
 __all__ = ["OnArm", "build_core", "place_on_arm"]
@@ -35,12 +34,11 @@ def build_core(scene: Scene) -> GuardCore:
         raise SceneError(["a guard needs a [[link]] with a [[link.sensor]]"], scene.name)
     from .robot.contact import GuardedSensor
     from .robot.guard_core import GuardCore
-    from .robot.watch import Watch
     from .skin.detection import Detection
     from .skin.stream import Stream
     from .skin.timing import TimingLimits
 
-    watch = scene.watch or Watch()
+    watch = scene.limits
     detection = Detection(stuck_frames=watch.stuck_frames, timing=TimingLimits(late=watch.skin_late))
     stream = Stream([item.sensor for item in scene.sensors], detection)
     touched = {item.sensor.name: item.sensor.thresholds.touch_level for item in scene.sensors}
@@ -48,22 +46,21 @@ def build_core(scene: Scene) -> GuardCore:
         GuardedSensor(item.name, item.link_name, item.link, item.place, touched[item.name])
         for item in place_on_arm(scene)
     ]
-    return GuardCore(stream, sensors, watch, _arm(scene, watch) if scene.arm else None)
+    return GuardCore(stream, sensors, watch, _arm(scene) if scene.arm else None)
 
 
-def _arm(scene: Scene, watch: Watch) -> ArmReaction:
+def _arm(scene: Scene) -> ArmReaction:
     from .robot.arm_reaction import ArmReaction
-    from .robot.commands import Reaction
     from .robot.rules import Rules
     from .robot.stop_watch import FOREIGN, OWNED
     from .robot.ur_models import model
 
     assert scene.arm is not None
     arm = model(scene.arm.model)
-    reaction = scene.reaction or Reaction(kind="stop")
+    reaction = scene.any_touch
     ways = OWNED if scene.arm.control == "owner" else FOREIGN
     mover = _mover(scene, arm) if Rules(reaction, scene.rules).move else None
-    return ArmReaction(arm, reaction, watch, ways, scene.rules, mover)
+    return ArmReaction(arm, reaction, scene.limits, ways, scene.rules, mover)
 
 
 def _mover(scene: Scene, arm: ArmModel) -> Mover:

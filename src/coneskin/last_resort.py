@@ -17,12 +17,10 @@ _CONNECT = 0.5  # s for each port; a controller that takes longer is tried again
 
 def keeping(scene: Scene) -> dict[str, Any]:
     """What the owner, or the keeper, has to know to stop the arm."""
-    from .robot.commands import Reaction
-    from .robot.watch import Watch
 
     assert scene.arm is not None
-    deceleration = (scene.reaction or Reaction(kind="stop")).deceleration
-    return {"host": scene.arm.host, "watch": asdict(scene.watch or Watch()), "deceleration": deceleration}
+    deceleration = scene.any_touch.deceleration
+    return {"host": scene.arm.host, "watch": asdict(scene.limits), "deceleration": deceleration}
 
 
 class LastResort:

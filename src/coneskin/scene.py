@@ -157,6 +157,20 @@ class Scene:
         """All sensors, in the order of the file."""
         return tuple(sensor for link in self.links for sensor in link.sensors)
 
+    @property
+    def any_touch(self) -> Reaction:
+        """The reaction to a touch that no rule fits; a stop where the file names none."""
+        from .robot.commands import Reaction
+
+        return self.reaction or Reaction(kind="stop")
+
+    @property
+    def limits(self) -> Watch:
+        """The limits of the watch; the defaults where the file names none."""
+        from .robot.watch import Watch
+
+        return self.watch or Watch()
+
 
 def load(path: Path | str) -> Scene:
     """Read a scene from a TOML file.

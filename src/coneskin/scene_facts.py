@@ -32,15 +32,11 @@ def facts(scene: Scene) -> dict[str, Any]:
     if scene.source:
         found["source"] = scene.source.kind + (f" {scene.source.port}" if scene.source.port else "")
     if scene.arm:
-        from .robot.commands import Reaction
-
-        found["reaction"] = _reaction(scene.reaction or Reaction(kind="stop"))
+        found["reaction"] = _reaction(scene.any_touch)
     for number, rule in enumerate(scene.rules, 1):
         found[f"rule {number}"] = f"{_reaction(rule.reaction)}, {_conditions(rule)}"
     if scene.source:
-        from .robot.watch import Watch
-
-        found["watch"] = _watch(scene.watch or Watch(), scene.arm is not None)
+        found["watch"] = _watch(scene.limits, scene.arm is not None)
     if scene.source and scene.source.touches:
         found["touches"] = str(len(scene.source.touches))
     if scene.motion:

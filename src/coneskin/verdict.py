@@ -35,15 +35,13 @@ _MARGIN = 0.5  # s for the events to come, on a busy machine
 
 def braking_time(scene: Scene) -> float:
     """How long the arm of a scene may brake until a standstill is seen, whatever moves it and stops it [s]."""
-    from .robot.commands import Reaction
     from .robot.ur_models import model
-    from .robot.watch import Watch
 
     assert scene.arm is not None
-    reactions = [scene.reaction or Reaction(kind="stop"), *(rule.reaction for rule in scene.rules)]
+    reactions = [scene.any_touch, *(rule.reaction for rule in scene.rules)]
     slowest = min(reaction.deceleration for reaction in reactions)
     fastest = max(model(scene.arm.model).joint_speed)
-    return (scene.watch or Watch()).stop_budget(fastest, slowest) + _MARGIN
+    return scene.limits.stop_budget(fastest, slowest) + _MARGIN
 
 
 def stop_error(stop: GuardEvent, contact: GuardEvent | None, outcome: str) -> Collision | RobotRefused:

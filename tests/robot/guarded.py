@@ -23,15 +23,32 @@ radius2_mm = 37.2
 height_mm = 260
 xyz_mm = [0, 0, 80]
 [source]
-kind = "virtual"
+{source}
 [reaction]
-kind = "retreat"
-distance_mm = 30
-[watch]
-skin_silence_ms = 400
-skin_late_ms = 400
-arm_silence_ms = 300
+{reaction}
 """
+_PATIENT = "skin_silence_ms = 400\nskin_late_ms = 400\narm_silence_ms = 300"
+
+
+def forearm_scene(
+    host="127.0.0.1",
+    control="owner",
+    port="",
+    reaction='kind = "stop"\ndeceleration_rad_s2 = 10',
+    watch="",
+):
+    """The text of a scene; the benches use it too.
+
+    Args:
+        host: of the controller.
+        control: "owner" or "foreign".
+        port: of the skin's bytes; a virtual skin where it is empty.
+        reaction: lines of [reaction].
+        watch: lines of [watch]; the limits that are not named have their defaults.
+    """
+    source = f'kind = "serial"\nport = "{port}"' if port else 'kind = "virtual"'
+    text = _SCENE.format(host=host, control=control, source=source, reaction=reaction)
+    return text + (f"[watch]\n{watch}\n" if watch else "")
 
 
 def scene_text(host, changes=None, control="owner"):
@@ -40,7 +57,7 @@ def scene_text(host, changes=None, control="owner"):
     Its silences are long: the machine that runs the tests may stall a pseudo-terminal. The limits themselves are tested
     in virtual time (test_guard_core).
     """
-    text = _SCENE.format(host=host, control=control)
+    text = forearm_scene(host, control, reaction='kind = "retreat"\ndistance_mm = 30', watch=_PATIENT)
     for old, new in (changes or {}).items():
         assert old in text, old
         text = text.replace(old, new)
