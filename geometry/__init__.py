@@ -1,4 +1,4 @@
-"""Shapes: cones, their flat sectors, poses, meshes. Imports nothing else of coneskin but its errors."""
+"""Geometry of cones, flat sectors, poses and meshes; of coneskin it imports only errors and arrays."""
 
 if __name__ != "coneskin.geometry":
     raise ImportError("import coneskin.geometry: the folder geometry/ is a part of the package coneskin")

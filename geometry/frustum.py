@@ -1,4 +1,4 @@
-"""A truncated cone, and the coordinates on its side.
+"""Truncated cone and the surface coordinates (u, phi) on its side.
 
 Symbols (docs/conventions.md): rho1, rho2 radii, h height, s slant, a half angle;
 d = rho2 - rho1 = s sin a, h = s cos a.
@@ -35,7 +35,7 @@ class Frustum:
         wrap: angle about the axis that is covered [rad], in (0, 2 pi], from phi = 0 (the x axis) on.
 
     Raises:
-        GeometryError: a value is not finite or negative, nothing is left of the side, or wrap is beyond a full turn.
+        GeometryError: a value is not finite or negative, the side has no area, or wrap exceeds a full turn.
     """
 
     radius1: float
@@ -52,9 +52,9 @@ class Frustum:
         if not 0.0 < self.wrap <= _TURN:
             raise GeometryError(f"wrap must be above 0 and at most a full turn (2 pi rad), got {self.wrap!r} rad")
         if self.radius1 == self.radius2 == 0.0:
-            raise GeometryError("radius1 and radius2 must not both be 0 m: the side has no area")
+            raise GeometryError("radius1 and radius2 must not both be 0: the side has no area")
         if self.slant == 0.0:
-            raise GeometryError("height must be above 0 m where both radii are equal: the side has no length")
+            raise GeometryError("height must be above 0 where both radii are equal: the side has no length")
 
     @property
     def slant(self) -> float:
@@ -68,7 +68,7 @@ class Frustum:
 
     @property
     def sin_half_angle(self) -> float:
-        """Sine of the half angle, without the loss that asin or acos would bring."""
+        """Sine of the half angle, from the lengths; a detour by the angle would lose digits."""
         return (self.radius2 - self.radius1) / self.slant
 
     @property
@@ -82,12 +82,12 @@ class Frustum:
         return 0.5 * self.wrap * (self.radius1 + self.radius2) * self.slant
 
     def radius_at(self, u: float) -> float:
-        """Distance from the axis [m] at slant distance u [m] from end 1."""
+        """Return the distance from the axis [m] at slant distance u [m] from end 1."""
         s = self.slant  # both terms are positive on the side, so nothing cancels near the apex
         return ((s - u) * self.radius1 + u * self.radius2) / s
 
     def point(self, u: float, phi: float) -> tuple[float, float, float]:
-        """Point of the side.
+        """Return the point of the side at surface coordinates.
 
         Args:
             u: slant distance from end 1 [m].
@@ -100,12 +100,12 @@ class Frustum:
         return rho * math.cos(phi), rho * math.sin(phi), u * self.cos_half_angle
 
     def normal(self, phi: float) -> tuple[float, float, float]:
-        """Outward unit normal of the side at azimuth phi [rad]; it does not depend on u."""
+        """Return the outward unit normal of the side at azimuth phi [rad]; it does not depend on u."""
         ca = self.cos_half_angle
         return ca * math.cos(phi), ca * math.sin(phi), -self.sin_half_angle
 
     def locate(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """Surface coordinates of the foot of a point, the inverse of ``point``.
+        """Return the surface coordinates of the foot of a point, the inverse of ``point``.
 
         Args:
             x: first coordinate in the frame of the frustum [m].
@@ -121,12 +121,12 @@ class Frustum:
         return out * sa + z * ca, self._branch(math.atan2(y, x), self.wrap), out * ca - z * sa
 
     def polar(self, u: float, phi: float) -> tuple[float, float]:
-        """Polar coordinates (r [m], theta [rad]) on the flat sector; r is infinite and theta 0 on a cylinder."""
+        """Return the polar coordinates (r [m], theta [rad]) on the flat sector; (infinity, 0) on a cylinder."""
         q = abs(self.sin_half_angle)
         return (self.radius_at(u) / q if q else math.inf), phi * q
 
-    def flat(self, u: float, phi: float) -> tuple[float, float]:
-        """Point of the flat pattern, isometric to the side and regular for every half angle.
+    def flat_point(self, u: float, phi: float) -> tuple[float, float]:
+        """Return the point of the flat pattern, isometric to the side and regular for every half angle.
 
         Args:
             u: slant distance from end 1 [m].
@@ -140,8 +140,15 @@ class Frustum:
         half = 0.5 * phi * sa
         return rho * phi * _sinc(phi * sa), u - rho * phi * math.sin(half) * _sinc(half)
 
-    def unflat(self, x: float, y: float) -> tuple[float, float]:
-        """Surface coordinates (u [m], phi [rad]) of a point of the flat pattern, the inverse of ``flat``."""
+    def locate_flat(self, x: float, y: float) -> tuple[float, float]:
+        """Return the surface coordinates (u [m], phi [rad]) of a point of the flat pattern.
+
+        The inverse of ``flat_point``.
+
+        Args:
+            x: as ``flat_point`` returns it [m].
+            y: as ``flat_point`` returns it [m].
+        """
         sa, rho1 = self.sin_half_angle, self.radius1
         along, across = rho1 + sa * y, sa * x
         rho = math.hypot(across, along)
@@ -157,11 +164,11 @@ class Frustum:
 
     @staticmethod
     def _branch(angle: float, span: float) -> float:
-        """The angle, by whole turns, that lies within half a turn of span / 2."""
+        """Return the angle [rad], moved by whole turns, that lies within half a turn of span / 2."""
         return angle - _TURN * round((angle - 0.5 * span) / _TURN)
 
     def points(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-        """``point`` for arrays that broadcast: shape (..., 3) [m]."""
+        """Return the points of the side for arrays u [m] and phi [rad] that broadcast: shape (..., 3) [m]."""
         import numpy as np
 
         u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
@@ -170,15 +177,15 @@ class Frustum:
         return np.stack([rho * np.cos(phi), rho * np.sin(phi), u * self.cos_half_angle], axis=-1)
 
     def normals(self, phi: ArrayLike) -> NDArray[np.float64]:
-        """``normal`` for an array: shape (..., 3)."""
+        """Return the outward unit normals for an array of azimuths [rad]: shape (..., 3)."""
         import numpy as np
 
         phi = np.asarray(phi, float)
         ca = self.cos_half_angle
         return np.stack([ca * np.cos(phi), ca * np.sin(phi), np.full_like(phi, -self.sin_half_angle)], axis=-1)
 
-    def flats(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-        """``flat`` for arrays that broadcast: shape (..., 2) [m]."""
+    def flat_points(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
+        """Return the points of the flat pattern for arrays u [m], phi [rad] that broadcast: shape (..., 2) [m]."""
         import numpy as np
 
         u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))

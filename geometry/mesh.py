@@ -1,7 +1,8 @@
-"""Link meshes: read from a file, brought to metres, welded and checked. The only importer of trimesh."""
+"""Link meshes: read from a file, converted to metres, welded and checked. The only importer of trimesh."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,19 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.arrays import frozen
+from coneskin.bounded_file import read_file
 from coneskin.errors import MeshError, MissingExtra
 
 from .pose import Pose
 
-__all__ = ["UNITS", "Mesh", "load_mesh", "make_mesh"]
+__all__ = ["UNITS", "Mesh", "load_mesh", "make_mesh", "refuse_entities"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}  #: metres in one unit
 SUFFIXES = (".stl", ".obj", ".dae", ".ply")
-SHORTEST, LONGEST = 0.005, 5.0  #: a link's largest extent lies between these [m]
-THINNEST = 0.0005  #: and its smallest extent above this [m]
+MAX_SIZE = 100_000_000  # bytes of a file; 2 million triangles, and a link is modelled with 10 000
+MIN_LENGTH = 0.005  # m; a shorter mesh is in another unit
+MAX_LENGTH = 5.0  # m; a longer mesh is in another unit
+MIN_THICKNESS = 0.0005  # m; a thinner mesh is a flat drawing
+#: note on a mesh of a model; {0} is the model
 TERMS = "{0}: the maker's terms for its drawings forbid physical models of {0} for commercial use"
 _UP = {  # rotations that bring the named up axis to z, as COLLADA 1.4.1 describes the three frames
     "X_UP": ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
@@ -38,11 +43,11 @@ class Mesh:
     """Triangles of one link, in the frame of the link.
 
     Attributes:
-        vertices: corners [m], shape (n, 3), no two of them at one place.
-        faces: indices of three corners, shape (m, 3); none without area. Nothing is promised of their direction.
-        source: where it came from, for messages.
-        unit: the unit of the file, a key of ``UNITS`` or, for COLLADA, what its unit tag says.
-        notes: what was guessed or changed on the way, one sentence each.
+        vertices: corners [m], shape (n, 3), all distinct.
+        faces: indices of three corners, shape (m, 3), each with an area; their winding may be inconsistent.
+        source: its origin, for messages.
+        unit: the unit of the file, a key of ``UNITS`` or, for COLLADA, the name in its unit tag.
+        notes: guesses and changes made while reading, one sentence each.
     """
 
     vertices: Floats
@@ -63,7 +68,7 @@ class Mesh:
         return self.vertices[self.faces]
 
     def normals_and_areas(self) -> tuple[Floats, Floats]:
-        """Unit normals, shape (m, 3), by the winding of the file, and areas [m2], shape (m,)."""
+        """Return the unit normals by the winding of the file, shape (m, 3), and the areas [m2], shape (m,)."""
         a, b, c = self.triangles.transpose(1, 0, 2)
         cross = np.cross(b - a, c - a)
         twice = np.linalg.norm(cross, axis=1)
@@ -75,12 +80,15 @@ class Mesh:
         return np.asarray(np.ptp(self.vertices, axis=0))
 
     def moved(self, pose: Pose) -> Mesh:
-        """The same mesh in the outer frame of a pose."""
-        vertices = self.vertices @ np.array(pose.rotation).T + np.array(pose.translation)
-        return Mesh(vertices, self.faces, self.source, self.unit, self.notes)
+        """Return the same mesh in the outer frame of a pose."""
+        return Mesh(pose.apply_all(self.vertices), self.faces, self.source, self.unit, self.notes)
 
-    def embree(self) -> Callable[[Floats, Floats], Indices] | None:
-        """Index of the first face hit by each ray (-1: none), through trimesh and embree; None without embreex."""
+    def embree_intersector(self) -> Callable[[Floats, Floats], Indices] | None:
+        """Return a function that casts rays with embree, through trimesh; None without the package embreex.
+
+        The function takes origins [m] and directions, both of shape (n, 3), and returns the index of the first face hit
+        by each ray, -1 for none, shape (n,).
+        """
         try:
             import trimesh
             from trimesh.ray.ray_pyembree import RayMeshIntersector
@@ -108,10 +116,10 @@ def load_mesh(
         scale: factors along the axes, after the unit and the up axis, as a URDF's mesh tag has them.
 
     Returns:
-        the mesh in metres, all parts of the file in one, welded.
+        the mesh in metres, all parts of the file merged and welded.
 
     Raises:
-        MeshError: no such file, not a mesh, nothing in it, or a shape that cannot be a link.
+        MeshError: no such file, not a mesh, an empty one, or a shape that cannot be a link.
         MissingExtra: a COLLADA file without pycollada.
     """
     path = Path(path)
@@ -119,31 +127,34 @@ def load_mesh(
         raise MeshError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
     if up_axis not in ("ignore", "apply"):
         raise MeshError(f"up_axis must be 'ignore' or 'apply', got {up_axis!r}")
-    if not path.is_file():
-        raise MeshError(f"{path}: no such file")
+    try:
+        data = read_file(path, MAX_SIZE)
+    except OSError as exc:
+        raise MeshError(f"{path}: {exc.strerror or exc}") from exc
     if path.suffix.lower() not in SUFFIXES:
         raise MeshError(f"{path}: a mesh is read from {', '.join(SUFFIXES)}, got {path.suffix or 'no suffix'}")
-    if path.stat().st_size == 0:
+    if not data:
         raise MeshError(f"{path}: the file is empty")
     notes = [TERMS.format(part.upper()) for part in path.resolve().parts if part.lower() in ("ur20", "ur30")]
     metres = None if unit is None else UNITS[unit]
     turn = None
     if path.suffix.lower() == ".dae":
-        tag_name, tag_metres, up = _collada_asset(path)
+        refuse_entities(data, path)
+        tag_name, tag_metres, up = _collada_asset(path, data)
         if metres is None:
             unit, metres = tag_name, tag_metres
-            notes.append(f"unit {tag_name} ({tag_metres:g} m) as the COLLADA file says")
+            notes.append(f"unit {tag_name} ({tag_metres:g} m), from the COLLADA file")
         if up != "Z_UP" and up_axis == "apply":
             turn = np.array(_UP[up])
             notes.append(f"rotated from {up} to z up")
         elif up != "Z_UP":
-            notes.append(f"the file says {up}; its axes are kept, as RViz and MoveIt do")
-    vertices, faces = _read(path)
+            notes.append(f"the file declares {up}; its axes are kept, as in RViz and MoveIt")
+    vertices, faces = _read(path, data)
     if turn is not None:
         vertices = vertices @ turn.T
     if metres is None:
         extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
-        unit, metres = ("m", 1.0) if extent < LONGEST else ("mm", 0.001)
+        unit, metres = ("m", 1.0) if extent < MAX_LENGTH else ("mm", 0.001)
         notes.append(f"unit {unit} guessed from the largest extent, {extent:g}")
     if tuple(scale) != (1.0, 1.0, 1.0):
         notes.append(f"scaled by {scale[0]:g}, {scale[1]:g}, {scale[2]:g}")
@@ -158,9 +169,9 @@ def make_mesh(
     Args:
         vertices: corners [m], shape (n, 3).
         faces: indices of three corners, shape (m, 3).
-        source: where it came from, for messages.
+        source: its origin, for messages.
         unit: the file's unit, for messages.
-        notes: what the reader has to say.
+        notes: guesses and changes of the reader, one sentence each.
 
     Raises:
         MeshError: a corner that is not finite, an index out of range, or a shape that cannot be a link.
@@ -169,7 +180,7 @@ def make_mesh(
     if len(faces) == 0:
         raise MeshError(f"{source}: no faces")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise MeshError(f"{source}: a face names corner {faces.max()}, there are {len(vertices)}")
+        raise MeshError(f"{source}: a face refers to corner {faces.max()}, there are {len(vertices)}")
     used = np.zeros(len(vertices), bool)
     used[faces] = True
     bad = used & ~np.isfinite(vertices).all(axis=1)
@@ -178,14 +189,14 @@ def make_mesh(
     low = vertices[used].min(axis=0)
     size = vertices[used].max(axis=0) - low
     longest = float(size.max())
-    advice = f"a link measures {SHORTEST * 1e3:g} mm to {LONGEST:g} m: name the file's unit (unit m, cm, mm, inch)"
+    advice = f"a link measures {MIN_LENGTH * 1e3:g} mm to {MAX_LENGTH:g} m: name the file's unit (unit m, cm, mm, inch)"
     if longest == 0.0:
         raise MeshError(f"{source}: all vertices are one point")
-    if longest < SHORTEST:
+    if longest < MIN_LENGTH:
         raise MeshError(f"{source}: only {longest * 1e3:.3g} mm long (unit {unit}); {advice}")
-    if longest > LONGEST:
+    if longest > MAX_LENGTH:
         raise MeshError(f"{source}: {longest:.4g} m long (unit {unit}); {advice}")
-    # One 63-bit key for each corner; a cell is a millionth of the length, far below what is modelled.
+    # one 63-bit key for each corner; a cell is a millionth of the length, far below any modelled detail
     cells = np.where(used[:, None], (vertices - low) * (2**20 / longest), 0.0).round().astype(np.int64)
     key = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
     _, first, inverse = np.unique(key[used], return_index=True, return_inverse=True)
@@ -201,9 +212,9 @@ def make_mesh(
     kept, faces = np.unique(faces, return_inverse=True)
     welded, faces = welded[kept], faces.reshape(-1, 3)
     thin = float(np.ptp((welded - welded.mean(axis=0)) @ _principal(welded).T, axis=0).min())
-    if thin < max(THINNEST, 1e-4 * longest):
+    if thin < max(MIN_THICKNESS, 1e-4 * longest):
         raise MeshError(
-            f"{source}: flat, {longest * 1e3:.4g} mm long and {thin * 1e3:.2g} mm thick; a link has a volume"
+            f"{source}: flat, {longest * 1e3:.4g} mm long and {thin * 1e3:.2g} mm thick; a link must have a volume"
         )
     notes = list(notes)
     if len(welded) < len(vertices):
@@ -216,17 +227,27 @@ def _principal(points: Floats) -> Floats:
     return np.asarray(np.linalg.eigh(centred.T @ centred)[1].T)
 
 
-def _read(path: Path) -> tuple[Floats, Indices]:
-    """Corners and faces of all parts of a file, in its own unit."""
+def refuse_entities(data: bytes, path: Path) -> None:
+    """Refuse an XML text that defines entities: they could name other files, or grow a thousandfold.
+
+    Raises:
+        MeshError: it does.
+    """
+    if b"<!ENTITY" in data.replace(b"\0", b""):  # two bytes for each letter are allowed as well
+        raise MeshError(f"{path}: an XML text that defines entities is not read; export the file without them")
+
+
+def _read(path: Path, data: bytes) -> tuple[Floats, Indices]:
+    """Read the corners and faces of all parts of a file, in its own unit; no file that it names is opened."""
     import trimesh
 
     try:
-        loaded = trimesh.load(str(path), process=False)
-    except Exception as error:  # the readers raise anything, from struct.error to KeyError
+        loaded = trimesh.load(io.BytesIO(data), file_type=path.suffix[1:].lower(), process=False)
+    except Exception as error:  # the readers raise errors of many types, from struct.error to KeyError
         if isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0] in ("collada", "lxml"):
             raise MissingExtra(error.name or "", f"reading {path.name}", "design") from error
         reason = str(error).strip().splitlines() or [type(error).__name__]
-        if isinstance(error, ModuleNotFoundError):  # of a reader that is tried when all else has failed
+        if isinstance(error, ModuleNotFoundError):  # of the last reader that trimesh tries
             reason = ["neither binary nor text of that kind"]
         raise MeshError(f"{path}: not a readable {path.suffix[1:].upper()} file ({reason[0]})") from error
     scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene([loaded])
@@ -243,15 +264,15 @@ def _read(path: Path) -> tuple[Floats, Indices]:
         faces.append(np.asarray(part.faces, np.int64) + count)
         count += len(corners[-1])
     if not faces:
-        raise MeshError(f"{path}: no triangles in it; is it a mesh?")
+        raise MeshError(f"{path}: not a readable {path.suffix[1:].upper()} file (no triangles in it)")
     return np.concatenate(corners), np.concatenate(faces)
 
 
-def _collada_asset(path: Path) -> tuple[str, float, str]:
-    """Name of the unit, metres in it and up axis of a COLLADA file."""
-    name, metres, up = "m", 1.0, "Y_UP"  # what COLLADA means where the tags are missing
+def _collada_asset(path: Path, data: bytes) -> tuple[str, float, str]:
+    """Read the name of the unit, its length in metres and the up axis of a COLLADA file."""
+    name, metres, up = "m", 1.0, "Y_UP"  # defaults of COLLADA for missing tags
     try:
-        for _, element in ElementTree.iterparse(path, ("end",)):
+        for _, element in ElementTree.iterparse(io.BytesIO(data), ("end",)):
             tag = element.tag.rpartition("}")[2]
             if tag == "unit":
                 metres = float(element.get("meter", "1"))

@@ -1,12 +1,17 @@
-"""A rigid motion. Named so that neighbours cancel: p_base = base_link.apply(p_link)."""
+"""Rigid motion from one frame to another, named so that neighbours cancel: p_base = base_link.apply(p_link)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from coneskin.errors import GeometryError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 __all__ = ["Pose", "Vector"]
 
@@ -15,7 +20,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Rotation and translation from one frame to another; plain floats, for the live loop.
+    """Rotation and translation from an inner frame to an outer one; plain floats, for the live loop.
 
     Attributes:
         rotation: three rows of three; its columns are the axes of the inner frame seen from the outer one.
@@ -43,8 +48,20 @@ class Pose:
         object.__setattr__(self, "translation", shift)
 
     @classmethod
+    def trusted(cls, rotation: tuple[Vector, Vector, Vector], translation: Vector) -> Pose:
+        """Make a pose of floats that were computed as one; nothing is checked, which is most of the cost of a pose."""
+        pose = object.__new__(cls)
+        object.__setattr__(pose, "rotation", rotation)
+        object.__setattr__(pose, "translation", translation)
+        return pose
+
+    @classmethod
     def from_xyz_rpy(cls, xyz: Sequence[float] = (0.0, 0.0, 0.0), rpy: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
-        """Pose in the way of URDF: translation [m]; roll, pitch and yaw about the fixed x, y and z axes [rad]."""
+        """Make a pose from xyz [m] and roll, pitch and yaw about the fixed x, y and z axes [rad], as in URDF.
+
+        Raises:
+            GeometryError: not three numbers each.
+        """
         if len(xyz) != 3 or len(rpy) != 3:
             raise GeometryError(f"xyz and rpy need 3 numbers each, got {len(xyz)} and {len(rpy)}")
         (sr, sp, sy), (cr, cp, cy) = ([f(angle) for angle in rpy] for f in (math.sin, math.cos))
@@ -67,7 +84,7 @@ class Pose:
         return math.atan2(a21, a22), math.atan2(-a20, level), math.atan2(a10, a00)
 
     def rotate(self, v: Vector) -> Vector:
-        """A direction of the inner frame, seen from the outer one."""
+        """Return a direction of the inner frame, seen from the outer one."""
         x, y, z = v
         a, b, c = self.rotation
         return (
@@ -77,20 +94,27 @@ class Pose:
         )
 
     def apply(self, p: Vector) -> Vector:
-        """A point of the inner frame [m], seen from the outer one."""
+        """Return a point of the inner frame [m], seen from the outer one."""
         x, y, z = self.rotate(p)
         t = self.translation
         return x + t[0], y + t[1], z + t[2]
 
+    def apply_all(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return points of the inner frame [m], shape (..., 3), seen from the outer one."""
+        import numpy as np
+
+        moved: NDArray[np.float64] = points @ np.array(self.rotation).T + np.array(self.translation)
+        return moved
+
     def inverse(self) -> Pose:
-        """The outer frame, seen from the inner one."""
+        """Return the pose of the outer frame, seen from the inner one."""
         a, b, c = self.rotation
         back = ((a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2]))
-        x, y, z = Pose(back).rotate(self.translation)
-        return Pose(back, (-x, -y, -z))
+        x, y, z = Pose.trusted(back, (0.0, 0.0, 0.0)).rotate(self.translation)
+        return Pose.trusted(back, (-x, -y, -z))
 
     def __matmul__(self, inner: Pose) -> Pose:
-        """Chain: (a_b @ b_c) maps c to a."""
+        """Chain two poses: (a_b @ b_c) maps frame c to frame a."""
         columns = [self.rotate(column) for column in zip(*inner.rotation, strict=True)]
         rows = tuple(zip(*columns, strict=True))
         return Pose((rows[0], rows[1], rows[2]), self.apply(inner.translation))

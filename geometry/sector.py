@@ -1,7 +1,7 @@
-"""The flat annular sector of a truncated cone: paper, figure 1.
+"""Flat annular sector of a truncated cone (paper, figure 1).
 
-r1, r2 and theta0 are what a drawing needs, but alone they cannot hold a cylinder (r infinite, theta0 0). So a sector
-keeps its slant, its two arc lengths and theta0; r1 and r2 follow.
+A drawing needs r1, r2 and theta0, but these cannot represent a cylinder (r infinite, theta0 0). So a sector keeps its
+slant, its two arc lengths and theta0; r1 and r2 follow.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from coneskin.errors import GeometryError
 
 from .frustum import Frustum
 
-__all__ = ["Sector", "roll", "unroll"]
+__all__ = ["Sector", "roll_up", "unroll"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Sector:
 
     @classmethod
     def from_polar(cls, r1: float, r2: float, theta0: float) -> Sector:
-        """Sector with radii r1 (end 1) and r2 (end 2) [m] and central angle theta0 [rad], as the paper writes it.
+        """Make a sector from radii r1 (end 1), r2 (end 2) [m] and the central angle theta0 [rad], as in the paper.
 
         Raises:
             GeometryError: a value is not finite and positive, or r1 equals r2.
@@ -79,7 +79,7 @@ class Sector:
 
 
 def unroll(frustum: Frustum) -> Sector:
-    """The flat sector of a frustum: r = rho s / |d| at both ends, theta0 = wrap |d| / s."""
+    """Return the flat sector of a frustum: r = rho s / |d| at both ends, theta0 = wrap |d| / s."""
     return Sector(
         slant=frustum.slant,
         arc1=frustum.wrap * frustum.radius1,
@@ -88,12 +88,12 @@ def unroll(frustum: Frustum) -> Sector:
     )
 
 
-def roll(sector: Sector, wrap: float = 2.0 * math.pi) -> Frustum:
-    """The frustum that a sector becomes when it is wrapped through an angle, the inverse of ``unroll``.
+def roll_up(sector: Sector, wrap: float = 2.0 * math.pi) -> Frustum:
+    """Return the frustum that a sector forms when it is wrapped through an angle, the inverse of ``unroll``.
 
     Args:
         sector: the flat sector.
-        wrap: angle about the axis that the sheet shall cover [rad], in (0, 2 pi].
+        wrap: angle about the axis that the sheet covers [rad], in (0, 2 pi].
 
     Raises:
         GeometryError: wrap is out of range, or smaller than theta0 (a sheet cannot cover less than it measures).

@@ -1,4 +1,4 @@
-"""The mesh of one link of a URDF, in the frame of the link."""
+"""Mesh of one link of a URDF, in the frame of the link."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from coneskin.bounded_file import read_file
 from coneskin.errors import MeshError
 
-from .mesh import Mesh, load_mesh, make_mesh
+from .mesh import Mesh, load_mesh, make_mesh, refuse_entities
 from .pose import Pose, Vector
 
 __all__ = ["load_urdf_link", "urdf_links"]
 
+MAX_SIZE = 10_000_000  # bytes of a URDF
+
 
 def urdf_links(path: str | Path) -> tuple[str, ...]:
-    """Names of the links of a URDF that have a mesh, visual or collision.
+    """Return the names of the links of a URDF that have a mesh, visual or collision.
 
     Raises:
         MeshError: no such file, or not a URDF.
@@ -38,9 +41,9 @@ def load_urdf_link(
     Args:
         path: the URDF; a xacro file has to be expanded first.
         link: name of the link.
-        geometry: "visual" or "collision". Collision bodies are often hulls that have lost the tube.
-        packages: folders of the ROS packages in package:// paths; those not named are looked for at and beside the
-            folders above the URDF.
+        geometry: "visual" or "collision". Collision bodies are often convex hulls that have lost the tube.
+        packages: folders of the ROS packages in package:// paths; others are searched for at and beside the folders
+            above the URDF.
         up_axis: what to do with COLLADA's up_axis tag, see ``load_mesh``.
 
     Returns:
@@ -66,7 +69,7 @@ def load_urdf_link(
             continue
         file = _resolve(shape.get("filename", ""), path, packages or {})
         scale = _numbers(shape.get("scale", "1 1 1"), f"{path}: scale of {link}")
-        # The numbers of a URDF are metres: only COLLADA says otherwise, in its own unit tag.
+        # lengths of a URDF are in metres; only COLLADA has a unit tag of its own
         unit = None if file.suffix.lower() == ".dae" else "m"
         origin = body.find("origin")
         xyz = _numbers("0 0 0" if origin is None else origin.get("xyz", "0 0 0"), f"{path}: xyz of {link}")
@@ -87,21 +90,23 @@ def load_urdf_link(
 
 
 def _robot(path: Path) -> ElementTree.Element:
-    if not path.is_file():
-        raise MeshError(f"{path}: no such file")
     try:
-        root = ElementTree.parse(path).getroot()
-    except ElementTree.ParseError as error:
+        data = read_file(path, MAX_SIZE)
+        refuse_entities(data, path)
+        root = ElementTree.fromstring(data)
+    except OSError as error:
+        raise MeshError(f"{path}: {error.strerror or error}") from error
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # malformed, or of an unknown encoding
         raise MeshError(f"{path}: malformed XML: {error}") from error
     if root.tag != "robot":
-        raise MeshError(f"{path}: a URDF begins with <robot>, this begins with <{root.tag}>")
+        raise MeshError(f"{path}: a URDF begins with <robot>, this file with <{root.tag}>")
     if any("xacro" in str(item.tag) for item in root.iter()):
-        raise MeshError(f"{path}: xacro has to be expanded first (xacro {path.name} > robot.urdf)")
+        raise MeshError(f"{path}: a xacro file must be expanded first (xacro {path.name} > expanded.urdf)")
     return root
 
 
 def _resolve(name: str, urdf: Path, packages: Mapping[str, str | Path]) -> Path:
-    """Where a mesh file is; the name may be package://, file:// or a path beside the URDF."""
+    """Return the path of a mesh file; the name may be package://, file:// or a path beside the URDF."""
     parsed = urlparse(name)
     if parsed.scheme == "file":
         return Path(unquote(parsed.path))
@@ -113,7 +118,10 @@ def _resolve(name: str, urdf: Path, packages: Mapping[str, str | Path]) -> Path:
             for root in (folder, folder / package):
                 if root.name == package and (root / inner).is_file():
                     return root / inner
-        raise MeshError(f"{name}: package {package} is not above or beside {urdf}; say where it is (--package)")
+        raise MeshError(
+            f"{name}: package {package} is neither above nor beside {urdf}; say where it is (--package {package}=DIR, "
+            "packages={...}), or name the mesh file"
+        )
     if parsed.scheme and len(parsed.scheme) > 1:
         raise MeshError(f"{name}: a mesh is named by package://, file:// or a path, got {parsed.scheme}://")
     return (urdf.parent / name).resolve()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from coneskin.errors import MeshError, MissingExtra
 from coneskin.geometry import mesh as mesh_module
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
 from coneskin.geometry.pose import Pose
+from coneskin.geometry.urdf import urdf_links
 
 from .synthetic import Floats, Indices, exploded, frustum
 
@@ -108,7 +110,7 @@ def test_collada_unit_is_applied(tmp_path: Path) -> None:
         write_dae(tmp_path / "a.dae", body, '<unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis>')
     )
     assert mesh.size[2] == pytest.approx(0.3, abs=1e-6)
-    assert any("centimeter (0.01 m) as the COLLADA file says" in note for note in mesh.notes)
+    assert any("centimeter (0.01 m), from the COLLADA file" in note for note in mesh.notes)
 
 
 def test_collada_node_matrix_is_applied(tmp_path: Path) -> None:
@@ -179,7 +181,7 @@ def test_missing_collada_reader_gives_the_pip_line(tmp_path: Path, monkeypatch: 
 
 
 def test_no_such_file(tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match=r"nowhere\.stl: no such file"):
+    with pytest.raises(MeshError, match=r"nowhere\.stl: No such file"):
         load_mesh(tmp_path / "nowhere.stl")
 
 
@@ -226,7 +228,7 @@ def test_shapes_that_cannot_be_links(corners: Floats, words: str) -> None:
 def test_a_tilted_plane_is_flat() -> None:
     corners = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0.0]])
     turned = corners @ np.array(Pose.from_xyz_rpy((0, 0, 0), (0.5, 0.7, 0.1)).rotation).T
-    with pytest.raises(MeshError, match="a link has a volume"):
+    with pytest.raises(MeshError, match="a link must have a volume"):
         make_mesh(turned, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
@@ -238,7 +240,7 @@ def test_sizes_that_cannot_be_links(tmp_path: Path, scale: float, words: str) ->
 
 
 def test_faces_that_name_no_corner() -> None:
-    with pytest.raises(MeshError, match="a face names corner 9, there are 3"):
+    with pytest.raises(MeshError, match="a face refers to corner 9, there are 3"):
         make_mesh(np.eye(3), np.array([[0, 1, 9]]))
     with pytest.raises(MeshError, match="no faces"):
         make_mesh(np.eye(3), np.zeros((0, 3)))
@@ -258,3 +260,43 @@ def test_bad_collada_tags(tmp_path: Path) -> None:
         load_mesh(write_dae(tmp_path / "b.dae", TUBE, '<unit meter="one"/>'))
     with pytest.raises(MeshError, match="up_axis must be X_UP, Y_UP or Z_UP, got 'W_UP'"):
         load_mesh(write_dae(tmp_path / "c.dae", TUBE, "<up_axis>W_UP</up_axis>"))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_an_xml_text_that_defines_entities_is_refused(tmp_path: Path, encoding: str) -> None:
+    """One entity names a file, another grows by a factor at each level: neither is read, in a mesh or a URDF."""
+    for name in ("bomb.dae", "bomb.urdf"):
+        text = (
+            f'<?xml version="1.0" encoding="{encoding}"?><!DOCTYPE r [<!ENTITY a SYSTEM "canary">]><robot>&a;</robot>'
+        )
+        (tmp_path / name).write_bytes(text.encode(encoding))
+        with pytest.raises(MeshError, match="defines entities is not read"):
+            load_mesh(tmp_path / name) if name.endswith("dae") else urdf_links(tmp_path / name)
+
+
+def test_no_file_that_a_mesh_names_is_opened(tmp_path: Path) -> None:
+    """An OBJ may name a file of materials, and that one pictures: a pipe there would never be ready."""
+    path = write_obj(tmp_path / "tube.obj", TUBE)
+    path.write_text("mtllib pipe.mtl\nusemtl a\n" + path.read_text())
+    os.mkfifo(tmp_path / "pipe.mtl")
+    assert len(load_mesh(path).faces) == len(TUBE[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("many.stl", b"\0" * 80 + struct.pack("<I", 2**32 - 1) + b"\0" * 50),
+        (
+            "many.ply",
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 99999999999\nproperty float x\nend_header\n",
+        ),
+        ("many.obj", b"v 0 0 0\n" * 3 + b"f 1 2 99999999999\n"),
+        ("long.obj", b"f " + b"1 " * 100_000),
+        ("deep.dae", b"<a>" * 100_000),
+        ("odd.ply", b"ply\nformat ascii 1.0\nelement vertex -5\nproperty list float x\nend_header\n"),
+    ],
+)
+def test_a_file_that_says_more_than_it_holds_is_refused(tmp_path: Path, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshError, match=name.replace(".", r"\.")):
+        load_mesh(tmp_path / name)

@@ -101,8 +101,8 @@ def test_collision_is_another_mesh(tmp_path: Path) -> None:
             "no visual mesh, only cylinder",
         ),
         (visual("arm.stl"), "leg", "no link 'leg'; there are: arm"),
-        (visual("none.stl"), "arm", r"none\.stl: no such file"),
-        (visual("package://nowhere/arm.stl"), "arm", "package nowhere is not above or beside .*say where"),
+        (visual("none.stl"), "arm", r"none\.stl: No such file"),
+        (visual("package://nowhere/arm.stl"), "arm", "nowhere is neither above nor beside .*--package nowhere=DIR"),
         (visual("http://x/arm.stl"), "arm", "named by package://, file:// or a path, got http://"),
         (visual("arm.stl", '<origin xyz="0 0"/>'), "arm", "xyz of arm must be 3 numbers, got '0 0'"),
         (visual("arm.stl", "", 'scale="a b c"'), "arm", "scale of arm must be 3 numbers"),
@@ -118,8 +118,8 @@ def test_what_is_missing_is_named(tmp_path: Path, body: str, link: str, words: s
     ("text", "words"),
     [
         ("<robot><link", "malformed XML"),
-        ("<sdf/>", "begins with <robot>, this begins with <sdf>"),
-        ('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arm/></robot>', "xacro has to be expanded first"),
+        ("<sdf/>", "begins with <robot>, this file with <sdf>"),
+        ('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arm/></robot>', "a xacro file must be expanded first"),
     ],
 )
 def test_what_is_no_urdf(tmp_path: Path, text: str, words: str) -> None:
@@ -127,7 +127,7 @@ def test_what_is_no_urdf(tmp_path: Path, text: str, words: str) -> None:
     file.write_text(text)
     with pytest.raises(MeshError, match=words):
         load_urdf_link(file, "arm")
-    with pytest.raises(MeshError, match="no such file"):
+    with pytest.raises(MeshError, match="No such file"):
         load_urdf_link(tmp_path / "none.urdf", "arm")
     with pytest.raises(MeshError, match="'visual' or 'collision', got 'both'"):
         load_urdf_link(file, "arm", "both")

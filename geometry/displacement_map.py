@@ -1,0 +1,205 @@
+"""Run-time map from the surface coordinates (u, phi) of a sheet to points of the mesh: a cone and a grid of heights.
+
+A cone alone misses the mesh by the residual of the fit. Heights above the side, along its normal and interpolated
+between the nodes of a grid, bring the error under 0.1 mm on smooth links for a few multiplications; no ray is cast
+while the arm moves. A sheet spans holes and narrow grooves, so the grid does too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from coneskin.arrays import frozen
+from coneskin.errors import GeometryError
+
+from .hole_bridging import bridge_holes
+from .mesh import Mesh
+from .placed_frustum import PlacedFrustum
+from .pose import Vector
+from .ray_casting import RayCaster
+
+__all__ = ["DisplacementMap", "heights_by_ray", "measure_displacement"]
+
+Floats = NDArray[np.float64]
+
+TURN = 2.0 * math.pi
+_CHUNK = 16384  # points computed at a time, so that the intermediate arrays stay in the cache
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplacementMap:
+    """A placed frustum and the heights of the mesh over it.
+
+    Attributes:
+        placed: the sheet.
+        heights: above the side, along its outward normal [m]; rows at equal steps of u from 0 to slant, columns at
+            equal steps of phi from 0 to wrap, shape (k, p) with k and p at least 2. Of a full wrap the last column
+            repeats the first.
+        clamped: share of the nodes that do not follow the mesh, because a hole is bridged or a height clamped there.
+
+    Raises:
+        GeometryError: fewer than two rows or columns, or a full wrap that does not close.
+    """
+
+    placed: PlacedFrustum
+    heights: Floats
+    clamped: float = 0.0
+    _point: Callable[[float, float], Vector] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        heights = frozen(self.heights, (None, None), "heights")
+        if min(heights.shape) < 2:
+            raise GeometryError(f"heights must have at least 2 rows and 2 columns, got {heights.shape}")
+        if self.placed.frustum.wrap == TURN and not np.array_equal(heights[:, 0], heights[:, -1]):
+            raise GeometryError("heights of a full wrap must end with the column they begin with")
+        object.__setattr__(self, "heights", heights)
+        object.__setattr__(self, "_point", _compiled(self.placed, heights.tolist()))
+
+    def point(self, u: float, phi: float) -> Vector:
+        """Return the point of the mesh at (u [m], phi [rad]), in the link's frame [m].
+
+        Beyond the ends and the edges of the sheet the cone continues with the height at the rim.
+        """
+        return self._point(u, phi)
+
+    def normal(self, phi: float) -> Vector:
+        """Return the outward unit normal of the cone in the link's frame; the normals of the facets jump by degrees."""
+        return self.placed.normal(phi)
+
+    def height(self, u: ArrayLike, phi: ArrayLike) -> Floats:
+        """Return the heights [m] above the side at (u [m], phi [rad]), arrays that broadcast."""
+        f = self.placed.frustum
+        rows, columns = self.heights.shape
+        u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
+        if f.wrap == TURN:
+            phi = phi - TURN * np.floor(phi / TURN)
+        x = np.clip(u * ((rows - 1) / f.slant), 0.0, rows - 1)
+        y = np.clip(phi * ((columns - 1) / f.wrap), 0.0, columns - 1)
+        i = np.minimum(x.astype(np.int32), rows - 2)
+        j = np.minimum(y.astype(np.int32), columns - 2)
+        x, y = x - i, y - j
+        flat, at = self.heights.ravel(), i * np.int32(columns) + j
+        near = flat[at] * (1.0 - y) + flat[at + 1] * y
+        far = flat[at + columns] * (1.0 - y) + flat[at + columns + 1] * y
+        return np.asarray(near * (1.0 - x) + far * x)
+
+    def points(self, u: ArrayLike, phi: ArrayLike) -> Floats:
+        """Return the points of the mesh for arrays u [m] and phi [rad] of shape (n,): shape (n, 3) [m].
+
+        Raises:
+            GeometryError: u and phi have another number of dimensions than one.
+        """
+        us, phis = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
+        if us.ndim != 1:
+            raise GeometryError(f"u and phi must have shape (n,), got {us.shape}")
+        f, pose = self.placed.frustum, self.placed.link_frustum
+        sa, ca = f.sin_half_angle, f.cos_half_angle
+        turn, shift = np.array(pose.rotation).T, np.array(pose.translation)
+        result = np.empty((len(us), 3))
+        for start in range(0, len(us), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            u_part, phi_part = us[part], phis[part]
+            height = self.height(u_part, phi_part)
+            rho = f.radius1 + u_part * sa + height * ca
+            local = np.stack([rho * np.cos(phi_part), rho * np.sin(phi_part), u_part * ca - height * sa], axis=1)
+            result[part] = local @ turn + shift
+        return result
+
+
+def _compiled(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], Vector]:
+    """Return ``point`` with every constant bound: plain floats, no attribute looked up."""
+    f, pose = placed.frustum, placed.link_frustum
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = pose.rotation
+    ox, oy, oz = pose.translation
+    radius, sa, ca = f.radius1, f.sin_half_angle, f.cos_half_angle
+    last_row, last_column = len(heights) - 2, len(heights[0]) - 2
+    per_u, per_phi = (last_row + 1) / f.slant, (last_column + 1) / f.wrap
+    full = f.wrap == TURN
+    cos, sin = math.cos, math.sin
+
+    def point(u: float, phi: float) -> Vector:
+        y = phi * per_phi
+        if full:
+            y %= last_column + 1
+        x = u * per_u
+        i, j = int(x), int(y)
+        if not 0.0 <= x <= last_row:
+            i = 0 if x < 0.0 else last_row
+            x = min(max(x, 0.0), last_row + 1)
+        if not 0.0 <= y <= last_column:
+            j = 0 if y < 0.0 else last_column
+            y = min(max(y, 0.0), last_column + 1)
+        x -= i
+        y -= j
+        near, far = heights[i], heights[i + 1]
+        a, b = near[j], far[j]
+        a += (near[j + 1] - a) * y
+        height = a + (b + (far[j + 1] - b) * y - a) * x
+        rho = radius + u * sa + height * ca
+        px, py, pz = rho * cos(phi), rho * sin(phi), u * ca - height * sa
+        return xx * px + xy * py + xz * pz + ox, yx * px + yy * py + yz * pz + oy, zx * px + zy * py + zz * pz + oz
+
+    return point
+
+
+def measure_displacement(
+    mesh: Mesh,
+    placed: PlacedFrustum,
+    along: int = 128,
+    around: int = 256,
+    limit: float = 0.001,
+    max_bridge: float = 0.010,
+    rays: RayCaster | None = None,
+) -> DisplacementMap:
+    """Measure the heights of a mesh over a sheet, by rays along the sheet's normals.
+
+    Args:
+        mesh: the link.
+        placed: the sheet.
+        along: steps of u.
+        around: steps of phi.
+        limit: depth beyond which a node lies in a hole [m]; the tolerance of the fit. Heights are clamped to it.
+        max_bridge: width of the widest hole that is spanned at the height of its rim [m]; wider ones are clamped.
+        rays: a ray caster of the same mesh; None to make one.
+
+    Raises:
+        GeometryError: fewer than one step, or no part of the mesh lies near the sheet.
+    """
+    if along < 1 or around < 1:
+        raise GeometryError(f"along and around must be at least 1 step, got {along} and {around}")
+    if not limit > 0.0:
+        raise GeometryError(f"limit must be above 0 m, got {limit!r}")
+    f = placed.frustum
+    full = f.wrap == TURN
+    u = np.linspace(0.0, f.slant, along + 1)
+    phi = np.linspace(0.0, f.wrap, around + 1)[: around if full else around + 1]
+    # A mesh may end at the rim itself, so the rays of the nodes there start slightly inside.
+    inset = 1e-6 * f.slant
+    height = heights_by_ray(rays or RayCaster(mesh), placed, np.clip(u, inset, f.slant - inset), phi, limit)
+    if not (np.abs(height) <= limit).any():
+        raise GeometryError(f"{mesh.source}: no part of it lies within {limit * 1e3:g} mm of the sheet")
+    # the closing needs values that grow outwards from 0, where there is no surface
+    depth = 4.0 * limit + 0.05 * max(f.radius1, f.radius2)
+    shown = np.where(height > -depth, height + depth, 0.0)
+    arc = 0.5 * (f.radius1 + f.radius2) * f.wrap / around
+    closed = bridge_holes(shown, f.slant / along, arc, max_bridge, full) - depth
+    clamped = float((np.abs(height) > limit).mean())
+    height = np.clip(np.where(height < -limit, closed, height), -limit, limit)
+    return DisplacementMap(placed, np.concatenate([height, height[:, :1]], axis=1) if full else height, clamped)
+
+
+def heights_by_ray(rays: RayCaster, placed: PlacedFrustum, u: Floats, phi: Floats, limit: float) -> Floats:
+    """Return the heights of the mesh over the nodes u x phi of a sheet [m], shape (k, p); -inf without a surface.
+
+    The rays start ten limits (at least 5 mm) above the side, so that parts further out do not block them.
+    """
+    us, phis = np.meshgrid(u, phi, indexing="ij")
+    points, normals = placed.place(us.ravel(), phis.ravel())
+    lift = max(10.0 * limit, 0.005)
+    depth = rays.cast(points + lift * normals, -normals)[0]
+    return np.asarray((lift - depth).reshape(us.shape))

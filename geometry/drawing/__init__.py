@@ -1,0 +1,1 @@
+"""Layers, electrodes and cut files of a sheet."""

@@ -1,0 +1,261 @@
+"""Cut sheets of a sensor: the outlines, holes, marks and labels of each material.
+
+There are seven, in the order of assembly: lower substrate, lower electrodes, lower conductive, isolation, upper
+conductive, upper electrodes, upper substrate. A part that is laid with the other face up is its mirror image, with tabs
+and leads on the wrong side, so every part is labelled with the face that is up. By default that is the face on which
+the next part is glued: electrodes go on the back of each conductive sheet, between it and its substrate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from coneskin.errors import GeometryError
+from coneskin.geometry.frustum import Frustum
+
+from .electrode_layout import SheetLayout, edge_room
+from .layer_stack import LayerStack, snap_to_cylinder
+from .outline import Outline
+from .part_labels import PartLabel, ascii_text, part_labels, strip_label
+from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
+from .touch_marks import between_marks, mark_labels, mark_lines
+
+__all__ = [
+    "LINE_COLOURS",
+    "CutPart",
+    "CutSheet",
+    "FaceUp",
+    "SheetFace",
+    "Stroke",
+    "StrokeKind",
+    "cut_sheets",
+    "nest_sheets",
+]
+
+StrokeKind = Literal["cut", "hole", "score", "fold"]
+SheetFace = Literal["outside", "inside"]
+FaceUp = Literal["work", "outside", "inside"]
+#: colour of each kind of line (red, green, blue), none of them white; a cutter selects speed and power by it
+LINE_COLOURS: dict[str, tuple[int, int, int]] = {
+    "cut": (255, 0, 0),
+    "hole": (255, 0, 255),
+    "score": (0, 0, 255),
+    "fold": (0, 153, 0),
+    "label": (0, 0, 0),
+}
+_LONGEST_TITLE = 40  # letters; a longer line would make all text on a part small
+_WIDEST_FLAP = 0.25  # of the way around the narrow end; a wider flap covers the active area twice
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """A line for the cutter.
+
+    Attributes:
+        kind: cut (an outer border), hole, score (a mark, not a cut) or fold.
+        outline: its course on the flat pattern.
+    """
+
+    kind: StrokeKind
+    outline: Outline
+
+
+@dataclass(frozen=True, slots=True)
+class CutPart:
+    """One piece of material.
+
+    Attributes:
+        name: of the part.
+        strokes: lines for the cutter, in order: marks, holes, then the border.
+        labels: text on the part.
+    """
+
+    name: str
+    strokes: tuple[Stroke, ...]
+    labels: tuple[PartLabel, ...]
+
+    @property
+    def area(self) -> float:
+        """Area of the material that remains [m2]."""
+        sign = {"cut": 1.0, "hole": -1.0}
+        return math.fsum(sign.get(s.kind, 0.0) * abs(s.outline.area) for s in self.strokes if s.outline.closed)
+
+    @property
+    def cut_length(self) -> float:
+        """Length of all cuts [m]."""
+        return math.fsum(s.outline.length for s in self.strokes if s.kind in ("cut", "hole"))
+
+
+@dataclass(frozen=True, slots=True)
+class CutSheet:
+    """The parts that are cut from one material.
+
+    Attributes:
+        number: position in the order of assembly, from the link outwards, from 1.
+        name: of the layer.
+        material: material and thickness.
+        face: face of the sensor that is up in the drawing.
+        surface: cone for which the parts are cut.
+        parts: pieces of the material.
+    """
+
+    number: int
+    name: str
+    material: str
+    face: SheetFace
+    surface: Frustum
+    parts: tuple[CutPart, ...]
+
+    @property
+    def slug(self) -> str:
+        """Name for files and layers."""
+        return f"{self.number}-{self.name.replace(' ', '-')}"
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Smallest x, smallest y, largest x, largest y of all strokes [m]."""
+        boxes = [stroke.outline.bounds for part in self.parts for stroke in part.strokes]
+        lows, highs = [box[:2] for box in boxes], [box[2:] for box in boxes]
+        return min(x for x, _ in lows), min(y for _, y in lows), max(x for x, _ in highs), max(y for _, y in highs)
+
+    def moved(self, dx: float, dy: float) -> CutSheet:
+        """Return the cut sheet, shifted by dx and dy [m]."""
+        parts = (
+            replace(
+                part,
+                strokes=tuple(Stroke(s.kind, s.outline.moved(dx, dy)) for s in part.strokes),
+                labels=tuple(replace(label, x=label.x + dx, y=label.y + dy) for label in part.labels),
+            )
+            for part in self.parts
+        )
+        return replace(self, parts=tuple(parts))
+
+
+def cut_sheets(
+    layout: SheetLayout,
+    stack: LayerStack,
+    *,
+    title: str = "sheet",
+    kerf: float = 0.0,
+    overlap: float = 0.0,
+    snap: float = 1e-5,
+    face_up: FaceUp = "work",
+) -> tuple[CutSheet, ...]:
+    """Draw the seven cut sheets of a sensor.
+
+    Args:
+        layout: electrodes, leads, tabs and holes.
+        stack: the layers.
+        title: written on every part.
+        kerf: width of the cut [m]; borders grow and holes shrink by half of it.
+        overlap: width of a flap that closes the seam, on the upper substrate beyond phi = wrap [m].
+        snap: a layer is cut as a rectangle where that moves no cut by more than this [m].
+        face_up: "work" for the face on which the next part is glued, or one face for all parts.
+
+    Raises:
+        GeometryError: kerf, overlap or snap is negative or not finite, a detail is smaller than the kerf, or
+            the overlap runs into tabs or the other edge.
+    """
+    for name, value in (("kerf", kerf), ("overlap", overlap), ("snap", snap)):
+        if not (math.isfinite(value) and value >= 0.0):
+            raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:.4g} mm")
+    if overlap and layout.plan.wires == "edge1":
+        raise GeometryError("an overlap at edge1 would cover the tabs there: choose another side for the wires")
+    around = layout.sheet.wrap * min(layout.sheet.radius1, layout.sheet.radius2)
+    if overlap > _WIDEST_FLAP * around:
+        raise GeometryError(
+            f"an overlap must be at most {_WIDEST_FLAP:.0%} of the narrow end, {_WIDEST_FLAP * around * 1e3:.4g} mm, "
+            f"got {overlap * 1e3:.4g} mm"
+        )
+    if overlap and overlap >= edge_room(layout.sheet):
+        raise GeometryError(
+            f"an overlap of {overlap * 1e3:.4g} mm runs into the other edge of the flat pattern, "
+            f"{edge_room(layout.sheet) * 1e3:.4g} mm away: make it narrower"
+        )
+    plain = ascii_text(title)[:_LONGEST_TITLE]
+
+    def sheet(number: int, name: str, index: int, face: SheetFace, foil: bool = False) -> CutSheet:
+        face = face if face_up == "work" else face_up
+        surface = snap_to_cylinder(stack.surface(layout.sheet, index), snap)
+        layer = stack.layers[index]
+        text = (plain, name.upper(), f"{face.upper()} FACE UP")
+        material = "aluminium foil" if foil else f"{layer.material} {layer.thickness * 1e3:.2f} mm"
+        if foil:
+            pair = "CD" if index < 2 else "AB"
+            parts = tuple(_foil(layout, surface, which, face, plain) for which in pair)
+        else:
+            strokes = _marks(layout, surface, index) + _border(layout, surface, index, overlap if index == 4 else 0.0)
+            clear = between_marks(layout) if index == 4 else None
+            labels = part_labels(layout, surface, (*text, ascii_text(material)), clear)
+            labels += tuple(mark_labels(layout, surface)) if index == 4 else ()
+            parts = (CutPart(name, strokes, labels),)
+        return CutSheet(
+            number, name, material, face, surface, tuple(_finish(part, kerf, face == "inside") for part in parts)
+        )
+
+    return (
+        sheet(1, "lower substrate", 0, "outside"),
+        sheet(2, "lower electrodes", 1, "inside", foil=True),
+        sheet(3, "lower conductive", 1, "inside"),
+        sheet(4, "isolation", 2, "outside"),
+        sheet(5, "upper conductive", 3, "outside"),
+        sheet(6, "upper electrodes", 3, "outside", foil=True),
+        sheet(7, "upper substrate", 4, "inside"),
+    )
+
+
+def nest_sheets(sheets: tuple[CutSheet, ...], gap: float = 10e-3) -> tuple[CutSheet, ...]:
+    """Arrange sheets side by side in rows, a gap [m] apart, with the lower left corner of all at (0, 0)."""
+    boxes = [sheet.bounds for sheet in sheets]
+    widths = [x1 - x0 for x0, _, x1, _ in boxes]
+    room = max(max(widths), math.sqrt(1.2 * sum(w * (b[3] - b[1]) for w, b in zip(widths, boxes, strict=True))))
+    placed, x, y, row_top = [], 0.0, 0.0, 0.0
+    for sheet, (x0, y0, x1, y1) in zip(sheets, boxes, strict=True):
+        if x > 0.0 and x + x1 - x0 > room:
+            x, y = 0.0, row_top + gap
+        placed.append(sheet.moved(x - x0, y - y0))
+        x, row_top = x + x1 - x0 + gap, max(row_top, y + y1 - y0)
+    return tuple(placed)
+
+
+def _border(layout: SheetLayout, surface: Frustum, index: int, overlap: float) -> tuple[Stroke, ...]:
+    shape = {1: layout.lower, 3: layout.upper}.get(index, layout.rim)
+    strokes = [Stroke("hole", draw_hole(surface, u, phi, layout.plan.hole)) for u, phi in layout.holes]
+    if overlap:
+        slant, wrap = surface.slant, surface.wrap
+        flap = ShapeTab(0.5 * slant, wrap, slant, overlap, "edge1")
+        seam = (ShapeCorner(0.0, wrap), ShapeCorner(slant, wrap))
+        shape = (ShapeCorner(0.0, 0.0), seam[0], flap, seam[1], ShapeCorner(slant, 0.0))
+        strokes.insert(0, Stroke("fold", draw_shape(surface, seam, closed=False)))
+    return (*strokes, Stroke("cut", draw_shape(surface, shape)))
+
+
+def _marks(layout: SheetLayout, surface: Frustum, index: int) -> tuple[Stroke, ...]:
+    """Mark the conductive sheet on its substrate, the electrodes on their conductive sheet, touches on the cover."""
+    if index == 0:
+        return (Stroke("score", draw_shape(surface, layout.lower)),)
+    if index == 4:
+        crosses = (Stroke("score", draw_shape(surface, line, closed=False)) for line in mark_lines(layout))
+        return (Stroke("score", draw_shape(surface, layout.upper)), *crosses)
+    marks: tuple[SurfaceShape, ...] = layout.marks.get({1: "lower", 3: "upper"}.get(index, ""), ())
+    return tuple(Stroke("score", draw_shape(surface, mark, closed=False)) for mark in marks)
+
+
+def _foil(layout: SheetLayout, surface: Frustum, which: str, face: SheetFace, title: str) -> CutPart:
+    strokes = [Stroke("cut", draw_shape(surface, layout.foils[which]))]
+    if which in layout.folds:
+        strokes.insert(0, Stroke("fold", draw_shape(surface, layout.folds[which], closed=False)))
+    return CutPart(f"electrode {which}", tuple(strokes), strip_label(layout, surface, which, face, title))
+
+
+def _finish(part: CutPart, kerf: float, mirror: bool) -> CutPart:
+    """Return the part with its cuts moved out by half the kerf, mirrored where its inside is up."""
+    grow = {"cut": 0.5 * kerf, "hole": -0.5 * kerf}
+    strokes = []
+    for stroke in part.strokes:
+        outline = stroke.outline.offset(grow[stroke.kind]) if stroke.kind in grow else stroke.outline
+        strokes.append(Stroke(stroke.kind, outline.mirrored() if mirror else outline))
+    labels = tuple(label.mirrored() for label in part.labels) if mirror else part.labels
+    return CutPart(part.name, tuple(strokes), labels)

@@ -1,0 +1,232 @@
+"""Cut sheets as PDF at 1:1, tiled over pages of a printer.
+
+The drawing is one form, in millimetres, that every page shows through its own window. Windows meet without overlap at
+the crop marks; a bleed of a few millimetres is printed beyond them, so that an inaccurate cut leaves no white border.
+Layers are optional content, and the file asks viewers not to scale when they print.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Literal, get_args
+
+from coneskin.errors import GeometryError
+
+from .cut_sheet import LINE_COLOURS, CutSheet
+from .outline import Outline
+from .part_labels import CAP_HEIGHT, PartLabel
+from .pdf_writer import PdfWriter, pdf_number
+from .tiling import PageTiling, tile_pages
+
+__all__ = ["PageSize", "to_pdf"]
+
+PageSize = Literal["A4", "A3", "Letter"]
+_PAGE_SIZES = {"A4": (210.0, 297.0), "A3": (297.0, 420.0), "Letter": (215.9, 279.4)}  # mm, ISO 216 and ANSI Y14.1
+_MAX_CUBIC_SWEEP = math.radians(15.0)  # rad; a cubic over it deviates from the arc by 6e-9 of the radius
+_POINTS_PER_MM = 72.0 / 25.4
+_BLEED = 4.0  # mm; width printed beyond a window
+
+
+def to_pdf(sheets: Sequence[CutSheet], page: PageSize = "A4", title: str = "coneskin") -> bytes:
+    """Write cut sheets as one PDF: a page map first, then the pages to print.
+
+    Args:
+        sheets: the sheets, drawn in their own coordinates.
+        page: paper size.
+        title: text on every page.
+
+    Returns:
+        the bytes of the file.
+
+    Raises:
+        GeometryError: an unknown paper size.
+    """
+    if page not in get_args(PageSize):
+        raise GeometryError(f"page must be one of {', '.join(get_args(PageSize))}, got {page!r}")
+    tiling = tile_pages(sheets, *_PAGE_SIZES[page])
+    pdf = PdfWriter()
+    font = pdf.add("<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>")
+    layers = [pdf.add(f"<< /Type /OCG /Name ({sheet.slug}) >>") for sheet in sheets]
+    names = " ".join(f"/L{i} {layer} 0 R" for i, layer in enumerate(layers))
+    resources = f"/Font << /F {font} 0 R >> /Properties << {names} >>"
+    x0, y0, x1, y1 = tiling.extent
+    box = " ".join(pdf_number(value) for value in (x0 - 1, y0 - 1, x1 + 1, y1 + 1))
+    drawing = pdf.add_stream(
+        "\n".join(_drawing(sheets)),
+        f"/Type /XObject /Subtype /Form /BBox [{box}] /Resources << {resources} >>",
+    )
+    shared = f"<< {resources} /XObject << /D {drawing} 0 R >> >>"
+    box = f"[0 0 {pdf_number(tiling.width * _POINTS_PER_MM)} {pdf_number(tiling.height * _POINTS_PER_MM)}]"
+    contents = [_map_page(tiling, sheets, f"{title} - {page}"), *_tiles(tiling, title)]
+    for content in contents:
+        stream = pdf.add_stream("\n".join([f"{_POINTS_PER_MM:.9f} 0 0 {_POINTS_PER_MM:.9f} 0 0 cm", *content]))
+        pdf.add_page(f"/MediaBox {box} /Resources {shared} /Contents {stream} 0 R")
+    order = " ".join(f"{layer} 0 R" for layer in layers)
+    return pdf.finish(
+        "/ViewerPreferences << /PrintScaling /None >> "
+        f"/OCProperties << /OCGs [{order}] /D << /Order [{order}] /ON [{order}] >> >>",
+        title,
+    )
+
+
+def _drawing(sheets: Sequence[CutSheet]) -> Iterator[str]:
+    """Yield the drawing of all sheets in their own coordinates [mm]."""
+    yield "0.2 w 1 J 1 j"
+    for i, sheet in enumerate(sheets):
+        yield f"/OC /L{i} BDC"
+        for part in sheet.parts:
+            for stroke in part.strokes:
+                yield _rgb(LINE_COLOURS[stroke.kind], "RG")
+                yield from _path(stroke.outline)
+            for label in part.labels:
+                yield _rgb(LINE_COLOURS["label"], "rg")
+                yield _label(label)
+        yield "EMC"
+
+
+def _path(outline: Outline) -> Iterator[str]:
+    def at(x: float, y: float) -> str:
+        return f"{pdf_number(x * 1e3)} {pdf_number(y * 1e3)}"
+
+    x0, y0, _ = outline.vertices[0]
+    yield f"{at(x0, y0)} m"
+    for segment in outline.segments():
+        if segment.bulge == 0.0:
+            yield f"{at(*segment.end)} l"
+            continue
+        for piece in segment.split(max(1, math.ceil(abs(segment.sweep) / _MAX_CUBIC_SWEEP - 1e-9))):
+            half = 0.5 * abs(piece.sweep)  # pull = 4/3 tan(sweep/4) radius, from the chord: regular for a flat arc
+            pull = 2.0 / 3.0 * piece.chord * math.tan(0.5 * half) / math.sin(half) if half else piece.chord / 3.0
+            a, b = piece.heading(0.0), piece.heading(1.0)
+            first = at(piece.start[0] + pull * math.cos(a), piece.start[1] + pull * math.sin(a))
+            second = at(piece.end[0] - pull * math.cos(b), piece.end[1] - pull * math.sin(b))
+            yield f"{first} {second} {at(*piece.end)} c"
+    yield "s" if outline.closed else "S"
+
+
+def _label(label: PartLabel) -> str:
+    c, s = math.cos(label.angle), math.sin(label.angle)
+    back, down = -0.5 * label.width, -0.5 * label.height
+    x, y = label.x + back * c - down * s, label.y + back * s + down * c
+    return _text(label.text, x * 1e3, y * 1e3, label.height * 1e3, c, s)
+
+
+def _text(text: str, x: float, y: float, height: float, c: float = 1.0, s: float = 0.0) -> str:
+    escaped = text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
+    turn = " ".join(pdf_number(value) for value in (c, s, -s, c, x, y))
+    return f"BT /F {pdf_number(height / CAP_HEIGHT)} Tf {turn} Tm ({escaped}) Tj ET"
+
+
+def _rgb(colour: tuple[int, int, int], operator: str) -> str:
+    return " ".join(pdf_number(value / 255.0) for value in colour) + f" {operator}"
+
+
+def _line(x0: float, y0: float, x1: float, y1: float) -> str:
+    return f"{pdf_number(x0)} {pdf_number(y0)} m {pdf_number(x1)} {pdf_number(y1)} l S"
+
+
+def _scale_bar(x: float, y: float) -> Iterator[str]:
+    """Yield a scale bar with 100 mm between the left edges of its first and last tick."""
+    yield "0 0 0 rg 0 0 0 RG 0.2 w 0 J"
+    yield _line(x, y, x + 100.0, y)
+    for ten in range(11):
+        yield _line(x + 10.0 * ten, y, x + 10.0 * ten, y + (4.0 if ten % 5 == 0 else 2.5))
+    yield _text("100 mm - measure before cutting", x + 104.0, y, 2.2)
+
+
+def _tiles(tiling: PageTiling, title: str) -> Iterator[list[str]]:
+    width, height = tiling.window
+    count = len(tiling.cells)
+    for page, (column, row) in enumerate(tiling.cells, start=1):
+        left, bottom = tiling.corner
+        x, y = tiling.origin[0] + column * width, tiling.origin[1] + row * height
+        content = [
+            "q",
+            f"{pdf_number(left - _BLEED)} {pdf_number(bottom - _BLEED)} {pdf_number(width + 2 * _BLEED)} ",
+        ]
+        content[-1] += f"{pdf_number(height + 2 * _BLEED)} re W n"
+        content += [f"1 0 0 1 {pdf_number(left - x)} {pdf_number(bottom - y)} cm /D Do", "Q"]
+        content += _crop_marks(left, bottom, width, height)
+        for dx, dy, mid_x, mid_y in (
+            (-1, 0, left, bottom + 0.5 * height),
+            (1, 0, left + width, bottom + 0.5 * height),
+            (0, -1, left + 0.5 * width, bottom),
+            (0, 1, left + 0.5 * width, bottom + height),
+        ):
+            if (column + dx, row + dy) in tiling.cells:
+                content += _registration(mid_x, mid_y)
+                neighbour = tiling.cells.index((column + dx, row + dy)) + 1
+                content.append(_neighbour(neighbour, mid_x, mid_y, dx, dy))
+        content += _scale_bar(left, 8.0)
+        content.append(
+            _text(
+                f"{title} - page {page} of {count}, column {column + 1}, row {tiling.counts[1] - row}", left, 4.0, 2.2
+            )
+        )
+        yield content
+
+
+def _neighbour(page: int, x: float, y: float, dx: int, dy: int) -> str:
+    """Return the number of the adjacent page, just beyond the bleed, inside the printable area."""
+    if dx:
+        return _text(f"page {page}", x + (6.5 if dx > 0 else -4.7), y + 4.0, 1.8, 0.0, 1.0)
+    return _text(f"page {page}", x + 4.0, y + (4.7 if dy > 0 else -6.5), 1.8)
+
+
+def _crop_marks(left: float, bottom: float, width: float, height: float) -> Iterator[str]:
+    yield "0 0 0 RG 0 0 0 rg 0.1 w 0 J"
+    for x, out_x in ((left, -1.0), (left + width, 1.0)):
+        for y, out_y in ((bottom, -1.0), (bottom + height, 1.0)):
+            yield _line(x + out_x * 5.0, y, x + out_x * 9.0, y)
+            yield _line(x, y + out_y * 5.0, x, y + out_y * 9.0)
+
+
+def _registration(x: float, y: float) -> Iterator[str]:
+    """Yield a cross in a ring on the border of two windows; half of it is on each page."""
+    k = 2.0 * 4.0 / 3.0 * math.tan(math.pi / 8.0)
+    yield _line(x - 3.0, y, x + 3.0, y)
+    yield _line(x, y - 3.0, x, y + 3.0)
+    a, b = [(2.0, 0.0), (0.0, 2.0), (-2.0, 0.0), (0.0, -2.0)], [(0.0, k), (-k, 0.0), (0.0, -k), (k, 0.0)]
+    words = [f"{pdf_number(x + 2.0)} {pdf_number(y)} m"]
+    for (px, py), (tx, ty), (qx, qy), (sx, sy) in zip(a, b, a[1:] + a[:1], b[1:] + b[:1], strict=True):
+        points = (x + px + tx, y + py + ty, x + qx - sx, y + qy - sy, x + qx, y + qy)
+        words.append(" ".join(pdf_number(value) for value in points) + " c")
+    yield " ".join(words) + " s"
+
+
+def _map_page(tiling: PageTiling, sheets: Sequence[CutSheet], title: str) -> list[str]:
+    """Return the overview page: a map of the pages, the materials, and how to print."""
+    left, bottom = tiling.corner
+    width, height = tiling.window
+    content = ["0 0 0 rg 0 0 0 RG", _text(title, left, bottom + height - 6.0, 5.0)]
+    notes = [
+        f"Print at 100 %, without scaling. {len(tiling.cells)} pages follow. The bar below must measure 100 mm.",
+        "Cut at the crop marks and join the pages edge to edge; the crosses must meet. Empty pages are left out.",
+        "Red: cut. Magenta: hole. Blue: mark, do not cut. Green: fold. Layers can be hidden in the viewer.",
+        *(f"{sheet.slug}: {sheet.material}, {sheet.face} face up" for sheet in sheets),
+    ]
+    y = bottom + height - 16.0
+    for note in notes:
+        content.append(_text(note, left, y, 2.2))
+        y -= 4.5
+    columns, rows = tiling.counts
+    scale = min(width / (columns * tiling.window[0]), (y - bottom) / (rows * tiling.window[1]))
+    x, y = left, y - scale * rows * tiling.window[1]
+    shift_x, shift_y = x - scale * tiling.origin[0], y - scale * tiling.origin[1]
+    content += [
+        "q",
+        f"{scale:.6f} 0 0 {scale:.6f} {pdf_number(shift_x)} {pdf_number(shift_y)} cm",
+        "/D Do",
+        "Q",
+        "0.5 0.5 0.5 RG 0.2 w",
+    ]
+    for page, (column, row) in enumerate(tiling.cells, start=1):
+        cell_x, cell_y = x + scale * column * width, y + scale * row * height
+        content.append(
+            f"{pdf_number(cell_x)} {pdf_number(cell_y)} {pdf_number(scale * width)} {pdf_number(scale * height)} re S"
+        )
+        content.append("0.5 0.5 0.5 rg")
+        content.append(_text(str(page), cell_x + 1.5, cell_y + 1.5, min(5.0, 0.2 * scale * height)))
+    content += _scale_bar(left, 8.0)
+    return content

@@ -1,0 +1,1 @@
+"""Fit of the frusta that cover a link mesh."""

@@ -1,0 +1,131 @@
+"""Bare areas of a link: what no sheet covers, each with the reason."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .axis_plan import AxisPlan, SheetRequirements, plan_sheets
+from .cone_fit import InfiniteCone
+from .plan import AxisSurvey, SheetPlan, kept_clear
+from .side import covered_points
+from .surface_samples import SurfaceSamples
+
+__all__ = ["BareArea", "bare_areas"]
+
+Floats = NDArray[np.float64]
+
+_NEIGHBOURS = 8  # samples, half of which must face one way where the hull is flat: beside an edge no more do
+_FLAT_COSINE = math.cos(math.radians(2.0))
+_ROUND_COSINE = 0.985
+_LEAST_SHARE = 0.01  # of the hull; less is not reported
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BareArea:
+    """A part of the hull without a sheet.
+
+    Attributes:
+        reason: why no sheet lies there, in words.
+        share: of the hull.
+        points: samples of it [m], shape (n, 3).
+    """
+
+    reason: str
+    share: float
+    points: Floats = field(repr=False)
+
+
+def bare_areas(
+    plan: SheetPlan, surveys: list[AxisSurvey], hull: SurfaceSamples, requirements: SheetRequirements
+) -> list[BareArea]:
+    """Return what a plan leaves bare, by reason, the largest area first.
+
+    Args:
+        plan: the sheets.
+        surveys: of all axes.
+        hull: samples of the link.
+        requirements: on the sheets.
+    """
+    bare = ~_covered(plan.axes, hull, requirements.tolerance)
+    found: list[BareArea] = []
+
+    def take(reason: str, chosen: NDArray[np.bool_]) -> None:
+        mine = bare & chosen
+        share = float(mine.mean())
+        if share >= _LEAST_SHARE:
+            found.append(BareArea(reason, share, hull.points[mine]))
+            bare[mine] = False
+
+    further, hindered = _further_plans(plan, surveys, requirements)
+    if further is not None:
+        seen = _covered([further], hull, requirements.tolerance)
+        if further.area >= requirements.least_gain:
+            take(f"a sheet more would cover it: allow {plan.count + 1} sheets", seen)
+        else:
+            take("room for a sheet that is too small to be worth its four wires", seen)
+    if hindered is not None:
+        take(
+            "a sheet here would run into another one or reach too far around it",
+            _covered([hindered], hull, requirements.tolerance),
+        )
+    take("flat", _flat(hull))
+    least = f"{requirements.min_length * 1e3:g} mm long and {math.degrees(requirements.min_wrap):g} deg wide"
+    take(f"round, but without room for a sheet {least}", _round(surveys, hull, requirements.tolerance))
+    take("curved in two ways, or in a corner", np.ones(len(hull), bool))
+    return sorted(found, key=lambda area: -area.share)
+
+
+def _covered(plans: tuple[AxisPlan, ...] | list[AxisPlan], hull: SurfaceSamples, tolerance: float) -> NDArray[np.bool_]:
+    """Return whether sheets cover each sample, shape (n,)."""
+    covered = np.zeros(len(hull), bool)
+    for about in plans:
+        for side in about.sides:
+            covered |= covered_points(about.profile, side, hull, tolerance)
+    return covered
+
+
+def _further_plans(
+    plan: SheetPlan, surveys: list[AxisSurvey], requirements: SheetRequirements
+) -> tuple[AxisPlan | None, AxisPlan | None]:
+    """Return the largest sheet that there is room for, and the largest one if the others took no room."""
+    further: AxisPlan | None = None
+    hindered: AxisPlan | None = None
+    least = replace(requirements, least_gain=0.0)
+    for survey in surveys:
+        clear = kept_clear(survey.profile, list(plan.axes), requirements)
+        taken = kept_clear(survey.profile, list(plan.axes), replace(requirements, thickness=0.0, gap=0.0))
+        for profile, known in ((clear, further), (taken, hindered)):
+            for about in plan_sheets(profile, survey.lines, least, 1):
+                if known is None or about.area > known.area:
+                    known = about
+            if profile is clear:
+                further = known
+            else:
+                hindered = known
+    return further, hindered
+
+
+def _flat(hull: SurfaceSamples) -> NDArray[np.bool_]:
+    """Return whether the hull is flat about each sample, shape (n,)."""
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(hull.points).query(hull.points, min(_NEIGHBOURS, len(hull)))[1]
+    cosines = np.einsum("ijk,ik->ij", hull.normals[near], hull.normals)
+    return np.asarray(np.quantile(cosines, 0.5, axis=1) >= _FLAT_COSINE)
+
+
+def _round(surveys: list[AxisSurvey], hull: SurfaceSamples, tolerance: float) -> NDArray[np.bool_]:
+    """Return whether each sample lies on a cone about one of the axes, shape (n,)."""
+    on_cone = np.zeros(len(hull), bool)
+    for survey in surveys:
+        frame = survey.profile.frame
+        for radius, slope in survey.lines:
+            if radius > 0.0:
+                cone = InfiniteCone(frame.origin, frame.axis, radius, math.atan(slope))
+                near = np.abs(cone.distances(hull.points)) <= tolerance
+                on_cone |= near & (cone.alignment(hull.points, hull.normals) > _ROUND_COSINE)
+    return on_cone

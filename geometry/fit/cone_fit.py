@@ -1,0 +1,160 @@
+"""Fit of one cone to points of a mesh: gated, reweighted Gauss-Newton, regular at the cylinder.
+
+The unknowns are two tilts and two shifts of the axis, the distance c = rho cos(a) of the side from the origin and the
+half angle a. There is no apex among them, so a cylinder (a = 0) is an ordinary point. The residual is the distance from
+the side, d = rho cos(a) - z sin(a) - c, where z runs along the axis and rho away from it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .surface_samples import SurfaceSamples
+
+__all__ = ["InfiniteCone", "distance_jacobian", "fit_cone", "perpendicular_vectors"]
+
+Floats = NDArray[np.float64]
+
+MAX_HALF_ANGLE = math.radians(80.0)  #: rad; a flatter ring is a flange, not a cone
+_MAX_STEPS = 30  # Gauss-Newton steps at the last gate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InfiniteCone:
+    """A cone without ends, or a cylinder.
+
+    Attributes:
+        origin: a point of the axis [m], shape (3,).
+        axis: unit vector, shape (3,).
+        radius: distance of the side from the axis at the origin [m].
+        half_angle: angle between side and axis [rad]; positive where the cone widens along the axis.
+    """
+
+    origin: Floats
+    axis: Floats
+    radius: float
+    half_angle: float
+
+    def cylindrical_coordinates(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return the distances from the axis and the heights along it from the origin [m], each of shape (n,)."""
+        q = points - self.origin
+        z = q @ self.axis
+        return np.linalg.norm(q - z[:, None] * self.axis, axis=1), z
+
+    def distances(self, points: Floats) -> Floats:
+        """Return the signed distances from the side [m], positive outside, shape (n,)."""
+        rho, z = self.cylindrical_coordinates(points)
+        return np.asarray((rho - self.radius) * math.cos(self.half_angle) - z * math.sin(self.half_angle))
+
+    def alignment(self, points: Floats, normals: Floats) -> Floats:
+        """Return the cosines between the normals of points and those of the side, shape (n,)."""
+        q = points - self.origin
+        across = q - (q @ self.axis)[:, None] * self.axis
+        rho = np.maximum(np.linalg.norm(across, axis=1), 1e-12)
+        out = np.einsum("ij,ij->i", across, normals) / rho
+        return np.asarray(out * math.cos(self.half_angle) - (normals @ self.axis) * math.sin(self.half_angle))
+
+
+def perpendicular_vectors(axis: Floats) -> tuple[Floats, Floats]:
+    """Return two unit vectors that form a right-handed frame with an axis: (first, second, axis)."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(helper, axis)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def distance_jacobian(cone: InfiniteCone, points: Floats) -> Floats:
+    """Return the derivatives of ``InfiniteCone.distances``, shape (n, 6).
+
+    The columns are tilt 1, tilt 2, shift 1, shift 2, c and the half angle.
+
+    Tilt i turns the axis towards the i-th vector of ``perpendicular_vectors`` [m/rad]; shift i moves the origin
+    along it [m/m]; c is radius * cos(half_angle) [m/m].
+    """
+    e1, e2 = perpendicular_vectors(cone.axis)
+    local = (points - cone.origin) @ np.stack([e1, e2, cone.axis], axis=1)
+    return _slopes(local, np.hypot(local[:, 0], local[:, 1]), cone.half_angle)
+
+
+def _slopes(local: Floats, rho: Floats, half_angle: float) -> Floats:
+    x, y, z = local.T
+    rho = np.maximum(rho, 1e-12)
+    ca, sa = math.cos(half_angle), math.sin(half_angle)
+    lever = -(z * ca / rho + sa)
+    columns = [lever * x, lever * y, -ca * x / rho, -ca * y / rho, -np.ones(len(z)), -rho * sa - z * ca]
+    return np.stack(columns, axis=1)
+
+
+def fit_cone(
+    samples: SurfaceSamples, start: InfiniteCone, gates: tuple[float, ...], angle: float = 0.2
+) -> InfiniteCone | None:
+    """Fit a cone to the points that lie near it and whose normals agree with its own.
+
+    Args:
+        samples: points and normals of the hull.
+        start: first guess; some points must lie within the first gate of it.
+        gates: distances beyond which a point has no weight [m], decreasing; each is kept until the fit converges.
+        angle: between the normals, above which a point has no weight [rad]; twice that at the first of several gates.
+
+    Returns:
+        the cone, with its origin in the middle of its points; None where too few points are left or the fit diverges.
+    """
+    cone = start
+    for number, gate in enumerate(gates):
+        last = number == len(gates) - 1
+        stride = 1 if last else max(1, len(samples) // 2000)  # a rough fit is enough at the early gates
+        points, normals = samples.points[::stride], samples.normals[::stride]
+        aligned = math.cos(angle * (2.0 if number == 0 and not last else 1.0))
+        for _ in range(_MAX_STEPS if last else _MAX_STEPS // 2):
+            better, moved = _step(cone, points, normals, gate, aligned)
+            if better is None:
+                return None
+            cone = better
+            if moved < (1e-4 if last else 1e-2) * gate:
+                break
+    return cone
+
+
+def _step(
+    cone: InfiniteCone, points: Floats, normals: Floats, gate: float, aligned: float
+) -> tuple[InfiniteCone | None, float]:
+    """Take one Gauss-Newton step with Tukey's weights; return the new cone and how far the side moved [m]."""
+    e1, e2 = perpendicular_vectors(cone.axis)
+    columns = np.stack([e1, e2, cone.axis], axis=1)
+    sa, ca = math.sin(cone.half_angle), math.cos(cone.half_angle)
+    local, turned = (points - cone.origin) @ columns, normals @ columns
+    rho = np.hypot(local[:, 0], local[:, 1])
+    distance = (rho - cone.radius) * ca - local[:, 2] * sa
+    out = (local[:, 0] * turned[:, 0] + local[:, 1] * turned[:, 1]) * ca - rho * turned[:, 2] * sa
+    near = np.flatnonzero((np.abs(distance) < gate) & (out > aligned * rho))
+    if len(near) < 24:
+        return None, math.inf
+    local, rho, distance = local[near], rho[near], distance[near]
+    middle = float(local[:, 2].mean())
+    local[:, 2] -= middle
+    size = max(float(np.abs(local[:, 2]).max()), float(rho.max()))
+    scale = np.array([size, size, 1.0, 1.0, 1.0, size])  # tilts in metres too
+    slopes = _slopes(local, rho, cone.half_angle) / scale
+    weighted = slopes * ((1.0 - (distance / gate) ** 2) ** 2)[:, None]
+    normal = weighted.T @ slopes
+    # Negligible beside the data; it fixes only what the points leave undetermined (a narrow strip, a short ring).
+    normal[np.diag_indices(6)] += 1e-9 * np.trace(normal)
+    scaled = -np.linalg.solve(normal, weighted.T @ distance)
+    longest = float(np.abs(scaled).max())
+    if longest > 0.2 * size:
+        scaled *= 0.2 * size / longest
+    tilt1, tilt2, shift1, shift2, dc, dangle = scaled / scale
+    axis = cone.axis + tilt1 * e1 + tilt2 * e2
+    axis /= np.linalg.norm(axis)
+    half_angle = cone.half_angle + dangle
+    if abs(half_angle) > MAX_HALF_ANGLE:
+        return None, math.inf
+    radius = (cone.radius * ca + middle * sa + dc) / math.cos(half_angle)
+    if not 1e-4 < radius < 5.0:
+        return None, math.inf
+    origin = cone.origin + middle * cone.axis + shift1 * e1 + shift2 * e2
+    return InfiniteCone(origin, axis, radius, half_angle), longest

@@ -1,0 +1,44 @@
+"""Largest region in length and angle for a partial wrap, on shoulders and wrists that no full wrap fits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["largest_region"]
+
+Region = tuple[int, int, int, int]  #: first row, end row, first column, columns
+
+
+def largest_region(good: NDArray[np.bool_], rows: int = 1, columns: int = 1, exact: bool = False) -> Region | None:
+    """Return the largest rectangle of good cells on a grid whose columns go round.
+
+    Args:
+        good: True for the cells of the (z, phi) grid that are within the tolerance, shape (k, p).
+        rows: smallest number of rows.
+        columns: smallest number of columns.
+        exact: True to take exactly that many columns.
+
+    Returns:
+        first row, row after the last, first column (in [0, p)) and number of columns (p for a full turn); None
+        where no rectangle is large enough.
+    """
+    count, around = good.shape
+    if columns > around or rows > count:
+        return None
+    whole = np.cumsum(np.concatenate([good, good], axis=1), axis=1, dtype=np.int32)
+    whole = np.concatenate([np.zeros((count, 1), np.int32), whole], axis=1)
+    row = np.arange(1, count + 1, dtype=np.int32)[:, None]
+    best: Region | None = None
+    area = 0
+    for wide in (columns,) if exact else range(columns, around + 1):
+        block = whole[:, wide : wide + around] - whole[:, :around] == wide
+        run = row - np.maximum.accumulate(np.where(block, 0, row), axis=0)  # rows in a block, up to this one
+        at = int(run.argmax())
+        tall = int(run.flat[at])
+        if tall < rows or tall * around <= area:  # a wider block is not taller
+            break
+        if tall * wide > area:
+            end, first = divmod(at, around)
+            area, best = tall * wide, (end + 1 - tall, end + 1, first, wide)
+    return best

@@ -1,0 +1,134 @@
+"""Outermost surface of a link about an axis: R(z, phi), by rays towards the axis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.geometry.hole_bridging import bridge_holes
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.ray_casting import RayCaster
+
+from .cone_fit import perpendicular_vectors
+
+__all__ = ["AxisFrame", "RadialProfile", "measure_profile"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisFrame:
+    """An axis with the direction of azimuth 0.
+
+    Attributes:
+        origin: a point of the axis [m], shape (3,).
+        columns: unit vectors of azimuth 0, of azimuth pi / 2 and of the axis as columns, shape (3, 3).
+    """
+
+    origin: Floats
+    columns: Floats
+
+    @classmethod
+    def along(cls, origin: Floats, axis: Floats, seam: Floats | None = None) -> AxisFrame:
+        """Make a frame about an axis; azimuth 0 is the direction ``seam``, projected across the axis."""
+        first = perpendicular_vectors(axis)[0]
+        if seam is not None:
+            square = seam - (seam @ axis) * axis
+            if np.linalg.norm(square) > 1e-3:
+                first = square / np.linalg.norm(square)
+        return cls(origin, np.stack([first, np.cross(axis, first), axis], axis=1))
+
+    @property
+    def axis(self) -> Floats:
+        """Unit vector along the axis."""
+        return np.asarray(self.columns[:, 2])
+
+    def local(self, points: Floats) -> Floats:
+        """Return points in the coordinates of this frame [m], shape (n, 3)."""
+        return np.asarray((points - self.origin) @ self.columns)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RadialProfile:
+    """Radius of the hull on a grid of heights and azimuths.
+
+    Attributes:
+        frame: the axis.
+        z: heights of the slices [m], ascending and evenly spaced, shape (k,).
+        phi: azimuths [rad], ascending from 0, evenly spaced over the turn, shape (p,).
+        radius: distance from the axis to the outermost surface [m], 0 where there is none, shape (k, p).
+        bridged: the same, with the holes and grooves filled that a sheet spans, shape (k, p).
+        weight: what an area counts there, 1 by default, shape (k, p); 0 where no sheet may lie.
+    """
+
+    frame: AxisFrame
+    z: Floats
+    phi: Floats
+    radius: Floats
+    bridged: Floats
+    weight: Floats | None = None
+
+    @property
+    def step(self) -> float:
+        """Distance between slices [m]."""
+        return float(self.z[1] - self.z[0])
+
+    def floor(self, tolerance: float) -> Floats:
+        """Return the radii that a sheet must not stand off from [m], shape (k, p): holes count as filled.
+
+        What lies less than the tolerance [m] below its rim is no hole, and the sheet has to follow it.
+        """
+        return np.where(self.bridged - self.radius > tolerance, self.bridged, self.radius)
+
+    def bounds(self, tolerance: float) -> tuple[Floats, Floats]:
+        """Return the largest radius and the smallest one above the floor of every slice [m], each of shape (k,).
+
+        A slice in which no full wrap may lie has 0 for the latter.
+        """
+        low = self.floor(tolerance).min(axis=1)
+        if self.weight is not None:
+            low = np.where((self.weight > 0.0).all(axis=1), low, 0.0)
+        return self.radius.max(axis=1), low
+
+    def free(self) -> NDArray[np.bool_]:
+        """Return whether a sheet may lie on each cell, shape (k, p)."""
+        return np.ones(self.radius.shape, bool) if self.weight is None else self.weight > 0.0
+
+    def blocked(self, cells: NDArray[np.bool_]) -> RadialProfile:
+        """Return the profile with cells, shape (k, p), on which no sheet may lie."""
+        weight = np.ones(self.radius.shape) if self.weight is None else self.weight
+        return replace(self, weight=np.where(cells, 0.0, weight))
+
+
+def measure_profile(
+    mesh: Mesh, rays: RayCaster, frame: AxisFrame, step: float, around: int, max_bridge: float = 0.010
+) -> RadialProfile:
+    """Measure R(z, phi) from end to end of a link.
+
+    Args:
+        mesh: the link.
+        rays: a ray caster of the same mesh.
+        frame: axis and azimuth 0.
+        step: approximate distance between slices [m].
+        around: number of rays in a slice.
+        max_bridge: width and length of the widest hole that a sheet spans rather than follows [m].
+    """
+    local = frame.local(mesh.vertices)
+    low, high = float(local[:, 2].min()), float(local[:, 2].max())
+    count = max(8, round((high - low) / step))
+    step = (high - low) / count
+    z = low + step * (np.arange(count) + 0.5)
+    phi = np.linspace(0.0, 2.0 * math.pi, around, endpoint=False)
+    start = 1.02 * float(np.hypot(local[:, 0], local[:, 1]).max()) + 1e-3
+    out = frame.columns[:, :2] @ np.stack([np.cos(phi), np.sin(phi)])
+    origins = frame.origin + z[:, None, None] * frame.axis + start * out.T[None, :, :]
+    ways = np.broadcast_to(-out.T, origins.shape)
+    depth = rays.cast(origins.reshape(-1, 3), np.ascontiguousarray(ways).reshape(-1, 3))[0]
+    # a ray that has passed the axis has not hit a surface on its own side
+    radius = np.where(depth < start, start - depth, 0.0).reshape(count, around)
+    present = radius[radius > 0.0]
+    arc = 2.0 * math.pi / around * (float(np.median(present)) if len(present) else 1.0)
+    return RadialProfile(frame, np.asarray(z), phi, radius, bridge_holes(radius, step, arc, max_bridge))

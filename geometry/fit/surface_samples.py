@@ -1,0 +1,77 @@
+"""Points spread evenly over the outer surface of a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.errors import MeshError
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.ray_casting import RayCaster
+
+__all__ = ["SurfaceSamples", "sample_surface"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceSamples:
+    """Points on the hull of a link: the surface that is visible from outside.
+
+    Attributes:
+        points: on the mesh [m], shape (n, 3).
+        normals: unit outward normals of the faces of the points, shape (n, 3).
+        faces: index of the face of each point, shape (n,).
+        area: area that each point represents [m2].
+    """
+
+    points: Floats
+    normals: Floats
+    faces: NDArray[np.int64]
+    area: float
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def subset(self, chosen: NDArray[np.bool_]) -> SurfaceSamples:
+        """Return the chosen points; ``chosen`` has the shape (n,)."""
+        return SurfaceSamples(self.points[chosen], self.normals[chosen], self.faces[chosen], self.area)
+
+
+def sample_surface(mesh: Mesh, rays: RayCaster, count: int = 6000, seed: int = 1) -> SurfaceSamples:
+    """Spread points over a mesh by area and keep those from which a ray along the normal leaves the link.
+
+    This removes inner walls and screws in their holes, and corrects flipped faces: a point is kept if a ray leaves the
+    link from one of the two sides of its face, and that side gives its normal.
+
+    Args:
+        mesh: the link.
+        rays: a ray caster of the same mesh.
+        count: number of points before the selection.
+        seed: seed of the random numbers.
+
+    Raises:
+        MeshError: no point is visible from outside.
+    """
+    rng = np.random.default_rng(seed)
+    face_normals, areas = mesh.normals_and_areas()
+    total = np.cumsum(areas)
+    face = np.searchsorted(total, (np.arange(count) + rng.random(count)) / count * total[-1], side="right")
+    face = np.minimum(face, len(areas) - 1)
+    a, b, c = mesh.triangles[face].transpose(1, 0, 2)
+    root, share = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
+    points = (1.0 - root) * a + root * (1.0 - share) * b + root * share * c
+    normals = face_normals[face]
+    lift = 1e-5 * float(mesh.size.max())  # m; the ray must not hit its own face in float32
+    outer = np.isinf(rays.cast(points + lift * normals, normals)[0])
+    inner = np.isinf(rays.cast(points - lift * normals, -normals)[0])
+    # both sides of an open surface are outer ones: the normal points away from the middle
+    away = np.einsum("ij,ij->i", normals, points - points.mean(axis=0)) >= 0.0
+    flip = inner & ~(outer & away)
+    keep = outer | inner
+    if not keep.any():
+        raise MeshError(f"{mesh.source}: no face is visible from outside")
+    normals = np.where(flip[:, None], -normals, normals)
+    return SurfaceSamples(points[keep], normals[keep], face[keep], float(total[-1]) / count)

@@ -1,0 +1,129 @@
+"""Frustum with its pose on a link, and the two frusta of a double cone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from coneskin.errors import GeometryError
+
+from .frustum import Frustum
+from .pose import Pose, Vector
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["PlacedFrustum", "double_cone"]
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedFrustum:
+    """A frustum and its pose on a link.
+
+    Attributes:
+        frustum: the shape.
+        link_frustum: pose of the frustum's frame in the link's frame.
+    """
+
+    frustum: Frustum
+    link_frustum: Pose = field(default_factory=Pose)
+
+    def point(self, u: float, phi: float) -> Vector:
+        """Return the point of the side at (u [m], phi [rad]), in the link's frame [m]."""
+        return self.link_frustum.apply(self.frustum.point(u, phi))
+
+    def normal(self, phi: float) -> Vector:
+        """Return the outward unit normal at azimuth phi [rad], in the link's frame."""
+        return self.link_frustum.rotate(self.frustum.normal(phi))
+
+    def locate(self, p_link: Vector) -> Vector:
+        """Return u [m], phi [rad] and the signed distance [m] of a point of the link's frame (``Frustum.locate``)."""
+        return self.frustum.locate(*self.link_frustum.inverse().apply(p_link))
+
+    def place(self, u: ArrayLike, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return points and outward unit normals in the link's frame, for numbers or arrays.
+
+        Args:
+            u: slant distance from end 1 [m], any shape.
+            phi: azimuth [rad], of a shape that broadcasts with u.
+
+        Returns:
+            points [m] and normals, each of shape (..., 3).
+        """
+        import numpy as np
+
+        points = self.link_frustum.apply_all(self.frustum.points(u, phi))
+        normals = np.broadcast_to(self.frustum.normals(phi) @ np.array(self.link_frustum.rotation).T, points.shape)
+        return points, normals.copy()
+
+    def place_polar(self, r: ArrayLike, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return points and outward unit normals as ``place`` does, from polar coordinates on the flat sector.
+
+        Args:
+            r: radius on the flat sector [m], any shape; the paper's r.
+            theta: angle on the flat sector [rad], of a shape that broadcasts with r; the paper's theta.
+
+        Raises:
+            GeometryError: the frustum is a cylinder, whose flat pattern has no apex.
+        """
+        import numpy as np
+
+        frustum = self.frustum
+        q = frustum.sin_half_angle
+        if q == 0.0:
+            raise GeometryError("a cylinder has no polar coordinates: its flat pattern is a rectangle; use u and phi")
+        u = (np.asarray(r, float) * abs(q) - frustum.radius1) / q
+        return self.place(u, np.asarray(theta, float) / abs(q))
+
+    def locate_all(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return u [m], phi [rad] and the signed distance [m] of many points, the inverse of ``place``.
+
+        Args:
+            points: in the link's frame [m], shape (..., 3).
+
+        Returns:
+            three arrays of shape (...), as ``Frustum.locate`` returns them for one point.
+        """
+        import numpy as np
+
+        points = np.asarray(points, float)
+        back = self.link_frustum.inverse()
+        rows = [self.frustum.locate(*back.apply((x, y, z))) for x, y, z in points.reshape(-1, 3).tolist()]
+        u, phi, distance = np.array(rows, float).reshape(-1, 3).T.reshape(3, *points.shape[:-1])
+        return u, phi, distance
+
+
+def double_cone(
+    radius1: float,
+    belt_radius: float,
+    radius2: float,
+    height1: float,
+    height2: float,
+    wrap: float = 2.0 * math.pi,
+    link_body: Pose | None = None,
+) -> tuple[PlacedFrustum, PlacedFrustum]:
+    """Return two frusta on one axis that share a belt, the rugby ball of the paper's figure 14.
+
+    Args:
+        radius1: radius at the first end [m].
+        belt_radius: radius at the belt, where the two meet [m].
+        radius2: radius at the far end [m].
+        height1: axial length of the first frustum [m].
+        height2: axial length of the second [m].
+        wrap: angle covered, the same for both [rad].
+        link_body: pose in the link's frame of the body, whose z axis runs from the first end to the far one.
+
+    Returns:
+        the frustum from the first end to the belt, and the one from the belt to the far end.
+
+    Raises:
+        GeometryError: a length is negative or not finite.
+    """
+    body = link_body or Pose()
+    if not belt_radius > 0.0:
+        raise GeometryError(f"belt_radius must be above 0 m, got {belt_radius!r} m")
+    first = Frustum(radius1, belt_radius, height1, wrap)
+    second = Frustum(belt_radius, radius2, height2, wrap)
+    return PlacedFrustum(first, body), PlacedFrustum(second, body @ Pose(translation=(0.0, 0.0, height1)))
