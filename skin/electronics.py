@@ -1,4 +1,4 @@
-"""What drives and reads a sensor: supply, converter, resistors, and the levels at which a value counts.
+"""Electronics of a sensor: supply, converter, resistors, and the levels at which a value counts.
 
 The circuit (docs/wire-format.md): each of the electrodes A, B, C, D has one wire, which drives it in one phase and
 reads it in another. The drive current is measured in the supply line; the supply is measured behind that.
@@ -8,17 +8,34 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from coneskin.errors import SensorError
 
-__all__ = ["Electronics", "Polarity", "Thresholds"]
+__all__ = ["Electronics", "LeadOhms", "Polarity", "Thresholds"]
 
 
 def _check_positive(owner: str, values: dict[str, tuple[float, str]]) -> None:
     for name, (value, unit) in values.items():
         if not (math.isfinite(value) and value > 0.0):
             raise SensorError(f"{owner}.{name} must be finite and above 0 {unit}, got {value!r} {unit}")
+
+
+class LeadOhms(NamedTuple):
+    """Resistance of the wire and the switch of each electrode [ohm]."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+
+    @classmethod
+    def equal(cls, ohms: float) -> LeadOhms:
+        """Return the same resistance for all four electrodes."""
+        return cls(ohms, ohms, ohms, ohms)
+
+
+_ONE_OHM = LeadOhms(1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +49,7 @@ class Electronics:
         pulldown_ohms: resistor from each of C and D to ground in the touch phase [ohm].
         input_ohms: resistor from each guide electrode to ground in the other phases [ohm]; it brings an untouched
             guide to 0 V.
-        lead_ohms: wire and switch of one electrode [ohm].
+        lead_ohms: wire and switch of each electrode [ohm].
         current_full_scale: drive current that gives the highest count [A].
 
     Raises:
@@ -44,15 +61,15 @@ class Electronics:
     adc_bits: int = 12
     pulldown_ohms: float = 10e3
     input_ohms: float = 10e6
-    lead_ohms: float = 1.0
+    lead_ohms: LeadOhms = _ONE_OHM
     current_full_scale: float = 0.02
 
     def __post_init__(self) -> None:
         units = {"supply_volts": "V", "adc_volts": "V", "current_full_scale": "A"}
-        _check_positive(
-            "electronics",
-            {f.name: (getattr(self, f.name), units.get(f.name, "ohm")) for f in fields(self) if f.name != "adc_bits"},
-        )
+        values = {f.name: (getattr(self, f.name), units.get(f.name, "ohm")) for f in fields(self)}
+        del values["adc_bits"], values["lead_ohms"]
+        values |= {f"lead_ohms.{name}": (ohms, "ohm") for name, ohms in self.lead_ohms._asdict().items()}
+        _check_positive("electronics", values)
         if not (isinstance(self.adc_bits, int) and 8 <= self.adc_bits <= 16):
             raise SensorError(f"electronics.adc_bits must be a whole number from 8 to 16, got {self.adc_bits!r}")
         if self.supply_volts > 0.95 * self.adc_volts:
@@ -72,25 +89,25 @@ class Electronics:
         return (1 << self.adc_bits) - 1
 
     def volts(self, count: int) -> float:
-        """Potential [V] that a count stands for."""
+        """Return the potential that a count stands for [V]."""
         return count * self.adc_volts / self.full_count
 
     def amperes(self, count: int) -> float:
-        """Drive current [A] that a count stands for."""
+        """Return the drive current that a count stands for [A]."""
         return count * self.current_full_scale / self.full_count
 
     def count_volts(self, volts: float) -> int:
-        """Count that the converter gives for a potential [V]: rounded, held within its range."""
+        """Return the count of the converter for a potential [V]: rounded, held within its range."""
         return min(max(round(volts * self.full_count / self.adc_volts), 0), self.full_count)
 
     def count_amperes(self, amperes: float) -> int:
-        """Count that the converter gives for a drive current [A]: rounded, held within its range."""
+        """Return the count of the converter for a drive current [A]: rounded, held within its range."""
         return min(max(round(amperes * self.full_count / self.current_full_scale), 0), self.full_count)
 
 
 @dataclass(frozen=True, slots=True)
 class Polarity:
-    """Which electrode of each pair is at the supply; the other is at ground.
+    """The electrode of each pair that is at the supply; the other is at ground.
 
     The paper's figure 3 text and its eq. 13 agree only if r1 is the arc of B; then B is positive (eq. 13) and C is
     (eq. 21). A sensor that is wired the other way round is described here, not re-soldered.
@@ -115,7 +132,7 @@ class Polarity:
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """From where on a value counts; all of them are ratios.
+    """The levels from which a value counts; all of them are ratios.
 
     Attributes:
         touch_level: level from which an untouched sensor is touched.
@@ -126,8 +143,8 @@ class Thresholds:
         supply_tolerance: how far the supply may be from its nominal value, as a ratio of it.
         balance: how far the drive current of the touch phase may be from the current through the two pull-downs, as a
             ratio of the largest possible one.
-        guide_spread: difference of the two guides of a phase from which on the location is not to be trusted (two
-            touches, or one touch and a fault), as a ratio of the supply.
+        guide_spread: difference of the two guides of a phase from which on the location is not to be trusted
+            (contacts far apart in both u and phi, or a fault), as a ratio of the supply.
         overshoot: how far outside the driven range a guide may be, as a ratio of the supply.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The scale of the radial field: potential against distance on a sheet whose width changes (eq. 19, 20).
+"""Logarithmic scale of the radial field: potential against distance where the width of the sheet changes (eq. 19, 20).
 
 The paper's potential is linear in ln r. r is proportional to the radius rho of the link, rho is linear in the distance
 t along the side, and so the fraction f of the potential difference that has passed at t is
@@ -19,7 +19,7 @@ _log, _log1p, _expm1 = math.log, math.log1p, math.expm1
 
 
 class LogScale:
-    """Potential against distance, measured from one end of the side.
+    """The relation of potential and distance, measured from one end of the side.
 
     Args:
         near: radius at the end where distance and fraction are 0 [m], above 0.
@@ -49,7 +49,7 @@ class LogScale:
         return self.near * self._mean
 
     def distance(self, fraction: float) -> float:
-        """Distance from the near end [m] at which this fraction of the potential difference has passed (eq. 20)."""
+        """Return the distance from the near end [m] where this fraction of the potential has passed (eq. 20)."""
         x = fraction * self._log_ratio
         if self._moderate:
             return fraction * self._stretch * (_expm1(x) / x if x else 1.0)
@@ -58,7 +58,7 @@ class LogScale:
         return float(self._stretch * (self._ratio**fraction - 1.0))
 
     def fraction(self, distance: float) -> float:
-        """Fraction of the potential difference that has passed at this distance [m] (eq. 19)."""
+        """Return the fraction of the potential difference that has passed at this distance [m] (eq. 19)."""
         part = distance / self.length
         x = part * self._growth
         if self._moderate:
@@ -69,10 +69,10 @@ class LogScale:
         return _log(ratio) / self._log_ratio
 
     def radius(self, fraction: float) -> float:
-        """Radius of the link [m] where this fraction of the potential difference has passed: eq. 20 as printed."""
+        """Return the link's radius [m] where this fraction of the potential has passed: eq. 20 as printed."""
         return float(self.near * self._ratio**fraction)
 
     def slope(self, distance: float) -> float:
-        """Derivative of the fraction with respect to the distance [1/m], eq. 25 over U0 in terms of the distance."""
+        """Return the derivative of the fraction by the distance [1/m], eq. 25 over U0 in terms of the distance."""
         s = self.length
         return self._mean / ((s - distance) + distance * self._ratio)

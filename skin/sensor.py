@@ -1,4 +1,4 @@
-"""The sensor: two conducting sheets on the side of a truncated cone, and the law from potentials to a place.
+"""Sensor: two conducting sheets on the side of a truncated cone, and the law from potentials to a place.
 
 Symbols (paper, section 2): U0 supply, Ur and Ut the potentials at the contact in the radial and in the angular phase,
 r1, r2, theta0 the flat sector (r1 at end 1), r and theta the polar coordinates of the contact on it.
@@ -9,21 +9,48 @@ finite where a cone becomes a cylinder: theta = phi theta0 / wrap, |dr| = |du|.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 
 from .electronics import Electronics, Polarity, Thresholds
 from .log_scale import LogScale
+from .matched_electronics import match_electronics
 
-__all__ = ["Bounds", "Sensor"]
+if TYPE_CHECKING:
+    from .force_table import ForceTable
+    from .place_map import PlaceMap
 
-_MIN_NOMINAL_COUNTS = 16  # half of it, the limit for an open wire, is then well above noise
+__all__ = ["Bounds", "Sensor", "sheet_resistances"]
+
+_MATCHED = Electronics()  # this very object: to be chosen
+_MIN_NOMINAL_COUNTS = 16  # counts; half of it, the limit for an open wire, is well above noise
+
+
+def sheet_resistances(frustum: Frustum, upper_sheet_ohms: float, lower_sheet_ohms: float) -> tuple[float, float]:
+    """Return the resistances of the untouched sheets between their electrodes, A to B and C to D [ohm].
+
+    Args:
+        frustum: the active area.
+        upper_sheet_ohms: sheet resistance of the upper layer [ohm per square].
+        lower_sheet_ohms: sheet resistance of the lower layer [ohm per square].
+
+    Raises:
+        SensorError: an end is an apex, which has no arc for an electrode.
+    """
+    for end, radius in ((1, frustum.radius1), (2, frustum.radius2)):
+        if radius <= 0.0:
+            raise SensorError(
+                f"frustum.radius{end} must be above 0 m for a sensor: an apex has no arc for an electrode, and "
+                f"eq. 20 has no limit there; got {radius!r} m"
+            )
+    breadth = frustum.wrap * LogScale(frustum.radius1, frustum.radius2, frustum.slant).mean_radius
+    return upper_sheet_ohms * frustum.slant / breadth, lower_sheet_ohms * breadth / frustum.slant
 
 
 class Bounds(NamedTuple):
-    """The limits of a sensor in counts of its converter, worked out once for the hot path."""
+    """The limits of a sensor in counts of its converter, computed once for the live path."""
 
     full: int  #: highest count
     supply_low: int
@@ -36,7 +63,10 @@ class Bounds(NamedTuple):
     touch_current_slack: float  #: allowed difference [counts of drive current]
     weaker_guide: float  #: in a touch, the lower guide is at least this ratio of the higher
     noise: int  #: counts that mean nothing
-    drop_per_current: float  #: counts of potential lost on one lead for one count of drive current
+    radial_ground_drop: float  #: counts of potential lost on the lead to ground for one count of drive current
+    radial_drop: float  #: the same on both leads together
+    angular_ground_drop: float
+    angular_drop: float
     load_ratio: float  #: pull-down over guide input resistance
 
 
@@ -47,31 +77,35 @@ class Sensor:
     Attributes:
         frustum: the active area: between the inner rims of the arc electrodes, from electrode D (phi = 0) to C.
         sensor_id: number of the sensor on the wire, 0..255.
-        electronics: supply, converter, resistors.
+        electronics: supply, converter, resistors; by default those that match the sheets (``match_electronics``).
         polarity: which electrode of each pair is positive.
         thresholds: from where on a value counts.
         device_id: number of the electronics on the wire, 0..65535.
         upper_sheet_ohms: sheet resistance of the upper layer, electrodes A and B [ohm per square].
         lower_sheet_ohms: sheet resistance of the lower layer, electrodes C and D [ohm per square].
         name: what people call it; by default its numbers.
-        bounds: its limits in counts, for the hot path.
+        place_map: what its calibration takes off the places that it reads; None where it has none.
+        force_table: what force its level stands for; None where no calibration has shown it.
+        bounds: its limits in counts, for the live path.
         b_positive: B, not A, is at the supply in the radial phase.
         c_positive: C, not D, is at the supply in the angular phase.
 
     Raises:
-        SensorError: an end of the frustum has no arc for an electrode, a number does not fit the wire, or the normal
-            drive current does not fit the range in which it is measured.
+        SensorError: an end of the frustum has no arc for an electrode, a number does not fit the wire, the normal drive
+            current does not fit the range in which it is measured, or the place map is that of another frustum.
     """
 
     frustum: Frustum
     sensor_id: int = 0
-    electronics: Electronics = field(default_factory=Electronics)
+    electronics: Electronics = _MATCHED
     polarity: Polarity = field(default_factory=Polarity)
     thresholds: Thresholds = field(default_factory=Thresholds)
     device_id: int = 0
     upper_sheet_ohms: float = 1000.0
     lower_sheet_ohms: float = 1000.0
     name: str = ""
+    place_map: PlaceMap | None = None
+    force_table: ForceTable | None = None
     bounds: Bounds = field(init=False, repr=False, compare=False)
     _from_end1: LogScale = field(init=False, repr=False, compare=False)
     _from_end2: LogScale = field(init=False, repr=False, compare=False)
@@ -81,12 +115,7 @@ class Sensor:
 
     def __post_init__(self) -> None:
         cone = self.frustum
-        for end, radius in ((1, cone.radius1), (2, cone.radius2)):
-            if radius <= 0.0:
-                raise SensorError(
-                    f"frustum.radius{end} must be above 0 m for a sensor: an apex has no arc for an electrode, and "
-                    f"eq. 20 has no limit there; got {radius!r} m"
-                )
+        sheet_resistances(cone, 1.0, 1.0)  # refuses an apex
         for name, top in (("sensor_id", 0xFF), ("device_id", 0xFFFF)):
             value = getattr(self, name)
             if not (isinstance(value, int) and 0 <= value <= top):
@@ -95,10 +124,14 @@ class Sensor:
             value = getattr(self, name)
             if not 0.0 < value < float("inf"):
                 raise SensorError(f"{name} must be finite and above 0 ohm per square, got {value!r}")
+        if self.place_map is not None and self.place_map.frustum != cone:
+            raise SensorError(f"place_map must be one of {cone}, got one of {self.place_map.frustum}")
         put = object.__setattr__
         put(self, "name", self.name or f"sensor {self.device_id}/{self.sensor_id}")
         put(self, "_from_end1", LogScale(cone.radius1, cone.radius2, cone.slant))
         put(self, "_from_end2", LogScale(cone.radius2, cone.radius1, cone.slant))
+        if self.electronics is _MATCHED:
+            put(self, "electronics", match_electronics(self.radial_ohms, self.angular_ohms))
         put(self, "b_positive", self.polarity.radial == "B")
         put(self, "c_positive", self.polarity.angular == "C")
         put(self, "_wrap", cone.wrap)
@@ -107,27 +140,29 @@ class Sensor:
     @property
     def radial_ohms(self) -> float:
         """Resistance of the untouched upper sheet from A to B [ohm]."""
-        cone = self.frustum
-        return self.upper_sheet_ohms * cone.slant / (cone.wrap * self._from_end1.mean_radius)
+        return sheet_resistances(self.frustum, self.upper_sheet_ohms, self.lower_sheet_ohms)[0]
 
     @property
     def angular_ohms(self) -> float:
         """Resistance of the untouched lower sheet from C to D [ohm]."""
-        cone = self.frustum
-        return self.lower_sheet_ohms * cone.wrap * self._from_end1.mean_radius / cone.slant
+        return sheet_resistances(self.frustum, self.upper_sheet_ohms, self.lower_sheet_ohms)[1]
 
     @property
     def radial_amperes(self) -> float:
         """Drive current of the untouched sensor in the radial phase [A]."""
-        return self.electronics.supply_volts / (self.radial_ohms + 2.0 * self.electronics.lead_ohms)
+        return self.electronics.supply_volts / (
+            self.radial_ohms + self.electronics.lead_ohms.a + self.electronics.lead_ohms.b
+        )
 
     @property
     def angular_amperes(self) -> float:
         """Drive current of the untouched sensor in the angular phase [A]."""
-        return self.electronics.supply_volts / (self.angular_ohms + 2.0 * self.electronics.lead_ohms)
+        return self.electronics.supply_volts / (
+            self.angular_ohms + self.electronics.lead_ohms.c + self.electronics.lead_ohms.d
+        )
 
     def fractions(self, u: float, phi: float) -> tuple[float, float]:
-        """Potentials at a place as fractions of the supply (eq. 19, 22).
+        """Return the potentials at a place as fractions of the supply (eq. 19, 22).
 
         Args:
             u: slant distance from end 1 [m], in [0, slant].
@@ -143,7 +178,7 @@ class Sensor:
         return radial, angular if self.c_positive else 1.0 - angular
 
     def place(self, radial: float, angular: float) -> tuple[float, float]:
-        """The place at which the potentials are these fractions of the supply (eq. 20, 24), the inverse of fractions.
+        """Return the place where the potentials are these fractions of the supply (eq. 20, 24): inverse of fractions.
 
         Args:
             radial: potential in the radial phase over U0; values outside [0, 1] give the end of the sensor.
@@ -159,12 +194,12 @@ class Sensor:
         return self._from_end1.distance(along), self._wrap * around
 
     def potentials(self, u: float, phi: float) -> tuple[float, float]:
-        """Potentials Ur and Ut at a place [V] (eq. 19, 22); u [m] and phi [rad] as in ``fractions``."""
+        """Return the potentials Ur and Ut at a place [V] (eq. 19, 22); u [m] and phi [rad] as in ``fractions``."""
         radial, angular = self.fractions(u, phi)
         return radial * self.electronics.supply_volts, angular * self.electronics.supply_volts
 
     def polar(self, radial_volts: float, angular_volts: float) -> tuple[float, float]:
-        """Polar coordinates on the flat sector from the two potentials, eq. 20 and 24 as the paper has them.
+        """Return polar coordinates on the flat sector from the two potentials, eq. 20 and 24 as the paper has them.
 
         Args:
             radial_volts: Ur [V].
@@ -181,7 +216,7 @@ class Sensor:
         return (scale.radius(fraction) / q if q else float("inf")), self._wrap * around * q
 
     def radial_sensitivity(self, u: float) -> float:
-        """How fast the radial potential changes along the side at u [m]: dUr/du [V/m], signed.
+        """Return the change of the radial potential along the side at u [m]: dUr/du [V/m], signed.
 
         Its magnitude is |dUr/dr| of eq. 25, since |dr| = |du|; on a cylinder it is U0/slant.
         """
@@ -189,7 +224,7 @@ class Sensor:
         return -slope if self.b_positive else slope
 
     def angular_sensitivity(self) -> float:
-        """How fast the angular potential changes about the axis: dUt/dphi [V/rad], signed.
+        """Return the change of the angular potential about the axis: dUt/dphi [V/rad], signed.
 
         Eq. 26 is this times wrap/theta0.
         """
@@ -211,6 +246,7 @@ class Sensor:
                     f"allowed are {_MIN_NOMINAL_COUNTS} to {0.9 * full:.0f}"
                 )
         supply = parts.supply_volts * volt
+        leads, ohm = parts.lead_ohms, volt / ampere
         largest_touch = 2.0 * parts.supply_volts / parts.pulldown_ohms * ampere
         return Bounds(
             full=full,
@@ -225,6 +261,9 @@ class Sensor:
             # the worst place is an edge electrode: the other guide is behind the whole sheet
             weaker_guide=0.5 * parts.pulldown_ohms / (parts.pulldown_ohms + self.angular_ohms),
             noise=max(2, full // 100),
-            drop_per_current=parts.lead_ohms * volt / ampere,
+            radial_ground_drop=(leads.a if self.b_positive else leads.b) * ohm,
+            radial_drop=(leads.a + leads.b) * ohm,
+            angular_ground_drop=(leads.d if self.c_positive else leads.c) * ohm,
+            angular_drop=(leads.c + leads.d) * ohm,
             load_ratio=parts.pulldown_ohms / parts.input_ohms,
         )

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from coneskin.skin.field_fourport import angular_phase, radial_phase
-from coneskin.skin.field_model import FieldModel
-from coneskin.skin.field_sheet import SectorSheet
+from coneskin.skin.field.fourport import angular_phase, radial_phase
+from coneskin.skin.field.model import FieldModel
+from coneskin.skin.field.sheet import SectorSheet
 
 PAPER = SectorSheet.of_sector(0.1, 0.1, math.pi / 2)  # r1 = 100, r2 = 200 mm, 90 degrees: inferred from its figures
 SHEETS = {

@@ -1,0 +1,1 @@
+"""Detection of touches and faults in a sensor's frames."""

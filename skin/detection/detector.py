@@ -1,0 +1,374 @@
+"""Touch detector: thresholds with hysteresis on the level, and every fault that shows between frames.
+
+A detector is a machine of plain numbers for one sensor. It begins *not ready*: until it has seen a run of valid
+untouched frames, its silence does not mean "no touch". Time is an argument, so the same frames at the same times
+give the same events, bit by bit, live and in a replay.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import SensorError
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import Frame, Status
+
+from .events import SkinEvent, SkinFault
+from .fault_diagnosis import DIAGNOSED, FaultDiagnosis
+from .faults import Fault
+from .reading import read
+from .reported_touch import ReportedTouch
+from .self_test import FrameSelfTest
+from .settings import DetectorSettings
+from .stuck_values import StuckValues
+from .timing import FrameTiming
+from .touch_place import TouchPlace
+from .touch_reading import TouchReading
+from .untouched_currents import UntouchedCurrents
+from .untouched_guides import UntouchedGuides
+from .untouched_leak import UntouchedLeak
+from .untouched_level import UntouchedLevel
+
+if TYPE_CHECKING:  # for replays only
+    from .quiet_frames import QuietFrames
+
+__all__ = ["Detector"]
+
+#: Faults that a contact produces when it changes between the phases of one frame; over the seam it looks like a short.
+_CONTRADICTIONS = frozenset(
+    {
+        *(Fault.GUIDE_DRIVEN, Fault.OUT_OF_RANGE, Fault.GUIDES_DISAGREE, Fault.LEAK),
+        *(Fault.SHORT_UPPER, Fault.SHORT_LOWER),
+    }
+)
+_MAX_CONTRADICTIONS = 2.5  # frames; the third in a row is a fault, two may be a contact that closes slowly
+_RESTARTED = int(Status.RESTARTED)
+_CONTRADICTION_DECAY = 0.1  # frames; each good frame takes so many off the count
+
+
+class Detector:
+    """Touch detection on one sensor.
+
+    Args:
+        sensor: the sensor.
+        settings: how to decide.
+
+    Attributes:
+        sensor: the sensor.
+        ready: a run of valid untouched frames was seen, and no fault since: silence now means "no touch".
+        touched: a touch lasts.
+        fault: why the sensor cannot be believed at present, or None.
+        reading_now: the newest valid frame while the sensor is touched, else None.
+        timing: sequence and clocks; counts of what was missing.
+    """
+
+    __slots__ = (
+        "_above",
+        "_began",
+        "_below",
+        "_changes",
+        "_currents",
+        "_diagnosis",
+        "_fed",
+        "_guides",
+        "_lasting",
+        "_leak",
+        "_level",
+        "_places",
+        "_quiet",
+        "_release",
+        "_reported",
+        "_self_test",
+        "_stuck",
+        "_told",
+        "_touch",
+        "fault",
+        "reading_now",
+        "ready",
+        "sensor",
+        "settings",
+        "timing",
+        "touched",
+    )
+
+    def __init__(self, sensor: Sensor, settings: DetectorSettings | None = None) -> None:
+        self.sensor = sensor
+        self.settings = settings or DetectorSettings()
+        if not self.settings.drift_limit < sensor.thresholds.release_level:
+            raise SensorError(
+                "detector.drift_limit must be below thresholds.release_level, got "
+                f"{self.settings.drift_limit!r} and {sensor.thresholds.release_level!r}"
+            )
+        self.timing = FrameTiming(self.settings.timing)
+        self.ready = self.touched = False
+        self.fault: Fault | None = None
+        self.reading_now: TouchReading | None = None
+        self._reported: set[Fault | str] = set()
+        self._fed = -math.inf
+        self._currents = UntouchedCurrents(sensor, self.settings.current_drift)
+        self._guides = UntouchedGuides(self._currents)
+        self._diagnosis = FaultDiagnosis(sensor, self._currents)
+        self._touch, self._release = sensor.thresholds.touch_level, sensor.thresholds.release_level
+        self._level = UntouchedLevel(self.settings, self._release)
+        self._stuck = StuckValues(self.settings.stuck_frames)
+        release = self._release
+        self._leak = UntouchedLeak(sensor, 2.0 * release / (1.0 - release) / sensor.electronics.pulldown_ohms)
+        self._self_test = FrameSelfTest(sensor, self._currents)
+        self._places = TouchPlace(sensor, self.settings, self._currents, self._leak)
+        self._told = ReportedTouch(sensor, self.settings)
+        self._above = self._below = self._quiet = 0
+        self._began = self._changes = 0.0
+        self._lasting = False
+
+    def age(self, now: float) -> float:
+        """Return the time since the newest valid frame [s]; infinite before the first."""
+        return self.timing.age(now)
+
+    def feed(self, frame: Frame, now: float) -> list[SkinEvent]:
+        """Take the next frame of this sensor.
+
+        Args:
+            frame: the frame.
+            now: host clock when it arrived [s], monotonic.
+
+        Returns:
+            what happened; mostly nothing.
+        """
+        events: list[SkinEvent] = []
+        self._fed = now
+        restarted = frame.status & _RESTARTED and self.timing.frames > 0
+        if restarted:
+            self.timing.restart()
+        late = self.timing.advance(frame.sequence, frame.clock_us, now)
+        if restarted:
+            self._report(events, Fault.RESTARTED, frame, now)
+        elif late is not None:
+            self._report(events, late, frame, now, self.timing.detail)
+            if late is Fault.REPLAYED:
+                return events  # an old frame says nothing about now
+        reading = read(self.sensor, frame, self._places.inversion, self._currents.noise)
+        whole, fault = reading.level, reading.fault
+        level = whole - self._level.value
+        if fault is None and whole < self._release and self._guides.contradict(frame, whole, self.timing.period):
+            fault = Fault.GUIDE_DRIVEN
+        if self._diagnosis.active and (fault is None or fault in DIAGNOSED):
+            name = self._diagnosis.take(frame, fault)
+            if name is not None:
+                self._report(events, name, frame, now, self._diagnosis.words)
+        if fault is not None:
+            self._places.interrupt()
+            self._skip()
+            if not self._is_change(fault):
+                self._report(events, fault, frame, now)
+                return events
+            if whole < self._touch:
+                return events  # the next frames say what it was
+        else:
+            if self._changes:
+                self._changes = max(0.0, self._changes - _CONTRADICTION_DECAY)
+            self.timing.seen_valid(now)
+        if self._stuck.take(frame):
+            self._report(events, Fault.STUCK, frame, now)
+            return events
+        if self.touched:
+            matrix = reading.matrix
+            firm = self.settings.self_test and fault is None and reading.level >= self.sensor.thresholds.location_level
+            if firm and matrix is not None and self._self_test.take(matrix):
+                self._places.interrupt()
+                detail = f"{self._self_test.deviation(matrix):.1f} times the limit"
+                self._report(events, Fault.GUIDES_DISAGREE, frame, now, detail)
+                return events
+            if self._self_test.doubted:
+                reading = reading._replace(location_valid=False)
+            touch = self._places.take(frame, reading, level, now, self.timing.period)
+            self._while_touched(events, frame, touch)
+        elif level >= self._touch:
+            self._before_touch(events, self._places.begin(frame, reading, level, now))
+        else:
+            self._while_untouched(events, frame, now, level)
+        return events
+
+    def _is_change(self, fault: Fault) -> bool:
+        """Tell whether a fault may be a contact that came or went between the phases of this one frame.
+
+        The phases are measured one after the other, so such a frame contradicts itself. A few frames later the contact
+        rests, or has passed the threshold; if they go on, or come more often than now and then, it is a fault.
+        """
+        if fault not in _CONTRADICTIONS or self._changes > _MAX_CONTRADICTIONS:
+            return False
+        self._changes += 1.0
+        return True
+
+    @property
+    def baseline(self) -> float:
+        """Drift of the untouched level that is taken off."""
+        return self._level.value
+
+    @property
+    def settled(self) -> bool:
+        """True while a quiet frame changes nothing but what is learned, which ``learn`` does."""
+        waiting = self.touched or self.fault or self._reported or self._above or self._changes or self._diagnosis.active
+        return self.ready and not waiting
+
+    def learn(self, frames: QuietFrames, begin: int, end: int, final: bool = True) -> int:
+        """Take plain frames in a row as ``feed`` does, where the detector is settled and all of them are quiet.
+
+        Args:
+            frames: of this sensor.
+            begin: the first of them.
+            end: the one behind the last.
+            final: False: only tell what would be returned.
+
+        Returns:
+            ``end``; or the number of the first frame that is not quiet, or may not be. Then nothing was taken.
+        """
+        before = self._learned()
+        timing, part = self.timing, slice(begin, end)
+        levels = frames.levels[part]
+        periods = timing.learn(frames.sequences[part], frames.clocks[part], frames.times[part])
+        count = len(periods)
+        taken = self._guides.learn(frames.radial[part][:count], frames.angular[part][:count], levels[:count], periods)
+        taken = self._level.learn(levels[:taken], periods)
+        if taken == end - begin:
+            taken = self._currents.learn(
+                frames.radial_currents[part], frames.angular_currents[part], frames.supplies[part], periods
+            )
+        if taken == end - begin:
+            taken = self._stuck.learn(frames, begin, end)
+        if taken < end - begin or not final:
+            self._restore(before)
+            return begin + taken
+        if self._leak.wants(max(levels)):
+            for number in range(begin, end):
+                self._leak.feed(frames.frame(number), frames.levels[number])
+        self._fed = frames.times[end - 1]
+        self._quiet += end - begin
+        return end
+
+    def _learned(self) -> tuple[Any, ...]:
+        """Return what a quiet frame changes; the leak is learned last, when nothing has to be restored."""
+        states = [[getattr(part, name) for name in part.__slots__] for part in self._learners]
+        return tuple(states)
+
+    @property
+    def _learners(self) -> tuple[Any, ...]:
+        return self.timing, self._guides, self._currents, self._level, self._stuck
+
+    def _restore(self, learned: tuple[Any, ...]) -> None:
+        for part, values in zip(self._learners, learned, strict=True):
+            for name, value in zip(part.__slots__, values, strict=True):
+                setattr(part, name, value)
+
+    def distrust(self, fault: Fault, now: float, detail: str) -> list[SkinEvent]:
+        """Report a fault of what this sensor's frames come through: it has to become ready anew.
+
+        Args:
+            fault: what is wrong.
+            now: host clock [s].
+            detail: numbers that belong to it.
+        """
+        events: list[SkinEvent] = []
+        self._put_fault(events, fault, now, self.timing.clock_us, self.timing.sequence, detail)
+        return events
+
+    def silence(self, now: float, longest: float) -> list[SkinEvent]:
+        """Report that no valid frame has come for too long; where others come, what is wrong with them is reported.
+
+        Args:
+            now: host clock [s].
+            longest: silence that is allowed [s].
+
+        Returns:
+            a SkinFault, once until the sensor is ready again, or nothing.
+        """
+        age = self.timing.age(now)
+        events: list[SkinEvent] = []
+        if age > longest and (self.fault is None or now - self._fed > longest):
+            frame_clock, sequence = self.timing.clock_us, self.timing.sequence
+            detail = f"{age * 1e3:.1f} ms" if math.isfinite(age) else "none at all"
+            self._put_fault(events, Fault.SILENT, now, frame_clock, sequence, detail)
+        return events
+
+    def _while_untouched(self, events: list[SkinEvent], frame: Frame, now: float, level: float) -> None:
+        settings = self.settings
+        if self._above:
+            self._above = 0
+            self._places.end()
+        whole = level + self._level.value
+        if self._level.exhausted(whole):
+            self._report(events, Fault.DRIFT, frame, now, f"{whole:+.3f} of the level")
+        if level >= self.sensor.thresholds.release_level:  # neither touched nor quiet: no drift is learned from it
+            self._quiet = 0
+            self._skip()
+            return
+        self._quiet += 1
+        if self._diagnosis.active:
+            self._diagnosis.end()
+        self._leak.feed(frame, whole)
+        changed = self._currents.feed(frame, self.timing.period)
+        if changed is not None:
+            self._report(events, changed[0], frame, now, changed[1])
+        if self._quiet >= settings.settle_frames and self._currents.frames:
+            self.ready, self.fault = True, None
+            self._reported.clear()
+        self._level.follow(level, self.timing.period)
+
+    def _before_touch(self, events: list[SkinEvent], touch: TouchReading) -> None:
+        """Take a frame above the threshold; a touch begins once there are enough of them."""
+        self._quiet = 0
+        self._skip()
+        self._above += 1
+        if self._above < self.settings.confirm_frames:
+            return
+        self.touched, self._lasting, self._began = True, False, touch.time
+        self._below = 0
+        self.reading_now = touch
+        events.append(self._told.begin(touch))
+
+    def _while_touched(self, events: list[SkinEvent], frame: Frame, touch: TouchReading) -> None:
+        now, level = touch.time, touch.level
+        if level < self._release:
+            self._end(events, frame, now, level)
+            return
+        self.reading_now = touch
+        self._below = 0
+        if not self._lasting and now - self._began >= self.settings.lasting_touch:
+            self._lasting = True
+            self._report(events, Fault.LAYERS_CLOSED, frame, now, f"{now - self._began:.1f} s")
+        moved = self._told.move(touch)
+        if moved is not None:
+            events.append(moved)
+
+    def _end(self, events: list[SkinEvent], frame: Frame, now: float, level: float) -> None:
+        """Take a frame of a touch that is below the release threshold."""
+        self._below += 1
+        if self._below < self.settings.release_frames:
+            return
+        self.touched, self.reading_now = False, None
+        self._above = self._quiet = 0
+        self._self_test.begin()
+        self._places.end()
+        events.append(self._told.end(frame, now, level))
+
+    def _skip(self) -> None:
+        """Forget what was being learned: the sensor is not quiet any more."""
+        self._currents.skip()
+        self._leak.skip()
+
+    def _report(self, events: list[SkinEvent], fault: Fault, frame: Frame, now: float, detail: str = "") -> None:
+        self._put_fault(events, fault, now, frame.clock_us, frame.sequence, detail)
+
+    def _put_fault(
+        self, events: list[SkinEvent], fault: Fault, now: float, clock_us: int, sequence: int, detail: str
+    ) -> None:
+        self._quiet = self._above = 0
+        self._currents.restart()
+        if fault in DIAGNOSED:
+            fault = self._diagnosis.rename(fault)
+        self.ready = False
+        self.fault = fault
+        told = detail if detail and detail == self._diagnosis.words else fault
+        if told not in self._reported:  # each once until the sensor is ready again, though they may alternate
+            self._reported |= {told, fault}
+            events.append(SkinFault(self.sensor.name, now, clock_us, sequence, fault, detail))

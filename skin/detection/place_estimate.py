@@ -1,0 +1,230 @@
+"""Place of a contact out of its contact matrix, without the area error, and how certain it is.
+
+The electrical centre of an extended contact is displaced by the images of its own dipole in the sheet's edges
+(docs/field.md):
+
+    displacement = -1/2 A grad gamma - (Ru+Rl) kappa/(4 pi) (2 A_xx - A_yy, 3 A_xy)
+
+with A = (P_xx L^2, P_xy L T, P_yy T^2).
+
+P is what the contacts add to the sheets' own conductances, and those are learned while nothing touches. It is small
+beside both, so it is never taken as measured: the mean of the polarisability along and around is weighed against that
+of a round contact (`dipole_strength`), and its inequality against the little that a round contact has. What a coarse
+converter says about the size of a contact therefore moves its place only as far as it is worth.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from coneskin.skin.robin_function import RobinFunction
+from coneskin.skin.sensor import Sensor
+
+from .contact_matrix import ContactMatrix
+from .dipole_strength import DipoleStrength, weigh_dipole
+from .matrix_noise import MatrixNoise
+
+__all__ = ["PlaceEstimate", "PlaceEstimator", "SheetConductances"]
+
+_STANDS_OUT = 4.0**2  # deviations, squared; an inequality below is taken for noise and drift
+_UNEQUAL = 0.05  # of the dipole; inequality that an edge next to a round contact gives it; longer ones stand out
+# what the multipoles beyond the dipole are, by the dipole's area: of the displacement, over the distance to the edge
+# squared; and of the taper, by its curvature squared (root mean squares of the difference to the exact field)
+_NEXT_IMAGE, _NEXT_TAPER = 0.02, 0.05
+_MARGIN = 1e-4  # of a side; the edge itself has no gradient
+_LARGEST_STEP = 0.03  # of a side; a displacement is smaller, save of what is no contact
+
+
+class SheetConductances(NamedTuple):
+    """The sheets alone, as learned while nothing touched."""
+
+    upper: float  #: [S]
+    lower: float  #: [S]
+    upper_variance: float  #: [S^2]
+    lower_variance: float  #: [S^2]
+
+
+class PlaceEstimate(NamedTuple):
+    """A place on the sheet with its covariance; s is the distance around, along the circle."""
+
+    u: float  #: slant distance from end 1 [m]
+    phi: float  #: azimuth [rad]
+    uu: float  #: variance of u [m^2]
+    us: float  #: covariance of u and s [m^2]
+    ss: float  #: variance of s [m^2]
+    move_x: float  #: from the electrical centre to the place, in the rectangle [m]
+    move_y: float
+    dipole: DipoleStrength
+
+
+class PlaceEstimator:
+    """The places of the contacts on one sensor.
+
+    Args:
+        sensor: the sensor.
+    """
+
+    __slots__ = ("_breadth", "_curvature", "_length", "_per_y", "_robin", "_sheets", "_slant", "_sum", "_within")
+
+    def __init__(self, sensor: Sensor) -> None:
+        cone = sensor.frustum
+        self._curvature = cone.sin_half_angle / cone.radius1
+        self._slant = cone.slant
+        self._breadth = cone.radius1 * cone.wrap
+        self._length = math.log1p(self._curvature * cone.slant) / self._curvature if self._curvature else cone.slant
+        self._per_y = cone.wrap
+        self._within = (
+            *(_MARGIN * self._length, (1.0 - _MARGIN) * self._length),
+            *(_MARGIN * self._breadth, (1.0 - _MARGIN) * self._breadth),
+        )
+        self._sheets = (0.0, 0.0)
+        self._sum = 0.0
+        self._robin = self._learn(
+            self._breadth / (sensor.upper_sheet_ohms * self._length),
+            self._length / (sensor.lower_sheet_ohms * self._breadth),
+        )
+
+    @property
+    def length(self) -> float:
+        """Length of the rectangle between the arcs [m]."""
+        return self._length
+
+    @property
+    def curvature(self) -> float:
+        """Curvature of the arc at end 1, signed [1/m]: the sheet is stretched by exp(curvature x)."""
+        return self._curvature
+
+    @property
+    def sheets(self) -> tuple[float, float]:
+        """Conductances of the upper and the lower sheet that it takes them for [S]."""
+        return self._sheets
+
+    @property
+    def breadth(self) -> float:
+        """Breadth of the rectangle between the straight edges [m]."""
+        return self._breadth
+
+    def _learn(self, upper: float, lower: float) -> RobinFunction:
+        upper_ohms, lower_ohms = self._breadth / (upper * self._length), self._length / (lower * self._breadth)
+        self._sheets, self._sum = (upper, lower), upper_ohms + lower_ohms
+        self._robin = RobinFunction(self._length, self._breadth, upper_ohms, lower_ohms)
+        return self._robin
+
+    def estimate(
+        self, matrix: ContactMatrix, one: MatrixNoise, frames: float, sheets: SheetConductances
+    ) -> PlaceEstimate:
+        """Return the place of a contact.
+
+        Args:
+            matrix: of one frame, or the mean over some.
+            one: noise of one frame's matrix.
+            frames: number of frames in the mean.
+            sheets: without contact.
+        """
+        if not (
+            0.998 < sheets.upper / self._sheets[0] < 1.002 and 0.998 < sheets.lower / self._sheets[1] < 1.002
+        ):  # the edges' images depend on them, by less than this matters
+            self._learn(sheets.upper, sheets.lower)
+        length, breadth, rs = self._length, self._breadth, self._sum
+        seen_x, seen_y = matrix.x * length, matrix.y * breadth
+        squares = length * length, length * breadth, breadth * breadth
+        a_xx, a_yy = (matrix.along - sheets.upper) * squares[0], (matrix.around - sheets.lower) * squares[2]
+        a_xy = matrix.cross * squares[1]
+        share = 1.0 / frames
+        noise_xx = (share * one.along + sheets.upper_variance) * squares[0] * squares[0]
+        noise_yy = (share * one.around + sheets.lower_variance) * squares[2] * squares[2]
+        noise_both = share * one.along_around * squares[0] * squares[2]
+        noise_xy = share * one.cross * squares[1] * squares[1]
+
+        x, y = self._inside(seen_x, seen_y)
+        stretch = math.exp(self._curvature * x)
+        robin, slope_x, slope_y = self._robin.value_and_gradient(x, y)
+        taper = rs * self._curvature / (4.0 * math.pi)
+        xx = share * one.xx * squares[0]
+        xy = share * one.xy * squares[1]
+        yy = share * one.yy * squares[2]
+        # the mean of both, each weighed by its noise: for a round contact they are equal
+        weight = (noise_yy - noise_both) / max(noise_xx + noise_yy - 2.0 * noise_both, 1e-60)
+        weight = 0.0 if weight < 0.0 else 1.0 if weight > 1.0 else weight
+        rest = 1.0 - weight
+        noise = weight * weight * noise_xx + rest * rest * noise_yy + 2.0 * weight * rest * noise_both
+        measured = weight * a_xx + rest * a_yy
+        unequal = 0.5 * (a_xx - a_yy)
+        noise_unequal = 0.25 * (noise_xx + noise_yy - 2.0 * noise_both)
+        per_dipole = (0.5 * slope_x + taper) ** 2 + 0.25 * slope_y * slope_y  # square of the displacement by it
+        tolerated = (xx + yy) / (per_dipole + 1e-12 * rs * rs)
+        dipole = weigh_dipole(measured, noise, rs, 1.0 / matrix.conductance - robin, stretch, tolerated)
+        prior = (_UNEQUAL * dipole.strength) ** 2
+        gain1, gain2 = _gain(unequal, noise_unequal, prior), _gain(a_xy, noise_xy, prior)
+        half, cross = gain1 * unequal, gain2 * a_xy
+        # where the inequality is real, the weighed mean must not count it twice
+        mean = dipole.strength - (2.0 * weight - 1.0) * half
+        a_xx, a_yy, a_xy = mean + half, mean - half, cross
+
+        move_x = move_y = size = 0.0
+        for again in (False, True):
+            if again:
+                if size * size < xx + yy:
+                    break  # it changes by less than noise does
+                slope_x, slope_y = self._robin.gradient(x, y)
+            move_x = 0.5 * (a_xx * slope_x + a_xy * slope_y) + taper * (2.0 * a_xx - a_yy)
+            move_y = 0.5 * (a_xy * slope_x + a_yy * slope_y) + 3.0 * taper * a_xy
+            most = _LARGEST_STEP * (length + breadth)
+            size = math.hypot(move_x, move_y)
+            if size > most:
+                move_x, move_y = move_x * most / size, move_y * most / size
+            x, y = self._inside(seen_x + move_x, seen_y + move_y)
+
+        # derivatives of the place by mean, inequality and cross; what was shrunk counts by its gain
+        by_mean = 0.5 * slope_x + taper, 0.5 * slope_y
+        by_half = rest * slope_x + (4.0 - 2.0 * weight) * taper, -weight * slope_y
+        by_cross = 0.5 * slope_y, 0.5 * slope_x + 3.0 * taper
+        var_mean = dipole.variance
+        var_half, var_cross = gain1 * noise_unequal, gain2 * noise_xy
+        gain = dipole.gain
+        x_mean = (weight * one.x_along * squares[0] + rest * one.x_around * squares[2]) * length
+        y_mean = (weight * one.y_along * squares[0] + rest * one.y_around * squares[2]) * breadth
+        x_mean, y_mean = gain * share * x_mean, gain * share * y_mean
+        area = abs(dipole.strength) * rs / (2.0 * math.pi)
+        edge, moved = self._edge(x, y), math.hypot(move_x, move_y)
+        neglected = (
+            area * (_NEXT_IMAGE * moved / (edge * edge) + _NEXT_TAPER * math.sqrt(area) * self._curvature**2)
+        ) ** 2
+        xx += by_mean[0] ** 2 * var_mean + by_half[0] ** 2 * var_half + by_cross[0] ** 2 * var_cross
+        xx += 2.0 * by_mean[0] * x_mean + neglected
+        yy += by_mean[1] ** 2 * var_mean + by_half[1] ** 2 * var_half + by_cross[1] ** 2 * var_cross
+        yy += 2.0 * by_mean[1] * y_mean + neglected
+        xy += by_mean[0] * by_mean[1] * var_mean + by_half[0] * by_half[1] * var_half
+        xy += by_cross[0] * by_cross[1] * var_cross + by_mean[1] * x_mean + by_mean[0] * y_mean
+        stretch = math.exp(self._curvature * x)
+        squared = stretch * stretch
+        u, phi = self.place(matrix.x, matrix.y, move_x, move_y)
+        return PlaceEstimate(u, phi, squared * xx, squared * xy, squared * yy, move_x, move_y, dipole)
+
+    def place(self, x: float, y: float, move_x: float, move_y: float) -> tuple[float, float]:
+        """Return u [m] and phi [rad] of an electrical centre and the move from there to the place [m]."""
+        curvature, breadth = self._curvature, self._breadth
+        low_x, high_x, low_y, high_y = self._within
+        along, around = x * self._length + move_x, y * breadth + move_y
+        if not (low_x < along < high_x and low_y < around < high_y):
+            along, around = self._inside(along, around)
+        return math.expm1(curvature * along) / curvature if curvature else along, around / breadth * self._per_y
+
+    def _inside(self, x: float, y: float) -> tuple[float, float]:
+        low_x, high_x, low_y, high_y = self._within
+        return (
+            low_x if x < low_x else high_x if x > high_x else x,
+            low_y if y < low_y else high_y if y > high_y else y,
+        )
+
+    def _edge(self, x: float, y: float) -> float:
+        """Return the distance to the nearest edge, in the rectangle [m]."""
+        return min(x, self._length - x, y, self._breadth - y)
+
+
+def _gain(seen: float, noise: float, prior: float) -> float:
+    """Return how much of an inequality to believe: little of what a round contact has not, all of what stands out."""
+    beyond = seen * seen - _STANDS_OUT * noise
+    prior += beyond if beyond > 0.0 else 0.0
+    return prior / (prior + noise) if prior + noise > 0.0 else 0.0

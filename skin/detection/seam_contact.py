@@ -1,0 +1,160 @@
+"""Press over the seam: one body on both straight edges of a sheet that is wrapped around a link.
+
+The sheet is cut at the seam, so such a press is two contacts, at y near 0 and near 1 of the wrap, and its electrical
+centre lies anywhere between them, on the other side of the link too. With the conductances w of its contacts
+
+    G Y (1 - Y) - P_yy (1 - Gamma G) = sum of w y (1 - y),
+
+Gamma the coupling that the two straight edges have through the upper sheet. For two contacts at the edges this is
+exact. Each term on the right is positive: the sum over G is the mean distance of all contacts from the seam, and where
+it is small, no strong contact is far from there. That excludes two hands which are not both at the seam; two that are
+both within the dangerous angle of it have nearly one normal, and are one press as far as a motion goes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from coneskin.skin.sensor import Sensor
+
+from .contact_matrix import ContactMatrix
+from .matrix_noise import MatrixNoise
+from .place_estimate import PlaceEstimator, SheetConductances
+from .settings import DetectorSettings
+from .single_contact import DANGEROUS_ANGLE
+
+__all__ = ["SeamPlace", "SeamTest"]
+
+_WIDEST_GAP = math.radians(24.0)  # between the straight edges; beyond, the wrap does not close
+_LEAST_SHARE = 0.05  # P_yy over G below which hardly anything is on the other side of the seam
+_NEARER = 0.5  # of the spread about the electrical centre; contacts that are nearer to the seam belong to it
+_DEVIATIONS = 3.0  # standard deviations of the noise that may stand against the evidence
+_MODEL = 0.02  # of P_yy; gains of the two phases, and the coupling
+_MARGIN = 0.8  # of the limit; two contacts that are not quite at the edges show a little less
+_ALONG = 2.0  # of the second contact, at the dangerous angle's distance along the side
+_TERMS = 12
+_FLAT, _CUBIC, _QUINTIC = 1.85, -1.1, 0.25  # place of a disc over its mean distance, by how unequal its two parts are
+_SIDES = 0.5  # of the mean distance; standard deviation of the centroid across the seam
+_SKEW = 0.1  # of the mean distance; likewise along the side
+
+_SEAM = "it presses on both sides of the seam: too far from it, or too long, for one contact"
+
+
+class SeamPlace(NamedTuple):
+    """Centroid of a press over the seam."""
+
+    u: float  #: slant distance from end 1 [m]
+    phi: float  #: azimuth, from 0 to a whole turn; it may lie in the gap [rad]
+    covariance: tuple[float, float, float]  #: uu, us, ss [m^2]
+    doubt: str  #: why it may not be one press at the seam; empty where it is
+    elongation: tuple[float, float]  #: half length [m] and direction of the line across the seam [rad]
+
+
+class SeamTest:
+    """The seam of one sensor.
+
+    Args:
+        sensor: the sensor.
+        settings: the weakest second contact that is to be excluded.
+        estimator: of its places.
+    """
+
+    __slots__ = ("_angle", "_coupling", "_estimator", "_gap", "_limit", "_radius_at", "_slant", "_wrap", "closes")
+
+    def __init__(self, sensor: Sensor, settings: DetectorSettings, estimator: PlaceEstimator) -> None:
+        cone = sensor.frustum
+        self._wrap, self._slant, self._radius_at = cone.wrap, cone.slant, cone.radius_at
+        self._gap = 0.5 * max(0.0, 2.0 * math.pi - cone.wrap)  # [rad], from an edge to the middle of the seam
+        #: whether the wrap closes, so that one body can press on both edges
+        self.closes = 2.0 * self._gap <= _WIDEST_GAP
+        self._limit = settings.second_contact
+        self._angle = (DANGEROUS_ANGLE - self._gap) / cone.wrap  # of the wrap
+        self._estimator = estimator
+        aspect = estimator.breadth / estimator.length
+        self._coupling = tuple(
+            2.0 / (math.pi * n * math.sinh(min(n * math.pi * aspect, 300.0))) for n in range(1, _TERMS + 1)
+        )
+
+    def place(
+        self, matrix: ContactMatrix, one: MatrixNoise, frames: float, sheets: SheetConductances
+    ) -> SeamPlace | None:
+        """Return the centroid of a press over the seam; None where what presses does not lie on both its sides.
+
+        Args:
+            matrix: of one frame, or the mean over some.
+            one: noise of one frame's matrix.
+            frames: number of frames in the mean.
+            sheets: without contact.
+        """
+        whole, x, y = matrix[:3]
+        around = matrix.around - sheets.lower
+        if not self.closes or not 0.0 <= y <= 1.0 or not around > _LEAST_SHARE * whole > 0.0:
+            return None
+        coupled = self._coupled(x, sheets.upper) * whole
+        if not coupled < 1.0:
+            return None
+        share = y * (1.0 - y) * whole
+        away = share - around * (1.0 - coupled)  # [S]: sum of w y (1 - y)
+        mean = away / whole if away > 0.0 else 0.0  # of the wrap
+        if mean > _NEARER * math.sqrt(around / whole):
+            return None
+        noise = abs(1.0 - 2.0 * y) * whole * math.sqrt(one.yy / frames) + math.sqrt(
+            one.around / frames + sheets.lower_variance
+        )
+        slack = _DEVIATIONS * noise + _MODEL * around
+        mean = 0.5 - math.sqrt(0.25 - mean if mean < 0.25 else 0.0)  # where all are equally far, y (1 - y) is that of y
+        beyond = (y - mean) / max(1.0 - 2.0 * mean, 1e-3)  # part of the conductance before the seam, at phi = wrap
+        uneven = 1.0 - 2.0 * (0.0 if beyond < 0.0 else 1.0 if beyond > 1.0 else beyond)
+        square = uneven * uneven
+        far = mean * self._wrap + self._gap  # [rad], from the middle of the seam
+        off = uneven * (_FLAT + square * (_CUBIC + square * _QUINTIC)) * far  # of the centroid, likewise
+        angle = max(0.0, self._angle - abs(off) / self._wrap)  # on the other side of the seam than the centroid
+        second = whole if whole < self._limit else self._limit
+        doubt = "" if abs(away) + slack < _MARGIN * second * angle * (1.0 - angle) else _SEAM
+        return self._centroid(matrix, one, frames, sheets, (mean, far, off), doubt)
+
+    def _coupled(self, x: float, upper: float) -> float:
+        """Return the coupling of the two straight edges at equal x through the upper sheet [ohm]."""
+        turn, total = math.pi * x, 0.0
+        for number, weight in enumerate(self._coupling, 1):
+            sine = math.sin(number * turn)
+            total += weight * sine * sine
+            if weight < 1e-4 * self._coupling[0]:
+                break
+        return total * self._estimator.breadth / (self._estimator.length * upper)
+
+    def _centroid(
+        self,
+        matrix: ContactMatrix,
+        one: MatrixNoise,
+        frames: float,
+        sheets: SheetConductances,
+        across: tuple[float, float, float],
+        doubt: str,
+    ) -> SeamPlace:
+        """Return the place of contacts by their mean distance from the edges [of the wrap] and from the seam [rad]."""
+        mean, far, off = across
+        length, breadth = self._estimator.length, self._estimator.breadth
+        u, _ = self._estimator.place(matrix.x, matrix.y, 0.0, 0.0)
+        phi = off - self._gap
+        radius = self._radius_at(u)
+        stretch = radius / self._radius_at(0.0)
+        share = stretch * stretch / frames
+        uu = share * one.xx * length * length + (_SKEW * far * radius) ** 2
+        ss = share * one.yy * breadth * breadth * mean * mean + (_SIDES * far * radius) ** 2
+        # the side after the seam lies so much further along than the side before it
+        ahead = -matrix.cross / (matrix.around - sheets.lower) * length * stretch
+        if not doubt:
+            along = (matrix.along - sheets.upper) * (length / (DANGEROUS_ANGLE * self._radius_at(0.0))) ** 2
+            second = matrix.conductance if matrix.conductance < self._limit else self._limit
+            if along > _ALONG * second:
+                doubt = _SEAM
+        half = far * radius
+        return SeamPlace(
+            u,
+            phi if phi >= 0.0 else phi + 2.0 * math.pi,
+            (uu, 0.0, ss),
+            doubt,
+            (math.hypot(0.5 * ahead, half), math.atan2(half, 0.5 * ahead) - (math.pi if ahead < 0.0 else 0.0)),
+        )

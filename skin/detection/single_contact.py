@@ -1,0 +1,202 @@
+"""Test whether the contact on a sensor can be two: what the drive currents and the guides' split say of its shape.
+
+All contacts together add a symmetric tensor P to the conductances along and around the sheets (docs/field.md): P_xx to
+the radial drive current, P_yy to the angular one, P_xy splits the guides. One disc adds equally in all directions, at
+most as much as a perfect bond. Two contacts of conductance G1 and G2 at a distance s add G1 G2 s^2/(G1 + G2) along
+the line between them and nothing across. So the inequality of P, over the square of a distance, is the conductance of
+the second contact: everything here is in siemens at a distance of DANGEROUS_ANGLE about the axis.
+"""
+
+from __future__ import annotations
+
+import math
+
+from coneskin.skin.sensor import Sensor
+
+from .contact_matrix import ContactMatrix, FrameInversion
+from .settings import DetectorSettings
+from .untouched_currents import UntouchedCurrents
+
+__all__ = ["DANGEROUS_ANGLE", "SingleContactTest", "frames_until_certain", "weakest_pair_excluded"]
+
+#: Azimuth by which a place may be off every contact [rad]: a motion along its normal goes away from them all.
+DANGEROUS_ANGLE = math.radians(20.0)
+
+_DEVIATIONS = 3.0  # standard deviations of the averaged noise that may stand against the evidence
+_LONGEST = 512  # frames; the average reaches back so far
+_SHOWN = 4.0  # standard deviations of an inequality that is one
+_UNEQUAL = 0.15  # of the mean rise; a round contact of 15 mm next to an edge shows .07, two of 5 mm 20 mm apart 1.4
+_BEGIN = 0.9  # of the limit; what is not certain must fall below it to become so
+
+_UNLEARNED = "the untouched drive currents are not known yet"
+_NEW = "too few frames yet to exclude a second contact"
+_SEVERAL = "the drive currents rise unequally, or the guides differ: several contacts, or a long one"
+_LARGE = "the drive currents rise more than by one contact: several, or a very large one"
+_COARSE = "the readings are too coarse to exclude a second contact so lightly touched"
+
+
+class SingleContactTest:
+    """The evidence of one touch, averaged over its frames.
+
+    Args:
+        sensor: the sensor.
+        settings: the weakest second contact, the largest single one.
+        currents: of the untouched sensor.
+    """
+
+    __slots__ = (
+        "_across",
+        "_angles",
+        "_certain",
+        "_currents",
+        "_differ",
+        "_frames",
+        "_inversion",
+        "_largest",
+        "_limit",
+        "_lower",
+        "_mean",
+        "_per_along",
+        "_per_cross",
+        "_pulldown",
+        "_radius1",
+        "_required",
+        "_scale",
+        "_taper",
+        "_unit",
+        "_upper",
+        "_wrap",
+    )
+
+    def __init__(self, sensor: Sensor, settings: DetectorSettings, currents: UntouchedCurrents) -> None:
+        parts, cone = sensor.electronics, sensor.frustum
+        self._currents, self._inversion = currents, FrameInversion(sensor)
+        aspect = currents.aspect
+        self._wrap = cone.wrap
+        self._angles = (cone.wrap / DANGEROUS_ANGLE) ** 2
+        # siemens at DANGEROUS_ANGLE for a count of current over a count of supply
+        self._unit = parts.current_full_scale / parts.adc_volts * self._angles
+        self._pulldown = 2.0 / parts.pulldown_ohms
+        self._limit = settings.second_contact
+        self._radius1, self._taper = cone.radius1, cone.sin_half_angle
+        self._per_along, self._per_cross = self._angles * aspect**2, 2.0 * self._angles * aspect
+        sheets = sensor.upper_sheet_ohms + sensor.lower_sheet_ohms
+        self._largest = 2.0 * math.pi * (settings.largest_contact / DANGEROUS_ANGLE) ** 2 / sheets
+        self._scale = self._unit * max(1.0, _split_noise(sensor, aspect))
+        self._upper = self._lower = 0.0
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the evidence: another touch, or another place."""
+        self._frames = 0
+        self._differ = self._across = self._mean = self._required = 0.0
+        self._certain = False
+        if self._currents.frames:
+            self._upper, self._lower = self._inversion.untouched(self._currents.radial, self._currents.angular)
+
+    def take(self, matrix: ContactMatrix, level: float, u: float) -> str:
+        """Take a frame of the touch.
+
+        Args:
+            matrix: of a valid frame.
+            level: its level, the drift taken off.
+            u: where it is read [m].
+
+        Returns:
+            why there may be more than one contact; empty once that is excluded.
+        """
+        currents = self._currents
+        learned = currents.frames
+        if not learned:
+            return _UNLEARNED
+        frames = self._frames
+        if frames < _LONGEST:
+            self._frames = frames = frames + 1
+        gain, limit = 1.0 / frames, self._limit
+        along, cross, around = matrix[3:6]
+        rise1, rise2 = self._per_along * (along - self._upper), self._angles * (around - self._lower)
+        total = level / (1.0 - level) * self._pulldown if level < 0.999 else limit
+        self._differ = differ = self._differ + gain * (rise2 - rise1 - self._differ)
+        self._across = across = self._across + gain * (self._per_cross * cross - self._across)
+        self._mean += gain * (0.5 * (rise1 + rise2) - self._mean)
+        self._required = required = self._required + gain * ((total if total < limit else limit) - self._required)
+        # what is seen, compared with what the weakest dangerous pair would show
+        noise = self._scale * math.sqrt(currents.variance * (gain + 1.0 / learned))
+        slack = _DEVIATIONS * noise + self._unit * currents.bias
+        seen = math.sqrt(differ * differ + across * across)
+        # What was excluded once is not doubted again for noise: one standard deviation is left of three.
+        limit, held = (required, slack / _DEVIATIONS) if self._certain else (_BEGIN * required, slack)
+        self._certain = False
+        if seen + held > limit:
+            if seen - slack > limit:
+                return _SEVERAL
+            return _NEW if frames < _LONGEST else _COARSE
+        radius = self._radius1 + self._taper * u
+        if (self._mean + slack) * radius * radius > self._largest:
+            return _LARGE
+        self._certain = True
+        return ""
+
+    def elongation(self, conductance: float) -> tuple[float, float] | None:
+        """Return half the length [m] and the direction of the line on which the contacts lie; None where none shows.
+
+        The length is that of two equal contacts of no extent, measured around the narrower end. How the contacts share
+        the conductance is not identifiable: unequal ones are farther apart.
+
+        Args:
+            conductance: of all contact [S].
+
+        Returns:
+            half the length [m], and the angle from u towards growing phi [rad], within a right angle.
+        """
+        if not self._frames or not self._currents.frames or not conductance > 0.0:
+            return None
+        noise = self._scale * math.sqrt(self._currents.variance * (1.0 / self._frames + 1.0 / self._currents.frames))
+        seen = math.hypot(self._differ, self._across)
+        if seen < _SHOWN * noise + self._unit * self._currents.bias + _UNEQUAL * max(0.0, self._mean):
+            return None
+        around = math.sqrt(seen / self._angles / conductance) * self._wrap  # [rad], of the circle about the axis
+        return around * self._radius1, 0.5 * math.atan2(self._across, -self._differ)
+
+
+def _split_noise(sensor: Sensor, aspect: float) -> float:
+    """Return the noise of 2 P_xy over that of P_yy - P_xx."""
+    own1, own2 = (
+        amperes / sensor.electronics.current_full_scale * sensor.electronics.adc_volts / sensor.electronics.supply_volts
+        for amperes in (sensor.radial_amperes, sensor.angular_amperes)
+    )
+    return aspect * math.sqrt(2.0 * (own1 * own1 + own2 * own2) / (1.0 + aspect**4))
+
+
+def weakest_pair_excluded(sensor: Sensor, frames: int = 100, noise_counts: float = 0.7) -> float:
+    """Return how weak a second contact may be that a certain place excludes [S].
+
+    A contact at least this conductive (spreading in the sheets included) whose normal is DANGEROUS_ANGLE off the place
+    that is read does not leave that place certain; farther off, at an angle b, one weaker by (DANGEROUS_ANGLE/b)^2 does
+    not either. Where this is above ``DetectorSettings.second_contact``, no place is certain after so many frames.
+
+    Args:
+        sensor: the sensor.
+        frames: of the touch that are averaged, up to 512.
+        noise_counts: standard deviation of each reading.
+    """
+    currents = UntouchedCurrents(sensor, 0.0)
+    parts = sensor.electronics
+    supply = parts.supply_volts / parts.adc_volts * parts.full_count
+    variance = (noise_counts**2 + 1.0 / 12.0) * (1.0 + currents.aspect**4) / supply**2
+    unit = parts.current_full_scale / parts.adc_volts * (sensor.frustum.wrap / DANGEROUS_ANGLE) ** 2
+    noise = math.sqrt(variance / min(frames, _LONGEST))
+    return unit * _DEVIATIONS * max(1.0, _split_noise(sensor, currents.aspect)) * noise / _BEGIN
+
+
+def frames_until_certain(sensor: Sensor, settings: DetectorSettings, noise_counts: float = 0.7) -> int | None:
+    """Return for how many frames a firm touch by one contact lasts before its place is certain; None: it never is.
+
+    Args:
+        sensor: the sensor.
+        settings: the weakest second contact that is to be excluded.
+        noise_counts: standard deviation of each reading.
+    """
+    one = weakest_pair_excluded(sensor, 1, noise_counts)  # it falls with the square root of the number of frames
+    frames = max(1, math.ceil((one / settings.second_contact) ** 2))
+    return frames if frames <= _LONGEST else None

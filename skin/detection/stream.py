@@ -1,0 +1,167 @@
+"""Touches of all sensors on one stream: bytes in, events out.
+
+Nothing that arrives is dropped in silence: frames of an unexpected sensor or version, and bytes that are no
+frames, are counted, and reported once each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coneskin.errors import SensorError
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder
+
+from .detector import Detector
+from .events import SkinEvent, SkinFault
+from .faults import Fault
+from .settings import DetectorSettings
+
+__all__ = ["TouchStream"]
+
+_MAX_BAD_BYTES = 4 * FRAME_LENGTH  # bytes; more of them outside any frame are a corrupt stream
+_BAD_BYTES_DECAY = 1  # byte; each good frame takes so many off the count
+
+
+class TouchStream:
+    """The detectors of all sensors that share one port.
+
+    Args:
+        sensors: the sensors expected.
+        settings: how their detectors decide.
+
+    Attributes:
+        decoder: finds the frames; its counters tell what else was on the line.
+        detectors: one for each sensor, in the order given.
+        unknown: frames from unexpected devices or sensors: (device, sensor) -> count.
+
+    Raises:
+        SensorError: there is no sensor, or two have the same numbers or the same name.
+    """
+
+    __slots__ = (
+        "_bad",
+        "_by_number",
+        "_corrupt",
+        "_skipped",
+        "_starting",
+        "_version_reported",
+        "_versions",
+        "decoder",
+        "detectors",
+        "unknown",
+    )
+
+    def __init__(self, sensors: Sequence[Sensor], settings: DetectorSettings | None = None) -> None:
+        if not sensors:
+            raise SensorError("a stream needs at least one sensor, got none")
+        self.decoder = FrameDecoder()
+        self.detectors = tuple(Detector(sensor, settings) for sensor in sensors)
+        self._by_number = {(d.sensor.device_id, d.sensor.sensor_id): d for d in self.detectors}
+        names = {d.sensor.name for d in self.detectors}
+        if len(self._by_number) < len(self.detectors) or len(names) < len(self.detectors):
+            listing = ", ".join(f"{s.name} = {s.device_id}/{s.sensor_id}" for s in sensors)
+            raise SensorError(f"sensors on one stream must differ in name and in (device_id, sensor_id), got {listing}")
+        self.unknown: dict[tuple[int, int], int] = {}
+        self._bad = self._skipped = self._versions = 0
+        self._corrupt = self._starting = self._version_reported = False
+
+    @property
+    def ready(self) -> bool:
+        """True while every sensor is ready: silence then means "no touch"."""
+        return all(detector.ready for detector in self.detectors)
+
+    @property
+    def touched(self) -> bool:
+        """True while any sensor is touched."""
+        return any(detector.touched for detector in self.detectors)
+
+    def feed(self, data: bytes, now: float) -> list[SkinEvent]:
+        """Take the next bytes.
+
+        Args:
+            data: any number of bytes.
+            now: host clock when they arrived [s], monotonic.
+
+        Returns:
+            what happened, in the order of the frames.
+        """
+        events: list[SkinEvent] = []
+        frames = self.decoder.feed(data)
+        for frame in frames:
+            detector = self._by_number.get((frame.device, frame.sensor))
+            if detector is not None:
+                happened = detector.feed(frame, now)
+                if happened:
+                    events += happened
+            else:
+                self._note_unknown(events, frame, now)
+        if self.decoder.bytes_skipped != self._skipped or self._bad:
+            self._watch_bytes(events, len(frames), now)
+        if self.decoder.unknown_versions != self._versions:
+            if not self._version_reported:
+                self._version_reported = True
+                detail = f"version {self.decoder.last_unknown_version}"
+                events.append(SkinFault("", now, 0, 0, Fault.UNKNOWN_VERSION, detail))
+            self._versions = self.decoder.unknown_versions
+        return events
+
+    @property
+    def settled(self) -> bool:
+        """True while good frames change nothing but what the detectors learn."""
+        counted = self.decoder.bytes_skipped == self._skipped and self.decoder.unknown_versions == self._versions
+        return counted and not self._bad and all(detector.settled for detector in self.detectors)
+
+    def silence(self, now: float, longest: float) -> list[SkinEvent]:
+        """Report a fault, once, for each sensor that has sent no valid frame for longer than allowed [s]."""
+        events: list[SkinEvent] = []
+        for detector in self.detectors:
+            if detector.age(now) > longest:
+                events += detector.silence(now, longest)
+        return events
+
+    def reconnect(self, now: float) -> None:
+        """Take that the port is open again [s]: each sensor has to become ready anew, and its clocks are not known."""
+        self.forget_faults()
+        for detector in self.detectors:
+            detector.timing.restart()
+            detector.distrust(Fault.SILENT, now, "")  # that it was gone is reported
+
+    def forget_faults(self) -> None:
+        """Report faults of the line once more if they go on: a person has reset the guard."""
+        self._corrupt = self._version_reported = False
+        self.unknown.clear()
+
+    def _note_unknown(self, events: list[SkinEvent], frame: Frame, now: float) -> None:
+        key = (frame.device, frame.sensor)
+        if key not in self.unknown and len(self.unknown) < 256:
+            detail = f"device {frame.device}, sensor {frame.sensor}"
+            events.append(SkinFault("", now, frame.clock_us, frame.sequence, Fault.UNKNOWN_SENSOR, detail))
+            self.unknown[key] = 0
+        if key in self.unknown:
+            self.unknown[key] += 1
+
+    def _watch_bytes(self, events: list[SkinEvent], frames: int, now: float) -> None:
+        """Forgive a few bad bytes with time (a port opened in mid-frame); report many as a fault.
+
+        Before the sensors are ready, it is a fault of theirs that passes with the bad bytes, as every fault does then:
+        many boards print a banner when they start.
+        """
+        skipped = self.decoder.bytes_skipped
+        self._bad = max(0, self._bad + skipped - self._skipped - _BAD_BYTES_DECAY * frames)
+        self._skipped = skipped
+        if self._bad > _MAX_BAD_BYTES:
+            self._bad = _MAX_BAD_BYTES
+            if not self.ready and not self._corrupt:
+                self._starting = True
+            elif not self._corrupt:
+                self._corrupt = True
+                events.append(SkinFault("", now, 0, 0, Fault.CORRUPT, self._bad_bytes()))
+        elif not self._bad:
+            self._corrupt = self._starting = False
+        if self._starting:
+            for detector in self.detectors:
+                events += detector.distrust(Fault.CORRUPT, now, self._bad_bytes())
+
+    def _bad_bytes(self) -> str:
+        return f"{self.decoder.bytes_skipped} bytes skipped, {self.decoder.crc_errors} wrong checksums"

@@ -1,0 +1,58 @@
+"""Velocity of a touch along the surface: an alpha-beta filter of its electrical centre."""
+
+from __future__ import annotations
+
+import math
+
+from .contact_matrix import ContactMatrix
+from .matrix_noise import MatrixNoise
+from .place_estimate import PlaceEstimator
+
+__all__ = ["TouchVelocity"]
+
+_POSITION_REST, _VELOCITY_GAIN = 0.8, 0.02  # critically damped
+_NOISE = 0.035  # of a frame's noise over the period; what the filter leaves
+_LEAST = (5.0 * _NOISE) ** 2  # five standard deviations, squared; what is less is no velocity
+_RESTS = (0.0, 0.0)
+
+
+class TouchVelocity:
+    """The velocity of one touch after another.
+
+    Args:
+        estimator: of the sheet; says how long and broad it is.
+    """
+
+    __slots__ = ("_breadth", "_curvature", "_length", "_track")
+
+    def __init__(self, estimator: PlaceEstimator) -> None:
+        self._length, self._breadth, self._curvature = estimator.length, estimator.breadth, estimator.curvature
+        self._track: tuple[float, float, float, float] | None = None
+
+    def restart(self) -> None:
+        """Forget the touch."""
+        self._track = None
+
+    def follow(self, matrix: ContactMatrix, noise: MatrixNoise | None, period: float) -> tuple[float, float]:
+        """Return the velocity along the side and around [m/s]; zeros where noise explains what moved.
+
+        Args:
+            matrix: of the next frame of the touch.
+            noise: of one frame; None: not known yet.
+            period: time from frame to frame [s].
+        """
+        track = self._track
+        if track is None or noise is None or not period > 0.0:
+            self._track = matrix.x, matrix.y, 0.0, 0.0
+            return _RESTS
+        x, y, step_x, step_y = track
+        new_x, new_y = matrix.x, matrix.y
+        off_x, off_y = new_x - x - step_x, new_y - y - step_y
+        step_x, step_y = step_x + _VELOCITY_GAIN * off_x, step_y + _VELOCITY_GAIN * off_y
+        x, y = new_x - _POSITION_REST * off_x, new_y - _POSITION_REST * off_y
+        self._track = x, y, step_x, step_y
+        if step_x * step_x < _LEAST * noise.xx and step_y * step_y < _LEAST * noise.yy:
+            return _RESTS
+        on_sheet = min(max(x, 0.0), 1.0)  # hostile counts put a centre anywhere
+        stretch = math.exp(self._curvature * on_sheet * self._length) / period
+        return step_x * self._length * stretch, step_y * self._breadth * stretch

@@ -1,0 +1,210 @@
+"""Search for the checksum that frames carry instead of the right one: other CRC parameters, ranges, sums.
+
+A CRC is linear: the CRCs of two messages of one length differ by the CRC of their difference with start 0, whatever the
+start value and what is added at the end. So polynomial, reflection, byte order and range are found from differences of
+frames first, and the start value from any one of them.
+"""
+
+from __future__ import annotations
+
+from binascii import crc_hqx
+from collections.abc import Callable, Sequence
+from itertools import product
+from typing import Literal, NamedTuple
+
+from .cause import Cause, Diagnosis
+
+__all__ = ["crc16", "find_checksum"]
+
+_RIGHT = 0x1021  # polynomial of CRC-16/XMODEM
+_POLYNOMIALS = (_RIGHT, 0x8005, 0x3D65, 0x8BB7, 0xA097, 0xC867, 0x0589, 0x5935, 0x8D95)
+_NAMES = {0x8005: "0x8005 (MODBUS, ARC, USB)", 0x3D65: "0x3D65 (DNP)", 0x8BB7: "0x8BB7 (T10-DIF)"}
+_RANGES = {
+    0: "",
+    2: "it leaves out the sync bytes",
+    3: "it leaves out sync and version",
+    4: "it leaves out sync, version and length",
+}
+_STARTS = (0xFFFF, 0x1D0F, 0xB2AA, 0x800D, 0x89EC, 0x554D)
+_FRAMES = 8  # that are compared
+_ENOUGH = 0.9  # share of the frames that must agree
+
+
+def crc16(data: bytes, polynomial: int, start: int = 0, reflected: bool = False) -> int:
+    """Return a CRC of 16 bits, without anything added at the end.
+
+    Args:
+        data: the message.
+        polynomial: without its highest bit, not reflected.
+        start: value of the register before the first byte, not reflected.
+        reflected: the least significant bit of each byte goes first, and the result is reflected.
+    """
+    register = start
+    for byte in data:
+        value = int(f"{byte:08b}"[::-1], 2) if reflected else byte
+        register ^= value << 8
+        for _ in range(8):
+            register = (register << 1 ^ polynomial if register & 0x8000 else register << 1) & 0xFFFF
+    return int(f"{register:016b}"[::-1], 2) if reflected else register
+
+
+def find_checksum(frames: Sequence[bytes]) -> Diagnosis:
+    """Name the checksum of frames that are right but for it.
+
+    Args:
+        frames: whole frames of one length whose last two bytes are no CRC-16/XMODEM of the others.
+    """
+    bodies, tails = [frame[:-2] for frame in frames], [frame[-2:] for frame in frames]
+    different = len(set(bodies)) > 1
+    if different and len(set(tails)) == 1:
+        what = f"the checksum is {tails[0].hex(' ').upper()} in every frame"
+        return Diagnosis(Cause.CRC_CONSTANT, what)
+    for search in (_find_stale, _find_sum):
+        if found := search(bodies, tails):
+            return found
+    distinct = list(dict.fromkeys(zip(bodies, tails, strict=True)))
+    if found := _find_crc(distinct[: _FRAMES + 1]):
+        return found
+    body, tail = distinct[0]
+    right = crc_hqx(body, 0).to_bytes(2, "big").hex(" ").upper()
+    what = f"frames come with a wrong checksum that follows no rule known here ({tail.hex(' ').upper()} for {right})"
+    return Diagnosis(Cause.CRC_UNKNOWN, what)
+
+
+def _find_stale(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | None:
+    """Find a CRC that was taken of the frame before, or before sequence or clock were written."""
+    pairs = list(zip(bodies, bodies[1:], tails[1:], strict=False))
+    if len(pairs) < 3:
+        return None
+    parts: dict[str, Callable[[bytes, bytes], bytes]] = {
+        "is that of the frame before": lambda old, _: old,
+        "was taken before the sequence was written": lambda old, new: new[:8] + old[8:10] + new[10:],
+        "was taken before the clock was written": lambda old, new: new[:10] + old[10:14] + new[14:],
+        "was taken before sequence and clock were written": lambda old, new: new[:8] + old[8:14] + new[14:],
+        "was taken before the measurements were written": lambda old, new: new[:14] + old[14:],
+        "was taken before the status was written": lambda _, new: new[:7] + b"\0" + new[8:],
+    }
+    for words, mix in parts.items():
+        hits = sum(crc_hqx(mix(old, new) + tail, 0) == 0 for old, new, tail in pairs)
+        if hits >= _ENOUGH * len(pairs):
+            return Diagnosis(Cause.CRC_STALE, f"the checksum {words}")
+    return None
+
+
+def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | None:
+    """Find a sum, an exclusive or, a Fletcher sum or a CRC of 8 bits."""
+    kinds: dict[str, Callable[[bytes], int]] = {
+        "the sum of the bytes": sum,
+        "the sum of the bytes, negated": lambda data: -sum(data),
+        "the sum of the bytes, inverted": lambda data: ~sum(data),
+        "the exclusive or of the bytes": _exclusive_or,
+        "the sum of the 16-bit words": lambda data: sum(data[::2]) + (sum(data[1::2]) << 8),
+        "a Fletcher checksum": _fletcher,
+        "a CRC of 8 bits": _crc8,
+    }
+    pairs = list(zip(bodies, tails, strict=True))
+    for (words, kind), start in product(kinds.items(), _RANGES):
+        hits = [0, 0, 0, 0]
+        for body, tail in pairs:
+            value = kind(body[start:]) & 0xFFFF
+            wide = value.to_bytes(2, "big")
+            low = value & 0xFF
+            hits[0] += tail in (wide, wide[::-1])
+            hits[1] += low == tail[0] and tail[1] == tails[0][1]
+            hits[2] += low == tail[1] and tail[0] == tails[0][0]
+        if max(hits) >= _ENOUGH * len(pairs) and len(pairs) >= 3:
+            return Diagnosis(Cause.CHECKSUM_KIND, f"the checksum is {words}, not a CRC of 16 bits")
+    return None
+
+
+def _exclusive_or(data: bytes) -> int:
+    value = 0
+    for byte in data:
+        value ^= byte
+    return value
+
+
+def _fletcher(data: bytes) -> int:
+    low = high = 0
+    for byte in data:
+        low = (low + byte) % 255
+        high = (high + low) % 255
+    return high << 8 | low
+
+
+def _crc8(data: bytes) -> int:
+    register = 0
+    for byte in data:
+        register ^= byte
+        for _ in range(8):
+            register = (register << 1 ^ 0x07 if register & 0x80 else register << 1) & 0xFF
+    return register
+
+
+def _find_crc(frames: Sequence[tuple[bytes, bytes]]) -> Diagnosis | None:
+    """Find the parameters of a CRC of 16 bits from differences of frames."""
+    if len(frames) < 4:
+        return None
+    (body0, tail0), *others = frames
+    for polynomial, padded, reflected in product(_POLYNOMIALS, (b"", b"\0\0"), (False, True)):
+        orders = {"big", "little"}
+        for body, tail in others:
+            change = bytes(a ^ b for a, b in zip(body0, body, strict=True)).lstrip(b"\0") + padded
+            crc = crc16(change, polynomial, 0, reflected)
+            got = int.from_bytes(tail0, "big") ^ int.from_bytes(tail, "big")
+            orders &= {order for order, value in (("big", got), ("little", _swapped(got))) if value == crc}
+            if not orders:
+                break
+        if orders:
+            order: Literal["big", "little"] = "big" if "big" in orders else "little"
+            return _describe(body0, tail0, _Found(polynomial, bool(padded), reflected, order))
+    return None
+
+
+def _swapped(value: int) -> int:
+    return (value & 0xFF) << 8 | value >> 8
+
+
+class _Found(NamedTuple):
+    """Parameters that differences of frames show."""
+
+    polynomial: int
+    padded: bool  # taken over two zeros behind the message as well
+    reflected: bool
+    order: Literal["big", "little"]
+
+
+def _describe(body: bytes, tail: bytes, found: _Found) -> Diagnosis:
+    """Name every parameter that differs from CRC-16/XMODEM, the gravest first."""
+    polynomial, padded, reflected, order = found
+    seen: list[tuple[Cause, str]] = []
+    if polynomial != _RIGHT:
+        seen.append((Cause.CRC_POLYNOMIAL, f"its polynomial is {_NAMES.get(polynomial, f'0x{polynomial:04X}')}"))
+    if reflected:
+        seen.append((Cause.CRC_REFLECTED, "its bits are reflected (as KERMIT, X-25 and MODBUS have them)"))
+    if padded:
+        seen.append((Cause.CRC_RANGE, "it was taken over its own two bytes as well, while they were 0"))
+    start, value, inverted = _find_start(body + bytes(2 * padded), int.from_bytes(tail, order), polynomial, reflected)
+    if start:
+        seen.append((Cause.CRC_RANGE, _RANGES[start]))
+    if value is None:
+        seen.append((Cause.CRC_START, "its start value is another one"))
+    elif value or inverted:
+        seen.append((Cause.CRC_START, f"it starts with 0x{value:04X}{' and is inverted at the end' * inverted}"))
+    if order == "little":
+        seen.append((Cause.CRC_BYTE_ORDER, "its low byte goes first"))
+    cause = seen[0][0] if seen else Cause.CRC_UNKNOWN
+    return Diagnosis(cause, f"the checksum is another CRC: {', and '.join(words for _, words in seen)}")
+
+
+def _find_start(message: bytes, wanted: int, polynomial: int, reflected: bool) -> tuple[int, int | None, bool]:
+    """Return where a CRC's message begins, its start value (None where no known one fits), whether it is inverted."""
+    for values, inverted, start in (
+        *(((0,), False, start) for start in _RANGES),
+        *((_STARTS, inverted, start) for start in _RANGES for inverted in (False, True)),
+        *(((0,), True, start) for start in _RANGES),
+    ):
+        for value in values:
+            if crc16(message[start:], polynomial, value, reflected) ^ 0xFFFF * inverted == wanted:
+                return start, value, inverted
+    return 0, None, False

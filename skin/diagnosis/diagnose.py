@@ -1,0 +1,140 @@
+"""Diagnosis of a capture: every examination in the order in which one mistake would hide the next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import MAX_LENGTH, Frame, FrameDecoder
+
+from .capture import Capture
+from .cause import Cause, Diagnosis
+from .foreign_stream import find_constant, find_protocol, find_text, first_line
+from .found_frames import FoundFrames, find_frames, printable_share, short_hex
+from .frame_numbers import find_wrong_numbers, measure_numbers
+from .frame_shape import find_foreign_sync, find_shape
+from .line_coding import find_baud, find_coding
+from .measurements import current_remarks, find_big_endian, find_status, find_wrong_measurements
+from .stream_damage import find_damage
+
+__all__ = ["diagnose"]
+
+_FEW = 64  # bytes, of which nothing can be said
+_STOPPED = 0.7  # s without a byte
+_SHAPE = 1 << 13  # newest bytes in which the shape is looked for
+_MIN_FRAMES = 3
+_MIN_COVERED = 0.02  # share of the bytes that are valid frames; fewer are chance
+
+
+def diagnose(capture: Capture, sensors: Sequence[Sensor] = (), baud: int | None = None) -> Diagnosis:
+    """Say what is wrong with the bytes of a line.
+
+    Args:
+        capture: the newest bytes; two seconds of them say all that can be said.
+        sensors: that a scene expects on this line; empty where there is no scene.
+        baud: rate at which the port listens [1/s]; None where it has none.
+
+    Returns:
+        the likeliest cause; where several mistakes come together, that which has to be mended first.
+    """
+    data = capture.data
+    if not data:
+        return Diagnosis(Cause.SILENT, f"no byte has come for {capture.silence:.1f} s")
+    found = find_frames(data)
+    if len(found.frames) >= _MIN_FRAMES and found.covered >= _MIN_COVERED:
+        named = find_damage(data, found) or _find_in_frames(capture, found, sensors)
+    else:
+        named = _find_without_frames(capture, data, baud)
+    if capture.timed and capture.silence > _STOPPED:
+        return _stopped(capture, data, named)
+    return named
+
+
+def _stopped(capture: Capture, data: bytes, before: Diagnosis) -> Diagnosis:
+    """Name a stream that has ended, with what it was before."""
+    silence = f"nothing has come for {capture.silence:.1f} s"
+    if before.cause is Cause.TEXT and len(data) < 4096:
+        return Diagnosis(Cause.STOPPED, f"{silence}; before, the device wrote {first_line(data)!r}")
+    good = "" if before.good else f" ({before.what})"
+    return Diagnosis(Cause.STOPPED, f"{silence}, after {len(data)} bytes{good}")
+
+
+def _find_without_frames(capture: Capture, data: bytes, baud: int | None) -> Diagnosis:
+    """Name the cause where hardly any frame is valid."""
+    rate = len(data) / capture.duration if capture.duration > 0.0 else math.inf  # of a file, whose bytes have no times
+    newest = data[-_SHAPE:]
+    decoder = FrameDecoder()
+    decoder.feed(newest)
+    if decoder.unknown_versions >= _MIN_FRAMES:
+        what = f"frames come in version {decoder.last_unknown_version}, which this coneskin does not know"
+        return Diagnosis(Cause.VERSION, what)
+    named = (
+        find_constant(data, rate, baud)
+        or (find_text(newest) if len(data) >= 4 else None)
+        or find_coding(newest)
+        or find_shape(newest)
+        or _find_seven_bits(newest)
+        or find_foreign_sync(newest)
+        or find_protocol(capture, newest)
+        or find_baud(newest, baud)
+    )
+    if named:
+        return named
+    if len(data) < _FEW:
+        return Diagnosis(Cause.FEW_BYTES, f"only {len(data)} bytes have come: {short_hex(data)}")
+    how_many = f"{rate:.0f} bytes a second" if math.isfinite(rate) else f"{len(data)} bytes"
+    what = f"{how_many} come, but no frame: {short_hex(newest[-MAX_LENGTH:])}"
+    return Diagnosis(Cause.UNKNOWN, what)
+
+
+def _find_seven_bits(data: bytes) -> Diagnosis | None:
+    """Find frames whose eighth bits are gone, or have become a parity bit."""
+    low = data.translate(bytes(n & 0x7F for n in range(256)))
+    if max(data) < 0x80 and low.count(b"\x45\x3a") >= _MIN_FRAMES and printable_share(data) < 0.9:
+        return Diagnosis(Cause.SEVEN_BITS, "no byte has its highest bit set, and frames seem to begin with 45 3A")
+    return None
+
+
+def _find_in_frames(capture: Capture, found: FoundFrames, sensors: Sequence[Sensor]) -> Diagnosis:
+    """Name what is wrong with valid frames, sensor by sensor."""
+    times = capture.arrivals(found.offsets)
+    by_sensor: dict[tuple[int, int], tuple[list[Frame], list[float]]] = {}
+    for frame, time in zip(found.frames, times, strict=True):
+        frames, at = by_sensor.setdefault((frame.device, frame.sensor), ([], []))
+        frames.append(frame)
+        at.append(time)
+    known = {(sensor.device_id, sensor.sensor_id): sensor for sensor in sensors}
+    good = []
+    for key, (frames, at) in by_sensor.items():
+        name = f"device {key[0]}, sensor {key[1]}"
+        sensor = known.get(key)
+        named = find_status(frames) or find_big_endian(frames)
+        if named is None and sensors and sensor is None:
+            listing = ", ".join(f"{device}/{number}" for device, number in known)
+            named = Diagnosis(Cause.UNKNOWN_SENSOR, f"frames come from {name}; the scene expects {listing}")
+        if named is None:
+            named = find_wrong_measurements(frames, sensor)
+        if named is None or named.cause is Cause.GUIDES_FLOAT:
+            wrong = find_wrong_numbers(frames, at if capture.timed else _by_device(frames), len(by_sensor))
+            named = wrong or named
+        if named is not None:
+            return Diagnosis(named.cause, f"{name}: {named.what}" if len(by_sensor) > 1 else named.what)
+        numbers = measure_numbers(frames, at)
+        ratio = "" if math.isnan(numbers.clock_ratio) else f", clock ratio {numbers.clock_ratio:.4f}"
+        said = f"{name}: {numbers.rate:.0f} a second{ratio}" if capture.timed else name
+        good.append(", ".join([said, *(current_remarks(frames, sensor) if sensor is not None else ())]))
+    missing = [sensor.name for sensor in sensors if (sensor.device_id, sensor.sensor_id) not in by_sensor]
+    if missing:
+        return Diagnosis(Cause.UNKNOWN_SENSOR, f"no frame comes from {', '.join(missing)}")
+    return Diagnosis(Cause.NONE, f"frames come as they should ({'; '.join(good)})")
+
+
+def _by_device(frames: Sequence[Frame]) -> list[float]:
+    """Return the times of frames by their own clock [s], for bytes from a file."""
+    total, last, times = 0.0, frames[0].clock_us, []
+    for frame in frames:
+        total += ((frame.clock_us - last) & 0xFFFFFFFF) * 1e-6
+        last = frame.clock_us
+        times.append(total)
+    return times

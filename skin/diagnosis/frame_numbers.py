@@ -1,0 +1,182 @@
+"""Numbers of the frames of one sensor: sequence and clock, against the host's clock, and how regularly they come."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from coneskin.skin.wire import Frame
+
+from .cause import Cause, Diagnosis
+
+__all__ = ["FrameNumbers", "find_wrong_numbers", "measure_numbers"]
+
+_MIN_FRAMES = 8
+_SHARE = 0.9  # of the steps that must be of one kind
+_MIN_RATE = 100.0  # Hz
+_CLOCK_TOLERANCE = 0.015  # of its speed; a ceramic resonator is off by 0.005
+_HELD_BACK = 0.012  # s from one group of frames to the next, where the frames themselves are closer
+_LOST = 0.02  # share of frames
+_TURNS = 3
+_MIN_TIME = 0.25  # s over which the clocks can be compared
+
+
+@dataclass(frozen=True, slots=True)
+class FrameNumbers:
+    """How the frames of one sensor follow each other.
+
+    Attributes:
+        rate: frames a second, by the host's clock; nan where that is not known.
+        clock_ratio: speed of the device's clock over that of the host; nan where it is not known.
+        missing: share of the sequence numbers that never came.
+        period: device time from frame to frame, the middle one [s].
+    """
+
+    rate: float
+    clock_ratio: float
+    missing: float
+    period: float
+
+
+def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNumbers:
+    """Measure how frames of one sensor follow each other.
+
+    Args:
+        frames: of one sensor, in their order.
+        times: when each came, host clock [s].
+    """
+    steps = [(b.sequence - a.sequence) & 0xFFFF for a, b in itertools.pairwise(frames)]
+    ticks = _clock_steps(frames)
+    seconds = times[-1] - times[0] if times else 0.0
+    rate = (len(frames) - 1) / seconds if seconds > 0.0 else math.nan
+    forward = [step for step in steps if 0 < step < 0x8000]
+    missing = sum(step - 1 for step in forward) / max(1, sum(forward))
+    middle = sorted(ticks)[len(ticks) // 2] * 1e-6 if ticks else 0.0
+    return FrameNumbers(rate, _slope(ticks, times) if seconds >= _MIN_TIME else math.nan, missing, middle)
+
+
+def _clock_steps(frames: Sequence[Frame]) -> list[int]:
+    """Return the steps of the device's clock [us], signed."""
+    return [((b.clock_us - a.clock_us + 0x80000000) & 0xFFFFFFFF) - 0x80000000 for a, b in itertools.pairwise(frames)]
+
+
+def _slope(ticks: Sequence[int], times: Sequence[float]) -> float:
+    """Return the speed of the device's clock over that of the host.
+
+    A frame comes late, never early. So a first line by least squares is turned until the quickest frames of the first
+    and of the last third are equally quick.
+    """
+    clocks = list(itertools.accumulate(ticks, initial=0))
+    count = len(times)
+    mean_time, mean_clock = math.fsum(times) / count, math.fsum(clocks) / count
+    spread = math.fsum((time - mean_time) ** 2 for time in times)
+    slope = math.fsum((t - mean_time) * (c - mean_clock) for t, c in zip(times, clocks, strict=True)) / spread
+    third = count // 3
+    for _ in range(_TURNS if third else 0):
+        if not slope > 0.0:
+            break
+        lag = [time - clock / slope for time, clock in zip(times, clocks, strict=True)]
+        first = min(range(third), key=lag.__getitem__)
+        last = min(range(count - third, count), key=lag.__getitem__)
+        if times[last] <= times[first]:
+            break
+        slope = (clocks[last] - clocks[first]) / (times[last] - times[first])
+    return slope * 1e-6
+
+
+def find_wrong_numbers(frames: Sequence[Frame], times: Sequence[float], sensors: int) -> Diagnosis | None:
+    """Say what is wrong with sequence and clock of the frames of one sensor.
+
+    Args:
+        frames: of one sensor, in their order.
+        times: when each came, host clock [s].
+        sensors: number of sensors that send on this line.
+    """
+    if len(frames) < _MIN_FRAMES:
+        return None
+    numbers = measure_numbers(frames, times)
+    return (
+        _find_repeats(frames)
+        or _find_sequence(frames, sensors)
+        or _find_clock(frames, numbers)
+        or _find_rate(frames, times, numbers)
+    )
+
+
+def _find_repeats(frames: Sequence[Frame]) -> Diagnosis | None:
+    pairs = len(frames) - 1
+    same = sum(a[4:6] == b[4:6] for a, b in itertools.pairwise(frames))
+    if len({frame[4:6] for frame in frames}) == 1 and len(set(frames)) > 1:
+        return None  # neither sequence nor clock is ever written
+    if same >= 0.3 * pairs:
+        return Diagnosis(Cause.REPEATED, f"{same} of {pairs} frames are the one before once more")
+    return None
+
+
+def _find_sequence(frames: Sequence[Frame], sensors: int) -> Diagnosis | None:
+    steps = [(b.sequence - a.sequence) & 0xFFFF for a, b in itertools.pairwise(frames)]
+    (step, count), *_ = Counter(steps).most_common(1)
+    share = count / len(steps)
+    if step == 0 and share >= _SHARE:
+        return Diagnosis(Cause.SEQUENCE_STANDS, f"the sequence stands at {frames[-1].sequence}")
+    if step == 1 and share >= 0.5:
+        if max(frame.sequence for frame in frames) == 0xFF and 0xFF01 in steps:
+            return Diagnosis(Cause.SEQUENCE_8_BIT, "the sequence goes from 255 back to 0")
+        return None
+    forward = [step for step in steps if 0 < step < 0x8000]
+    if len(forward) < 0.7 * len(steps) or max(forward) > 4096:
+        return Diagnosis(Cause.SEQUENCE_RANDOM, f"the sequence does not count: {_listing(frames)}")
+    if share >= _SHARE and step == sensors:
+        return Diagnosis(Cause.SEQUENCE_SHARED, f"the {sensors} sensors share one sequence, which goes up by {step}")
+    if share >= _SHARE:
+        return Diagnosis(Cause.SEQUENCE_STEPS, f"the sequence goes up by {step} from frame to frame")
+    return None
+
+
+def _listing(frames: Sequence[Frame]) -> str:
+    return ", ".join(str(frame.sequence) for frame in frames[-4:])
+
+
+def _find_clock(frames: Sequence[Frame], numbers: FrameNumbers) -> Diagnosis | None:
+    ticks = _clock_steps(frames)
+    if not any(ticks):
+        return Diagnosis(Cause.CLOCK_STANDS, f"the device's clock stands at {frames[-1].clock_us}")
+    if max(frame.clock_us for frame in frames) <= 0xFFFF and any(-0x10000 <= tick < -0x4000 for tick in ticks):
+        return Diagnosis(Cause.CLOCK_16_BIT, "the device's clock goes from 65535 back to 0")
+    if sum(tick < 0 for tick in ticks) > 0.05 * len(ticks):
+        return Diagnosis(
+            Cause.CLOCK_JUMPS, f"the device's clock goes back: {[frame.clock_us for frame in frames[-4:]]} us"
+        )
+    ratio = numbers.clock_ratio
+    if math.isnan(ratio):
+        return None
+    for factor, cause, unit in (
+        (1e-3, Cause.CLOCK_MILLISECONDS, "milliseconds"),
+        (1e-6, Cause.CLOCK_SECONDS, "seconds"),
+        (1e3, Cause.CLOCK_NANOSECONDS, "nanoseconds"),
+    ):
+        if 0.9 * factor < ratio < 1.1 * factor:
+            return Diagnosis(cause, f"the device's clock counts {unit}")
+    if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
+        return Diagnosis(Cause.CLOCK_RATIO, f"the device's clock runs {ratio:.3f} times as fast as the computer's")
+    uneven = sum(abs(tick - 1e6 * numbers.period) > 5e5 * numbers.period + 2e3 for tick in ticks)
+    if uneven > 0.1 * len(ticks):
+        return Diagnosis(Cause.CLOCK_JUMPS, f"the device's clock jumps in {uneven} of {len(ticks)} frames")
+    return None
+
+
+def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Diagnosis | None:
+    if numbers.missing > _LOST:
+        return Diagnosis(Cause.FRAMES_LOST, f"{100.0 * numbers.missing:.1f} % of the frames never come")
+    if numbers.rate < _MIN_RATE:
+        return Diagnosis(Cause.RATE_LOW, f"a sensor sends only {numbers.rate:.1f} frames a second")
+    groups = sorted({*times})
+    pauses = sorted(b - a for a, b in itertools.pairwise(groups))
+    pause = pauses[len(pauses) // 2] if pauses else 0.0
+    if pause > max(_HELD_BACK, 3.0 * numbers.period) and len(frames) > 3 * len(groups):
+        each = len(frames) / len(groups)
+        return Diagnosis(Cause.HELD_BACK, f"frames come {each:.0f} at a time, every {1e3 * pause:.0f} ms")
+    return None

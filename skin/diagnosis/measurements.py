@@ -1,0 +1,260 @@
+"""Measurements of the frames of one sensor: what the counts themselves say about the firmware."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from math import gcd
+
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import Frame, Status
+
+from .cause import Cause, Diagnosis
+
+__all__ = [
+    "MEASURED",
+    "current_remarks",
+    "expected_counts",
+    "find_big_endian",
+    "find_status",
+    "find_wrong_measurements",
+]
+
+#: The measured fields of a frame, in the order of the wire.
+MEASURED = (
+    *("touch_c", "touch_d", "touch_current"),
+    *("radial_c", "radial_d", "radial_current"),
+    *("angular_a", "angular_b", "angular_current"),
+    *("touch_supply", "radial_supply", "angular_supply"),
+)
+_FIRST = Frame._fields.index(MEASURED[0])
+_SUPPLY = MEASURED.index("touch_supply")
+_RADIAL, _ANGULAR = MEASURED.index("radial_current"), MEASURED.index("angular_current")
+_GUIDES = tuple(MEASURED.index(name) for name in ("radial_c", "radial_d", "angular_a", "angular_b"))
+_MIN_FRAMES = 8
+_STUCK_FRAMES = 400  # in a row with the same reading
+_REMARKABLE = 0.05  # of a drive current; layers vary by more, which a guard learns and a design does not know
+_UNTOUCHED = 0.03  # of the supply, on both guides of the touch phase together
+_NEAR = 0.06  # a reading is another one
+_FULL = (255, 1023, 4095, 16383, 65535)
+_STATUS = {
+    Status.SUPPLY: "SUPPLY",
+    Status.ADC: "ADC",
+    Status.OVERRUN: "OVERRUN",
+    Status.SELF_TEST: "SELF_TEST",
+    Status.OVERCURRENT: "OVERCURRENT",
+}
+
+
+def expected_counts(sensor: Sensor) -> tuple[int, ...]:
+    """Return what an untouched sensor should read, in the order of ``MEASURED`` [counts]."""
+    parts = sensor.electronics
+    supply = parts.count_volts(parts.supply_volts)
+    radial, angular = parts.count_amperes(sensor.radial_amperes), parts.count_amperes(sensor.angular_amperes)
+    return (0, 0, 0, 0, 0, radial, 0, 0, angular, supply, supply, supply)
+
+
+def find_big_endian(frames: Sequence[Frame]) -> Diagnosis | None:
+    """Find frames whose numbers have their high byte first, by sequence and clock."""
+    if len(frames) < _MIN_FRAMES:
+        return None
+    pairs = list(itertools.pairwise(frames))
+
+    def share(number: Callable[[Frame], int], good: Callable[[int], bool], mask: int) -> float:
+        return sum(good((number(b) - number(a)) & mask) for a, b in pairs) / len(pairs)
+
+    def is_one(step: int) -> bool:
+        return step == 1
+
+    def is_short(step: int) -> bool:
+        return 0 < step < 1_000_000
+
+    straight = share(lambda f: f.sequence, is_one, 0xFFFF), share(lambda f: f.clock_us, is_short, 0xFFFFFFFF)
+    turned = (
+        share(lambda f: _turn2(f.sequence), is_one, 0xFFFF),
+        share(lambda f: _turn4(f.clock_us), is_short, 0xFFFFFFFF),
+    )
+    names = [
+        name
+        for name, right, wrong in zip(("sequence", "clock"), turned, straight, strict=True)
+        if right > 0.8 and wrong < 0.5
+    ]
+    if names:
+        return Diagnosis(
+            Cause.BIG_ENDIAN, f"the {' and the '.join(names)} of the frames come high byte first (big-endian)"
+        )
+    counts = [count for frame in frames[-64:] for count in _measured(frame)]
+    low = max(_turn2(count) for count in counts)
+    if max(counts) > 0xFFF and low <= 0xFFF and gcd(*counts) % 16:
+        return Diagnosis(Cause.BIG_ENDIAN, "the measurements come high byte first (big-endian)")
+    return None
+
+
+def _measured(frame: Frame) -> tuple[int, ...]:
+    return frame[_FIRST : _FIRST + len(MEASURED)]  # type: ignore[return-value]  # integers, all of them
+
+
+def _turn2(value: int) -> int:
+    return (value & 0xFF) << 8 | value >> 8
+
+
+def _turn4(value: int) -> int:
+    return int.from_bytes(value.to_bytes(4, "little"), "big")
+
+
+def find_status(frames: Sequence[Frame]) -> Diagnosis | None:
+    """Say what the device reports about itself."""
+    if len(frames) < _MIN_FRAMES:
+        return None
+    restarts = sum(bool(b.status & Status.RESTARTED) and a[4:6] != b[4:6] for a, b in itertools.pairwise(frames))
+    if restarts >= 0.5 * len(frames):
+        return Diagnosis(Cause.RESTARTED_ALWAYS, "every frame says that the device has just started")
+    if restarts >= 2:
+        return Diagnosis(Cause.RESTARTS, f"the device has started {restarts} times in {len(frames)} frames")
+    if sum(bool(frame.status & Status.RESERVED) for frame in frames) > 0.1 * len(frames):
+        return Diagnosis(Cause.STATUS_RESERVED, f"the status is 0x{frames[-1].status:02X}, with its reserved bit")
+    for bit, name in _STATUS.items():
+        if sum(bool(frame.status & bit) for frame in frames) > 0.1 * len(frames):
+            return Diagnosis(Cause.STATUS, f"the device reports {name} in its status")
+    return None
+
+
+def find_wrong_measurements(frames: Sequence[Frame], sensor: Sensor | None) -> Diagnosis | None:
+    """Say what is wrong with the measurements of one sensor.
+
+    Args:
+        frames: of one sensor, in their order.
+        sensor: as its scene has it; None where there is no scene.
+    """
+    if len(frames) < _MIN_FRAMES:
+        return None
+    columns = list(zip(*map(_measured, frames), strict=True))
+    return (
+        _find_scaling(columns, sensor)
+        or _find_zero(columns)
+        or _find_frozen(columns)
+        or (_find_unexpected(columns, sensor) if sensor is not None else None)
+        or _find_stuck(columns)
+        or _find_floating(columns)
+    )
+
+
+_Columns = Sequence[Sequence[int]]
+
+
+def _find_scaling(columns: _Columns, sensor: Sensor | None) -> Diagnosis | None:
+    counts = [count for column in columns for count in column]
+    top = max(counts)
+    bits = 12 if sensor is None else sensor.electronics.adc_bits
+    full = (1 << bits) - 1
+    if all(len({*column}) == 1 for column in columns) and min(counts) == top and top in _FULL:
+        return Diagnosis(Cause.SATURATED, f"every reading is {top}")
+    if top <= full:
+        return None
+    negative = sum(count >= 0xF000 for count in counts)
+    middling = sum(full < count < 0xF000 for count in counts)
+    if negative and not middling and negative < 0.6 * len(counts):
+        return Diagnosis(Cause.NEGATIVE, f"some readings are negative: {top} is {top - 0x10000}")
+    step = gcd(*counts)
+    if step >= 4 and step & (step - 1) == 0 and top <= 0xFFFF:
+        what = f"every reading is a multiple of {step}: the counts are shifted up by {step.bit_length() - 1} bits"
+        return Diagnosis(Cause.LEFT_JUSTIFIED, what)
+    return Diagnosis(Cause.SCALED, f"readings go up to {top}; the full scale of {bits} bits is {full}")
+
+
+def _find_zero(columns: _Columns) -> Diagnosis | None:
+    if max(columns[_SUPPLY]) == 0:
+        return Diagnosis(Cause.SUPPLY_ZERO, "the supply reads 0 in every frame")
+    radial, angular = max(columns[_RADIAL]) <= 2, max(columns[_ANGULAR]) <= 2
+    if radial and angular:
+        return Diagnosis(Cause.CURRENTS_ZERO, "both drive currents read 0 in every frame")
+    if radial:
+        return Diagnosis(Cause.RADIAL_CURRENT_ZERO, "the drive current of the radial phase reads 0 in every frame")
+    if angular:
+        return Diagnosis(Cause.ANGULAR_CURRENT_ZERO, "the drive current of the angular phase reads 0 in every frame")
+    return None
+
+
+def _find_frozen(columns: _Columns) -> Diagnosis | None:
+    if len(columns[0]) < _STUCK_FRAMES or any(len({*column[-_STUCK_FRAMES:]}) > 1 for column in columns):
+        return None
+    return Diagnosis(Cause.COUNTS_STUCK, f"no reading has changed in {_STUCK_FRAMES} frames")
+
+
+def _find_stuck(columns: _Columns) -> Diagnosis | None:
+    """Find a reading without noise: each of those that the detector's STUCK looks at must have some."""
+    if len(columns[0]) < _STUCK_FRAMES:
+        return None
+    for k in (_RADIAL, _ANGULAR, _SUPPLY, _SUPPLY + 1, _SUPPLY + 2):
+        if len({*columns[k][-_STUCK_FRAMES:]}) == 1:
+            return Diagnosis(Cause.NO_NOISE, f"{MEASURED[k]} has not changed in {_STUCK_FRAMES} frames")
+    return None
+
+
+def _middle(column: Sequence[int]) -> float:
+    return float(sorted(column)[len(column) // 2])
+
+
+def _find_unexpected(columns: _Columns, sensor: Sensor) -> Diagnosis | None:
+    """Compare what does not depend on a touch with what the scene says: supply and drive currents."""
+    parts, bounds = sensor.electronics, sensor.bounds
+    expected = expected_counts(sensor)
+    middles = [_middle(column) for column in columns]
+    supply, wanted = middles[_SUPPLY], expected[_SUPPLY]
+    said = f"the supply reads {supply:.0f} counts, the scene expects {wanted}"
+    if not bounds.supply_low <= supply <= bounds.supply_high:
+        for k, middle in enumerate(middles[:_SUPPLY]):
+            if abs(middle - wanted) < 0.03 * wanted:
+                return Diagnosis(Cause.FIELD_ORDER, f"{said}, and {MEASURED[k]} reads {middle:.0f}")
+        if abs(supply - 1e3 * parts.supply_volts) < _NEAR * supply:
+            return Diagnosis(Cause.MILLIVOLTS, f"{said}; these are the millivolts of {parts.supply_volts:g} V")
+        for bits in range(8, 17):
+            if bits != parts.adc_bits and abs(supply / wanted * 2.0 ** (parts.adc_bits - bits) - 1.0) < _NEAR:
+                return Diagnosis(Cause.CONVERTER_BITS, f"{said}: as a converter of {bits} bits, not {parts.adc_bits}")
+        return Diagnosis(Cause.SUPPLY_OFF, said)
+    radial, angular = middles[_RADIAL] / expected[_RADIAL], middles[_ANGULAR] / expected[_ANGULAR]
+    turned = middles[_RADIAL] / expected[_ANGULAR], middles[_ANGULAR] / expected[_RADIAL]
+    if all(abs(part - 1.0) < 0.1 for part in turned) and abs(radial - 1.0) > 0.2 and abs(angular - 1.0) > 0.2:
+        what = f"the currents read {middles[_RADIAL]:.0f} and {middles[_ANGULAR]:.0f} counts"
+        return Diagnosis(
+            Cause.PHASES_EXCHANGED, f"{what}, the scene expects {expected[_RADIAL]} and {expected[_ANGULAR]}"
+        )
+    limits = sensor.thresholds
+    for name, part, k in (("radial", radial, _RADIAL), ("angular", angular, _ANGULAR)):
+        if not limits.current_low <= part <= limits.current_high:
+            what = (
+                f"the drive current of the {name} phase reads {middles[k]:.0f} counts, the scene expects {expected[k]}"
+            )
+            return Diagnosis(Cause.CURRENT_OFF, what)
+    return None
+
+
+def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
+    """Return which drive currents are remarkably far from the design's, though a guard takes them; a few words each.
+
+    Args:
+        frames: of the sensor, in their order.
+        sensor: as its scene has it.
+    """
+    columns, expected = list(zip(*map(_measured, frames), strict=True)), expected_counts(sensor)
+    found = []
+    for name, k in (("radial", _RADIAL), ("angular", _ANGULAR)):
+        off = _middle(columns[k]) / max(expected[k], 1) - 1.0
+        if abs(off) > _REMARKABLE:
+            found.append(f"{name} current {100.0 * off:+.0f} % of the design's: see coneskin doctor")
+    return found
+
+
+def _find_floating(columns: _Columns) -> Diagnosis | None:
+    """Find guides that wander although nothing touches the sensor."""
+    supply = _middle(columns[_SUPPLY])
+    untouched = [c + d < _UNTOUCHED * supply for c, d in zip(columns[0], columns[1], strict=True)]
+    if sum(untouched) < _MIN_FRAMES:
+        return None
+    for k in _GUIDES:
+        column = sorted(itertools.compress(columns[k], untouched))
+        spread = column[int(0.95 * (len(column) - 1))] - column[int(0.05 * (len(column) - 1))]
+        if spread > max(0.02 * supply, 12.0):
+            what = f"{MEASURED[k]} wanders by {spread:.0f} counts although nothing touches the sensor"
+            return Diagnosis(Cause.GUIDES_FLOAT, what)
+    return None

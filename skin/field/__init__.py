@@ -1,0 +1,1 @@
+"""Electric field of the sheets, solved exactly."""

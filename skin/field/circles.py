@@ -1,0 +1,248 @@
+"""Circles around the contacts in the rectangle, and the Green function from circle to circle.
+
+Fourier coefficients are taken from N equidistant points on each circle. Everything is analytic there, so truncation
+(order M) and aliasing (N) both fall geometrically.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .disc import Discs
+from .green import Strip, StripPoints, direct_features, kernel, mirrored
+from .near_images import (
+    EdgeImage,
+    edge_images,
+    image_coefficients,
+    image_distance,
+    other_disc,
+    pair_coefficients,
+    pair_distance,
+)
+from .sheet import SectorSheet
+
+__all__ = ["PHASE", "Circles", "circle", "green_block", "make_circles", "offsets_of", "pair_points", "places_of"]
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+#: Place of the first point on a circle, in steps: none lies where a disc touches an edge, and both distances vanish.
+PHASE = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Circles:
+    """The circles of n scenes of k discs in the rectangle; lengths in units of (shorter side)/pi.
+
+    Attributes:
+        sheet: the sheet.
+        discs: the discs.
+        order: M.
+        offset: x + i y of the points from their centres, shape (n, k, N).
+        slope: |d offset / d zeta| there, zeta on the unit circle, shape (n, k, N).
+        s: centres from s = 0, shape (n, k).
+        s_far: centres from s = Sigma, shape (n, k).
+        p: centres from p = 0, shape (n, k).
+        p_far: centres from p = pi, shape (n, k).
+        x: Fourier coefficients of x/L, shape (n, k, 2M+1).
+        y: Fourier coefficients of y/T, shape (n, k, 2M+1).
+        images: near edges of each of the k discs, to be taken out of the samples.
+    """
+
+    sheet: SectorSheet
+    discs: Discs
+    order: int
+    offset: Complex
+    slope: Floats
+    s: Floats
+    s_far: Floats
+    p: Floats
+    p_far: Floats
+    x: Floats
+    y: Floats
+    images: tuple[tuple[EdgeImage, ...], ...] = ()
+
+
+@lru_cache(maxsize=64)
+def circle(order: int, points: int) -> tuple[Complex, Floats, Floats]:
+    """Return points zeta, |zeta - zeta'|^2 (ones on the diagonal), and the matrix to Fourier coefficients."""
+    n = points
+    angle = 2.0 * math.pi * (np.arange(n) + PHASE) / n
+    zeta = np.exp(1j * angle)
+    squared = 4.0 * np.sin(0.5 * (angle[:, None] - angle[None, :])) ** 2
+    np.fill_diagonal(squared, 1.0)
+    fourier = np.empty((2 * order + 1, n))
+    fourier[0] = 1.0 / n
+    m = np.arange(1, order + 1)[:, None]
+    fourier[1::2] = np.cos(m * angle) * (2.0 / n)
+    fourier[2::2] = np.sin(m * angle) * (2.0 / n)
+    for array in (zeta, squared, fourier):
+        array.setflags(write=False)
+    return zeta, squared, fourier
+
+
+def make_circles(
+    sheet: SectorSheet, strip: Strip, discs: Discs, order: int, points: int, with_images: bool = False
+) -> Circles:
+    """Make the circles of the discs, N points on each; images are of use between unequal sheets."""
+    zeta, _, _ = circle(order, points)
+    offset, slope = offsets_of(sheet, discs, zeta)
+    local = discs.radius / sheet.stretch(discs.u)
+    bend = (sheet.curvature * local)[:, :, None]
+    x, y = sheet.along(discs.u)[0], sheet.across(discs.phi)[0]
+    m = np.arange(1, order + 1)
+    series = local[:, :, None] * (-bend) ** (m - 1) / m
+    fx = np.zeros((*local.shape, 2 * order + 1))
+    fy = np.zeros_like(fx)
+    fx[:, :, 0] = x / sheet.length
+    fx[:, :, 1::2] = series / sheet.length
+    fy[:, :, 0] = y / sheet.breadth
+    fy[:, :, 2::2] = series / sheet.breadth
+    k = strip.scale
+    places = range(discs.u.shape[1]) if with_images else ()
+    images = tuple(tuple(edge_images(sheet, discs, place)) for place in places)
+    return Circles(sheet, discs, order, offset * k, slope * k, *places_of(sheet, strip, discs), fx, fy, images)
+
+
+def offsets_of(sheet: SectorSheet, discs: Discs, zeta: Complex) -> tuple[Complex, Floats]:
+    """Return offsets in the rectangle from the centres to points zeta of the rims, and |d offset / d zeta| [m].
+
+    Args:
+        sheet: the sheet.
+        discs: n scenes of k discs.
+        zeta: on the unit circle, shape (N,) or (n, k, N).
+    """
+    local = discs.radius / sheet.stretch(discs.u)  # a/h, the radius in the rectangle
+    if sheet.curvature == 0.0:
+        offset = local[:, :, None] * zeta
+        return offset, np.broadcast_to(local[:, :, None], offset.shape)
+    bend = (sheet.curvature * local)[:, :, None]  # q = a/r_c, signed
+    cos, sin = zeta.real, zeta.imag
+    offset = np.empty((*local.shape, zeta.shape[-1]), dtype=np.complex128)
+    over = local[:, :, None] / bend
+    # numpy's complex log1p loses digits near zero; the two real ones do not.
+    np.multiply(0.5 * np.log1p(bend * (2.0 * cos + bend)), over, out=offset.real)
+    np.multiply(np.arctan2(bend * sin, 1.0 + bend * cos), over, out=offset.imag)
+    return offset, local[:, :, None] / np.sqrt(1.0 + bend * (2.0 * cos + bend))
+
+
+def places_of(sheet: SectorSheet, strip: Strip, discs: Discs) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return the centres' distances from s = 0, s = Sigma, p = 0 and p = pi [(shorter side)/pi], shape (n, k) each."""
+    x, y = sheet.along(discs.u), sheet.across(discs.phi)
+    (s, s_far), (p, p_far) = (x, y) if strip.along_x else (y, x)
+    k = strip.scale
+    return s * k, s_far * k, p * k, p_far * k
+
+
+class RimPlaces(Protocol):
+    """Points on the rims of n scenes of k discs; attributes as those of `Circles`."""
+
+    @property
+    def offset(self) -> Complex: ...
+    @property
+    def s(self) -> Floats: ...
+    @property
+    def s_far(self) -> Floats: ...
+    @property
+    def p(self) -> Floats: ...
+    @property
+    def p_far(self) -> Floats: ...
+
+
+def pair_points(
+    strip: Strip, circles: RimPlaces, i: int, j: int, equal: bool
+) -> tuple[StripPoints, StripPoints, Floats, Floats, Floats]:
+    """Return the points of discs i and j, mirrored to the near corner, and the linear part of the Green function.
+
+    That part is s_lo (Sigma - s_hi) / Sigma + (s_hi - s_ref) with s_ref the higher centre. Returned are its weights
+    on the offsets of i and of j and its value at the centres, so that a long strip loses nothing by that large
+    value.
+    """
+    flip_s = circles.s[:, i] + circles.s[:, j] > circles.s_far[:, i] + circles.s_far[:, j]
+    flip_p = circles.p[:, i] + circles.p[:, j] > circles.p_far[:, i] + circles.p_far[:, j]
+    s = [np.where(flip_s, circles.s_far[:, d], circles.s[:, d]) for d in (i, j)]
+    rest = [np.where(flip_s, circles.s[:, d], circles.s_far[:, d]) for d in (i, j)]
+    p = [np.where(flip_p, circles.p_far[:, d], circles.p[:, d]) for d in (i, j)]
+    i_high = s[0] >= s[1]
+    high, low, p_ref = np.where(i_high, s[0], s[1]), np.where(i_high, s[1], s[0]), np.where(i_high, p[0], p[1])
+    made = []
+    for place, d in enumerate((i,) if i == j else (i, j)):
+        offset = mirrored(circles.offset[:, d], strip.along_x, flip_s, flip_p)
+        made.append(direct_features(strip, offset, s[place], p[place], high, p_ref, equal))
+    above = np.where(i_high, rest[0], rest[1])
+    weight_high, weight_low = 1.0 - low / strip.sigma, above / strip.sigma
+    weight_i = np.where(i_high, weight_high, weight_low)
+    weight_j = np.where(i_high, weight_low, weight_high)
+    return made[0], made[-1], weight_i, weight_j, low * above / strip.sigma
+
+
+def green_block(
+    strip: Strip, circles: Circles, i: int, j: int, resistance_a: float, resistance_b: float
+) -> tuple[Floats, Floats]:
+    """Compute the Fourier coefficients of the Green function from disc j to disc i, shape (n, 2M+1, 2M+1).
+
+    On the disc itself its own logarithm, ln(|z - z'|/radius) (Ra + Rb)/(2 pi), is left out.
+
+    Returns:
+        the coefficients, and an estimate of the aliasing in them, shape (n,).
+    """
+    _, squared, fourier = circle(circles.order, circles.offset.shape[2])
+    first, second, weight_i, weight_j, centre = pair_points(strip, circles, i, j, resistance_a == resistance_b)
+    if i == j:
+        slope = circles.slope[:, i] * np.abs(1.0 + first.direct)
+        taken, put_back = _near_images(strip, circles, i)
+        values = kernel(strip, first, second, resistance_a, resistance_b, squared, slope * slope, taken=taken)
+    else:
+        zeta, _, _ = circle(circles.order, circles.offset.shape[2])
+        alpha, beta = other_disc(circles.sheet, circles.discs, i, j)
+        values = kernel(strip, first, second, resistance_a, resistance_b, pair_distance(alpha, beta, zeta))
+    b = resistance_b / math.pi
+    values += ((b * weight_i)[:, None] * first.s)[:, :, None] + ((b * weight_j)[:, None] * second.s)[:, None, :]
+    values -= (b / strip.sigma) * (first.s[:, :, None] * second.s[:, None, :])
+    n, points, _ = values.shape
+    half = (values.reshape(-1, points) @ fourier.T).reshape(n, points, -1).transpose(0, 2, 1)
+    block = (half.reshape(-1, points) @ fourier.T).reshape(n, fourier.shape[0], -1).transpose(0, 2, 1)
+    aliased = _aliasing(block, circles.order)
+    block[:, 0, 0] += b * centre
+    if i != j:
+        both = resistance_a + resistance_b
+        block -= both / (4.0 * math.pi) * pair_coefficients(alpha, beta, circles.order)
+    elif put_back is not None:
+        block -= (resistance_a - resistance_b) / (4.0 * math.pi) * put_back
+    return block, aliased
+
+
+def _aliasing(sampled: Floats, order: int) -> Floats:
+    """Estimate the coefficient of order 2M, which N = 2M + 2 points take for one of the lowest, shape (n,)."""
+    size = np.maximum(np.abs(sampled[:, 0, 1:]), np.abs(sampled[:, 1:, 0]))
+    window = 2 * max(2, order // 8)
+    last = size[:, -window:].max(axis=1)
+    if order < 4:
+        return np.asarray(last)
+    middle = size[:, order // 2 * 2 - window : order // 2 * 2].max(axis=1)
+    return np.asarray(10.0 * last * np.minimum(last / np.maximum(middle, 1e-300), 1.0) ** 2)
+
+
+def _near_images(strip: Strip, circles: Circles, i: int) -> tuple[Floats | None, Floats | None]:
+    """Return the near edges' part of A2/A3 on disc i, and the Fourier coefficients of its logarithm."""
+    if not circles.images or not circles.images[i]:
+        return None, None
+    zeta, _, _ = circle(circles.order, circles.offset.shape[2])
+    taken: Floats | None = None
+    put_back: Floats | None = None
+    for image in circles.images[i]:
+        # A2 holds the images in the ends of the strip, A3 those in its long edges.
+        at_end = image.arc == strip.along_x
+        distance, logarithm = image_distance(image, zeta), image_coefficients(image, circles.order)
+        if not at_end:
+            distance, logarithm = 1.0 / distance, -logarithm
+        taken = distance if taken is None else taken * distance
+        put_back = logarithm if put_back is None else put_back + logarithm
+    return taken, put_back

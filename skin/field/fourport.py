@@ -1,0 +1,240 @@
+"""Four-port of the electrodes: what the electronics apply and read in each phase.
+
+Each electrode has a lead, behind it a terminal: a source with its resistance, an ADC's input, a pull-down, or
+nothing. The unknowns are the four electrode potentials and the voltage across the contact, so a weak contact is
+never added to a strong sheet and open guides carry exactly no net current.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.errors import FieldError
+
+from .coupling import Coupling
+from .sheet import SectorSheet
+
+__all__ = ["DrivePhase", "Readings", "Terminal", "angular_phase", "radial_phase", "solve_phase", "touch_phase"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """A Thevenin source behind a lead; the ADC reads between the two.
+
+    Attributes:
+        emf: open-circuit potential [V].
+        resistance: of the source, or of an input to `emf` [ohm]; 0 drives ideally, inf is open.
+        lead: resistance between the terminal and the electrode [ohm].
+    """
+
+    emf: float = 0.0
+    resistance: float = math.inf
+    lead: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.emf):
+            raise FieldError(f"emf of a terminal must be finite [V], got {self.emf!r}")
+        if not self.resistance >= 0.0:
+            raise FieldError(f"resistance of a terminal must be 0 or more [ohm], got {self.resistance!r}")
+        if not (self.lead >= 0.0 and math.isfinite(self.lead)):
+            raise FieldError(f"lead of a terminal must be 0 or more and finite [ohm], got {self.lead!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class DrivePhase:
+    """One state of the electronics: a terminal at each electrode.
+
+    Attributes:
+        name: radial, angular, touch or the user's own.
+        a: terminal of electrode A, on the arc of end 2 of the upper sheet.
+        b: terminal of electrode B, on the arc of end 1 of the upper sheet.
+        c: terminal of electrode C, on the edge phi=wrap of the lower sheet.
+        d: terminal of electrode D, on the edge phi=0 of the lower sheet.
+    """
+
+    name: str
+    a: Terminal
+    b: Terminal
+    c: Terminal
+    d: Terminal
+
+    @property
+    def terminals(self) -> tuple[Terminal, Terminal, Terminal, Terminal]:
+        """The four terminals in the order A, B, C, D."""
+        return self.a, self.b, self.c, self.d
+
+
+def radial_phase(supply: float = 1.0, adc: float = math.inf, lead: float = 0.0, source: float = 0.0) -> DrivePhase:
+    """Make the radial phase: B at the supply, A at 0 V, guides C and D read.
+
+    Args:
+        supply: U0 [V].
+        adc: input resistance of the ADC at C and D [ohm].
+        lead: resistance of each lead [ohm].
+        source: internal resistance of each drive [ohm].
+    """
+    guide = Terminal(0.0, adc, lead)
+    return DrivePhase("radial", Terminal(0.0, source, lead), Terminal(supply, source, lead), guide, guide)
+
+
+def angular_phase(supply: float = 1.0, adc: float = math.inf, lead: float = 0.0, source: float = 0.0) -> DrivePhase:
+    """Make the angular phase: C at the supply, D at 0 V, guides A and B read; arguments as for `radial_phase`."""
+    guide = Terminal(0.0, adc, lead)
+    return DrivePhase("angular", guide, guide, Terminal(supply, source, lead), Terminal(0.0, source, lead))
+
+
+def touch_phase(supply: float = 1.0, pull_down: float = 1e5, lead: float = 0.0, source: float = 0.0) -> DrivePhase:
+    """Make the touch phase: A and B at the supply, C and D each pulled down through a resistor and read.
+
+    Args:
+        supply: U0 [V].
+        pull_down: from C and from D to 0 V [ohm].
+        lead: resistance of each lead [ohm].
+        source: internal resistance of each drive [ohm].
+    """
+    drive, guide = Terminal(supply, source, lead), Terminal(0.0, pull_down, lead)
+    return DrivePhase("touch", drive, drive, guide, guide)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Readings:
+    """The answer of one phase; axes over electrodes run A, B, C, D.
+
+    Attributes:
+        phase: what was solved.
+        electrodes: potentials of the electrodes [V], shape (n, 4).
+        terminals: potentials of the terminals, behind the leads, where an ADC reads [V], shape (n, 4).
+        currents: from the terminals into the sensor [A], shape (n, 4).
+        contact: current from the upper to the lower sheet [A], shape (n,).
+    """
+
+    phase: DrivePhase
+    electrodes: Floats
+    terminals: Floats
+    currents: Floats
+    contact: Floats
+
+    def __len__(self) -> int:
+        return int(self.contact.shape[0])
+
+
+def solve_phase(
+    coupling: Coupling, sheet: SectorSheet, upper_resistance: float, lower_resistance: float, phase: DrivePhase
+) -> Readings:
+    """Compute the potentials and currents of one phase.
+
+    Raises:
+        FieldError: a sheet is connected to nothing: no contact and both its electrodes open.
+    """
+    upper = sheet.breadth / (upper_resistance * sheet.length)
+    lower = sheet.length / (lower_resistance * sheet.breadth)
+    n = len(coupling)
+    opens = [math.isinf(t.resistance) for t in phase.terminals]
+    if (opens[0] and opens[1]) and (opens[2] and opens[3]):
+        raise FieldError(f"phase {phase.name}: all four electrodes are open; drive at least one sheet")
+    for pair, first in (("A and B", 0), ("C and D", 2)):
+        if opens[first] and opens[first + 1] and not (coupling.conductance > 0.0).all():
+            raise FieldError(
+                f"phase {phase.name}: without contact nothing fixes the potential of {pair}, which are open;"
+                " give their terminals a resistance, as every ADC has"
+            )
+    ideal = all(t.resistance == 0.0 and t.lead == 0.0 for t in phase.terminals if not math.isinf(t.resistance))
+    if ideal and opens == [False, False, True, True]:
+        electrodes, contact = np.empty((n, 4)), np.zeros(n)
+        electrodes[:, 0], electrodes[:, 1] = phase.a.emf, phase.b.emf
+        _guides(
+            electrodes[:, 2:], coupling.x, coupling.y, coupling.xy / (lower + coupling.yy), phase.b.emf, phase.a.emf
+        )
+    elif ideal and opens == [True, True, False, False]:
+        electrodes, contact = np.empty((n, 4)), np.zeros(n)
+        electrodes[:, 2], electrodes[:, 3] = phase.c.emf, phase.d.emf
+        _guides(
+            electrodes[:, :2], coupling.y, coupling.x, coupling.xy / (upper + coupling.xx), phase.d.emf, phase.c.emf
+        )
+    else:
+        ideal = False
+        electrodes, contact = _general(coupling, upper, lower, phase)
+    currents = _currents(coupling, upper, lower, electrodes, contact)
+    currents[:, opens] = 0.0
+    if ideal:
+        return Readings(phase, electrodes, electrodes, currents, contact)
+    resistance = np.array([t.resistance if not o else 0.0 for t, o in zip(phase.terminals, opens, strict=True)])
+    lead = np.array([t.lead for t in phase.terminals])
+    emf = np.array([t.emf for t in phase.terminals])
+    # Behind a small source resistance the emf is the better reference, before a large input the electrode.
+    from_source = (resistance < lead + 1.0 / min(upper, lower)) & ~np.array(opens)
+    terminals = np.where(from_source, emf - resistance * currents, electrodes + lead * currents)
+    return Readings(phase, electrodes, terminals, currents, contact)
+
+
+def _guides(out: Floats, along: Floats, across: Floats, moved: Floats, start: float, end: float) -> None:
+    """Solve the open guides of one sheet, the other driven from `start` to `end`; written to columns (far, near).
+
+    No net current passes, so the sheets meet at the electrical centre: start + h along = near + (far - near) across.
+    The guides are apart by the current moved across over their sheet's conductance, for each volt of h.
+    """
+    h = end - start
+    apart = h * moved
+    out[:, 1] = start + h * along - apart * across
+    out[:, 0] = out[:, 1] + apart
+
+
+def _currents(coupling: Coupling, upper: float, lower: float, volts: Floats, contact: Floats) -> Floats:
+    """Return the current into the sensor at each electrode; they sum to zero by construction."""
+    hx = volts[:, 0] - volts[:, 1]
+    hy = volts[:, 3] - volts[:, 2]
+    qx = coupling.xx * hx + coupling.xy * hy + coupling.x * contact
+    qy = coupling.xy * hx + coupling.yy * hy + coupling.y * contact
+    out = np.empty_like(volts)
+    out[:, 0] = upper * hx + qx
+    out[:, 1] = contact - out[:, 0]
+    out[:, 2] = -lower * hy - qy
+    out[:, 3] = -contact - out[:, 2]
+    return out
+
+
+def _general(coupling: Coupling, upper: float, lower: float, phase: DrivePhase) -> tuple[Floats, Floats]:
+    """Solve any four terminals: unknowns V_A - V_B, V_B, V_D - V_C, V_C and the voltage e across the contact.
+
+    An electrode's row is V + R I = E for a small R, V/R + I = E/R for a large one. Where both of a sheet's are large,
+    the second row is the sheet's net current instead, in a scale of its own: inputs of 1e18 ohm keep their digits.
+    """
+    n = len(coupling)
+    g = coupling.conductance
+    into_a, into_d, contact = np.zeros((n, 5)), np.zeros((n, 5)), np.zeros((n, 5))
+    contact[:, 4] = g
+    into_a[:, 0], into_a[:, 2], into_a[:, 4] = upper + coupling.xx, coupling.xy, coupling.x * g
+    into_d[:, 0], into_d[:, 2], into_d[:, 4] = coupling.xy, lower + coupling.yy, (coupling.y - 1.0) * g
+    a, b, c, d = phase.terminals
+    level = 1.0 / min(upper, lower)
+    matrix, right = np.zeros((n, 5, 5)), np.zeros((n, 5, 1))
+    for at, first, second, current, net in ((0, a, b, into_a, contact), (2, d, c, into_d, -contact)):
+        volts = np.zeros((2, 5))
+        volts[0, at] = volts[:, at + 1] = 1.0
+        for row, terminal, into in ((0, first, current), (1, second, net - current)):
+            resistance = terminal.resistance + terminal.lead
+            weight_v, weight_i = (1.0, resistance) if resistance <= level else (level / resistance, level)
+            matrix[:, at + row] = weight_i * into + weight_v * volts[row]
+            right[:, at + row, 0] = weight_v * terminal.emf
+        ends = (first, second)
+        least = min(t.resistance + t.lead for t in ends)
+        if least > level:
+            # Shares of the net current for each volt; with both open, all of it is the contact's, and is zero.
+            shares = [0.0 if math.isinf(least) else least / (t.resistance + t.lead) for t in ends]
+            size = np.maximum(1.0, least * g) if math.isfinite(least) else g
+            matrix[:, at + 1] = np.array(shares) @ volts
+            matrix[:, at + 1, 4] += np.sign(net[:, 4]) * (least * g if math.isfinite(least) else g)
+            matrix[:, at + 1] /= size[:, None]
+            right[:, at + 1, 0] = sum(s * t.emf for s, t in zip(shares, ends, strict=True)) / size
+    # V_B - V_D + (V_A - V_B) X - (V_C - V_D) Y = e
+    matrix[:, 4, 0], matrix[:, 4, 1] = coupling.x, 1.0
+    matrix[:, 4, 2], matrix[:, 4, 3], matrix[:, 4, 4] = coupling.y - 1.0, -1.0, -1.0
+    solved = np.asarray(np.linalg.solve(matrix, right)[:, :, 0], dtype=np.float64)
+    h_upper, v_b, h_lower, v_c, e = solved.T
+    return np.stack([v_b + h_upper, v_b, v_c, v_c + h_lower], axis=1), np.asarray(g * e)

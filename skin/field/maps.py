@@ -1,0 +1,195 @@
+"""Maps of potential and current density on the two sheets, for pictures and for checks.
+
+Each sheet's potential is the straight one between its electrodes plus what the multipoles of the contacts add.
+Outside a disc their logarithmic part is a sum over moments, inside it follows the difference d = sum c_m I_m(k
+rho); the images act from points on the circle. So the result is as exact as the solver, up to the rim and across
+it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from coneskin.errors import FieldError
+
+from .circles import Circles, circle, make_circles
+from .disc import Disc, Discs, bessel_ratios, check_discs
+from .fourport import DrivePhase
+from .green import Strip, direct_features, kernel, mirrored
+from .model import FieldModel
+from .multipole import solve_to_tolerance
+from .order import resolution
+
+__all__ = ["FieldMap"]
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FieldMap:
+    """The solved field of one scene in one phase.
+
+    Attributes:
+        model: the sensor.
+        discs: the contacts; may be none, if the phase fixes both sheets without them.
+        electrodes: potentials of A, B, C, D [V].
+        moments: of the current of each disc [A], shape (k, 2M+1).
+        order: M.
+    """
+
+    model: FieldModel
+    discs: tuple[Disc, ...]
+    electrodes: tuple[float, float, float, float]
+    moments: Floats
+    order: int
+
+    @classmethod
+    def of(cls, model: FieldModel, discs: Sequence[Disc], phase: DrivePhase) -> FieldMap:
+        """Solve one scene in one phase.
+
+        Raises:
+            FieldError: a contact that cannot be, a tolerance that multipoles cannot meet, or a sheet that floats.
+        """
+        sheet = model.sheet
+        if not discs:
+            ghost = Disc(0.5 * sheet.width, 0.5 * sheet.wrap, 1e-3 * min(sheet.width, sheet.arc), 0.0)
+            read = model.read(model.discs([ghost]), phase)
+            a, b, c, d = (float(v) for v in read.electrodes[0])
+            return cls(model, (), (a, b, c, d), np.zeros((0, 3)), 1)
+        u, phi, radius, g = (
+            np.array([[getattr(disc, name) for disc in discs]]) for name in ("u", "phi", "radius", "conductance")
+        )
+        check_discs(sheet, u, phi, radius, g)
+        scene = Discs(u, phi, radius, g)
+        # The readings are stationary in the moments, the potentials are not.
+        tolerance = max(1e-3 * model.tolerance, 1e-15)
+        order = int(resolution(sheet, scene, model.contrast, tolerance)[0])
+        coupling, moments = solve_to_tolerance(
+            sheet, model.upper_resistance, model.lower_resistance, scene, order, tolerance
+        )
+        a, b, c, d = (float(v) for v in model.read(coupling, phase).electrodes[0])
+        values = moments.values[0] @ np.array([b - d, a - b, d - c])
+        return cls(model, tuple(discs), (a, b, c, d), values, moments.order)
+
+    def potentials(self, u: ArrayLike, phi: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the potentials of the upper and of the lower sheet at (u, phi) [V]; arguments broadcast.
+
+        Raises:
+            FieldError: a point off the sheet, or a sheet more than 200 times longer than wide.
+        """
+        u, phi = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(phi, dtype=np.float64))
+        model, sheet = self.model, self.model.sheet
+        if not ((u >= 0.0) & (u <= sheet.width) & (phi >= 0.0) & (phi <= sheet.wrap)).all():
+            raise FieldError(
+                f"points must lie on the sheet: u in [0, {sheet.width:.6g}] m, phi in [0, {sheet.wrap:.6g}] rad"
+            )
+        x = sheet.along(u)[0] / sheet.length
+        y = sheet.across(phi)[0] / sheet.breadth
+        a, b, c, d = self.electrodes
+        upper, lower = b + (a - b) * x, d + (c - d) * y
+        for disc, moments in zip(self.discs, self.moments, strict=True):
+            by_upper, by_lower = self._added(disc, moments, u.ravel(), phi.ravel())
+            upper = upper - model.upper_resistance * by_upper.reshape(u.shape)
+            lower = lower + model.lower_resistance * by_lower.reshape(u.shape)
+        return upper, lower
+
+    def currents(self, u: ArrayLike, phi: ArrayLike) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return current densities (upper e_u, upper e_phi, lower e_u, lower e_phi) [A/m].
+
+        Central differences of the potentials over 1e-5 of the shorter side, 1e-9 from exact away from a rim.
+        """
+        sheet, model = self.model.sheet, self.model
+        u, phi = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(phi, dtype=np.float64))
+        h = 1e-5 * min(sheet.length, sheet.breadth)
+        x = np.clip(sheet.along(u)[0], h, sheet.length - h)
+        y = np.clip(sheet.across(phi)[0], h, sheet.breadth - h)
+        east, west = self.potentials(*sheet.locate(x + h, y)), self.potentials(*sheet.locate(x - h, y))
+        north, south = self.potentials(*sheet.locate(x, y + h)), self.potentials(*sheet.locate(x, y - h))
+        out = []
+        for i, resistance in enumerate((model.upper_resistance, model.lower_resistance)):
+            per = -1.0 / (2.0 * h * resistance * sheet.stretch(u))
+            out += [per * (east[i] - west[i]), per * (north[i] - south[i])]
+        return out[0], out[1], out[2], out[3]
+
+    def _added(self, disc: Disc, moments: Floats, u: Floats, phi: Floats) -> tuple[Floats, Floats]:
+        """Integrate G_u j and G_l j of one disc at points, per ohm [A]."""
+        sheet = self.model.sheet
+        strip = Strip.of(sheet.length, sheet.breadth)
+        if strip.sigma > 200.0 * math.pi:
+            ratio = strip.sigma / math.pi
+            raise FieldError(f"a map needs a sheet at most 200 times longer than wide, got {ratio:.0f} times")
+        one = Discs(*(np.array([[v]]) for v in (disc.u, disc.phi, disc.radius, disc.conductance)))
+        # Each sheet alone has images in the edges, also where those of equal sheets cancel in the solver.
+        room = float(sheet.edge_distances(disc.u, disc.phi).min()) / disc.radius
+        n = max(4 * self.order + 2, min(int(38.0 / math.acosh(max(room, 1.0005))), 1200))
+        zeta, _, fourier = circle(self.order, n)
+        source = make_circles(sheet, strip, one, self.order, n)
+        charges = fourier.T @ moments
+        flat = sheet.flat(u, phi, (disc.u, disc.phi)) / disc.radius
+        by_a, by_b = np.empty(u.size), np.empty(u.size)
+        for start in range(0, u.size, 1024):
+            part = slice(start, start + 1024)
+            by_a[part], by_b[part] = self._images(strip, source, flat[part], zeta, charges, u[part], phi[part])
+        log = self._logarithm(disc, moments, flat)
+        by_a += log
+        by_b += log
+        return (by_b, by_a) if strip.along_x else (by_a, by_b)
+
+    def _images(
+        self, strip: Strip, source: Circles, flat: Complex, zeta: Complex, charges: Floats, u: Floats, phi: Floats
+    ) -> tuple[Floats, Floats]:
+        """Sum both Green functions without -ln|z - z'| / 2 pi over the charges on the circle, at points."""
+        sheet = self.model.sheet
+        k = strip.scale
+        x, y = sheet.along(u)[0], sheet.across(phi)[0]
+        s, p = (x, y) if strip.along_x else (y, x)
+        flip_s, flip_p = source.s[:, 0] > source.s_far[:, 0], source.p[:, 0] > source.p_far[:, 0]
+        s0 = np.where(flip_s, source.s_far[:, 0], source.s[:, 0])
+        p0 = np.where(flip_p, source.p_far[:, 0], source.p[:, 0])
+        s_all = np.where(flip_s, strip.sigma - k * s, k * s)
+        p_all = np.where(flip_p, math.pi - k * p, k * p)
+        offset = np.asarray((s_all - s0 + 1j * (p_all - p0))[None], dtype=np.complex128)
+        field = direct_features(strip, offset, s0, p0, s0, p0, equal=False)
+        points = direct_features(
+            strip, mirrored(source.offset[:, 0], strip.along_x, flip_s, flip_p), s0, p0, s0, p0, equal=False
+        )
+        squared = np.abs(flat[:, None] - zeta[None, :]) ** 2
+        floor = 1e-24  # of a point upon a node, where both distances vanish together
+        out = []
+        for a, b in ((1.0, 0.0), (0.0, 1.0)):
+            values = kernel(strip, field, points, a, b, np.maximum(squared, floor), None)[0]
+            if b:
+                there, here = s0[0] + points.s[0][None, :], s_all[:, None]
+                values = values + (here + points.s[0][None, :] - here * there / strip.sigma) / math.pi
+            out.append(values @ charges)
+        return out[0], out[1]
+
+    def _logarithm(self, disc: Disc, moments: Floats, flat: Complex) -> Floats:
+        """Integrate -(1/2 pi) ln(|z - z'|/a) j at flat offsets in units of the radius."""
+        rho, angle = np.abs(flat), np.angle(flat)
+        rs = self.model.upper_resistance + self.model.lower_resistance
+        ka = disc.radius * math.sqrt(rs * disc.conductance)
+        inside = rho < 1.0
+        out = np.where(inside, 0.0, -moments[0] * np.log(np.maximum(rho, 1.0)) / (2.0 * math.pi))
+        ratios = bessel_ratios(np.array(ka), self.order + 1)
+        bonded = math.isinf(ka)
+        far = np.minimum(1.0 / np.maximum(rho, 1e-300), 1e300)
+        for m in range(self.order + 1):
+            wave = moments[0] if m == 0 else moments[2 * m - 1] * np.cos(m * angle) + moments[2 * m] * np.sin(m * angle)
+            if m > 0:
+                out = out + wave / (2.0 * math.pi * m) * np.where(inside, rho**m, np.where(inside, 1.0, far) ** m)
+            if bonded or ka == 0.0:
+                continue  # d = 0 inside, or nothing flows
+            # d on the rim over its moment: D_m less the logarithm's own share; times (shape inside - rho^m)
+            rim = 1.0 / (math.pi * ka * ratios[m]) if m else 1.0 / (2.0 * math.pi * ka * ratios[0])
+            z = np.where(inside, rho, 1.0) * ka
+            shape = special.ive(m, z) / special.ive(m, ka) * np.exp(z - ka)
+            out = out - np.where(inside, rim * wave * (shape - np.where(inside, rho, 1.0) ** m), 0.0)
+        return np.asarray(out)

@@ -1,0 +1,209 @@
+"""Forward model of the sensor: a sheet, two resistances and contacts give what the four electrodes read.
+
+model = FieldModel(SectorSheet.of_frustum(link), upper_resistance=100.0, lower_resistance=100.0)
+readings = solve(model, [Disc(u=0.05, phi=0.6, radius=0.005)], radial_phase(supply=5.0))
+readings.terminals[0]          # A, B, C, D [V]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from coneskin.errors import FieldError
+
+from .coupling import Coupling, admittance
+from .disc import Disc, Discs, check_discs
+from .fourport import DrivePhase, Readings, solve_phase
+from .multipole import solve_discs
+from .order import FIRST, LADDER, higher, resolution
+from .rim import near_apex, solve_rims
+from .sheet import SectorSheet
+
+__all__ = ["FieldModel", "solve", "solve_many"]
+
+Floats = NDArray[np.float64]
+
+#: Pairs of points in one piece of a batch, measured: larger pieces leave the cache.
+PAIRS_AT_ONCE = 12000
+
+#: Error that rounding leaves on points of a rim, relative to the supply: no tolerance below asks for more points.
+ROUNDING = 1e-13
+
+
+@dataclass(frozen=True, slots=True)
+class FieldModel:
+    """The sensor without contacts.
+
+    Attributes:
+        sheet: the flat sector that both conductive layers share.
+        upper_resistance: sheet resistance of the layer with the electrodes A and B [ohm per square].
+        lower_resistance: sheet resistance of the layer with the electrodes C and D [ohm per square].
+        tolerance: of every solution's estimated error, relative to the supply.
+
+    Raises:
+        FieldError: a resistance is not positive and finite, the tolerance is not in [1e-15, 0.1].
+    """
+
+    sheet: SectorSheet
+    upper_resistance: float
+    lower_resistance: float
+    tolerance: float = 1e-12
+
+    def __post_init__(self) -> None:
+        for name in ("upper_resistance", "lower_resistance"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise FieldError(f"{name} must be positive and finite [ohm per square], got {value!r}")
+        if not 1e-15 <= self.tolerance <= 0.1:
+            raise FieldError(f"tolerance must be in [1e-15, 0.1] of the supply, got {self.tolerance!r}")
+
+    @property
+    def contrast(self) -> float:
+        """Contrast of the sheets, |Ru - Rl| / (Ru + Rl): 0 for equal sheets."""
+        return abs(self.upper_resistance - self.lower_resistance) / (self.upper_resistance + self.lower_resistance)
+
+    def discs(self, discs: Sequence[Disc], order: int | None = None) -> Coupling:
+        """Couple one scene (n = 1) of several discs that do not overlap.
+
+        Args:
+            discs: at least one.
+            order: multipole order M; None chooses it for the model's tolerance.
+
+        Raises:
+            FieldError: a disc that cannot be (see `check_discs`), or none at all.
+        """
+        if not discs:
+            raise FieldError("at least one contact is needed; for no contact give one of conductance 0")
+        u, phi, radius, conductance = (
+            np.array([[getattr(d, name) for d in discs]]) for name in ("u", "phi", "radius", "conductance")
+        )
+        return self.contacts(u, phi, radius, conductance, order=order)
+
+    def contacts(
+        self,
+        u: ArrayLike,
+        phi: ArrayLike,
+        radius: ArrayLike,
+        conductance: ArrayLike = math.inf,
+        order: int | None = None,
+    ) -> Coupling:
+        """Couple n scenes: shape (n,) for one disc in each, (n, k) for k discs; arguments broadcast.
+
+        Args:
+            u: slant distance of the centres from end 1 [m].
+            phi: azimuth of the centres [rad].
+            radius: in the flat sheet [m].
+            conductance: per area [S/m^2], 0 to inf.
+            order: multipole order M; None chooses it for each scene from the model's tolerance.
+
+        Raises:
+            FieldError: a disc that cannot be; the tolerance cannot be met (only without `order`).
+        """
+        arrays = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (u, phi, radius, conductance)))
+        if arrays[0].ndim not in (0, 1, 2):
+            raise FieldError(f"contacts must have shape (n,) or (n, k), got {arrays[0].shape}")
+        shaped = [a.reshape(-1, 1) if a.ndim < 2 else a for a in arrays]
+        check_discs(self.sheet, *shaped)
+        if order is not None and order < 1:
+            raise FieldError(f"order must be at least 1, got {order}")
+        return self._in_groups(Discs(*shaped), order)
+
+    def admittance(self, coupling: Coupling) -> Floats:
+        """Compute Y of the 4-port (A, B, C, D) [S], shape (n, 4, 4)."""
+        return admittance(coupling, self.sheet, self.upper_resistance, self.lower_resistance)
+
+    def read(self, coupling: Coupling, phase: DrivePhase) -> Readings:
+        """Compute the potentials and currents of one phase.
+
+        Raises:
+            FieldError: a sheet without contact whose electrodes are both open.
+        """
+        return solve_phase(coupling, self.sheet, self.upper_resistance, self.lower_resistance, phase)
+
+    def _in_groups(self, discs: Discs, order: int | None) -> Coupling:
+        """Solve scenes of one resolution together; raise the order of those whose multipoles have not died away."""
+        n = discs.u.shape[0]
+        out = np.empty((7, n))
+        orders = resolution(self.sheet, discs, self.contrast, self.tolerance, order)
+        waiting = np.arange(n)
+        while waiting.size:
+            for m in sorted(set(orders[waiting].tolist())):
+                self._solve_group(discs, m, waiting[orders[waiting] == m], out)
+            if order is not None:
+                break
+            # Also where the estimate is no number.
+            waiting = waiting[~(out[6, waiting] <= self.tolerance)]
+            for index in waiting[orders[waiting] == FIRST].tolist():
+                out[:, index] = self._solve_rims(discs, index, out[:, index])
+            waiting = waiting[~(out[6, waiting] <= max(self.tolerance, ROUNDING))]
+            for index in waiting[orders[waiting] == LADDER[-1]].tolist():
+                self._refuse(discs, index, out[6, index])
+            orders[waiting] = [higher(int(orders[i]), float(out[6, i]), self.tolerance) for i in waiting]
+        if order is not None and not (out[0] >= 0.0).all():
+            raise FieldError(
+                f"order {order} is too low for a contact next to an edge or another contact: raise it, or leave it out"
+            )
+        return Coupling(*out)
+
+    def _solve_group(self, discs: Discs, order: int, group: NDArray[np.intp], out: Floats) -> None:
+        chunk = max(1, PAIRS_AT_ONCE // ((2 * order + 2) * discs.u.shape[1]) ** 2)
+        for start in range(0, group.size, chunk):
+            index = group[start : start + chunk]
+            try:
+                got, _ = solve_discs(
+                    self.sheet, self.upper_resistance, self.lower_resistance, discs.scenes(index), order
+                )
+            except np.linalg.LinAlgError:
+                if index.size > 1:
+                    for one in index:
+                        self._solve_group(discs, order, np.array([one]), out)
+                else:
+                    out[:, index] = math.nan
+                continue
+            out[:, index] = _numbers(got)
+            out[6, index[~(got.conductance >= 0.0)]] = math.nan
+
+    def _solve_rims(self, discs: Discs, index: int, found: Floats) -> Floats:
+        """Solve one scene that multipoles do not resolve; return what was found by them where this is no better."""
+        one = discs.scenes(np.array([index]))
+        if not near_apex(self.sheet, one):
+            return found
+        got = solve_rims(self.sheet, self.upper_resistance, self.lower_resistance, one, self.tolerance)
+        return found if found[6] <= got.error[0] else _numbers(got)[:, 0]
+
+    def _refuse(self, discs: Discs, index: int, error: float) -> None:
+        places = zip(discs.u[index].tolist(), discs.phi[index].tolist(), discs.radius[index].tolist(), strict=True)
+        named = ", ".join(f"u={u:.6g} m, phi={phi:.6g} rad, radius {a:.6g} m" for u, phi, a in places)
+        raise FieldError(
+            f"the field of scene {index} ({named}) is solved only to about {error:.1g} of the supply, the tolerance is"
+            f" {self.tolerance:g}: leave more room to the apex, to the edges and between contacts, or raise the model's"
+            " tolerance"
+        )
+
+
+def _numbers(coupling: Coupling) -> Floats:
+    return np.array([getattr(coupling, name) for name in ("conductance", "x", "y", "xx", "xy", "yy", "error")])
+
+
+def solve(model: FieldModel, discs: Sequence[Disc], *phases: DrivePhase) -> tuple[Readings, ...]:
+    """Return the readings of one scene of discs in each phase."""
+    coupling = model.discs(discs)
+    return tuple(model.read(coupling, phase) for phase in phases)
+
+
+def solve_many(
+    model: FieldModel,
+    u: ArrayLike,
+    phi: ArrayLike,
+    radius: ArrayLike,
+    conductance: ArrayLike,
+    *phases: DrivePhase,
+) -> tuple[Readings, ...]:
+    """Return the readings of n single contacts in each phase; arguments as for `FieldModel.contacts`."""
+    coupling = model.contacts(u, phi, radius, conductance)
+    return tuple(model.read(coupling, phase) for phase in phases)

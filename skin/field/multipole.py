@@ -1,0 +1,217 @@
+"""Exact solution of round contacts: multipole moments on each disc, coupled by the Green function of the rectangle.
+
+For each scene of k discs the moments Q of the current obey (D + K) Q = f: D from `disc`, K the Fourier
+coefficients of the Green function from circle to circle (the disc's own logarithm removed), f those of the
+difference that the electrodes impose. Scaled from both sides by D^(-1/2) the matrix is well conditioned for every
+conductance.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.errors import FieldError
+
+from .circles import Circles, green_block, make_circles
+from .coupling import Coupling
+from .disc import Discs, bessel_ratios
+from .green import Strip
+from .order import LADDER, higher, truncation
+from .sheet import SectorSheet
+
+__all__ = ["Moments", "solve_discs", "solve_to_tolerance"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moments:
+    """Multipole moments of the current for each unit of h0, hx, hy.
+
+    Attributes:
+        order: M.
+        values: moments (Q_0, Q_1 cos, Q_1 sin, Q_2 cos, ...) of each disc [S], shape (n, k, 2M+1, 3).
+    """
+
+    order: int
+    values: Floats
+
+
+def solve_discs(
+    sheet: SectorSheet,
+    upper_resistance: float,
+    lower_resistance: float,
+    discs: Discs,
+    order: int,
+    points: int | None = None,
+    with_moments: bool = False,
+) -> tuple[Coupling, Moments | None]:
+    """Solve n scenes of k discs at one order.
+
+    Args:
+        sheet: the sheet.
+        upper_resistance: of the sheet with the electrodes A and B [ohm per square].
+        lower_resistance: of the sheet with the electrodes C and D [ohm per square].
+        discs: the scenes, checked.
+        order: M, at least 1.
+        points: N on each circle, above 2M; None takes 2M + 2.
+        with_moments: return the moments too (they take memory).
+
+    Returns:
+        the coupling, its `error` from how fast the last multipoles die away, and the moments if wanted.
+
+    Raises:
+        LinAlgError: a system that far too low an order has made singular.
+    """
+    strip = Strip.of(sheet.length, sheet.breadth)
+    n, k = discs.u.shape
+    size = 2 * order + 1
+    rs = upper_resistance + lower_resistance
+    # The upper sheet has its electrodes across x.
+    a, b = (lower_resistance, upper_resistance) if strip.along_x else (upper_resistance, lower_resistance)
+    circles = make_circles(sheet, strip, discs, order, points or 2 * order + 2, with_images=a != b)
+    ka = np.sqrt(discs.conductance) * (math.sqrt(rs) * discs.radius)
+    ratios = bessel_ratios(ka, order + 1)
+    with np.errstate(divide="ignore"):
+        d0 = 1.0 / (2.0 * math.pi * ka * ratios[:, :, 0])  # I_0/(ka I_1) / 2 pi, in units of rs
+    root = np.sqrt(2.0 * math.pi * np.arange(1, order + 1) * ratios[:, :, :-1] * ratios[:, :, 1:])  # D_m^-1/2
+    # Resistances of the bare sheets in units of rs: they set what a change of the polarisability means.
+    aspects = (
+        upper_resistance / rs * sheet.length / sheet.breadth,
+        lower_resistance / rs * sheet.breadth / sheet.length,
+    )
+    if k == 1:
+        block, aliased = green_block(strip, circles, 0, 0, a / rs, b / rs)
+        return _solve_single(block, aliased, d0[:, 0], root[:, 0], circles, rs, order, aspects, with_moments)
+    scale = np.zeros((n, k, size))
+    scale[:, :, 1::2] = root
+    scale[:, :, 2::2] = root
+    # Unknowns run over the orders first and the discs within: the last multipoles are the last unknowns.
+    matrix, aliasing = np.empty((n, size, k, size, k)), np.zeros(n)
+    for i in range(k):
+        for j in range(i + 1):
+            block, aliased = green_block(strip, circles, i, j, a / rs, b / rs)
+            if i == j:
+                scale[:, i, 0] = 1.0 / np.sqrt(d0[:, i] + block[:, 0, 0])
+            # Between two discs it acts on the charges of both.
+            felt = (scale[:, [i, j], 0] ** 2 + root[:, [i, j], 0] ** 2).min(axis=1)
+            aliasing = np.maximum(aliasing, aliased * felt)
+            matrix[:, :, i, :, j] = block
+            matrix[:, :, j, :, i] = block.transpose(0, 2, 1)
+    scale = np.ascontiguousarray(scale.transpose(0, 2, 1))
+    matrix *= scale[:, :, :, None, None]
+    matrix *= scale[:, None, None, :, :]
+    flat = matrix.reshape(n, size * k, size * k)
+    index = np.arange(k, size * k)
+    flat[:, index, index] += 1.0
+    index = np.arange(k)
+    flat[:, index, index] = 1.0
+    right = np.zeros((n, size, k, 3))
+    right[:, 0, :, 0] = 1.0
+    right[..., 1] = circles.x.transpose(0, 2, 1)
+    right[..., 2] = circles.y.transpose(0, 2, 1)
+    right *= scale[..., None]
+    right_flat = right.reshape(n, size * k, 3)
+    solved: Floats = np.asarray(np.linalg.solve(flat, right_flat), dtype=np.float64)
+    w = right_flat.transpose(0, 2, 1) @ solved / rs
+    w = 0.5 * (w + w.transpose(0, 2, 1))
+    centre = np.stack([circles.x[:, :, 0].mean(axis=1), circles.y[:, :, 0].mean(axis=1)], axis=-1)
+    g = np.maximum(w[:, 0, 0] * rs, 1e-300)
+    reach = np.stack([1.0 / np.sqrt(g), np.full(n, aspects[0] ** 0.5), np.full(n, aspects[1] ** 0.5)], axis=1)
+    norm = reach[:, :, None] * reach[:, None, :]
+    norm[:, 0, 1:] = norm[:, 1:, 0] = np.maximum(1.0 / g, 0.0)[:, None]
+    tails = [_tail(flat, solved, k * (2 * kept + 1), norm) for kept in _kept(order)]
+    coupling = Coupling.of_matrix(w, centre, np.maximum(truncation(order, *tails), aliasing))
+    if not with_moments:
+        return coupling, None
+    values = (solved.reshape(n, size, k, 3) * scale[..., None] / rs).transpose(0, 2, 1, 3)
+    return coupling, Moments(order, values)
+
+
+def _kept(order: int) -> tuple[int, int]:
+    """Return the two lower orders with which the last multipoles are judged."""
+    step = max(order // 4, min(2, order // 2), 1)
+    return max(order - 2 * step, 0), order - step
+
+
+def _tail(matrix: Floats, solved: Floats, first: int, norm: Floats) -> Floats:
+    """Return what the unknowns from `first` on add to the numbers that the electrodes see, at most, shape (n,).
+
+    The change is x^T S x with the Schur complement S of the unknowns before, which is at most the matrix itself.
+    """
+    last = solved[:, first:]
+    change = last.transpose(0, 2, 1) @ (matrix[:, first:, first:] @ last)
+    own = np.sqrt(np.abs(change[:, [0, 1, 2], [0, 1, 2]]))
+    return np.asarray((own[:, :, None] * own[:, None, :] * norm).max(axis=(1, 2)))
+
+
+def _solve_single(
+    block: Floats,
+    aliased: Floats,
+    d0: Floats,
+    root: Floats,
+    circles: Circles,
+    rs: float,
+    order: int,
+    aspects: tuple[float, float],
+    with_moments: bool,
+) -> tuple[Coupling, Moments | None]:
+    """Solve one disc in each scene; eliminating the total current first keeps even a weak contact exact."""
+    n, size = block.shape[0], 2 * order
+    scale = np.repeat(root, 2, axis=1)
+    inner = block[:, 1:, 1:] * scale[:, :, None] * scale[:, None, :]
+    index = np.arange(size)
+    inner[:, index, index] += 1.0
+    right = np.empty((n, size, 3))
+    right[:, :, 0] = block[:, 1:, 0]
+    right[:, :, 1] = circles.x[:, 0, 1:]
+    right[:, :, 2] = circles.y[:, 0, 1:]
+    right *= scale[:, :, None]
+    solved: Floats = np.asarray(np.linalg.solve(inner, right), dtype=np.float64)
+    gram = right.transpose(0, 2, 1) @ solved
+    spread = d0 + (block[:, 0, 0] - gram[:, 0, 0])
+    x = circles.x[:, 0, 0] - gram[:, 0, 1]
+    y = circles.y[:, 0, 0] - gram[:, 0, 2]
+    reach = np.empty((n, 3))
+    reach[:, 0], reach[:, 1:] = 1.0 / np.sqrt(np.abs(spread)), np.sqrt(aspects)
+    norm = reach[:, :, None] * reach[:, None, :]
+    # X and Y themselves, and the rest relative to the conductances beside it.
+    norm[:, 0, 1:] = norm[:, 1:, 0] = 1.0
+    error = truncation(order, *(_tail(inner, solved, 2 * kept, norm) for kept in _kept(order)))
+    error = np.maximum(error, aliased * (1.0 / np.abs(spread) + root[:, 0] ** 2))
+    coupling = Coupling(1.0 / (rs * spread), x, y, gram[:, 1, 1] / rs, gram[:, 1, 2] / rs, gram[:, 2, 2] / rs, error)
+    if not with_moments:
+        return coupling, None
+    values = np.empty((n, 1, size + 1, 3))
+    total = coupling.conductance[:, None] * np.stack([np.ones(n), x, y], axis=-1)
+    values[:, 0, 0] = total
+    rest = -solved[:, :, :1] * total[:, None, :] * rs
+    rest[:, :, 1:] += solved[:, :, 1:]
+    values[:, 0, 1:] = rest * scale[:, :, None] / rs
+    return coupling, Moments(order, values)
+
+
+def solve_to_tolerance(
+    sheet: SectorSheet, upper_resistance: float, lower_resistance: float, discs: Discs, order: int, tolerance: float
+) -> tuple[Coupling, Moments]:
+    """Solve one scene by multipoles at the first order from `order` on whose error is within the tolerance.
+
+    Raises:
+        FieldError: even the highest order misses it.
+    """
+    while True:
+        coupling, moments = solve_discs(sheet, upper_resistance, lower_resistance, discs, order, with_moments=True)
+        assert moments is not None
+        if coupling.error[0] <= tolerance:
+            return coupling, moments
+        if order == LADDER[-1]:
+            raise FieldError(
+                f"{order} multipoles leave an error of {coupling.error[0]:.1g} of the supply, above the tolerance"
+                f" {tolerance:g}: a disc all but touches the apex, an edge or another disc; make it smaller, or raise"
+                " the model's tolerance"
+            )
+        order = higher(order, float(coupling.error[0]), tolerance)

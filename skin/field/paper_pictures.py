@@ -1,0 +1,154 @@
+"""Pictures of the paper's experiment beside the model: figures 16 and 17, Table 2, and what hangs on inference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import FieldModel
+from .paper_experiment import POINT_CONTACT, Experiment, Sensitivity, lead_errors
+from .paper_tables import TABLE_2_RADIUS_MM, decode_errors
+from .pictures import make_figure
+
+__all__ = ["draw_experiment", "draw_places", "draw_point_contacts", "draw_sensitivities"]
+
+Floats = NDArray[np.float64]
+
+_PAPER, _OURS, _LEFT = "tab:green", "tab:blue", "tab:red"
+
+
+def draw_point_contacts(path: Path, model: FieldModel) -> None:
+    """Draw figure 16: errors of a point contact. The paper gives their bounds, not its points.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    figure, panels = make_figure(9.0, 4.0, columns=2)
+    r, theta = np.linspace(104.0, 196.0, 70), np.linspace(4.0, 86.0, 70)
+    middle_r, middle_theta = np.full(70, 150.0), np.full(70, 45.0)
+    point_r = decode_errors(model, r * 1e-3, np.radians(middle_theta), 1e-3)[0] * 1e3
+    point_theta = np.degrees(decode_errors(model, middle_r * 1e-3, np.radians(theta), 1e-3)[1])
+    for axes, place, exact, bound, names, which in (
+        (panels[0], r, point_r, POINT_CONTACT[0], ("r [mm], at 45 deg", "error of r [mm]"), 0),
+        (panels[1], theta, point_theta, POINT_CONTACT[1], ("theta [deg], at 150 mm", "error of theta [deg]"), 1),
+    ):
+        axes.axhspan(-bound, bound, color=_PAPER, alpha=0.15, lw=0, label=f"paper: all within {bound:g}")
+        axes.plot(place, exact, color=_OURS, lw=1.6, label="model: disc of 1 mm, bonded")
+        for share, style in ((0.005, "--"), (0.01, ":")):
+            across_r, across_theta = (r, middle_theta) if which == 0 else (middle_r, theta)
+            off = lead_errors(model, across_r, across_theta, share)[which]
+            axes.plot(
+                place, off, style, color="gray", lw=1.2, label=f"... with driven leads of {share:.1%} of the sheet"
+            )
+        axes.set_xlabel(names[0])
+        axes.set_ylabel(names[1])
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=7, loc="lower left")
+    panels[0].set_title("figure 16a", fontsize=10)
+    panels[1].set_title("figure 16b", fontsize=10)
+    figure.savefig(path, dpi=130)
+
+
+def draw_places(path: Path, table: Experiment) -> None:
+    """Draw figure 17: the contacts of Table 2, where the paper's sensor saw them, and where the model sees them.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    figure, (axes,) = make_figure(6.4, 5.6)
+    turn = np.linspace(0.0, 2.0 * np.pi, 200)
+    paper, ours = table.places + table.paper, table.places + table.ours
+    for number, place in enumerate(table.places):
+        x, y = _flat(place[None])
+        rim = x + TABLE_2_RADIUS_MM * np.cos(turn), y + TABLE_2_RADIUS_MM * np.sin(turn)
+        axes.fill(*rim, color="lightgray", label="contact, radius 9.5 mm" if number == 0 else None)
+        axes.plot(x, y, "k+", ms=9, label="its middle" if number == 0 else None)
+        axes.annotate(str(number + 1), (float(x[0]) + 5.5, float(y[0]) + 5.5), fontsize=9)
+    axes.plot(*_flat(paper), "s", color=_PAPER, ms=6, label="seen by the paper's sensor")
+    axes.plot(*_flat(ours), "o", color=_OURS, ms=5, mfc="none", label="seen according to the model")
+    radii, angles = np.linspace(125.0, 175.0, 3), np.linspace(25.0, 65.0, 5)
+    for r in radii:
+        axes.plot(*_flat(np.stack([np.full(50, r), np.linspace(25.0, 65.0, 50)], axis=1)), color="gray", lw=0.5)
+        axes.annotate(f"{r:g} mm", tuple(float(v[0]) for v in _flat(np.array([[r, 24.0]]))), fontsize=7, va="top")
+    for angle in angles:
+        axes.plot(*_flat(np.stack([np.linspace(125.0, 175.0, 9), np.full(9, angle)], axis=1)), color="gray", lw=0.5)
+        axes.annotate(f"{angle:g}°", tuple(float(v[0]) for v in _flat(np.array([[177.0, angle]]))), fontsize=7)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [mm]")
+    axes.set_ylabel("y [mm]")
+    axes.legend(fontsize=8, loc="lower left")
+    axes.set_title("figure 17: contacts of Table 2 and the places decoded for them", fontsize=10)
+    figure.savefig(path, dpi=130)
+
+
+def draw_experiment(path: Path, table: Experiment) -> None:
+    """Draw Table 2: the paper's errors, ours, and the residuals with their mean.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    figure, panels = make_figure(9.0, 4.0, columns=2)
+    names = [f"{r:g} mm\n{theta:g} deg" for r, theta in table.places]
+    at = np.arange(len(names))
+    for axis, (axes, unit, name) in enumerate(zip(panels, ("mm", "deg"), ("r", "theta"), strict=True)):
+        left = table.residuals[:, axis]
+        for shift, values, colour, label in (
+            (-0.27, table.paper[:, axis], _PAPER, "paper"),
+            (0.0, table.ours[:, axis], _OURS, "model"),
+            (0.27, left, _LEFT, "residual"),
+        ):
+            axes.bar(at + shift, values, 0.25, color=colour, label=label)
+        axes.axhline(left.mean(), color=_LEFT, lw=1.0, ls="--", label=f"its mean {left.mean():.2f} {unit}")
+        for x, value in zip(at, left, strict=True):
+            off = value - left.mean()
+            axes.annotate(f"{off:+.2f}", (x + 0.27, 0.5 * value), ha="center", fontsize=7, color="white", rotation=90)
+        axes.axhline(0.0, color="black", lw=0.8)
+        axes.set_xticks(at, names, fontsize=8)
+        axes.set_ylabel(f"error of {name} [{unit}]")
+        axes.set_ylim(1.45 * float(min(left.min(), table.paper[:, axis].min())), None)
+        axes.legend(fontsize=8, ncols=2, loc="lower center")
+        axes.set_title(f"{name}: residuals spread by {np.ptp(left):.2f} {unit}", fontsize=10)
+    figure.suptitle("Table 2: numbers at the residuals are their distances from the mean", fontsize=10)
+    figure.savefig(path, dpi=130)
+
+
+def draw_sensitivities(path: Path, found: Sequence[Sensitivity]) -> None:
+    """Draw what each assumption makes of figures 11b and 12b and of Table 2's residuals.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    figure, panels = make_figure(12.0, 4.4, columns=4)
+    at = np.arange(len(found))[::-1]
+    columns: tuple[tuple[str, list[float], list[float] | None, float | None], ...] = (
+        ("fig. 11b: largest r error [mm]", [s.fig_11b_mm for s in found], None, 3.5),
+        ("fig. 12b: largest theta error [deg]", [s.fig_12b_deg for s in found], None, 1.9),
+        ("Table 2: residual of r [mm]", [s.mean[0] for s in found], [s.spread[0] for s in found], None),
+        ("Table 2: residual of theta [deg]", [s.mean[1] for s in found], [s.spread[1] for s in found], None),
+    )
+    for number, (axes, (title, values, spread, paper)) in enumerate(zip(panels, columns, strict=True)):
+        if spread is None:
+            axes.barh(at, values, color=_OURS)
+        else:
+            axes.errorbar(values, at, xerr=0.5 * np.array(spread), fmt="o", color=_LEFT, capsize=3, ms=4)
+            axes.axvline(0.0, color="black", lw=0.8)
+        if paper is not None:
+            axes.axvline(paper, color=_PAPER, lw=2.0, label=f"paper: {paper:g}")
+            axes.legend(fontsize=8, loc="lower right")
+        axes.set_yticks(at, [s.assumption.name for s in found] if number == 0 else [], fontsize=8)
+        axes.set_title(title, fontsize=9)
+        axes.grid(alpha=0.3, axis="x")
+    figure.suptitle(
+        "What hangs on inference; Table 2: mean of the residuals, the bar is their whole spread", fontsize=10
+    )
+    figure.savefig(path, dpi=130)
+
+
+def _flat(places: Floats) -> tuple[Any, Any]:
+    """Return (x, y) [mm] of places (r [mm], theta [deg]), shape (n, 2)."""
+    r, theta = places[:, 0], np.radians(places[:, 1])
+    return r * np.cos(theta), r * np.sin(theta)

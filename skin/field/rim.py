@@ -1,0 +1,218 @@
+"""Discs whose rims all but touch the apex, solved on points of the rims instead of by multipoles.
+
+Outside, a disc acts like a layer of charge (L_k - L_0) d / (Ru + Rl) on its rim, with L_k the map from the potential
+on the rim to its normal derivative where lap d = k^2 d inside. Inside, d is the potential of a layer mu of
+K_0(k r) / 2 pi. Both Green functions' logarithms are integrated by `rim_points.log_weights`. What L_k and L_0 have in
+common is taken out by hand, so that a weak contact keeps its digits. Beside an edge or another disc, which lie along
+the rim and are no point as the apex is, the multipoles' exact images do better.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .circles import pair_points
+from .coupling import Coupling
+from .disc import Discs
+from .green import Strip, kernel
+from .rim_points import RimPoints, log_weights
+from .sheet import SectorSheet
+
+__all__ = ["near_apex", "solve_rims"]
+
+Floats = NDArray[np.float64]
+
+_DENSITIES = (16, 24, 36, 54)  # points for each scale; from change to change the error's rest is estimated
+_MOST_POINTS = 2400  # unknowns, beyond which a solution takes more than seconds
+_SERIES_BELOW = 2.0  # kr below which the Bessel functions' small parts come from their series
+_WINDOW = 8.0  # kr beyond which the logarithm of K_0 is no longer split off: K_0 is smooth there, and I_0 large
+
+
+def near_apex(sheet: SectorSheet, discs: Discs) -> bool:
+    """Tell whether a disc of one scene is so near the apex that multipoles die away slower than exp(-m/3)."""
+    stretch = sheet.stretch(discs.u)
+    return bool(
+        (np.log(np.maximum(stretch, 1e-300) / (abs(sheet.curvature) * discs.radius + 1e-300)) < 1.0 / 6.0).any()
+    )
+
+
+def solve_rims(
+    sheet: SectorSheet, upper_resistance: float, lower_resistance: float, discs: Discs, tolerance: float
+) -> Coupling:
+    """Solve one scene of k discs.
+
+    Args:
+        sheet: the sheet.
+        upper_resistance: of the sheet with the electrodes A and B [ohm per square].
+        lower_resistance: of the sheet with the electrodes C and D [ohm per square].
+        discs: one scene, checked.
+        tolerance: of the supply, at which to stop.
+
+    Returns:
+        the coupling; its error is above the tolerance, or not finite, where that could not be met.
+    """
+    best: Coupling | None = None
+    units = (
+        upper_resistance * sheet.length / sheet.breadth,
+        math.sqrt(upper_resistance * lower_resistance),
+        lower_resistance * sheet.breadth / sheet.length,
+    )
+    x, y = np.array([sheet.along(discs.u)[0].mean() / sheet.length]), np.array([(discs.phi / sheet.wrap).mean()])
+    before = math.inf
+    for density in _DENSITIES:
+        w = _solve(sheet, upper_resistance, lower_resistance, discs, density)
+        if w is None:
+            break
+        got = Coupling.of_matrix(w[None], np.zeros((1, 2)))
+        error = math.inf
+        if best is not None:
+            changes = [got.conductance / best.conductance - 1.0, got.x + x - best.x, got.y + y - best.y]
+            changes += [
+                (getattr(got, n) - getattr(best, n)) * r for n, r in zip(("xx", "xy", "yy"), units, strict=True)
+            ]
+            change = max(float(np.abs(v[0])) for v in changes)
+            # The rest of a geometric series, once it is known to be one.
+            error = change if change > 0.1 * before or math.isinf(before) else 10.0 * change * change / before
+            before = change
+        best = Coupling(got.conductance, got.x + x, got.y + y, got.xx, got.xy, got.yy, np.array([error]))
+        if error <= tolerance:
+            break
+    if best is None:
+        nothing = np.full(1, math.nan)
+        return Coupling(nothing, nothing, nothing, nothing, nothing, nothing, np.full(1, math.inf))
+    return best
+
+
+def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density: int) -> Floats | None:
+    """Return W about the middle of the centres [S], shape (3, 3), or None where it would take too many points."""
+    strip = Strip.of(sheet.length, sheet.breadth)
+    rs = upper + lower
+    k = discs.u.shape[1]
+    decay = np.where(np.isfinite(discs.conductance), np.sqrt(discs.conductance * rs) * discs.radius, 0.0)[0]
+    density *= math.ceil(max(1.0, float(decay.max()) / 3.0))
+    points = RimPoints.of(sheet, strip, discs, density)
+    n = points.t.size
+    if n * k > _MOST_POINTS:
+        return None
+    weights = log_weights(n)
+    matrix, charges, wanted = np.empty((k, n, k, n)), [], np.empty((k, n, 3))
+    x, y = sheet.along(discs.u)[0][0] / sheet.length, sheet.across(discs.phi)[0][0] / sheet.breadth
+    offset = points.offset[0] / strip.scale
+    for i in range(k):
+        touching = float(discs.conductance[0, i])
+        layer, charge = _inside(points, i, float(discs.radius[0, i]), math.sqrt(touching * rs), weights)
+        charges.append(charge)
+        wanted[i, :, 0] = 1.0
+        wanted[i, :, 1] = x[i] - x.mean() + offset[i].real / sheet.length
+        wanted[i, :, 2] = y[i] - y.mean() + offset[i].imag / sheet.breadth
+        for j in range(k):
+            matrix[i, :, j, :] = layer if i == j else 0.0
+    a, b = (lower, upper) if strip.along_x else (upper, lower)
+    for i in range(k):
+        for j in range(k):
+            matrix[i, :, j, :] += _green(strip, points, i, j, a / rs, b / rs, weights) @ charges[j]
+    try:
+        solved = np.linalg.solve(matrix.reshape(k * n, k * n), wanted.reshape(k * n, 3)).reshape(k, n, 3)
+    except np.linalg.LinAlgError:
+        return None
+    w = sum(wanted[i].T @ (charges[i] @ solved[i]) for i in range(k)) / rs
+    return np.asarray(0.5 * (w + w.T)) if np.isfinite(w).all() else None
+
+
+def _green(strip: Strip, points: RimPoints, i: int, j: int, a: float, b: float, weights: Floats) -> Floats:
+    """Return Ra G_a + Rb G_b from the charge of each point of disc j to each point of disc i, shape (N, N)."""
+    n = points.t.size
+    first, second, weight_i, weight_j, centre = pair_points(strip, points, i, j, a == b)
+    if i == j:
+        slope = points.slope[:, i] * np.abs(1.0 + first.direct)
+        lag = _lag(points.t)
+        values = kernel(strip, first, second, a, b, lag * lag, slope * slope)
+        values -= (a + b) / (4.0 * math.pi) * (n / (2.0 * math.pi)) * weights
+    else:
+        values = kernel(strip, first, second, a, b)
+    values += (b / math.pi) * (
+        (weight_i[:, None] * first.s)[:, :, None]
+        + (weight_j[:, None] * second.s)[:, None, :]
+        - first.s[:, :, None] * second.s[:, None, :] / strip.sigma
+        + centre[:, None, None]
+    )
+    return np.asarray(values[0])
+
+
+def _lag(t: Floats) -> Floats:
+    """Return |2 sin((t - t')/2)|, ones on the diagonal."""
+    lag = np.abs(2.0 * np.sin(0.5 * (t[:, None] - t[None, :])))
+    np.fill_diagonal(lag, 1.0)
+    return lag
+
+
+def _inside(points: RimPoints, i: int, a: float, k: float, weights: Floats) -> tuple[Floats, Floats]:
+    """Return d on the rim and the charge of each point times Ru + Rl, for each unit of the unknown layer.
+
+    Args:
+        points: the rims.
+        i: the disc.
+        a: its radius [m].
+        k: of lap d = k^2 d inside [1/m]; inf is a perfect bond, where d = 0 and the charge itself is the unknown.
+        weights: of `log_weights`.
+    """
+    n = points.t.size
+    if math.isinf(k):
+        return np.zeros((n, n)), np.eye(n)
+    theta, speed = points.theta[i], points.speed[i]
+    step = 2.0 * math.pi / n
+    chord = 2.0 * np.abs(np.sin(0.5 * (theta[:, None] - theta[None, :])))
+    np.fill_diagonal(chord, 1.0)
+    log_lag = 2.0 * np.log(_lag(points.t))
+    ka = k * a
+    i0, i1, r0, r1 = _small_parts(ka * chord)
+    index = np.arange(n)
+    # Each function of kr is (coefficient) ln(4 sin^2((t-t')/2)) + (smooth); on the diagonal both vanish.
+    rest0, rest1 = r0 + 0.5 * i0 * log_lag, r1 - 0.5 * i1 * log_lag
+    log = 2.0 * np.log(chord) - log_lag
+    log[index, index] = 2.0 * np.log(speed)
+    for array in (i0, i1, rest0, rest1):
+        array[index, index] = 0.0
+    # Arc lengths in units of the radius. K_0(kr) = -ln(kr/2) - gamma + r0, k r K_1(kr) = 1 + r1.
+    harmonic = (-0.5 * weights - step * 0.5 * log) * speed / (2.0 * math.pi)
+    grown = (-0.5 * weights * i0 + step * rest0) * speed / (2.0 * math.pi)
+    slope = -(0.5 * weights * i1 + step * rest1) * speed / (4.0 * math.pi)
+    mean = step * speed / (2.0 * math.pi)
+    single = harmonic + grown - (math.log(0.5 * ka) + np.euler_gamma) * mean
+    # L_0 of the part that the harmonic layer does not share with mu: no net charge, and a constant c.
+    system = np.zeros((n + 1, n + 1))
+    system[:n, :n], system[:n, n], system[n, :n] = harmonic, 1.0, mean
+    apart = np.linalg.solve(system, np.vstack([grown, np.zeros(n)]))[:n]
+    return single, (slope - 0.5 * apart) * (step * speed)[:, None]
+
+
+def _small_parts(x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return I_0(x) - 1 and x I_1(x), damped beyond the window, K_0 + ln(x/2) + gamma, and x K_1 - 1."""
+    from scipy import special  # few touches are so near the apex, and its import takes longer than all the rest
+
+    log = np.log(0.5 * x) + np.euler_gamma
+    quarter = 0.25 * np.minimum(x, _SERIES_BELOW) ** 2
+    term, harmonic = np.ones_like(x), 0.0
+    i0, i1, p0, p1 = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    for j in range(1, 17):
+        # term = (x/2)^(2j-2) / ((j-1)!)^2
+        i1 += term / j
+        p1 += term / j * (2.0 * harmonic + 1.0 / j)
+        term = term * quarter / (j * j)
+        harmonic += 1.0 / j
+        i0 += term
+        p0 += term * harmonic
+    i1, p1 = 2.0 * quarter * i1, quarter * p1
+    r0, r1 = p0 - log * i0, log * i1 - p1
+    large = x > _SERIES_BELOW
+    if large.any():
+        far = x[large]
+        r0[large] = special.k0(far) + log[large]
+        r1[large] = far * special.k1(far) - 1.0
+        window = np.exp(-((far / _WINDOW) ** 12)) if float(far.max()) > 2.0 * _WINDOW else 1.0
+        i0[large] = special.ive(0, far) * np.exp(np.minimum(far, 600.0)) * window - 1.0
+        i1[large] = far * special.ive(1, far) * np.exp(np.minimum(far, 600.0)) * window
+    return i0, i1, r0, r1

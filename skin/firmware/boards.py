@@ -1,0 +1,102 @@
+"""Tables of the boards that the sketch runs on, and of converters: their pins, read from the sketch itself."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+__all__ = ["BUILT_IN", "Board", "Converter", "board_header", "boards", "converters", "firmware_folder"]
+
+_ROW = re.compile(r"^const Board BOARD = \{(.*)\};$", re.MULTILINE)
+_CONVERTER = re.compile(r'^const Converter CONVERTER = \{"(ads\d+)", (.*)\};$', re.MULTILINE)
+_CHOICE = "#define CONESKIN_ADS "
+_HEADER = Path("coneskin") / "coneskin_board.h"
+_WORD = re.compile(r'"([^"]*)"|\{([^{}]*)\}|([^,{}\s]+)')
+_NO_PIN = "NONE"
+
+
+class Board(NamedTuple):
+    """A row of the sketch's table; pins are named as on the board."""
+
+    name: str
+    bits: int  #: of the converter
+    baud: int  #: of the serial port [bit/s]; one with USB of its own ignores it
+    sense: tuple[str, ...]  #: channels of the electrodes A, B, C, D
+    current: str  #: channel of the amplifier over the shunt
+    supply: str  #: channel of the rail
+    rail: tuple[str, ...]  #: gates of the switches from the rail to A, B, C, D
+    ground: tuple[str, ...]  #: pins that drive A, B, C, D to ground
+    pull_down: tuple[str, ...]  #: pins of the resistors of C and D
+    select: tuple[str, ...]  #: address pins of an analog multiplexer; empty where there is none
+    common: str  #: pin of its output; empty where there is none
+
+
+class Converter(NamedTuple):
+    """A row of the sketch's table of converters that stand in for a board's own."""
+
+    name: str  #: such as "ads1115"
+    bits: int
+    volts: float  #: of its highest count [V]
+    extra_bits: int  #: that the sketch's usual setting adds
+    rate_hz: int  #: frames per second of the usual setting
+    permille: int  #: of the range that the sketch takes for the rail
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Inputs of its chips for the electrodes A, B, C, D, the current and the rail."""
+        return tuple(f"0x{0x48 + n // 4:x} AIN{n % 4}" for n in range(6))
+
+
+#: name of a board's own converter
+BUILT_IN = "built-in"
+
+
+def firmware_folder() -> Path:
+    """Return the folder of the firmware: the sketch's folder ``coneskin``, and the test vectors beside it."""
+    return Path(__file__).parent
+
+
+def boards() -> dict[str, Board]:
+    """Return the rows of the table by name, in its order."""
+    text = (firmware_folder() / _HEADER).read_text(encoding="utf-8")
+    return {board.name: board for board in map(_board, _ROW.findall(text))}
+
+
+def converters() -> dict[str, Converter]:
+    """Return the rows of the table of converters by name, in its order."""
+    text = (firmware_folder() / _HEADER).read_text(encoding="utf-8")
+    found = {}
+    for name, row in _CONVERTER.findall(text):
+        bits, millivolts, _, _, _, extra_bits, _, rate, permille, _ = (w[1] or w[2] for w in _WORD.findall(row))
+        found[name] = Converter(name, int(bits), 1e-3 * int(millivolts), int(extra_bits), int(rate), int(permille))
+    return found
+
+
+def board_header(converter: str = BUILT_IN) -> bytes:
+    """Return the sketch's header with the tables, set to a converter."""
+    data = (firmware_folder() / _HEADER).read_bytes()
+    number = converter.removeprefix("ads") if converter != BUILT_IN else "0"
+    return data.replace(f"{_CHOICE}0\n".encode(), f"{_CHOICE}{number}\n".encode())
+
+
+def _board(row: str) -> Board:
+    words = [listed or quoted or word for quoted, listed, word in _WORD.findall(row)]
+    name, bits, baud, sense, current, supply, rail, ground, pull_down, select, common = words
+    return Board(
+        name=name,
+        bits=int(bits),
+        baud=int(baud),
+        sense=_pins(sense),
+        current=current,
+        supply=supply,
+        rail=_pins(rail),
+        ground=_pins(ground),
+        pull_down=_pins(pull_down),
+        select=_pins(select),
+        common="".join(_pins(common)),
+    )
+
+
+def _pins(listed: str) -> tuple[str, ...]:
+    return tuple(pin for pin in listed.split(", ") if pin != _NO_PIN)

@@ -1,0 +1,1 @@
+"""Sources: the bytes of a real sensor."""

@@ -1,0 +1,177 @@
+"""Serial port through pyserial: any of its URLs, and the quickest way to the bytes that the system has.
+
+Where there is a descriptor, a read is ``poll`` and ``os.read``, which wakes as soon as the first byte is there and
+takes all that have come. Where there is none (Windows, loop://) pyserial's own read is used.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import select
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from coneskin.errors import MissingExtra, SkinConnectionError, SkinTimeout
+
+from .port_list import list_ports
+from .source import Source
+
+__all__ = ["SerialPort"]
+
+_MAX_READ = 4096  # bytes in one read
+_DISCONNECTED = {errno.EIO, errno.ENXIO, errno.ENODEV, errno.EBADF, errno.ECONNRESET, errno.ENOTCONN}
+
+
+class SerialPort(Source):
+    """Source of bytes from a serial port.
+
+    Args:
+        port: a device (``/dev/ttyACM0``, ``COM3``) or any pyserial URL: ``hwgrep://1234:5678``, ``socket://host:port``,
+            ``rfc2217://``, ``loop://``, ``spy://``.
+        baud: bits per second; a device with USB of its own ignores it.
+
+    Attributes:
+        name: the device or URL.
+        low_latency: the driver was told not to hold bytes back (an FTDI adapter otherwise waits 16 ms); False where
+            that is not possible or not needed.
+    """
+
+    def __init__(self, port: str, baud: int = 921600) -> None:
+        self.name = port
+        self.baud = baud
+        self.low_latency = False
+        self._port: Any = None
+        self._descriptor: int | None = None
+        self._wait: Callable[[float], bool] = _never
+
+    def open(self) -> None:
+        """Open the port for this process alone, and throw away what had piled up in it.
+
+        Raises:
+            SkinConnectionError: no such port, busy, not permitted, or an URL that pyserial does not know.
+            MissingExtra: pyserial is not installed.
+        """
+        if self._port is not None:
+            return
+        try:
+            import serial
+        except ImportError as error:
+            raise MissingExtra("pyserial", "reading a serial port") from error
+        try:
+            port = serial.serial_for_url(self.name, self.baud, timeout=0, exclusive=True)
+        except (serial.SerialException, OSError, ValueError, KeyError, re.error) as error:  # of odd URLs the last two
+            raise SkinConnectionError(_explain(self.name, error)) from error
+        self._port = port
+        try:
+            port.set_low_latency_mode(True)
+            self.low_latency = True
+        except (AttributeError, NotImplementedError, ValueError, OSError):
+            self.low_latency = False  # no such switch here: a pseudo-terminal, a socket, not Linux
+        self._descriptor = _descriptor(port)
+        if self._descriptor is not None:
+            self._wait = _waiter(self._descriptor)
+
+    def close(self) -> None:
+        """Close the port; it does not matter whether it is open or still there."""
+        port, self._port, self._descriptor = self._port, None, None
+        self._wait = _never
+        if port is not None:
+            with suppress(OSError):  # a port that was pulled out cannot be closed any better than this
+                port.close()
+
+    def fileno(self) -> int | None:
+        """Return the port's descriptor, or None where the system or the kind of URL has none."""
+        return self._descriptor
+
+    def read(self, timeout: float) -> bytes:
+        """Wait for bytes, as every Source does."""
+        if self._port is None:
+            raise SkinConnectionError(f"{self.name} is not open: call open, or read it inside a with")
+        descriptor = self._descriptor
+        if descriptor is None:
+            return self._read_by_pyserial(timeout)
+        deadline = time.monotonic() + timeout
+        left = timeout
+        while True:
+            try:
+                if self._wait(left):
+                    data = os.read(descriptor, _MAX_READ)
+                    if data:
+                        return data
+                    raise SkinConnectionError(f"{self.name} is gone: the other end closed it")
+            except (BlockingIOError, InterruptedError):
+                pass  # another reader, or a signal, was quicker
+            except SkinConnectionError:
+                raise
+            except OSError as error:
+                raise SkinConnectionError(f"{self.name} is gone: {error.strerror or error}") from error
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
+
+    def _read_by_pyserial(self, timeout: float) -> bytes:
+        port = self._port
+        try:
+            port.timeout = timeout
+            data: bytes = port.read(1)
+            if data:
+                more = min(port.in_waiting, _MAX_READ - 1)
+                return data + port.read(more) if more else data
+        except OSError as error:  # SerialException is one
+            raise SkinConnectionError(f"{self.name} is gone: {error}") from error
+        raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
+
+
+def _never(_: float) -> bool:
+    return False
+
+
+def _descriptor(port: Any) -> int | None:
+    """Return the port's descriptor if this system can wait on it."""
+    if sys.platform == "win32":
+        return None
+    try:
+        return int(port.fileno())
+    except (AttributeError, OSError, ValueError):  # io.UnsupportedOperation is both
+        return None
+
+
+def _waiter(descriptor: int) -> Callable[[float], bool]:
+    """Return a function that waits up to so many seconds for the descriptor to be readable."""
+    if hasattr(select, "epoll") or (hasattr(select, "poll") and sys.platform != "darwin"):
+        poll = select.poll()
+        poll.register(descriptor, select.POLLIN)
+
+        def wait_by_poll(timeout: float) -> bool:
+            return bool(poll.poll(-(-max(timeout, 0.0) * 1e3 // 1)))  # rounded up to whole milliseconds
+
+        return wait_by_poll
+
+    def wait_by_select(timeout: float) -> bool:  # macOS cannot poll terminals
+        return bool(select.select([descriptor], (), (), max(timeout, 0.0))[0])
+
+    return wait_by_select
+
+
+def _explain(url: str, error: Exception) -> str:
+    """Say in one line which port, why, and what to do."""
+    code = getattr(error, "errno", None)
+    text = str(error)
+    low = text.lower()
+    if code == errno.EACCES or "access is denied" in low or "permission" in low:
+        return f"{url}: not permitted; on Linux, add yourself to the port's group (mostly dialout) and log in again"
+    if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in low or "busy" in low:
+        return f"{url}: busy, another program has it open"
+    if isinstance(error, ValueError | KeyError | re.error):
+        return f"{url}: not a port or URL that pyserial knows ({text}); write a device, COM3 or socket://host:port"
+    if code == errno.ENOENT or "no ports found" in low or "filenotfound" in low:
+        present = ", ".join(list_ports()) or "none at all"
+        return f"{url}: no such port; present: {present}"
+    if code == errno.ECONNREFUSED or "refused" in low:
+        return f"{url}: refused, no program listens there; start it, or correct the port"
+    return f"{url}: cannot be opened ({text})"

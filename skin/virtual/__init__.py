@@ -1,0 +1,1 @@
+"""Virtual skin: a sensor in software, with faults on demand."""

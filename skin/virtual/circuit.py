@@ -1,0 +1,208 @@
+"""Electronics around the sheets: the converter's inputs in each phase, given the sheets as a four-port.
+
+Two sheets and any contacts between them are one reciprocal linear network with four terminals, I = Y V in the order
+A, B, C, D. Where Y comes from (ideal resistors, or the exact field) is the business of a ``ContactModel``; the supply,
+the leads, the pull-downs, broken wires and shorts are the same for each and are here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+from coneskin.errors import SensorError
+from coneskin.skin.sensor import Sensor
+
+__all__ = ["ContactModel", "ConverterInputs", "LayerContact", "Matrix", "WiringFaults", "measure", "solve"]
+
+Matrix = tuple[tuple[float, ...], ...]
+_A, _B, _C, _D = range(4)
+_TERMINALS = "ABCD"
+_RAILS = ("ground", "supply", "rail")
+_SHORT_CONDUCTANCE = 10.0  # S; a solid metallic short, 0.1 ohm
+
+
+class LayerContact(NamedTuple):
+    """A contact between the two layers."""
+
+    u: float  #: slant distance of the middle from end 1 [m]
+    phi: float  #: azimuth of the middle [rad]
+    conductance: float  #: between the layers, all of the contact [S]
+    radius: float = 0.0  #: of a round contact [m]; 0 for a point
+    reach: float = 0.0  #: the radius that it will have at its firmest [m]; 0: this one
+
+
+class ContactModel(Protocol):
+    """A model of the sheets and their contacts as seen from the four electrodes."""
+
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
+        """Return for each scene of contacts the 4 x 4 matrix Y [S] of the bare sheets, in the order A, B, C, D.
+
+        Each is symmetric, and its rows sum to zero. Scenes of the same contacts, more or less firm, are cheap together.
+        """
+        ...
+
+    def prepare(self, sensor: Sensor, contact: LayerContact) -> None:
+        """Compute beforehand what would take long when the sensor is touched there."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class WiringFaults:
+    """Broken wires and shorts between the electronics and the sheets.
+
+    Attributes:
+        opened: electrodes whose wire is open.
+        shorts: pairs that are joined: two electrodes, or one of them and "ground", "supply" (before the current is
+            measured) or "rail" (behind that: a switch that is stuck).
+
+    Raises:
+        SensorError: a name is none of these.
+    """
+
+    opened: tuple[str, ...] = ()
+    shorts: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in self.opened:
+            if name not in tuple(_TERMINALS):
+                raise SensorError(f"an open wire must be one of A, B, C, D, got {name!r}")
+        for pair in self.shorts:
+            if not (len(pair) == 2 and pair[0] in tuple(_TERMINALS) and pair[1] in (*_TERMINALS, *_RAILS)):
+                raise SensorError(
+                    "a short must join one of A, B, C, D with another of them, with ground, supply or rail, "
+                    f"got {'-'.join(pair)!r}"
+                )
+
+
+class ConverterInputs(NamedTuple):
+    """The converter's inputs in one frame, in volts and amperes."""
+
+    touch_c: float
+    touch_d: float
+    touch_current: float
+    radial_c: float
+    radial_d: float
+    radial_current: float
+    angular_a: float
+    angular_b: float
+    angular_current: float
+    touch_supply: float
+    radial_supply: float
+    angular_supply: float
+    touch_a: float  #: from here on: the driven electrodes' own potentials
+    touch_b: float
+    radial_a: float
+    radial_b: float
+    angular_c: float
+    angular_d: float
+
+
+_Terminal = Literal["supply", "ground", "pulldown", "input"]
+
+
+def measure(sensor: Sensor, sheets: Sequence[Matrix], wiring: WiringFaults | None = None) -> ConverterInputs:
+    """Compute the converter's inputs in the three phases.
+
+    Args:
+        sensor: electronics and polarity.
+        sheets: the sheets with their contacts, from a ContactModel, during the touch, radial and angular phase.
+        wiring: what is broken; nothing by default.
+
+    Returns:
+        potentials [V] and drive currents [A], without noise.
+    """
+    wiring = wiring or WiringFaults()
+    radial: tuple[_Terminal, _Terminal] = ("ground", "supply") if sensor.b_positive else ("supply", "ground")
+    angular: tuple[_Terminal, _Terminal] = ("supply", "ground") if sensor.c_positive else ("ground", "supply")
+    touch_at, touch_i, touch_own = _phase(sensor, sheets[0], wiring, ("supply", "supply", "pulldown", "pulldown"))
+    radial_at, radial_i, radial_own = _phase(sensor, sheets[1], wiring, (*radial, "input", "input"))
+    angular_at, angular_i, angular_own = _phase(sensor, sheets[2], wiring, ("input", "input", *angular))
+    supply = sensor.electronics.supply_volts
+    return ConverterInputs(
+        touch_at[_C],
+        touch_at[_D],
+        touch_i,
+        radial_at[_C],
+        radial_at[_D],
+        radial_i,
+        angular_at[_A],
+        angular_at[_B],
+        angular_i,
+        supply,
+        supply,
+        supply,
+        touch_own[_A],
+        touch_own[_B],
+        radial_own[_A],
+        radial_own[_B],
+        angular_own[_C],
+        angular_own[_D],
+    )
+
+
+def _phase(
+    sensor: Sensor,
+    admittance: Matrix,
+    wiring: WiringFaults,
+    terminals: tuple[_Terminal, _Terminal, _Terminal, _Terminal],
+) -> tuple[list[float], float, list[float]]:
+    """Return the potentials at the inputs [V], the current out of the supply [A], the electrodes' potentials [V]."""
+    parts = sensor.electronics
+    matrix = [list(row) for row in admittance]
+    sources = [0.0] * 4
+    loads = {"pulldown": parts.pulldown_ohms, "input": parts.input_ohms, "supply": 0.0, "ground": 0.0}
+    feeds = [0.0] * 4
+    for k, terminal in enumerate(terminals):
+        feeds[k] = 0.0 if _TERMINALS[k] in wiring.opened else 1.0 / (parts.lead_ohms[k] + loads[terminal])
+        matrix[k][k] += feeds[k] + 1e-15  # keeps a sheet that has lost all of its wires at ground
+        sources[k] += feeds[k] * parts.supply_volts if terminal == "supply" else 0.0
+    for first, second in wiring.shorts:
+        j = _TERMINALS.index(first)
+        matrix[j][j] += _SHORT_CONDUCTANCE
+        if second in ("supply", "rail"):
+            sources[j] += _SHORT_CONDUCTANCE * parts.supply_volts
+        elif second != "ground":
+            k = _TERMINALS.index(second)
+            matrix[k][k] += _SHORT_CONDUCTANCE
+            matrix[j][k] -= _SHORT_CONDUCTANCE
+            matrix[k][j] -= _SHORT_CONDUCTANCE
+    at = solve(matrix, sources)
+    current = sum(
+        (parts.supply_volts - at[k]) * feeds[k] for k, terminal in enumerate(terminals) if terminal == "supply"
+    )
+    current += sum(
+        (parts.supply_volts - at[_TERMINALS.index(first)]) * _SHORT_CONDUCTANCE
+        for first, second in wiring.shorts
+        if second == "rail"
+    )
+    seen = [at[k] * feeds[k] * loads[terminal] for k, terminal in enumerate(terminals)]
+    return seen, current, at
+
+
+def solve(matrix: list[list[float]], right: Iterable[float]) -> list[float]:
+    """Solve a small system of nodal equations (diagonally dominant, so without pivoting).
+
+    Args:
+        matrix: n rows of n numbers; overwritten.
+        right: n numbers.
+
+    Returns:
+        the n unknowns.
+    """
+    x = list(right)
+    n = len(x)
+    for k in range(n):
+        row, inverse = matrix[k], 1.0 / matrix[k][k]
+        for i in range(k + 1, n):
+            factor = matrix[i][k] * inverse
+            if factor:
+                below = matrix[i]
+                for j in range(k + 1, n):
+                    below[j] -= factor * row[j]
+                x[i] -= factor * x[k]
+    for k in range(n - 1, -1, -1):
+        row = matrix[k]
+        x[k] = (x[k] - sum(row[j] * x[j] for j in range(k + 1, n))) / row[k]
+    return x

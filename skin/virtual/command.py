@@ -1,0 +1,282 @@
+"""Command ``coneskin sim-skin``: a virtual skin as a program of its own, on a pseudo-terminal or into a file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.geometry.frustum import Frustum
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import VERSIONS
+
+from .fault_injection import FaultInjection
+from .imperfections import Imperfections
+from .scripted_touch import ScriptedTouch
+from .skin import MODELS, VirtualSkin
+from .typed_script import FAULT_NAMES, TOUCH_SHAPES, parse_fault, parse_press, read_script
+
+__all__ = ["EXAMPLE", "HELP", "add_arguments", "play_skin", "run"]
+
+HELP = "run a virtual skin that sends the very bytes of a real one"
+EXAMPLE = """\
+example:
+  coneskin sim-skin --radius1-mm 54 --height-mm 434 --touch 1.0:1.5:200:90 --touch 3:4:100:180:10
+  Print the path of a serial port. Once a program opens it, the skin sends 1000 frames a second. It is touched from
+  1.0 s to 1.5 s at u = 200 mm, phi = 90 deg with 5 N, and from 3 s to 4 s at another place with 10 N.
+
+  coneskin sim-skin --touch grip:1:2:200:90 --touch seam:3:4:200:15 --wire-version 2
+  A hand closes around the link; a palm presses on both sides of the seam, 15 deg from each edge.
+
+  coneskin sim-skin --touch 1:3:100..300:90
+  A finger slides along the link within two seconds, from u = 100 mm to u = 300 mm.
+
+  coneskin sim-skin --sensors 4 --touch 1:2:200:90@2 --script touches.txt
+  Four sensors on one port; the third is touched, and whoever a line of touches.txt names, such as grip:3:4:200:90@1.
+
+  coneskin sim-skin --fault drop_every=50 --fault wiring=open-A --fault wiring_after=3000
+  Lose one frame in 50, and break the wire of A after 3000 frames.
+
+Ctrl-C ends it. Exit code: 0 ended, or the file of --output is written; 1 an option is not possible; 2 wrong usage.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    add = parser.add_argument
+    add("--radius1-mm", type=float, default=54.0, help="radius of the link at end 1 (default 54)")
+    add("--radius2-mm", type=float, help="radius at end 2 (default: radius 1, a cylinder)")
+    add("--height-mm", type=float, default=434.0, help="distance of the ends along the axis (default 434)")
+    add("--wrap-deg", type=float, default=360.0, help="angle about the axis that is covered (default 360)")
+    add("--device", type=int, default=0, help="number of the device in its frames (default 0)")
+    add("--sensor", type=int, default=0, help="number of the sensor in its frames (default 0)")
+    add(
+        "--sensors", type=int, default=1, metavar="N", help="send N such sensors, numbered from --sensor on (default 1)"
+    )
+    add("--rate-hz", type=float, default=1000.0, help="frames per second of the sensor (default 1000)")
+    add(
+        "--touch",
+        action="append",
+        type=_argument(parse_press),
+        default=[],
+        metavar="[SHAPE:]START_S:END_S:U_MM:PHI_DEG[:FORCE_N][@SENSOR]",
+        help="add a touch to the script; may be repeated (force: 5 N by default, on each side of a grip). Shapes: "
+        f"{', '.join(TOUCH_SHAPES)}; without one, finger. seam presses on both sides of it, PHI_DEG from each edge. "
+        "U_MM and PHI_DEG may be FROM..TO: the touch slides there, evenly from its start to its end. "
+        "@SENSOR is the number of the sensor touched; without it, the first",
+    )
+    add(
+        "--script",
+        type=Path,
+        metavar="FILE",
+        help="read touches from a file, one a line as --touch has them; # comments",
+    )
+    add(
+        "--fault",
+        action="append",
+        type=_argument(parse_fault),
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"inject a fault; may be repeated. Names: {', '.join(FAULT_NAMES)}. *_every and *_after count frames; "
+        "wiring is open-A, short-A-B or short-A-ground (also -supply, -rail)",
+    )
+    add(
+        "--model",
+        choices=MODELS,
+        default="field",
+        help="the sheets: exact field, or ideal resistors (default field)",
+    )
+    add("--noise-counts", type=float, default=0.7, help="standard deviation of each reading [counts] (default 0.7)")
+    add("--leak-drift", type=float, default=0.0, help="growth of the leak between the layers [S/s] (default 0)")
+    add(
+        "--seed",
+        type=int,
+        default=0,
+        help="seed of the noise; the same seed gives the same bytes (default 0)",
+    )
+    add("--duration-s", type=float, default=math.inf, help="end the stream after this time (default: never)")
+    add("--output", metavar="FILE", help="write the bytes to this file as fast as possible; - is standard output")
+    add("--wire-version", type=int, choices=VERSIONS, default=1, help="version of the wire format (default 1)")
+    add("--driven-potentials", action="store_true", help="send the driven electrodes' own potentials (version 2)")
+    add("--link", metavar="PATH", help="make this path a link to the port, and remove it at the end")
+    add("--now", action="store_true", help="start the script at once, not when the port is opened")
+    add("--json", action="store_true", help="report in JSON, one object per line")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command and return its exit code."""
+    radius2_mm = args.radius1_mm if args.radius2_mm is None else args.radius2_mm
+    frustum = Frustum(args.radius1_mm * 1e-3, radius2_mm * 1e-3, args.height_mm * 1e-3, math.radians(args.wrap_deg))
+    if args.sensors < 1:
+        raise SensorError(f"--sensors must be at least 1, got {args.sensors}")
+    sensors = [Sensor(frustum, args.sensor + number, device_id=args.device) for number in range(args.sensors)]
+    names = {str(sensor.sensor_id): sensor.name for sensor in sensors}
+    presses: list[tuple[str, ScriptedTouch]] = [*args.touch, *(read_script(args.script) if args.script else ())]
+    touches = []
+    for shape, press in presses:
+        if press.sensor and press.sensor not in names:
+            raise SensorError(f"the sensor of a touch must be one of {', '.join(names)}, got @{press.sensor}")
+        touches += TOUCH_SHAPES[shape](frustum, replace(press, sensor=names.get(press.sensor, "")))
+    skin = VirtualSkin(
+        sensors,
+        touches,
+        rate_hz=args.rate_hz,
+        seed=args.seed,
+        imperfections=Imperfections(noise_counts=args.noise_counts, leak_drift=args.leak_drift),
+        faults=FaultInjection(**dict(args.fault)),
+        model=args.model,
+        duration=args.duration_s,
+        wire_version=args.wire_version,
+        driven_potentials=args.driven_potentials,
+    )
+    return play_skin(skin, output=args.output, link=args.link, at_once=args.now, as_json=args.json)
+
+
+def play_skin(
+    skin: VirtualSkin,
+    *,
+    output: str | None = None,
+    link: str | None = None,
+    at_once: bool = False,
+    as_json: bool = False,
+) -> int:
+    """Play a virtual skin, from options or from a scene, until it ends or the program is told to stop.
+
+    Args:
+        skin: what to play.
+        output: file for the bytes, "-" for standard output; a pseudo-terminal by default.
+        link: name of a link to the port.
+        at_once: begin before the port is opened.
+        as_json: report in JSON.
+
+    Returns:
+        the exit code, 0.
+
+    Raises:
+        SensorError: the bytes are for a file, and the skin has no end.
+        SkinConnectionError: there are no pseudo-terminals, or the file or link cannot be made.
+    """
+    if output is not None:
+        return _write_file(skin, output, as_json)
+    from .pseudo_terminal import Pacing, drain, open_raw_terminal, play, wait_for_reader, write_all
+
+    def wait(duration: float) -> bool:
+        time.sleep(duration)
+        return False
+
+    master, slave, path = open_raw_terminal()
+    pacing = Pacing()
+    reader: int | None = None if not at_once else slave
+    try:
+        with _linked(path, link), _stoppable():
+            names = ", ".join(sensor.name for sensor in skin.sensors)
+            facts = {"port": path, "link": link, "rate_hz": skin.rate_hz, "sensors": names}
+            _say(as_json, facts, f"port: {link or path}")
+            if not at_once:
+                os.close(slave)
+                reader = wait_for_reader(master, path, wait)
+            play(skin, lambda data: write_all(master, data), wait=wait, pacing=pacing)
+            drain(reader, wait)
+    except KeyboardInterrupt:
+        pass  # the way to stop it
+    finally:
+        for descriptor in (reader, master):
+            if descriptor is not None:
+                os.close(descriptor)
+    worst_ms = round(pacing.worst_late * 1e3, 3)
+    summary = {"packets": pacing.packets, "overruns": pacing.overruns, "worst_late_ms": worst_ms}
+    _say(as_json, summary, f"sent {pacing.packets} packets, {pacing.overruns} lost, at worst {worst_ms} ms late")
+    return 0
+
+
+def _argument(parse: Any) -> Any:
+    """Make the parser one for argparse, which prints only its own kind of error."""
+
+    def parsed(text: str) -> Any:
+        try:
+            return parse(text)
+        except SensorError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return parsed
+
+
+def _write_file(skin: VirtualSkin, output: str, as_json: bool) -> int:
+    if not (math.isfinite(skin.duration) or skin.faults.unplug_after is not None):
+        raise SensorError("--output needs a stream that ends: give --duration-s")
+    count = 0
+    try:
+        if output == "-":
+            count = _write_packets(skin, sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+        else:
+            with Path(output).open("wb") as file:
+                count = _write_packets(skin, file)
+    except OSError as error:
+        raise SkinConnectionError(f"{output}: cannot be written ({error.strerror or error})") from error
+    if output != "-":
+        _say(as_json, {"output": output, "bytes": count}, f"wrote {count} bytes to {output}")
+    return 0
+
+
+def _write_packets(skin: VirtualSkin, file: BinaryIO) -> int:
+    count = 0
+    try:
+        for _, data in skin.packets():
+            count += file.write(data)
+    except SkinConnectionError:
+        pass  # unplugged, on purpose
+    return count
+
+
+def _say(as_json: bool, facts: dict[str, Any], line: str) -> None:
+    print(json.dumps(facts) if as_json else line, flush=True)
+
+
+@contextmanager
+def _linked(path: str, link: str | None) -> Iterator[None]:
+    """Link a stable name to the port while it lasts."""
+    if link is None:
+        yield
+        return
+    place = Path(link)
+    try:
+        if place.is_symlink():
+            place.unlink()
+        place.symlink_to(path)
+    except OSError as error:
+        raise SkinConnectionError(f"{link}: cannot be made a link to {path} ({error.strerror or error})") from error
+    try:
+        yield
+    finally:
+        place.unlink(missing_ok=True)
+
+
+@contextmanager
+def _stoppable() -> Iterator[None]:
+    """Let SIGTERM end the program as Ctrl-C does, so that nothing is left behind."""
+
+    def stop(_signal: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, stop)
+    except ValueError:  # not in the main thread, which handles the signals
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,211 @@
+"""Exact field as contact model of the virtual skin: any script of touches, in a tenth of a millisecond a frame.
+
+The touches stay where they are while their force changes, so `fixed_discs` works out what depends on the places when
+a touch begins (0.5 to 5 ms), and each moment after is one small system.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from coneskin.errors import FieldError
+from coneskin.skin.field.coupling import Coupling
+from coneskin.skin.field.disc import centre_distance
+from coneskin.skin.field.fixed_discs import FixedDiscs
+from coneskin.skin.field.model import FieldModel
+from coneskin.skin.field.sheet import SectorSheet
+from coneskin.skin.sensor import Sensor
+
+from .circuit import LayerContact, Matrix
+from .ladder import ResistorLadder
+
+__all__ = ["FieldContacts"]
+
+_CACHE_SIZE = 64  # sets of places; one for each combination of touches
+_MAX_REACH = 0.95  # part of the way to an edge that a disc may take
+_Key = tuple[tuple[float, float, float], ...]
+
+
+class FieldContacts:
+    """Contact model of round contacts with the exact field around them.
+
+    What cannot be a disc inside the sheet is replaced by one that can: of a contact across an edge, the disc about the
+    centroid of the part that is on the sheet, with that part's conductance; of contacts that overlap at their firmest,
+    one about their common middle where they overlap by more than half, otherwise smaller ones of the same conductance.
+
+    Args:
+        point_radius: of a contact that has none of its own [m].
+        tolerance: of the potentials, relative to the supply; a count of 16 bits is 1.5e-5.
+
+    Raises:
+        FieldError: point_radius is not positive.
+    """
+
+    def __init__(self, point_radius: float = 1e-3, tolerance: float = 1e-7) -> None:
+        if not (math.isfinite(point_radius) and point_radius > 0.0):
+            raise FieldError(f"point_radius must be positive and finite [m], got {point_radius!r}")
+        self.point_radius = point_radius
+        self.tolerance = tolerance
+        self._settings: OrderedDict[tuple[Sensor, _Key], _Setting] = OrderedDict()
+
+    def admittance(self, sensor: Sensor, contacts: Sequence[LayerContact]) -> Matrix:
+        """Return the 4 x 4 matrix Y [S] of one scene; see ``admittances``."""
+        return self.admittances(sensor, [contacts])[0]
+
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
+        """Return for each scene the 4 x 4 matrix Y [S] in the order A, B, C, D: symmetric, its rows sum to zero.
+
+        Raises:
+            FieldError: a conductance is negative, not finite or NaN, or a contact's middle is off the sensor.
+        """
+        found: dict[_Key, list[tuple[int, list[LayerContact]]]] = {}
+        for number, contacts in enumerate(scenes):
+            touching = [self._checked(sensor, contact) for contact in contacts if contact.conductance != 0.0]
+            key = tuple((c.u, c.phi, c.reach) for c in touching)
+            found.setdefault(key, []).append((number, touching))
+        out: list[Matrix] = [()] * len(scenes)
+        for key, group in found.items():
+            if not key:
+                matrices: list[Matrix] = ResistorLadder().admittances(sensor, [()] * len(group))
+            else:
+                matrices = self._setting(sensor, key).admittances([touching for _, touching in group])
+            for (number, _), matrix in zip(group, matrices, strict=True):
+                out[number] = matrix
+        return out
+
+    def prepare(self, sensor: Sensor, contact: LayerContact) -> None:
+        """Compute a contact's place before it is touched, so that nothing waits for it then."""
+        self.admittances(sensor, [[contact]])
+
+    def _checked(self, sensor: Sensor, contact: LayerContact) -> LayerContact:
+        cone = sensor.frustum
+        if not (0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap):
+            raise FieldError(
+                f"a contact must lie on {sensor.name}: u in [0, {cone.slant:g}] m and phi in [0, {cone.wrap:g}] rad, "
+                f"got {contact.u!r} m and {contact.phi!r} rad"
+            )
+        if not 0.0 <= contact.conductance < math.inf:
+            raise FieldError(f"conductance of a contact must be 0 or more and finite [S], got {contact.conductance!r}")
+        radius = contact.radius or self.point_radius
+        return contact._replace(radius=radius, reach=max(contact.reach, radius))
+
+    def _setting(self, sensor: Sensor, key: _Key) -> _Setting:
+        known = self._settings.get((sensor, key))
+        if known is None:
+            known = _Setting.of(sensor, key, self.tolerance)
+            self._settings[sensor, key] = known
+            if len(self._settings) > _CACHE_SIZE:
+                self._settings.popitem(last=False)
+        else:
+            self._settings.move_to_end((sensor, key))
+        return known
+
+
+class _Spot(NamedTuple):
+    """The disc that stands for one contact, or for several that overlap."""
+
+    u: float
+    phi: float
+    reach: float  #: its radius at its firmest [m]
+    members: tuple[int, ...]  #: the contacts that it stands for
+    on_sheet: float  #: part of their conductance that is on the sheet
+
+
+class _Setting(NamedTuple):
+    """Contacts at their places, ready for any force."""
+
+    places: FixedDiscs
+    spots: tuple[_Spot, ...]
+    reaches: tuple[float, ...]  #: what the spots' radii are at the contacts' firmest, before any is made smaller
+
+    @classmethod
+    def of(cls, sensor: Sensor, key: _Key, tolerance: float) -> _Setting:
+        sheet = SectorSheet.of_frustum(sensor.frustum)
+        model = FieldModel(sheet, sensor.upper_sheet_ohms, sensor.lower_sheet_ohms, tolerance)
+        spots = _merged(sheet, [_clipped(sheet, sensor, *one, n) for n, one in enumerate(key)])
+        limits = _limits(sheet, spots)
+        u, phi = [spot.u for spot in spots], [spot.phi for spot in spots]
+        return cls(FixedDiscs.of(model, u, phi, limits), tuple(spots), tuple(spot.reach for spot in spots))
+
+    def admittances(self, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
+        radius = np.empty((len(scenes), len(self.spots)))
+        siemens = np.empty_like(radius)
+        for row, contacts in enumerate(scenes):
+            for column, spot in enumerate(self.spots):
+                members = [contacts[n] for n in spot.members]
+                radius[row, column] = math.sqrt(sum(c.radius * c.radius for c in members))
+                siemens[row, column] = spot.on_sheet * sum(c.conductance for c in members)
+        radius *= np.minimum(self.places.largest / self.reaches, 1.0)
+        np.minimum(radius, self.places.largest, out=radius)
+        coupling: Coupling = self.places.coupling(radius, siemens / (math.pi * radius * radius))
+        return [tuple(map(tuple, y)) for y in self.places.model.admittance(coupling).tolist()]
+
+
+def _clipped(sheet: SectorSheet, sensor: Sensor, u: float, phi: float, reach: float, number: int) -> _Spot:
+    """Return the part of a disc that is on the sheet, at its firmest: its centroid, and how much of the disc it is."""
+    cuts = [_cut(distance / reach) for distance in sheet.edge_distances(u, phi).tolist()]
+    (kept1, off1), (kept2, off2), (kept_d, off_d), (kept_c, off_c) = cuts
+    u = _within(u + reach * (off1 - off2), sheet.width)
+    phi = _within(phi + reach * (off_d - off_c) / sensor.frustum.radius_at(u), sheet.wrap)
+    return _Spot(u, phi, reach, (number,), kept1 * kept2 * kept_d * kept_c)
+
+
+def _within(value: float, end: float) -> float:
+    return min(max(value, 1e-3 * end), (1.0 - 1e-3) * end)
+
+
+def _cut(distance: float) -> tuple[float, float]:
+    """Return what a straight edge leaves of the unit disc: part of its area, and offset of its centroid.
+
+    Args:
+        distance: of the edge from the middle.
+    """
+    if distance >= 1.0:
+        return 1.0, 0.0
+    sine = math.sqrt(1.0 - distance * distance)
+    kept = 1.0 - (math.acos(distance) - distance * sine) / math.pi
+    return kept, 2.0 / 3.0 * sine**3 / (math.pi * kept)
+
+
+def _merged(sheet: SectorSheet, spots: list[_Spot]) -> list[_Spot]:
+    """Merge the contacts that overlap by more than half."""
+    done: list[_Spot] = []
+    for spot in spots:
+        while True:
+            near = [s for s in done if _apart(sheet, spot, s) <= 0.5 * (spot.reach + s.reach)]
+            if not near:
+                break
+            other = near[0]
+            done.remove(other)
+            own, others = spot.reach**2 * spot.on_sheet, other.reach**2 * other.on_sheet
+            part = others / (own + others)
+            spot = _Spot(
+                (1.0 - part) * spot.u + part * other.u,
+                (1.0 - part) * spot.phi + part * other.phi,
+                math.hypot(spot.reach, other.reach),
+                spot.members + other.members,
+                (1.0 - part) * spot.on_sheet + part * other.on_sheet,
+            )
+        done.append(spot)
+    return done
+
+
+def _limits(sheet: SectorSheet, spots: Sequence[_Spot]) -> list[float]:
+    """Return the largest radii at which all are inside the sheet and apart."""
+    radii = [min(spot.reach, _MAX_REACH * float(sheet.edge_distances(spot.u, spot.phi).min())) for spot in spots]
+    for i, first in enumerate(spots):
+        for j in range(i):
+            ratio = _MAX_REACH * _apart(sheet, first, spots[j]) / (radii[i] + radii[j])
+            if ratio < 1.0:
+                radii[i], radii[j] = radii[i] * ratio, radii[j] * ratio
+    return radii
+
+
+def _apart(sheet: SectorSheet, first: _Spot, second: _Spot) -> float:
+    u1, phi1, u2, phi2 = (np.array([v]) for v in (first.u, first.phi, second.u, second.phi))
+    return float(centre_distance(sheet, u1, phi1, u2, phi2)[0])

@@ -1,0 +1,88 @@
+"""Ladders of ideal resistors for the sheets: the quick contact model of the virtual skin.
+
+Each contact divides the upper sheet at its radial fraction and the lower sheet at its angular fraction into resistors
+in series, and joins the two at these nodes. Current that spreads sideways around a small contact is left out; the
+resistance of that spreading counts as part of the contact's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from coneskin.errors import SensorError
+from coneskin.skin.sensor import Sensor
+
+from .circuit import LayerContact, Matrix
+
+__all__ = ["ResistorLadder"]
+
+_A, _B, _C, _D = range(4)
+_LEAST_PART = 1e-6  # part of a sheet between two nodes, so that nodes may coincide
+
+
+class ResistorLadder:
+    """Contact model of ideal series and parallel resistors."""
+
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
+        """Return the matrix of each scene; see ``admittance``."""
+        return [self.admittance(sensor, contacts) for contacts in scenes]
+
+    def prepare(self, sensor: Sensor, contact: LayerContact) -> None:
+        """Do nothing: nothing takes long here."""
+
+    def admittance(self, sensor: Sensor, contacts: Sequence[LayerContact]) -> Matrix:
+        """Return the 4 x 4 matrix Y [S] in the order A, B, C, D.
+
+        Args:
+            sensor: the sheets.
+            contacts: any number of them.
+
+        Returns:
+            a symmetric matrix whose rows sum to zero.
+
+        Raises:
+            SensorError: a contact lies off the sensor, or its conductance is negative.
+        """
+        size = 4 + 2 * len(contacts)
+        y = [[0.0] * size for _ in range(size)]
+        along = [(0.0, _B), (1.0, _A)]
+        around = [(0.0, _D), (1.0, _C)]
+        cone = sensor.frustum
+        for k, contact in enumerate(contacts):
+            if not (0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap):
+                raise SensorError(
+                    f"a contact must lie on {sensor.name}: u in [0, {cone.slant:g}] m and phi in [0, {cone.wrap:g}] "
+                    f"rad, got {contact.u!r} m and {contact.phi!r} rad"
+                )
+            if not contact.conductance >= 0.0:
+                raise SensorError(f"contact.conductance must not be negative, got {contact.conductance!r} S")
+            radial, angular = sensor.fractions(contact.u, contact.phi)
+            upper, lower = 4 + 2 * k, 5 + 2 * k
+            along.append((1.0 - radial if sensor.b_positive else radial, upper))
+            around.append((angular if sensor.c_positive else 1.0 - angular, lower))
+            _join(y, upper, lower, contact.conductance)
+        for ladder, ohms in ((along, sensor.radial_ohms), (around, sensor.angular_ohms)):
+            ladder.sort()
+            for (start, j), (stop, k) in pairwise(ladder):
+                _join(y, j, k, 1.0 / (ohms * max(stop - start, _LEAST_PART)))
+        for node in range(size - 1, 3, -1):  # star-mesh: leave the inner nodes out one by one
+            _eliminate(y, node)
+        return tuple(tuple(row[:4]) for row in y[:4])
+
+
+def _join(y: list[list[float]], j: int, k: int, siemens: float) -> None:
+    y[j][j] += siemens
+    y[k][k] += siemens
+    y[j][k] -= siemens
+    y[k][j] -= siemens
+
+
+def _eliminate(y: list[list[float]], node: int) -> None:
+    row = y[node]
+    own = row[node]
+    for j in range(node):
+        if row[j]:
+            factor = row[j] / own
+            for k in range(node):
+                y[j][k] -= factor * row[k]

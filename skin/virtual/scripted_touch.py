@@ -1,0 +1,142 @@
+"""Touch of a virtual skin: where, when and how firmly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from coneskin.errors import SensorError
+
+from .substrate import Foam
+
+__all__ = ["ScriptedTouch"]
+
+_MEMORY = 40.0  # relaxation times; after them nothing is left of a touch
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptedTouch:
+    """One touch of the script.
+
+    Attributes:
+        start: when it begins [s].
+        end: when it ends [s]; may be infinite.
+        u: slant distance from end 1 [m].
+        phi: azimuth [rad].
+        force: at its firmest [N].
+        rise: time in which the force rises, and falls again [s].
+        radius: of a flat body's face [m]; 0 for a round body, whose contact grows with the force.
+        sensor: name of the sensor touched; empty: the first.
+        grown_force: to which it changes once it has risen [N]; 0: it stays.
+        growth_time: in which it grows, evenly [s]; above 0 where there is a grown force.
+        slide_u: how far it slides along the side, evenly from its start to its end [m]; below 0 towards end 1.
+        slide_phi: how far it slides around [rad]; below 0 towards the edge at 0.
+
+    Raises:
+        SensorError: it ends before it begins, a value is not finite, one but the slide's is negative, or it slides and
+            has no end.
+    """
+
+    start: float
+    end: float
+    u: float
+    phi: float
+    force: float = 5.0
+    rise: float = 0.01
+    radius: float = 0.0
+    sensor: str = ""
+    grown_force: float = 0.0
+    growth_time: float = 0.0
+    slide_u: float = 0.0
+    slide_phi: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.start) and self.end > self.start):
+            raise SensorError(f"a touch must end after it starts, got {self.start!r} s to {self.end!r} s")
+        units = {
+            "u": "m",
+            "phi": "rad",
+            "force": "N",
+            "rise": "s",
+            "radius": "m",
+            "grown_force": "N",
+            "growth_time": "s",
+        }
+        for name, unit in units.items():
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise SensorError(f"touch.{name} must be finite and not negative [{unit}], got {value!r}")
+        if self.grown_force and not self.growth_time > 0.0:
+            raise SensorError(
+                f"touch.growth_time must be above 0 s where grown_force is given, got {self.growth_time!r}"
+            )
+
+        if not (math.isfinite(self.slide_u) and math.isfinite(self.slide_phi)):
+            raise SensorError(
+                "touch.slide_u and touch.slide_phi must be finite [m, rad], "
+                f"got {self.slide_u!r} and {self.slide_phi!r}"
+            )
+        if self.slides and self.end == math.inf:
+            raise SensorError("a touch that slides must have an end: its speed follows from it, got end = inf s")
+
+    @property
+    def slides(self) -> bool:
+        """Whether it ends at another place than it starts at."""
+        return self.slide_u != 0.0 or self.slide_phi != 0.0
+
+    def place_at(self, time: float) -> tuple[float, float]:
+        """Return u [m] and phi [rad] at a time: a straight line on the unrolled sensor, at constant speed."""
+        if not self.slides:
+            return self.u, self.phi
+        part = min(max((time - self.start) / (self.end - self.start), 0.0), 1.0)
+        return self.u + part * self.slide_u, self.phi + part * self.slide_phi
+
+    def ended_at(self, time: float) -> ScriptedTouch:
+        """Return the same touch with another end [s]; what slides keeps its speed."""
+        if not self.slides:
+            return replace(self, end=time)
+        part = (time - self.start) / (self.end - self.start)
+        return replace(self, end=time, slide_u=part * self.slide_u, slide_phi=part * self.slide_phi)
+
+    @property
+    def firmest(self) -> float:
+        """Largest force that it may reach [N]."""
+        return max(self.force, self.grown_force)
+
+    @property
+    def _slope(self) -> float:
+        return (self.grown_force - self.force) / self.growth_time if self.grown_force else 0.0
+
+    def _risen(self, since: float) -> float:
+        """Return the force a time after it has risen [N]."""
+        return self.force + self._slope * min(max(since, 0.0), self.growth_time)
+
+    def force_at(self, time: float) -> float:
+        """Return the force at a time [N]: it rises along half a cosine, may grow, and falls as it has risen."""
+        begun, left = time - self.start, self.end - time
+        since = min(begun, left)
+        if since <= 0.0:
+            return 0.0
+        held = begun - self.rise if begun < left else self.end - self.start - 2.0 * self.rise
+        force = self._risen(min(held, begun - self.rise))
+        return force if since >= self.rise else 0.5 * force * (1.0 - math.cos(math.pi * since / self.rise))
+
+    def seated_at(self, time: float, foam: Foam) -> float:
+        """Return the force that would in the end press the foam as far as it is pressed at a time [N]."""
+        since, length = time - self.start, self.end - self.start
+        if since <= 0.0 or since > length + _MEMORY * foam.relaxation_time:
+            return 0.0
+        swing, state, slope = 0.5 * self.force, 0.0, self._slope
+        ramp = min(self.rise, 0.5 * length)  # a short touch turns back on its way up
+        if ramp > 0.0:
+            rate = math.pi / self.rise
+            state = foam.advance_swing(state, swing, swing, rate, 0.0, min(since, ramp))
+        held = min(max(since - ramp, 0.0), length - 2.0 * ramp)
+        growing = min(held, self.growth_time)
+        state = foam.advance_ramp(state, self.force, slope, growing)
+        state = foam.advance(state, self._risen(growing), held - growing)
+        swing = 0.5 * self._risen(growing)
+        if ramp > 0.0 and since > length - ramp:
+            state = foam.advance_swing(state, swing, swing, -rate, rate * ramp, min(since - length, 0.0) + ramp)
+        state = foam.advance(state, 0.0, max(since - length, 0.0))
+        return foam.seated(state, self.force_at(time))

@@ -1,0 +1,285 @@
+"""Virtual skin: turns a script of touches into the very bytes that a real sensor would send.
+
+The chain is a device's own: force -> foam, which yields late -> contact of the layers: its radius and conductance ->
+field in the sheets -> potentials and currents at the converter in each of the three phases -> settling, drift, noise,
+counts -> frame -> bytes -> a line with faults. The same seed gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Sequence
+
+from coneskin.errors import SensorError
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import VERSIONS, DrivenPotentials, Frame
+
+from .circuit import ContactModel, ConverterInputs, LayerContact, Matrix, measure
+from .fault_injection import FaultInjection, FaultyLine
+from .frame_counts import frame_of
+from .imperfections import Imperfections
+from .placed_touch import PlacedTouch
+from .rewired_sheets import RIGHT_WIRES, RewiredSheets
+from .scripted_touch import ScriptedTouch
+from .seam import across_seam
+
+__all__ = ["MODELS", "VirtualSkin"]
+
+MODELS = ("field", "ladder")
+_CURRENTS = frozenset({"touch_current", "radial_current", "angular_current"})  # the rest are potentials
+_FORCE_DIGITS = 6  # decimals of a force [N]: far below a count, and a relaxing touch comes to rest
+_MAX_RATE = 1e6  # Hz; frames of a microsecond, the unit of the device clock
+_FRAMES_AHEAD = 8  # frames; solved at once while touches change
+# Conductance of 1 S spread evenly over the rectangle of the field: the mean of f f^T, f = (x, 1 - x, -y, y - 1)
+_SPREAD = (
+    (1 / 3, 1 / 6, -1 / 4, -1 / 4),
+    (1 / 6, 1 / 3, -1 / 4, -1 / 4),
+    (-1 / 4, -1 / 4, 1 / 3, 1 / 6),
+    (-1 / 4, -1 / 4, 1 / 6, 1 / 3),
+)
+
+
+_Scenes = tuple[tuple[LayerContact, ...], ...]  # the contacts in each phase of a frame
+
+
+class VirtualSkin:
+    """One virtual device with any number of sensors.
+
+    Args:
+        sensors: its sensors; they are measured one after the other.
+        touches: the script; more may be added while it runs, with ``touch``.
+        rate_hz: frames per second of each sensor.
+        seed: of noise and of random damage.
+        imperfections: noise, drift, contact law.
+        faults: what goes wrong.
+        model: how the sheets look from their electrodes: "field", exactly (needs numpy and scipy), "ladder", as ideal
+            resistors, or a model of your own.
+        duration: when the device goes away [s]; infinite by default.
+        wire_version: of the wire format, 1 or 2.
+        driven_potentials: its frames carry the driven electrodes' own potentials; only in version 2.
+        wires: electrodes on the terminals A, B, C, D; another order is a wrong wiring.
+
+    Raises:
+        SensorError: no sensor, a rate that is not positive, an unknown model or version, a fault of a reading that the
+            version does not carry, or a touch of a sensor that is not here.
+    """
+
+    def __init__(
+        self,
+        sensors: Sensor | Sequence[Sensor],
+        touches: Sequence[ScriptedTouch] = (),
+        *,
+        rate_hz: float = 1000.0,
+        seed: int = 0,
+        imperfections: Imperfections | None = None,
+        faults: FaultInjection | None = None,
+        model: ContactModel | str = "field",
+        duration: float = math.inf,
+        wire_version: int = 1,
+        driven_potentials: bool = False,
+        wires: str = RIGHT_WIRES,
+    ) -> None:
+        self.sensors = (sensors,) if isinstance(sensors, Sensor) else tuple(sensors)
+        if not self.sensors:
+            raise SensorError("a virtual skin needs at least one sensor, got none")
+        if not 0.0 < rate_hz <= _MAX_RATE:
+            raise SensorError(f"rate_hz must be finite and above 0 Hz, at most {_MAX_RATE:g} Hz, got {rate_hz!r} Hz")
+        if not duration > 0.0:
+            raise SensorError(f"duration must be above 0 s, got {duration!r} s")
+        self.rate_hz = rate_hz
+        self.seed = seed
+        self.imperfections = imperfections or Imperfections()
+        self.faults = faults or FaultInjection()
+        sheets = _model(model) if isinstance(model, str) else model
+        self.model = sheets if wires == RIGHT_WIRES else RewiredSheets(sheets, wires)
+        self.duration = duration
+        self.wire_version = wire_version
+        self.driven_potentials = driven_potentials
+        self._channels = _channels(wire_version, driven_potentials)
+        stuck = self.faults.stuck_channel
+        if stuck not in (*self._channels, "supply", "all") or (wire_version == 1 and stuck == "touch_supply"):
+            raise SensorError(
+                f"faults.stuck_channel {stuck} is no reading of its own in these frames: see wire_version"
+            )
+        self._touches: dict[str, list[PlacedTouch]] = {sensor.name: [] for sensor in self.sensors}
+        self._ahead: dict[str, list[tuple[_Scenes, list[Matrix]]]] = {}
+        self._measured: dict[str, tuple[object, ConverterInputs]] = {}
+        for sensor in self.sensors:  # so that the first touch does not wait for what is loaded on first use
+            self.model.prepare(sensor, LayerContact(0.5 * sensor.frustum.slant, 0.5 * sensor.frustum.wrap, 1e-3))
+        for touch in touches:
+            self.touch(touch)
+
+    def touch(self, touch: ScriptedTouch) -> None:
+        """Add a touch to the script.
+
+        Raises:
+            SensorError: there is no such sensor, or the place is off it.
+        """
+        name = touch.sensor or self.sensors[0].name
+        sensor = next((s for s in self.sensors if s.name == name), None)
+        if sensor is None:
+            names = ", ".join(s.name for s in self.sensors)
+            raise SensorError(f"touch.sensor must be one of {names}, got {touch.sensor!r}")
+        firmest = self.imperfections.layers.touch(touch.firmest, touch.radius)
+        placed = PlacedTouch.on(sensor, touch, firmest.radius)
+        if firmest.siemens > 0.0:
+            self.model.prepare(
+                sensor, LayerContact(touch.u, touch.phi, firmest.siemens, firmest.radius, firmest.radius)
+            )
+        self._touches[name].append(placed)
+
+    def release(self, time: float) -> None:
+        """End at a time [s] every touch that has begun by then and would last longer."""
+        for name, placed in self._touches.items():
+            self._touches[name] = [
+                item._replace(touch=item.touch.ended_at(time + item.touch.rise))
+                if item.touch.start < time < item.touch.end - item.touch.rise
+                else item
+                for item in placed
+            ]
+
+    def frames(self) -> Iterator[tuple[float, Frame]]:
+        """Measure the frames, for ever or until ``duration``.
+
+        Yields:
+            the time since the start at which a frame is complete [s], and the frame.
+        """
+        rng = random.Random(f"noise {self.seed}")
+        period = 1.0 / self.rate_hz
+        step = period / (3.0 * len(self.sensors))
+        index = cycle = 0
+        while cycle * period < self.duration:
+            for place, sensor in enumerate(self.sensors):
+                start = cycle * period + 3.0 * step * place
+                volts = self._volts(sensor, (start + step, start + 2.0 * step, start + 3.0 * step), index)
+                counts = self._convert(sensor, volts, rng)
+                clock = int((start + step) * 1e6 * self.imperfections.clock_ratio) & 0xFFFFFFFF
+                head = (self.wire_version, sensor.device_id, sensor.sensor_id, 0, cycle & 0xFFFF, clock)
+                yield start + 3.0 * step, frame_of(head, counts)
+                index += 1
+            cycle += 1
+
+    def packets(self) -> Iterator[tuple[float, bytes]]:
+        """Send the frames over the faulty line.
+
+        Yields:
+            the time since the start [s], and the bytes that arrive then (none, where a fault swallows them).
+
+        Raises:
+            SkinConnectionError: the line is gone, or the device after its ``duration``.
+        """
+        line = FaultyLine(self.faults, self.seed)
+        for time, frame in self.frames():
+            yield time, line.send(frame)
+
+    def _volts(self, sensor: Sensor, times: tuple[float, float, float], index: int) -> ConverterInputs:
+        """Return the converter's inputs; the newest result is kept, because a touch mostly rests."""
+        scenes = tuple(self._contacts(sensor, time) for time in times)
+        leaks = tuple(self.imperfections.leak + self.imperfections.leak_drift * time for time in times)
+        wiring = self.faults.wiring_at(index)
+        key = (scenes, leaks, wiring)
+        known = self._measured.get(sensor.name)
+        if known is None or known[0] != key:
+            sheets = [_leaking(y, leak) for y, leak in zip(self._sheets(sensor, scenes, times), leaks, strict=True)]
+            known = (key, measure(sensor, sheets, wiring))
+            self._measured[sensor.name] = known
+        return known[1]
+
+    def _sheets(self, sensor: Sensor, scenes: _Scenes, times: Sequence[float]) -> list[Matrix]:
+        """Solve the sheets of one frame; while touches change, also of the next ones, at little extra cost.
+
+        A touch that is added later makes those frames other ones, and they are solved again.
+        """
+        ahead = self._ahead.setdefault(sensor.name, [])
+        while ahead and ahead[0][0] != scenes:
+            ahead.pop(0)
+        if not ahead:
+            frames = [scenes]
+            for number in range(1, _FRAMES_AHEAD):
+                later = tuple(self._contacts(sensor, time + number / self.rate_hz) for time in times)
+                if later == frames[-1]:
+                    break
+                frames.append(later)
+            solved = self.model.admittances(sensor, [scene for frame in frames for scene in frame])
+            ahead += [(frame, solved[3 * number : 3 * number + 3]) for number, frame in enumerate(frames)]
+        return ahead[0][1]
+
+    def _contacts(self, sensor: Sensor, time: float) -> tuple[LayerContact, ...]:
+        """Return the contacts between the layers at a time."""
+        foam, layers = self.imperfections.foam, self.imperfections.layers
+        contacts = []
+        for placed in self._touches[sensor.name]:
+            touch, reach = placed.touch, placed.reach
+            seated = round(touch.seated_at(time, foam), _FORCE_DIGITS)
+            if seated > layers.threshold_force:
+                contact = layers.touch(seated, touch.radius)
+                u, phi = placed.place_at(time)
+                contacts.append(LayerContact(u, phi, contact.siemens, contact.radius, reach))
+                beyond = across_seam(sensor.frustum, u, phi, reach)
+                if beyond is not None:
+                    phi, share = beyond
+                    size = math.sqrt(share)
+                    part = LayerContact(u, phi, share * contact.siemens, size * contact.radius, size * reach)
+                    contacts.append(part)
+        return tuple(contacts)
+
+    def _convert(self, sensor: Sensor, volts: ConverterInputs, rng: random.Random) -> dict[str, int]:
+        """Return the counts of the converter by field: settling, noise and rounding."""
+        real, parts = self.imperfections, sensor.electronics
+        values = volts._asdict()
+        if real.settling_time:
+            left_over = math.exp(-1.0 / (3.0 * self.rate_hz * len(self.sensors) * real.settling_time))
+            supply = parts.supply_volts
+            at_c, at_d = (supply, 0.0) if sensor.c_positive else (0.0, supply)
+            rest = (at_c, at_d, volts.touch_c, volts.touch_d)  # the wires' potentials one phase before
+            for name, left in zip(("touch_c", "touch_d", "radial_c", "radial_d"), rest, strict=True):
+                values[name] += left_over * (left - values[name])
+            at_a, at_b = (0.0, supply) if sensor.b_positive else (supply, 0.0)
+            for name, left in (("angular_a", at_a), ("angular_b", at_b)):
+                values[name] += left_over * (left - values[name])
+        full, counts = parts.full_count, {}
+        volt, ampere = full / parts.adc_volts * real.supply_ratio, full / parts.current_full_scale * real.supply_ratio
+        for name in self._channels:
+            value = values[name]
+            count = value * (ampere if name in _CURRENTS else volt)
+            if real.noise_counts:
+                count += rng.gauss(0.0, real.noise_counts)
+            counts[name] = min(max(round(count), 0), full)
+        if self.wire_version == 1:
+            counts["radial_supply"] = counts["angular_supply"] = counts["touch_supply"]
+        return counts
+
+
+def _channels(wire_version: int, driven_potentials: bool) -> tuple[str, ...]:
+    """Return the readings that a frame of a version carries, in the order in which they are made."""
+    if wire_version not in VERSIONS or (driven_potentials and wire_version == 1):
+        raise SensorError(
+            "wire_version must be 1 or 2, and 2 where the driven potentials are sent, got "
+            f"{wire_version!r}{' with them' if driven_potentials else ''}"
+        )
+    names = ConverterInputs._fields
+    if wire_version == 1:
+        return names[: names.index("touch_supply") + 1]
+    return names if driven_potentials else names[: -len(DrivenPotentials._fields)]
+
+
+def _model(name: str) -> ContactModel:
+    if name == "field":
+        from .field_contacts import FieldContacts
+
+        return FieldContacts()
+    if name == "ladder":
+        from .ladder import ResistorLadder
+
+        return ResistorLadder()
+    raise SensorError(f"the model of a virtual skin must be one of {', '.join(MODELS)}, got {name!r}")
+
+
+def _leaking(sheets: Matrix, leak: float) -> Matrix:
+    if leak <= 0.0:
+        return sheets
+    return tuple(
+        tuple(y + leak * part for y, part in zip(row, parts, strict=True))
+        for row, parts in zip(sheets, _SPREAD, strict=True)
+    )

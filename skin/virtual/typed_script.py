@@ -1,0 +1,128 @@
+"""Touches and faults of a virtual skin as they are typed, and a script of them in a file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+
+from coneskin.bounded_file import read_file
+from coneskin.errors import SensorError
+from coneskin.geometry.frustum import Frustum
+
+from .circuit import WiringFaults
+from .fault_injection import FaultInjection
+from .scripted_touch import ScriptedTouch
+from .touch_shapes import fingers, grip, palm_over_seam
+
+__all__ = ["FAULT_NAMES", "TOUCH_SHAPES", "parse_fault", "parse_press", "parse_touch", "read_script"]
+
+_MAX_SCRIPT = 1 << 20  # bytes of a script
+_PALM = 0.03  # m; radius of its face
+_FINGERS = ((-0.02, 0.0), (0.0, 0.0), (0.02, 0.0))  # m; three, 20 mm apart along the link
+#: Shape of a touch, as it is typed -> what makes its contacts of the first one.
+TOUCH_SHAPES: dict[str, Callable[[Frustum, ScriptedTouch], list[ScriptedTouch]]] = {
+    "finger": lambda _, touch: [touch],
+    "palm": lambda _, touch: [replace(touch, radius=_PALM)],
+    "fingers": lambda cone, touch: fingers(cone, touch, _FINGERS),
+    "grip": grip,
+    "seam": lambda cone, touch: palm_over_seam(cone, touch, touch.phi),
+}
+#: Faults that can be typed.
+FAULT_NAMES = tuple(f.name for f in fields(FaultInjection))
+
+
+def read_script(path: Path) -> list[tuple[str, ScriptedTouch]]:
+    """Read a file of touches, one a line; empty lines and what follows a # mean nothing.
+
+    Raises:
+        SensorError: a line is no touch, or the file cannot be read; the message names the line.
+    """
+    try:
+        lines = read_file(path, _MAX_SCRIPT).decode("utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise SensorError(f"{path}: cannot be read as a script of touches ({error})") from error
+    presses = []
+    for number, line in enumerate(lines, 1):
+        if text := line.partition("#")[0].strip():
+            try:
+                presses.append(parse_press(text))
+            except SensorError as error:
+                raise SensorError(f"{path}, line {number}: {error}") from error
+    return presses
+
+
+def parse_press(text: str) -> tuple[str, ScriptedTouch]:
+    """Read [SHAPE:]START_S:END_S:U_MM:PHI_DEG[:FORCE_N][@SENSOR]: the shape, and its first touch.
+
+    U_MM and PHI_DEG may each be FROM..TO, between which the touch slides. The touch names the sensor by its number.
+
+    Raises:
+        SensorError: it is something else.
+    """
+    text, _, sensor = text.partition("@")
+    shape, touch = _parse_shape(text)
+    return shape, replace(touch, sensor=sensor.strip())
+
+
+def _parse_shape(text: str) -> tuple[str, ScriptedTouch]:
+    shape, separator, rest = text.partition(":")
+    if separator and shape in TOUCH_SHAPES:
+        return shape, parse_touch(rest)
+    if shape[:1].isalpha():
+        raise SensorError(f"the shape of a touch must be one of {', '.join(TOUCH_SHAPES)}, got {shape!r}")
+    return "finger", parse_touch(text)
+
+
+def parse_touch(text: str) -> ScriptedTouch:
+    """Read START_S:END_S:U_MM:PHI_DEG[:FORCE_N], U_MM and PHI_DEG each as one number or as FROM..TO.
+
+    Raises:
+        SensorError: it is something else.
+    """
+    try:
+        start, end, u_mm, phi_deg, *force = text.split(":")
+        if len(force) > 1:
+            raise ValueError
+        times, forces = (float(start), float(end)), [float(part) for part in force]
+        (u, to_u), (phi, to_phi) = _parse_way(u_mm), _parse_way(phi_deg)
+    except ValueError:
+        raise SensorError(
+            f"a touch must be START_S:END_S:U_MM:PHI_DEG[:FORCE_N], got {text!r}; where it slides, U_MM or PHI_DEG is "
+            "FROM..TO"
+        ) from None
+    slide_u, slide_phi = (to_u - u) * 1e-3, math.radians(to_phi - phi)
+    touch = ScriptedTouch(*times, u * 1e-3, math.radians(phi), slide_u=slide_u, slide_phi=slide_phi)
+    return replace(touch, force=forces[0]) if forces else touch
+
+
+def _parse_way(text: str) -> tuple[float, float]:
+    first, separator, last = text.partition("..")
+    if last.startswith("."):
+        raise ValueError  # a third point would make another place of it
+    return float(first), float(last if separator else first)
+
+
+def parse_fault(text: str) -> tuple[str, int | str | WiringFaults]:
+    """Read NAME=VALUE of one fault.
+
+    Raises:
+        SensorError: no fault has that name, or the value does not suit it.
+    """
+    name, _, value = text.partition("=")
+    if name not in FAULT_NAMES:
+        raise SensorError(f"a fault must be one of {', '.join(FAULT_NAMES)}, got {name!r}")
+    if name == "stuck_channel":
+        return name, value
+    if name == "wiring":
+        kind, *electrodes = value.split("-")
+        if kind == "open" and electrodes:
+            return name, WiringFaults(opened=tuple(electrodes))
+        if kind == "short" and len(electrodes) == 2:
+            return name, WiringFaults(shorts=((electrodes[0], electrodes[1]),))
+        raise SensorError(f"wiring must be open-A or short-A-ground (or -supply, -rail, -B), got {value!r}")
+    try:
+        return name, int(value, 0)
+    except ValueError:
+        raise SensorError(f"fault {name} must be a whole number such as {name}=50, got {value!r}") from None

@@ -1,0 +1,158 @@
+"""When a place is worked out: never before a touch has begun, and seldom after."""
+
+import itertools
+import math
+import random
+from collections import Counter
+
+import pytest
+
+from coneskin.geometry.frustum import Frustum
+from coneskin.skin.detection.detector import Detector
+from coneskin.skin.detection.events import TouchBegan, TouchMoved
+from coneskin.skin.detection.place_estimate import PlaceEstimator
+from coneskin.skin.detection.reading import read
+from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.single_contact import SingleContactTest
+from coneskin.skin.detection.touch_place import TouchPlace
+from coneskin.skin.detection.untouched_currents import UntouchedCurrents
+from coneskin.skin.detection.untouched_leak import UntouchedLeak
+from coneskin.skin.electronics import Electronics, Polarity
+from coneskin.skin.robin_function import RobinFunction
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.virtual.circuit import LayerContact
+from coneskin.skin.wire import Frame
+
+from ..bench_top import UR10, measured
+
+SENSOR = Sensor(UR10, name="forearm")
+COUNTS = Frame._fields[6:-1]
+LEARNED = 200  # frames
+OFTEN = 8  # frames; an estimate serves for as many
+
+
+class CountedTouch:
+    """A detector that has learned, and how often its decoder works out a place."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, confirm_frames: int = 1) -> None:
+        self.detector = Detector(SENSOR, DetectorSettings(confirm_frames=confirm_frames))
+        self.calls: Counter[str] = Counter()
+        self._count, self._rng = 0, random.Random(5)
+        for kind, name in (
+            (PlaceEstimator, "estimate"),
+            (RobinFunction, "value_and_gradient"),
+            (RobinFunction, "gradient"),
+        ):
+            monkeypatch.setattr(kind, name, self._counted(name, getattr(kind, name)))
+        for _ in range(LEARNED):
+            self.feed(())
+
+    def _counted(self, name, method):
+        def counted(*args):
+            self.calls[name] += 1
+            return method(*args)
+
+        return counted
+
+    def feed(self, contacts):
+        frame = measured(SENSOR, contacts)._asdict()
+        counts = {n: max(0, round(frame[n] + self._rng.gauss(0.0, 0.7))) for n in COUNTS}
+        stamp = {"sequence": self._count & 0xFFFF, "clock_us": 1000 * self._count}
+        self._count += 1
+        return self.detector.feed(Frame(**{**frame, **counts, **stamp}), 1e-3 * self._count)
+
+
+def press(siemens: float, u: float = 0.2) -> list[LayerContact]:
+    return [LayerContact(u, 1.0, siemens)]
+
+
+@pytest.mark.parametrize("confirm_frames", [1, 2])
+def test_what_stops_an_arm_waits_for_no_place(monkeypatch, confirm_frames):
+    touch = CountedTouch(monkeypatch, confirm_frames)
+    events = [event for _ in range(confirm_frames) for event in touch.feed(press(1e-3))]
+    (began,) = events
+    assert isinstance(began, TouchBegan)
+    assert not touch.calls
+    assert began.covariance is None
+    assert not began.location_valid
+    assert began.doubt
+    assert began.u == pytest.approx(0.2, abs=0.005)
+    assert began.phi == pytest.approx(1.0, abs=0.05)
+    assert touch.detector.reading_now.covariance is None
+    touch.feed(press(1e-3))
+    assert touch.calls["estimate"] == 1
+    assert touch.detector.reading_now.covariance is not None
+
+
+def test_no_place_is_certain_before_it_is_worked_out(monkeypatch):
+    monkeypatch.setattr(SingleContactTest, "take", lambda *_: "")
+    touch = CountedTouch(monkeypatch, 2)
+    touch.feed(press(1e-3))
+    (began,) = touch.feed(press(1e-3))
+    assert not began.location_valid
+    assert began.doubt
+    touch.feed(press(1e-3))
+    assert touch.detector.reading_now.location_valid
+
+
+def test_a_touch_that_is_not_confirmed_costs_no_place(monkeypatch):
+    touch = CountedTouch(monkeypatch, 2)
+    for _ in range(5):
+        assert touch.feed(press(1e-3)) == []
+        touch.feed(())
+    assert not touch.calls
+
+
+@pytest.mark.parametrize("slide", [0.0, 5e-4])
+def test_a_press_that_grows_or_slides_is_worked_out_once_in_eight_frames(monkeypatch, slide):
+    touch = CountedTouch(monkeypatch)
+    at = []
+    for n in range(100):
+        before = touch.calls["estimate"]
+        touch.feed(press(3e-4 * 1.05**n, 0.15 + slide * n))
+        if touch.calls["estimate"] > before:
+            at.append(n)
+    gaps = [later - sooner for sooner, later in itertools.pairwise(at)]
+    assert at[0] == 1
+    assert min(gaps) >= OFTEN
+    assert max(gaps) <= 2 * OFTEN
+
+
+def test_the_covariance_is_told_only_while_the_estimate_stands(monkeypatch):
+    touch = CountedTouch(monkeypatch)
+    for _ in range(3):
+        touch.feed(press(3e-4))
+    assert touch.detector.reading_now.covariance is not None
+    events = []
+    for _ in range(4):
+        events += touch.feed(press(9e-4))
+    reading = touch.detector.reading_now
+    assert touch.calls["estimate"] == 1
+    assert reading.covariance is None
+    assert reading.radius is None
+    assert any(isinstance(event, TouchMoved) and event.covariance is None for event in events)
+    for _ in range(OFTEN):
+        touch.feed(press(9e-4))
+    assert touch.detector.reading_now.covariance is not None
+
+
+def test_a_rest_sharpens_the_place_with_few_estimates(monkeypatch):
+    touch = CountedTouch(monkeypatch)
+    told = []
+    for _ in range(128):
+        touch.feed(press(1e-3))
+        told.append(touch.detector.reading_now.covariance)
+    assert touch.calls["estimate"] <= 128 // OFTEN
+    assert told[-1][0] < 0.1 * told[1][0]
+    assert told[-1][2] < 0.1 * told[1][2]
+
+
+def test_a_centre_far_off_the_sheet_has_a_finite_velocity():
+    """Counts beyond the converter's range put the electrical centre thousands of sheets away."""
+    sensor = Sensor(Frustum(0.012, 0.08, 0.2), electronics=Electronics(), polarity=Polarity("A", "D"))
+    places = TouchPlace(sensor, DetectorSettings(), UntouchedCurrents(sensor, 0.0), UntouchedLeak(sensor, 1e-3))
+    good = measured(sensor, [LayerContact(0.1, 1.0, 1e-3)])
+    far = dict(zip(COUNTS, (48634, 64561, 1089, 33060, 10132, 7643, 53009, 53330, 48986), strict=False))
+    for number, frame in enumerate((good, good, good._replace(**far))):
+        place = places.take(frame, read(sensor, frame), 0.9, 1e-3 * number, 1e-3)
+    assert 0.0 < math.hypot(*place.velocity) < math.inf

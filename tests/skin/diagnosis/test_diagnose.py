@@ -1,0 +1,117 @@
+"""Every mistake of the corpus is named by the first line, and none by a wrong name; the bytes come from a C program."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from coneskin.geometry.frustum import Frustum
+from coneskin.skin.diagnosis.capture import Capture, CaptureWindow
+from coneskin.skin.diagnosis.cause import Cause, Diagnosis
+from coneskin.skin.diagnosis.checksum import crc16
+from coneskin.skin.diagnosis.diagnose import diagnose
+from coneskin.skin.diagnosis.frame_numbers import measure_numbers
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.virtual.imperfections import Imperfections
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
+from coneskin.skin.wire import frame_at
+
+from .corpus import BAUD, CLOCK_RATIOS, MISTAKES, NOT_TO_BE_NAMED, WITH_A_SCENE, build, bytes_of
+
+SECONDS = 0.7  # of bytes; a line that falls silent is heard for longer
+SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("mistakes"))
+
+
+def heard(program: Path, mistake: str, sensors: tuple[Sensor, ...] = ()) -> Diagnosis:
+    seconds = 1.6 if MISTAKES.get(mistake) in (Cause.STOPPED, Cause.SILENT) else SECONDS
+    pieces = bytes_of(program, mistake, seconds)
+    window = CaptureWindow(0.0)
+    for time, piece in pieces:
+        window.add(piece, time)
+    return diagnose(window.capture(seconds), sensors, BAUD)
+
+
+@pytest.mark.parametrize("mistake", [*MISTAKES, *NOT_TO_BE_NAMED])
+def test_a_mistake_is_named(program: Path, mistake: str) -> None:
+    named = heard(program, mistake, (SENSOR,) if mistake in WITH_A_SCENE else ())
+    assert named.cause is {**MISTAKES, **NOT_TO_BE_NAMED}[mistake], named.line
+    assert "\n" not in named.line
+
+
+@pytest.mark.parametrize("mistake", ["none", "big endian", "supply 0", "currents 0", "shifted to 16 bits"])
+def test_with_a_scene_the_name_is_the_same(program: Path, mistake: str) -> None:
+    assert heard(program, mistake, (SENSOR,)).cause is MISTAKES[mistake]
+
+
+@pytest.mark.parametrize("mistake", CLOCK_RATIOS)
+def test_the_ratio_of_the_clocks_is_measured_to_one_per_cent(program: Path, mistake: str) -> None:
+    """With arrivals that a busy computer scatters over 8 ms, and once holds back for a quarter of a second."""
+    jitter = random.Random(f"arrivals {mistake}")
+    frames, times = [], []
+    for time, piece in bytes_of(program, mistake, 2.0):
+        frames.append(frame_at(piece))
+        late = time + 0.008 * jitter.random() ** 4
+        times.append(max(1.95 if 1.7 < time < 1.95 else late, times[-1] if times else 0.0))
+    assert measure_numbers(frames, times).clock_ratio == pytest.approx(CLOCK_RATIOS[mistake], rel=0.01)
+
+
+def test_a_line_of_two_seconds_is_not_kept_for_ever() -> None:
+    window = CaptureWindow(0.0, span=2.0, size=1000)
+    for number in range(500):
+        window.add(bytes(10), 0.01 * number)
+    assert len(window.capture(5.0).data) == 1000
+    assert len(CaptureWindow(0.0).capture(3.0).data) == 0
+
+
+def test_a_capture_knows_when_each_byte_came() -> None:
+    capture = Capture(((1.0, b"abc"), (2.0, b"d"), (4.0, b"ef")), 5.0)
+    assert capture.arrivals([0, 2, 3, 4, 5]) == [1.0, 1.0, 2.0, 4.0, 4.0]
+    assert (capture.duration, capture.silence) == (4.0, 1.0)
+
+
+def test_the_names_of_crcs_are_those_of_the_catalogue() -> None:
+    """Check values of "123456789" from the catalogue of parametrised CRC algorithms."""
+    check = b"123456789"
+    assert crc16(check, 0x1021) == 0x31C3  # XMODEM
+    assert crc16(check, 0x1021, 0xFFFF) == 0x29B1  # CCITT-FALSE
+    assert crc16(check, 0x1021, 0x1D0F) == 0xE5CC  # SPI-FUJITSU
+    assert crc16(check, 0x1021, 0, reflected=True) == 0x2189  # KERMIT
+    assert crc16(check, 0x8005, 0xFFFF, reflected=True) == 0x4B37  # MODBUS
+    assert crc16(check, 0x8005, 0, reflected=True) == 0xBB3D  # ARC
+
+
+def test_every_other_cause_is_in_the_corpus() -> None:
+    rare = {Cause.FEW_BYTES, Cause.NIBBLES_SWAPPED, Cause.WORDS_SWAPPED, Cause.UBX, Cause.CRC_UNKNOWN}
+    rare |= {Cause.CLOCK_SECONDS} | {Cause.SEQUENCE_RANDOM, Cause.SUPPLY_OFF, Cause.CURRENT_OFF}
+    assert {*Cause} - {*MISTAKES.values()} - {*NOT_TO_BE_NAMED.values()} == rare
+
+
+@pytest.mark.parametrize(
+    ("version", "driven", "count", "rate"), [(1, False, 1, 1000.0), (2, False, 2, 500.0), (2, True, 1, 200.0)]
+)
+def test_a_skin_on_which_all_is_right_is_not_blamed(version: int, driven: bool, count: int, rate: float) -> None:
+    """Touched or not, listened to from the middle of a frame on, with and without its scene."""
+    sensors = [Sensor(Frustum(0.05, 0.07, 0.3), number, device_id=0xC53A) for number in range(count)]
+    touches = [ScriptedTouch(0.3, 0.8, u=0.2, phi=2.0, force=9.0), ScriptedTouch(0.5, 2.0, u=0.1, phi=4.0)]
+    skin = VirtualSkin(
+        *(sensors, touches),
+        rate_hz=rate,
+        seed=version,
+        model="ladder",
+        imperfections=Imperfections(clock_ratio=1.004, supply_ratio=0.97),
+        wire_version=version,
+        driven_potentials=driven,
+        duration=1.2,
+    )
+    window = CaptureWindow(0.0)
+    for number, (time, data) in enumerate(skin.packets()):
+        window.add(data[17:] if number == 0 else data, time)
+    for scene in ((), sensors):
+        named = diagnose(window.capture(1.2), scene, BAUD)
+        assert named.good, named.line

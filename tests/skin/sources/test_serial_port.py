@@ -1,0 +1,84 @@
+"""The serial port's own matters: what cannot be opened is one clear line. The rest is in tests/contracts."""
+
+import errno
+import os
+import sys
+
+import pytest
+
+from coneskin.errors import SkinConnectionError
+from coneskin.skin.sources.port_list import list_ports
+from coneskin.skin.sources.serial_port import SerialPort
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("/dev/there-is-none", r"^/dev/there-is-none: no such port; present: "),
+        ("hwgrep://there-is-none", r"^hwgrep://there-is-none: no such port; present: "),
+        ("hwgrep://(", r"^hwgrep://\(: not a port or URL that pyserial knows"),
+        ("loop://?logging=loud", r"^loop://\?logging=loud: not a port or URL that pyserial knows"),
+        ("warp://9", r"^warp://9: not a port or URL that pyserial knows"),
+        (
+            "socket://127.0.0.1:1",
+            r"^socket://127.0.0.1:1: refused, no program listens there; start it, or correct the port$",
+        ),
+    ],
+)
+def test_a_port_that_is_not_there(url, words):
+    port = SerialPort(url)
+    with pytest.raises(SkinConnectionError, match=words) as caught:
+        port.open()
+    assert "\n" not in str(caught.value)
+
+
+@posix
+def test_a_busy_port_says_so():
+    from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal
+
+    master, slave, path = open_raw_terminal()
+    try:
+        second = SerialPort(path)
+        with SerialPort(path), pytest.raises(SkinConnectionError, match="busy, another program has it open"):
+            second.open()
+        with second:
+            assert second.fileno() is not None
+    finally:
+        os.close(slave)
+        os.close(master)
+
+
+@posix
+def test_a_file_is_no_port():
+    with pytest.raises(SkinConnectionError, match=r"^/dev/null: cannot be opened"):
+        SerialPort("/dev/null").open()
+
+
+def test_a_port_that_is_not_permitted_tells_what_to_do(monkeypatch):
+    import serial
+
+    def refuse(*_: object, **__: object) -> None:
+        raise serial.SerialException(errno.EACCES, "could not open port /dev/ttyACM0: Permission denied")
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(SkinConnectionError, match=r"not permitted; .* group \(mostly dialout\)"):
+        SerialPort("/dev/ttyACM0").open()
+
+
+def test_ports_are_listed_one_line_each():
+    assert all("\n" not in line and line for line in list_ports())
+
+
+@posix
+def test_a_pseudo_terminal_has_no_low_latency_switch():
+    from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal
+
+    master, slave, path = open_raw_terminal()
+    try:
+        with SerialPort(path) as port:
+            assert port.low_latency is False
+    finally:
+        os.close(slave)
+        os.close(master)

@@ -1,0 +1,64 @@
+"""Electronics chosen for a sheet: real parts, no geometry refused, what is given is kept."""
+
+import math
+import random
+
+import pytest
+
+from coneskin.geometry.frustum import Frustum
+from coneskin.skin.electronics import Electronics, LeadOhms
+from coneskin.skin.matched_electronics import HEADROOM, GivenElectronics, match_electronics, shunt_ohms
+from coneskin.skin.sensor import Sensor
+
+
+def test_every_geometry_of_a_link_has_electronics():
+    rng = random.Random(1)
+    for _ in range(3000):
+        radius = 10.0 ** rng.uniform(-2.0, 0.0)
+        breadth_over_length = 10.0 ** rng.uniform(-1.4, 1.4)
+        wrap = rng.uniform(1.0, 2.0 * math.pi)
+        cone = Frustum(radius, radius * rng.uniform(0.5, 1.5), radius * wrap / breadth_over_length, wrap)
+        sensor = Sensor(cone, upper_sheet_ohms=(ohms := 10.0 ** rng.uniform(1.0, 4.5)), lower_sheet_ohms=ohms)
+        parts = sensor.electronics
+        currents = sensor.radial_amperes, sensor.angular_amperes
+        assert parts.current_full_scale >= HEADROOM * max(currents) * (1.0 - 1e-9)
+        # the next shunt of the series, 2.4 % more, would not do; rounding of a value is 0.5 % of it
+        assert parts.current_full_scale < HEADROOM * max(currents) * 1.035
+        assert min(currents) / parts.current_full_scale * parts.full_count >= 16
+        assert sensor.bounds.radial_high < parts.full_count
+        if min(currents) / parts.current_full_scale * 4095 >= 100:
+            assert parts.adc_bits == 12
+
+
+def test_the_parts_can_be_bought():
+    e96 = {round(10.0 ** (k / 96.0), 2) for k in range(96)}
+    assert {1.0, 4.02, 9.31, 9.76} < e96  # of the published series
+    for ohms in (12.0, 130.0, 954.0, 9300.0, 4e4):
+        parts = match_electronics(ohms, 2.0 * ohms)
+        shunt = shunt_ohms(parts)
+        digits = shunt / 10.0 ** math.floor(math.log10(shunt) + 1e-12)
+        assert min(abs(digits - value) for value in e96) < 1e-9
+        assert f"{parts.pulldown_ohms:.0f}"[:2] in {"10", "20", "39", "82", "24", "36"}
+        assert 2.0 * 2.0 * ohms <= parts.pulldown_ohms or parts.pulldown_ohms == 100e3
+        assert parts.supply_volts in (2.5, 2.048, 1.25, 1.024, 0.512)
+
+
+def test_a_sheet_that_would_draw_too_much_gets_a_lower_supply():
+    assert match_electronics(1000.0, 1000.0).supply_volts == 2.5
+    assert match_electronics(30.0, 1000.0).supply_volts == 1.25  # 78 mA at 2.5 V, 64 mA at 2.048 V, 39 mA at 1.25 V
+    assert match_electronics(0.5, 1000.0).supply_volts == 0.512  # the least: still not refused
+
+
+def test_what_is_given_is_kept():
+    given = GivenElectronics(3.0, 5.0, 10, 22e3, 5e6, LeadOhms(1.0, 2.0, 3.0, 4.0), 0.033)
+    assert match_electronics(900.0, 1100.0, given) == Electronics(
+        3.0, 5.0, 10, 22e3, 5e6, LeadOhms(1.0, 2.0, 3.0, 4.0), 0.033
+    )
+    assert match_electronics(900.0, 1100.0, GivenElectronics(supply_volts=1.0)).current_full_scale == pytest.approx(
+        HEADROOM * 1.0 / 902.0, rel=0.03
+    )
+
+
+def test_electronics_that_are_given_to_a_sensor_are_its_own():
+    assert Sensor(Frustum(0.054, 0.054, 0.434), electronics=Electronics()).electronics.current_full_scale == 0.02
+    assert Sensor(Frustum(0.054, 0.054, 0.434)).electronics.current_full_scale < 0.008
