@@ -7,11 +7,12 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from coneskin.robot.ur_models import MODEL_NAMES, ArmModel, model
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 
 #: the corrections of one real UR10, printed in calibration_test.cpp of Universal_Robots_ROS2_Driver: 440 m along axes
 #: that are parallel to 1.4 mrad
-FAR_UR10 = model("UR10").calibrated(
+FAR_UR10 = arm_model("UR10").calibrated(
     delta_d=(
         -0.000160188285741325043,
         439.140974079900957,
@@ -47,7 +48,7 @@ FAR_UR10 = model("UR10").calibrated(
 )
 
 #: another one, 1.4 m along axes that are parallel to 7 mrad
-NEAR_UR10 = model("UR10").calibrated(
+NEAR_UR10 = arm_model("UR10").calibrated(
     delta_d=(
         0.00065609212979853,
         1.4442162376284788,
@@ -82,7 +83,7 @@ NEAR_UR10 = model("UR10").calibrated(
     ),
 )
 
-NOMINAL = tuple(model(name) for name in MODEL_NAMES)
+NOMINAL = tuple(arm_model(name) for name in MODEL_NAMES)
 
 
 def arms() -> st.SearchStrategy[ArmModel]:

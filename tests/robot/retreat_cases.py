@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from coneskin.robot.commands import ArmState, ContactOnLink, Done, Reaction
-from coneskin.robot.retreat import RetreatPlan, plan_retreat
-from coneskin.robot.ur_models import ArmModel, Joints, model
+from coneskin.robot.arm.model import ArmModel, Joints
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat
+from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
-UR10E = model("UR10e")
+UR10E = arm_model("UR10e")
 Q: Joints = (0.3, -1.2, 1.1, 0.4, 0.5, 0.6)
 FOREARM = ContactOnLink(3, (0.3, 0.0, 0.06), (0.0, 0.0, 1.0))
 
@@ -17,7 +18,7 @@ FOREARM = ContactOnLink(3, (0.3, 0.0, 0.06), (0.0, 0.0, 1.0))
 def planned(
     arm: ArmModel, q: Joints, contacts: list[ContactOnLink], reaction: Reaction | None = None, qd: Joints | None = None
 ) -> RetreatPlan | Done:
-    return plan_retreat(arm, ArmState(0.0, q, qd or (0.0,) * 6), contacts, reaction or Reaction())
+    return plan_retreat(arm, ArmState(0.0, q, qd or (0.0,) * 6), contacts, reaction or Reaction(kind="retreat"))
 
 
 def six(values: Iterable[float]) -> Joints:

@@ -1,8 +1,8 @@
-"""What the tests do with the real wheel: each function runs alone in a child process (see `wheel`), returns JSON."""
+"""Calls of the real wheel for the tests: each function runs alone in a child process (see `wheel`), returns JSON."""
 
 from __future__ import annotations
 
-import os
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -13,10 +13,14 @@ import rtde_control
 import rtde_io
 import rtde_receive
 
+from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.ur.stop_sockets import StopSockets
+from coneskin.robot.ur.ur_rtde import UrArm
+
 Joints = list[float]
 
 
-def _until(condition: Callable[[], bool], limit: float = 5.0) -> bool:
+def _until(condition: Callable[[], bool], limit: float = 20.0) -> bool:
     deadline = time.monotonic() + limit
     while not condition():
         if time.monotonic() > deadline:
@@ -54,6 +58,17 @@ def _lead(values: Joints) -> float:
     return max(abs(value) for value in values)
 
 
+def _settle(receive: Any) -> None:
+    """Wait for the packet in which the arm stands: a command may return before the newest packet has come."""
+    _until(lambda: _lead(receive.getActualQd()) == 0.0)
+
+
+def _reach(receive: Any, speed: float) -> float:
+    """Wait until the leading joint has a speed [rad/s]; return the speed that it has."""
+    _until(lambda: abs(_lead(receive.getActualQd()) - speed) < 1e-9)
+    return _lead(receive.getActualQd())
+
+
 def _refusal(call: Callable[..., Any], *arguments: Any) -> str:
     try:
         call(*arguments)
@@ -75,8 +90,7 @@ def receive_everything(host: str) -> dict[str, Any]:
     names = [name for name in dir(receive) if name.startswith("get") and name not in other]
     got = {name: getattr(receive, name)() for name in names}
     first = receive.getTimestamp()
-    time.sleep(0.05)
-    got["elapsed"] = receive.getTimestamp() - first
+    got["goes_on"] = _until(lambda: receive.getTimestamp() > first)
     got["register"] = receive.getOutputIntRegister(12) + receive.getOutputDoubleRegister(12)
     return got
 
@@ -90,14 +104,15 @@ def moves(host: str) -> dict[str, Any]:
     out: dict[str, Any] = {}
 
     def joints_off(target: Joints) -> float:
+        _settle(receive)
         return _lead([a - b for a, b in zip(receive.getActualQ(), target, strict=True)])
 
     def pose_off(target: Joints) -> float:
+        _settle(receive)
         return _lead([a - b for a, b in zip(receive.getActualTCPPose(), target, strict=True)])
 
-    begin = time.monotonic()
+    out["moveJ_target"] = away
     out["moveJ"] = (control.moveJ(away, 2.0, 10.0), joints_off(away))
-    out["moveJ_time"] = time.monotonic() - begin
     pose = receive.getActualTCPPose()
     pose[2] += 0.03
     pose[0] += 0.03
@@ -122,7 +137,7 @@ def moves(host: str) -> dict[str, Any]:
 
 
 def stops(host: str) -> dict[str, Any]:
-    """Every stop on the motion that it can stop: how long it took, and what moved after it."""
+    """Every stop on the motion that it can stop: how fast the arm was, how long the call took, what runs after it."""
     receive = _receive(host)
     control = _control(host)
     out: dict[str, Any] = {}
@@ -143,23 +158,26 @@ def stops(host: str) -> dict[str, Any]:
         q = receive.getActualQ()
         control.servoJ([q[0] + 1.5, *q[1:]], 0.0, 0.0, 0.002, 0.2, 100)
 
-    cases: list[tuple[str, Callable[[], None], Callable[[], Any]]] = [
-        ("stopJ after moveJ", move, lambda: control.stopJ(5.0)),
-        ("speedStop after speedJ", speed_joints, lambda: control.speedStop(5.0)),
-        ("speedStop after speedL", speed_tool, lambda: control.speedStop(2.0)),
-        ("servoStop after servoJ", servo, lambda: control.servoStop(5.0)),
-        ("stopL async after moveJ", move, lambda: control.stopL(5.0, True)),
+    def tool_is_fast() -> bool:
+        return abs(receive.getActualTCPSpeed()[1] - twist[1]) < 1e-3
+
+    cases: list[tuple[str, Callable[[], None], Callable[[], bool], Callable[[], Any]]] = [
+        ("stopJ after moveJ", move, lambda: _reach(receive, 1.0) == 1.0, lambda: control.stopJ(5.0)),
+        ("speedStop after speedJ", speed_joints, lambda: _reach(receive, 0.5) == 0.5, lambda: control.speedStop(5.0)),
+        ("speedStop after speedL", speed_tool, tool_is_fast, lambda: control.speedStop(2.0)),
+        ("servoStop after servoJ", servo, lambda: _lead(receive.getActualQd()) > 0.05, lambda: control.servoStop(5.0)),
+        ("stopL async after moveJ", move, lambda: _reach(receive, 1.0) == 1.0, lambda: control.stopL(5.0, True)),
     ]
-    for name, begin, stop in cases:
+    for name, begin, ready, stop in cases:
         begin()
-        time.sleep(0.15)
+        _until(ready)
         fast = _lead(receive.getActualQd())
         speed = receive.getActualTCPSpeed()
         start = time.monotonic()
         stop()
         taken = time.monotonic() - start
-        _until(lambda: _lead(receive.getActualQd()) == 0.0)
-        out[name] = (fast, speed, taken, time.monotonic() - start, control.isProgramRunning())
+        _settle(receive)
+        out[name] = (fast, speed, taken, control.isProgramRunning())
     control.moveJ(home, 3.0, 20.0)
     return out
 
@@ -208,20 +226,16 @@ def inputs_and_outputs(host: str) -> dict[str, Any]:
     out: dict[str, Any] = {"bits": _until(lambda: receive.getActualDigitalOutputBits() == wanted)}
     io.setStandardDigitalOut(3, False)
     out["off"] = _until(lambda: not receive.getDigitalOutState(3))
-    out["analog"] = receive.getStandardAnalogOutput0()
+    out["analog"] = _until(lambda: receive.getStandardAnalogOutput0() == 5.0)  # volts: half of 10
     home = receive.getActualQ()
-    control.moveJ([home[0] + 2.0, *home[1:]], 1.0, 10.0, True)
-    time.sleep(0.25)
-    out["full"] = _lead(receive.getActualQd())
+    control.moveJ([home[0] + 3.0, *home[1:]], 1.0, 10.0, True)
+    out["full"] = _reach(receive, 1.0)
     io.setSpeedSlider(0.5)
-    time.sleep(0.2)
-    out["half"] = (_lead(receive.getActualQd()), receive.getTargetSpeedFraction())
+    out["half"] = (_reach(receive, 0.5), receive.getTargetSpeedFraction())
     io.setSpeedSlider(0.0)
-    time.sleep(0.2)
-    out["none"] = _lead(receive.getActualQd())
+    out["none"] = _reach(receive, 0.0)
     io.setSpeedSlider(1.0)
-    time.sleep(0.2)
-    out["again"] = _lead(receive.getActualQd())
+    out["again"] = _reach(receive, 1.0)
     control.stopJ(10.0)
     control.moveJ(home, 3.0, 20.0)
     return out
@@ -233,19 +247,20 @@ def protective_stop(host: str) -> dict[str, Any]:
     control = _control(host)
     dashboard = _dashboard(host)
     home = receive.getActualQ()
-    target = [home[0] + 0.6, *home[1:]]
+    target = [home[0] + 1.2, *home[1:]]
     control.moveJ(target, 1.0, 5.0, True)
-    time.sleep(0.3)
+    _reach(receive, 1.0)
     out: dict[str, Any] = {"returned": control.triggerProtectiveStop()}
-    _until(lambda: _lead(receive.getActualQd()) == 0.0)
+    out["early"] = _refusal(dashboard.unlockProtectiveStop)
+    _settle(receive)
     out["state"] = (receive.isProtectiveStopped(), receive.getSafetyMode(), receive.getSafetyStatusBits())
     out["runtime"] = receive.getRuntimeState()
     out["safety"] = (dashboard.safetymode(), dashboard.safetystatus())
     out["before"] = receive.getActualQ()[0] - home[0]
-    out["early"] = _refusal(dashboard.unlockProtectiveStop)
     out["play"] = _refusal(dashboard.play)
     out["unlocked"] = _until(lambda: not _refusal(dashboard.unlockProtectiveStop))
-    time.sleep(0.1)
+    unlocked_at = receive.getTimestamp()
+    _until(lambda: receive.getTimestamp() > unlocked_at + 0.1)
     out["still"] = _lead(receive.getActualQd())
     dashboard.play()
     out["arrives"] = _until(lambda: _lead([a - b for a, b in zip(receive.getActualQ(), target, strict=True)]) == 0.0)
@@ -254,7 +269,7 @@ def protective_stop(host: str) -> dict[str, Any]:
 
 
 def scripts(host: str) -> dict[str, Any]:
-    """Stop, upload again, a script of one's own, pause and play."""
+    """StopProgram, upload again, a script of one's own, pause and play."""
     receive = _receive(host)
     control = _control(host)
     dashboard = _dashboard(host)
@@ -264,9 +279,10 @@ def scripts(host: str) -> dict[str, Any]:
     control.reuploadScript()
     out["again"] = (_until(control.isProgramRunning), control.moveJ(home))
     out["custom"] = control.sendCustomScriptFunction("mine", "movej([0.1, -1.5, 1.5, -1.5, -1.5, 0], a=20, v=3)")
+    _settle(receive)
     out["custom_q"] = receive.getActualQ()
-    control.moveJ([home[0] + 1.0, *home[1:]], 1.0, 10.0, True)
-    time.sleep(0.2)
+    control.moveJ([home[0] + 2.0, *home[1:]], 1.0, 10.0, True)
+    _reach(receive, 1.0)
     dashboard.pause()
     out["paused"] = _until(lambda: _lead(receive.getActualQd()) == 0.0)
     out["paused_state"] = (dashboard.programState(), receive.getRuntimeState(), dashboard.running())
@@ -286,7 +302,7 @@ def dashboard_lines(host: str) -> dict[str, Any]:
         out[name] = getattr(client, name)()
     for name in ("safetymode", "safetystatus", "isProgramSaved", "getRobotModel", "getLoadedProgram"):
         out[name] = getattr(client, name)()
-    client.loadURP("a.urp")
+    out["load"] = _refusal(client.loadURP, "a.urp")
     client.popup("hello")
     client.addToLog("hello")
     for name in ("closePopup", "closeSafetyPopup", "stop", "unlockProtectiveStop", "powerOff"):
@@ -315,10 +331,11 @@ def watchdog(host: str) -> dict[str, Any]:
     """Fed, the program runs; not fed, it ends and the arm stops."""
     receive = _receive(host)
     control = _control(host)
-    control.setWatchdog(10.0)
-    for _ in range(10):
+    control.setWatchdog(1.0)
+    begin = receive.getTimestamp()
+    while receive.getTimestamp() < begin + 1.2:  # on the controller's clock, beyond one period of 1 s
         control.kickWatchdog()
-        time.sleep(0.03)
+        time.sleep(0.01)
     out: dict[str, Any] = {"fed": control.isProgramRunning()}
     control.speedJ([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0, 0.0)
     out["moved"] = _until(lambda: receive.getActualQd()[0] == 0.5)
@@ -342,23 +359,21 @@ def sync_move_ignores_stops(host: str) -> dict[str, Any]:
     control = _control(host)
     dashboard = _dashboard(host)
     home = receive.getActualQ()
-    out: dict[str, Any] = {}
-    far = [home[0] + 0.5, *home[1:]]
-    mover = threading.Thread(target=control.moveJ, args=(far, 1.0, 10.0))
+    far = [home[0] + 1.5, *home[1:]]
+    mover = threading.Thread(target=control.moveJ, args=(far, 0.5, 10.0))
     mover.start()
-    time.sleep(0.2)
+    out: dict[str, Any] = {"before_stopJ": _reach(receive, 0.5)}
     stopper = threading.Thread(target=control.stopJ, args=(10.0,))
     stopper.start()
-    time.sleep(0.15)
-    out["after_stopJ"] = _lead(receive.getActualQd())
     stopper.join()
     mover.join()
+    _settle(receive)
     out["arrived"] = receive.getActualQ()[0] - home[0]
-    mover = threading.Thread(target=control.moveJ, args=(home, 1.0, 10.0), daemon=True)
-    mover.start()
-    time.sleep(0.2)
+    threading.Thread(target=control.moveJ, args=(home, 0.5, 10.0), daemon=True).start()
+    out["before_dashboard"] = _reach(receive, 0.5)
     dashboard.stop()
-    out["after_dashboard"] = _until(lambda: _lead(receive.getActualQd()) == 0.0, 0.3)
+    _settle(receive)
+    out["after_dashboard"] = _lead(receive.getActualQd())
     out["left"] = receive.getActualQ()[0] - home[0]
     return out
 
@@ -371,8 +386,8 @@ def stop_in_speed_mode(host: str) -> dict[str, Any]:
     _until(lambda: receive.getActualQd()[0] == 0.2)
     control.stopJ(2.0)
     stands = _until(lambda: receive.getActualQd()[0] == 0.0)
-    time.sleep(0.05)
-    return {"running": control.isProgramRunning(), "stands": stands, "moves": control.moveJ(receive.getActualQ())}
+    ended = _until(lambda: not control.isProgramRunning(), 1.0)
+    return {"running": not ended, "stands": stands, "moves": control.moveJ(receive.getActualQ())}
 
 
 def stop_types(host: str) -> dict[str, Any]:
@@ -400,7 +415,7 @@ def latched_speed(host: str) -> dict[str, Any]:
     dashboard.stop()
     out = {"stands": _until(lambda: receive.getActualQd()[0] == 0.0)}
     control.reuploadScript()
-    out["moves"] = _until(lambda: receive.getActualQd()[0] == 0.2, 1.0)
+    out["moves"] = _until(lambda: receive.getActualQd()[0] == 0.2)
     control.speedStop(10.0)
     return out
 
@@ -420,32 +435,37 @@ def connect_and_move(host: str) -> dict[str, Any]:
     target = receive.getActualQ()
     target[0] += 0.1
     moved = control.moveJ(target, 3.0, 20.0)
+    _settle(receive)
     return {"moved": moved, "off": _lead([a - b for a, b in zip(receive.getActualQ(), target, strict=True)])}
 
 
-def notice_silence(host: str, pid: int) -> dict[str, Any]:
-    """Freeze the controller: when the wheel notices."""
+def notice_silence(host: str) -> dict[str, Any]:
+    """Wait for the wheel to notice that the test has frozen the controller; connect again when the test says so."""
     receive = _receive(host)
-    os.kill(pid, 19)  # SIGSTOP
-    begin = time.monotonic()
-    noticed = _until(lambda: not receive.isConnected(), 5.0)
-    taken = time.monotonic() - begin
-    os.kill(pid, 18)  # SIGCONT
-    return {"noticed": noticed, "taken": taken, "again": receive.reconnect(), "q": receive.getActualQ()}
+    print("CONNECTED", flush=True)
+    noticed = _until(lambda: not receive.isConnected(), 15.0)
+    if noticed:
+        print("NOTICED", flush=True)
+        sys.stdin.readline()
+    stopped_at = receive.getTimestamp()
+    again = receive.reconnect()
+    return {
+        "again": again,
+        "goes_on": _until(lambda: receive.getTimestamp() > stopped_at),
+        "q": receive.getActualQ(),
+    }
 
 
 def notice_close(host: str) -> dict[str, Any]:
     """Wait for the test to close the RTDE connections."""
     receive = _receive(host)
     print("CONNECTED", flush=True)
-    return {"noticed": _until(lambda: not receive.isConnected(), 5.0)}
+    return {"noticed": _until(lambda: not receive.isConnected(), 15.0)}
 
 
 def silent_dashboard(host: str) -> dict[str, Any]:
     """A dashboard that answers nothing: an error, not a hang."""
-    begin = time.monotonic()
-    refusal = _refusal(_dashboard, host)
-    return {"refusal": refusal, "taken": time.monotonic() - begin}
+    return {"refusal": _refusal(_dashboard, host)}
 
 
 def remaining_calls(host: str) -> dict[str, Any]:
@@ -476,4 +496,25 @@ def remaining_calls(host: str) -> dict[str, Any]:
     out["running"] = control.isProgramRunning()
     out["unreachable"] = control.moveL([3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.2, 1.0)
     out["ended"] = not control.isProgramRunning()
+    return out
+
+
+def start_again_after_a_stop(host: str, revive: bool) -> dict[str, Any]:
+    """Stop a speedJ by a program, then start the wheel's again: with our care, or as the wheel does it."""
+    receive = _receive(host)
+    arm = UrArm(host, 1.0).__enter__()
+    _KEPT.append(arm)
+    arm.speed_j([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], 4.0)
+    out: dict[str, Any] = {"moves": _until(lambda: receive.getActualQd()[0] > 0.45)}
+    with StopSockets(host) as stops:
+        out["sent"] = stops.use(StopPath.PROGRAM, 10.0)
+        out["stands"] = _until(lambda: _lead(receive.getActualQd()) == 0.0 and receive.getRuntimeState() == 1)
+        stood = receive.getActualQ()
+        if revive:
+            arm.revive()
+        else:
+            arm._control.reuploadScript()
+        out["runs"] = _until(lambda: receive.getRuntimeState() == 2)
+        out["moved"] = _until(lambda: receive.getActualQ() != stood, 0.3 if revive else 20.0)
+        stops.use(StopPath.PROGRAM, 10.0)
     return out

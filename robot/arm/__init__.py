@@ -1,0 +1,1 @@
+"""Geometry, kinematics and limits of an arm, without input or output."""

@@ -1,0 +1,160 @@
+"""Messages between guard, driver process and guard watchdog. Pure: bytes in, values out.
+
+The guard's commands are a letter and doubles, because they are sent from the live loop.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+from coneskin.robot.arm.model import Joints
+
+__all__ = [
+    "HEARTBEAT_PERIOD",
+    "HEARTBEAT_TIMEOUT",
+    "REPORT_PERIOD",
+    "SETPOINT_TIMEOUT",
+    "EndReaction",
+    "GuardCommand",
+    "Heartbeat",
+    "Release",
+    "SetJointVelocity",
+    "Shutdown",
+    "StatusReport",
+    "StopProgram",
+    "decode_command",
+]
+
+HEARTBEAT_PERIOD = 0.05  #: s between two heartbeats of the guard
+REPORT_PERIOD = 0.03  #: s between two of the driver process, the guard watchdog, or the program that guards
+HEARTBEAT_TIMEOUT = 0.5  #: s without one after which the guard counts as dead; delays of 0.1 s occur under load
+SETPOINT_TIMEOUT = 0.1  #: s without a ``SetJointVelocity``, sent every 4 ms while the guard itself moves the arm
+
+_ONE = struct.Struct("<d")
+_SEVEN = struct.Struct("<7d")
+_NUMBER = struct.Struct("<Q")
+
+
+class StopProgram(NamedTuple):
+    """Command to stop whatever the driver moves, and to refuse the program until ``Release``.
+
+    Attributes:
+        deceleration: of the leading joint [rad/s2].
+    """
+
+    deceleration: float
+
+    def encode(self) -> bytes:
+        """Return the message."""
+        return b"S" + _ONE.pack(self.deceleration)
+
+
+class SetJointVelocity(NamedTuple):
+    """Command to move the joints at these speeds until the next command.
+
+    Attributes:
+        qd: joint speeds [rad/s].
+        acceleration: of the leading joint [rad/s2].
+    """
+
+    qd: Joints
+    acceleration: float
+
+    def encode(self) -> bytes:
+        """Return the message."""
+        return b"V" + _SEVEN.pack(*self.qd, self.acceleration)
+
+
+class EndReaction(NamedTuple):
+    """Command to end the motion that ``SetJointVelocity`` began.
+
+    Attributes:
+        deceleration: of the leading joint [rad/s2].
+    """
+
+    deceleration: float
+
+    def encode(self) -> bytes:
+        """Return the message."""
+        return b"H" + _ONE.pack(self.deceleration)
+
+
+class Release(NamedTuple):
+    """Command to let the program move the arm; acknowledged by a report "released" with the same number.
+
+    Attributes:
+        number: of the release; a guard watchdog, which lets nothing move, acknowledges it as well.
+    """
+
+    number: int
+
+    def encode(self) -> bytes:
+        """Return the message."""
+        return b"C" + _NUMBER.pack(self.number)
+
+
+class Heartbeat(NamedTuple):
+    """Heartbeat of the guard, every ``HEARTBEAT_PERIOD``; without it for ``HEARTBEAT_TIMEOUT`` the arm is stopped."""
+
+    def encode(self) -> bytes:
+        """Return the message."""
+        return b"A"
+
+
+class Shutdown(NamedTuple):
+    """Announcement that the guard ends on purpose, after it has seen the arm stand."""
+
+    def encode(self) -> bytes:
+        """Return the message."""
+        return b"F"
+
+
+_WORDS: dict[bytes, Heartbeat | Shutdown] = {word.encode(): word for word in (Heartbeat(), Shutdown())}
+GuardCommand = StopProgram | SetJointVelocity | EndReaction | Release | Heartbeat | Shutdown
+
+
+class StatusReport(NamedTuple):
+    """Report of the driver process, or of the guard watchdog, to the guard.
+
+    Attributes:
+        kind: "alive", every ``REPORT_PERIOD``; "ready"; "done" (a stop or the end of a reaction returned);
+            "released", with the number of the release; "restarts" and "restarted" around an end of the driver's program
+            on the controller that is meant; "remark"; "error".
+        text: more, for a person.
+    """
+
+    kind: str
+    text: str = ""
+
+    def encode(self) -> bytes:
+        """Return the message."""
+        return f"{self.kind}\n{self.text}".encode()
+
+    @classmethod
+    def decode(cls, message: bytes) -> StatusReport:
+        """Return the report in a message."""
+        kind, _, text = message.decode("utf-8", "replace").partition("\n")
+        return cls(kind, text)
+
+
+def decode_command(message: bytes) -> GuardCommand:
+    """Return the command in a message of the guard.
+
+    Raises:
+        ValueError: it is none.
+    """
+    letter, body = message[:1], message[1:]
+    try:
+        if letter == b"V":
+            *qd, acceleration = _SEVEN.unpack(body)
+            return SetJointVelocity((qd[0], qd[1], qd[2], qd[3], qd[4], qd[5]), acceleration)
+        if letter == b"C":
+            return Release(*_NUMBER.unpack(body))
+        if letter in (b"S", b"H"):
+            return (StopProgram if letter == b"S" else EndReaction)(*_ONE.unpack(body))
+    except struct.error as exc:
+        raise ValueError(f"a command of the guard is damaged: {message!r}") from exc
+    if message in _WORDS:
+        return _WORDS[message]
+    raise ValueError(f"not a command of the guard: {message!r}")

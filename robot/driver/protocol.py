@@ -1,0 +1,212 @@
+"""``ArmDriver``: everything that a guard needs of an arm's controller.
+
+``coneskin.robot.ur`` fulfils it. Another arm is a folder beside that one and a row in ``registry.py``; guard, reaction
+and stop know nothing else of a controller.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping
+from typing import Any, Protocol, Self
+
+from coneskin.finding import Finding
+from coneskin.robot.arm.model import ArmModel
+
+from .arm_reading import ArmReading
+from .examination import ExaminationScope
+from .setpoint import JointVelocitySetpoint, SetpointProgram
+from .state import ControllerState
+from .stop_path import StopPath
+
+__all__ = [
+    "ArmDriver",
+    "HeartbeatWriter",
+    "OutputWriter",
+    "PayloadReader",
+    "SetpointWriter",
+    "SpeedSlider",
+    "StopConnections",
+    "VariableReader",
+]
+
+
+class PayloadReader(Protocol):
+    """Connection that brings payloads, of states or of the speed slider; it is opened in a ``with`` and never waits."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def fileno(self) -> int:
+        """Return the descriptor, for select and poll."""
+
+    def read(self) -> list[bytes]:
+        """Return every whole payload that has arrived, oldest first.
+
+        Raises:
+            RobotConnectionError: the controller is gone.
+        """
+
+    def close(self) -> None:
+        """Close the connection; may be called again."""
+
+
+class SetpointWriter(PayloadReader, Protocol):
+    """Reader of states whose connection carries joint velocity setpoints as well."""
+
+    def write(self, setpoint: JointVelocitySetpoint, /) -> bool:
+        """Send a setpoint without waiting; return whether the system took the bytes."""
+
+
+class SpeedSlider(PayloadReader, Protocol):
+    """Reader and writer of the controller's speed slider."""
+
+    def set(self, fraction: float, /) -> bool:
+        """Send the slider to a fraction without waiting; return whether the system took the bytes."""
+
+
+class HeartbeatWriter(PayloadReader, Protocol):
+    """Writer of the guard's heartbeat to the controller, and reader of what its program has seen of it."""
+
+    def write(self, count: int, /) -> bool:
+        """Send a count without waiting; return whether the system took the bytes."""
+
+
+class VariableReader(Protocol):
+    """Reader of what the controller says, for the guarded program; it waits. Any thread may ask."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def value(self, name: str, /) -> Any:
+        """Return the newest value of a variable, by the controller's name of it."""
+
+    def reading(self) -> ArmReading:
+        """Return what the controller says at one moment."""
+
+    def close(self) -> None:
+        """Close the connection; may be called again."""
+
+
+class OutputWriter(Protocol):
+    """Writer of the controller's outputs, for the guarded program; it waits. Any thread may write."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def set_digital(self, group: str, number: int, on: bool, /) -> None:
+        """Switch a digital output of a group."""
+
+    def set_analog(self, number: int, ratio: float, kind: str, /) -> None:
+        """Set an analog output to a ratio of its range; the kind is "voltage" or "current"."""
+
+    def set_register(self, number: int, value: int | float, /) -> None:
+        """Write a register that programs on the controller read."""
+
+    def close(self) -> None:
+        """Close the connection; may be called again."""
+
+
+class StopConnections(Protocol):
+    """Connections through which an arm can be stopped, whatever moves it.
+
+    Entering it in a ``with`` opens all of them, or raises RobotConnectionError; ``reopen`` opens what it can.
+
+    Attributes:
+        host: the controller.
+    """
+
+    host: str
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def sockets(self) -> dict[str, socket.socket]:
+        """Return those that are open, by the name of the stop path that needs them."""
+
+    def drain(self) -> list[tuple[str, socket.socket]]:
+        """Discard what the controller has said; return the connections that are of no use any more, to be closed."""
+
+    def use(self, path: StopPath, deceleration: float, /) -> bool:
+        """Send one stop without waiting; return whether the system took the bytes."""
+
+    def follow(self, program: SetpointProgram, /) -> bool:
+        """Start the program that follows setpoints; return whether the system took the bytes."""
+
+    def reopen(self) -> bool:
+        """Open again what is gone; return whether any was opened."""
+
+    def close(self) -> None:
+        """Close all of them; may be called again."""
+
+
+class ArmDriver(Protocol):
+    """One maker's controller, as a guard sees it."""
+
+    @property
+    def process(self) -> str:
+        """Module of the driver process, which moves the arm for a program."""
+
+    @property
+    def lost_with(self) -> Mapping[str, frozenset[StopPath]]:
+        """Stop paths that are lost with each connection, by the name of the connection."""
+
+    def decode_state(self, time: float, payload: bytes, /) -> ControllerState:
+        """Return the state in a payload that was read at a host time [s].
+
+        Raises:
+            RobotConnectionError: the payload cannot be one.
+        """
+
+    def decode_speed_fraction(self, payload: bytes, /) -> float:
+        """Return the position of the speed slider in a payload, 0..1.
+
+        Raises:
+            RobotConnectionError: the payload cannot be one.
+        """
+
+    def check_model(self, arm: ArmModel, host: str) -> None:
+        """Compare the scene's model with the controller's arm.
+
+        Raises:
+            RobotRefused: the arm at this host is another one.
+            RobotConnectionError: the controller cannot be reached.
+        """
+
+    def state_reader(self, host: str, timeout: float = 2.0) -> PayloadReader:
+        """Return a reader of states, to be opened in a ``with``."""
+
+    def setpoint_writer(self, host: str) -> SetpointWriter:
+        """Return a reader of states that also writes setpoints, to be opened in a ``with``."""
+
+    def speed_slider(self, host: str) -> SpeedSlider:
+        """Return the speed slider, to be opened in a ``with``."""
+
+    def heartbeat_writer(self, host: str) -> HeartbeatWriter:
+        """Return the writer of the guard's heartbeat, to be opened in a ``with``."""
+
+    def heartbeat_lines(self, frequency: float) -> str:
+        """Return the lines of a program that let the controller end it without a heartbeat for 1 / frequency [Hz]."""
+
+    def decode_heartbeat(self, payload: bytes, /) -> int:
+        """Return the count that a program with these lines found at its start.
+
+        Raises:
+            RobotConnectionError: the payload cannot be one.
+        """
+
+    def variable_reader(self, host: str) -> VariableReader:
+        """Return a reader of variables for the guarded program, to be opened in a ``with``."""
+
+    def output_writer(self, host: str) -> OutputWriter:
+        """Return a writer of outputs for the guarded program, to be opened in a ``with``."""
+
+    def stop_connections(self, host: str, timeout: float = 2.0) -> StopConnections:
+        """Return connections for stops, none of them open yet."""
+
+    def examine(self, arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
+        """Look at a controller, and move and change nothing; what is wrong comes with a remedy."""

@@ -1,0 +1,124 @@
+"""Activation of a guard: at its start, or after a manual reset, once there has been no blocker for a while. Pure."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from .journal import EventName
+from .outputs import Outputs, emit
+
+if TYPE_CHECKING:  # a guard without an arm loads neither
+    from coneskin.robot.arm.model import ArmModel
+    from coneskin.robot.driver.state import ControllerState
+
+__all__ = ["Activation", "ActivationStep", "arm_blockers"]
+
+_REPORT_PERIOD = 0.5  # s between two lists of what the guard waits for
+_RELEASE_TIMEOUT = 4.0  # s; a driver process may first have to start its program on the controller again
+
+
+class ActivationStep(Enum):
+    """What a guard on its way to being active has to do next."""
+
+    WAIT = "wait"
+    RELEASE = "release"  #: ask the process that moves or holds the arm to let the program move it
+    WITHDRAW = "withdraw"  #: take that back: something stands against it after all
+
+
+class Activation:
+    """State of a guard on its way to being active.
+
+    Nothing may stand against it for a while; then a release goes out, and with its acknowledgement the guard is active.
+    Each release has a number, so that the acknowledgement of an older one does not count.
+
+    Args:
+        settle: time without a blocker after which the release goes out [s].
+
+    Attributes:
+        number: of the newest release, counted from 1.
+    """
+
+    def __init__(self, settle: float) -> None:
+        self.number = 0
+        self._settle = settle
+        self._free_since: float | None = None
+        self._released_at: float | None = None  # None while no release waits for its acknowledgement
+        self._reported_at: float | None = None
+        self._waiting_for: list[str] = []
+        self._request: int | None = None  # number of the reset that is under way
+        self._disturbed = False
+
+    def disturb(self) -> None:
+        """Note that a touch has begun, however short it is."""
+        self._disturbed = True
+
+    @property
+    def resetting(self) -> bool:
+        """True from a manual reset until it is accepted or refused."""
+        return self._request is not None
+
+    def reset(self, now: float, request: int) -> None:
+        """Note a manual reset at a time [s], with the number of the request."""
+        self._request, self._free_since, self._released_at, self._disturbed = request, now, None, False
+
+    def look(self, now: float, blockers: list[str], out: Outputs) -> ActivationStep:
+        """Return what is due. A first activation waits as long as there is a blocker; any refuses a reset.
+
+        Args:
+            now: host time [s].
+            blockers: what stands against it, one line each.
+            out: takes events.
+        """
+        if self._disturbed:
+            blockers, self._disturbed = [*blockers, "it was touched meanwhile"], False
+        released = self._released_at is not None
+        if self._released_at is not None and now - self._released_at > _RELEASE_TIMEOUT:
+            blockers = [*blockers, f"the release was not acknowledged within {_RELEASE_TIMEOUT:g} s"]
+        if blockers:
+            self._free_since = self._released_at = None
+            self._report(now, blockers, out)
+            return ActivationStep.WITHDRAW if released else ActivationStep.WAIT
+        if self._free_since is None:
+            self._free_since = now
+        if released or now - self._free_since < self._settle:
+            return ActivationStep.WAIT
+        self._released_at = now
+        self.number += 1
+        return ActivationStep.RELEASE
+
+    def acknowledged(self, number: int) -> bool:
+        """Tell whether this is the number of the release that waits for its acknowledgement."""
+        return self._released_at is not None and number == self.number
+
+    def end(self) -> int:
+        """End the way to being active: the guard is. Return the number of the reset; 0 for the first activation."""
+        request, self._request = self._request or 0, None
+        self._free_since = self._released_at = None
+        return request
+
+    def _report(self, now: float, blockers: list[str], out: Outputs) -> None:
+        if self._request is not None:
+            emit(out, EventName.REFUSED, now, what="reset", request=self._request, reasons=blockers)
+            self._request = None
+        elif self._reported_at is None:
+            self._reported_at = now
+        elif blockers != self._waiting_for and now - self._reported_at >= _REPORT_PERIOD:
+            self._reported_at, self._waiting_for = now, blockers
+            emit(out, EventName.WAITING, now, reasons=blockers)
+
+
+def arm_blockers(model: ArmModel, state: ControllerState) -> list[str]:
+    """Return why an arm in this state must not be put under guard, one line each; empty where it may.
+
+    Whether a program runs does not matter: a guard may be there before the program is.
+    """
+    blockers = []
+    if state.stopped_by_safety:
+        blockers.append("the controller's own safety system holds the arm: see its screen")
+    if not state.powered:
+        blockers.append("the arm is not powered, or its brakes are not released")
+    for number, (q, low, high) in enumerate(zip(state.q, model.joint_lower, model.joint_upper, strict=True), 1):
+        if not low <= q <= high:
+            blockers.append(f"joint {number} must be within {low:.3f} to {high:.3f} rad, it is at {q:.3f} rad")
+    return blockers

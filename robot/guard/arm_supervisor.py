@@ -1,0 +1,348 @@
+"""Supervisor of the arm under guard: it stops it, sees it stand, moves it away and latches. Pure.
+
+    ACTIVE --stop--> STOPPING --standing--> RETREATING --made, or over--> HALTING --standing--> LATCHED
+     |  ^              ^ |                                                                      |    ^
+     |  +-- free --+   | +-- standing, and no motion is wanted or possible ---------------------|----+
+     +-- slow --> SLOWED --not slower, too long, a harder touch, a fault                        |
+                       +---------- something moves the arm again, or no state shows it ---------+
+
+A stop counts when measured joint speed says so, and is not given up before. An arm that other programs may move is
+latched only at the end of a watch in which none did. Only a manual reset leaves LATCHED for good, and the arm is
+monitored until the guard is active again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from coneskin.errors import RobotRefused
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
+from coneskin.robot.driver.protocol import ArmDriver
+from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.reaction.rules import Rule, RuleSet
+from coneskin.robot.reaction.types import Done, Reaction
+from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.stop.standstill import WATCH, StandstillWatch
+
+from .activation import arm_blockers
+from .contact import Contact
+from .controller_clock import ControllerClock
+from .journal import EventName
+from .motion_away import MotionAway
+from .outputs import Outputs, emit
+from .phase import Phase
+from .speed_reduction import SpeedReduction
+from .stop_escalation import StopEscalation
+from .touch_record import TouchRecord
+
+if TYPE_CHECKING:  # a reaction that only stops loads neither
+    from .controller_heartbeat import ControllerHeartbeat
+    from .reaction_motion import ReactionPlanner
+
+__all__ = ["ArmSupervisor"]
+
+
+class ArmSupervisor:
+    """Supervisor of one arm.
+
+    Args:
+        model: the arm.
+        driver: of the arm's controller.
+        reaction: what the arm does when it is touched and no rule fits.
+        limits: of the monitoring.
+        paths: the stop paths that there are; the first is used for every stop, the others where it does not work.
+            Without DRIVER, what moves the arm is not known here.
+        rules: reactions with conditions.
+        planner: of motions away from a touch; None where no reaction moves the arm.
+        heartbeat: supervision of the program that moves the arm; None where that is the driver process.
+
+    Attributes:
+        phase: where it is.
+        state: newest measured state, or None before the first.
+        driver: of the arm's controller.
+        backup_ready: True once the process that stops the arm without this one is ready: driver process or watchdog.
+        heartbeat: supervision of the program that moves the arm; None where that is the driver process.
+        internal_control: True where the driver process moves the arm.
+        stop_number: of the newest stop, counted from 1; a motion away and its end belong to the stop before.
+        speed_reduction: of the slow reaction; it has to know where the controller's speed slider is.
+
+    Raises:
+        RobotRefused: a reaction moves the arm, and there is no planner.
+    """
+
+    def __init__(
+        self,
+        model: ArmModel,
+        driver: ArmDriver,
+        reaction: Reaction,
+        limits: MonitoringLimits,
+        paths: tuple[StopPath, ...],
+        rules: tuple[Rule, ...] = (),
+        planner: ReactionPlanner | None = None,
+        heartbeat: ControllerHeartbeat | None = None,
+    ) -> None:
+        self.phase = Phase.STARTING
+        self.state: ControllerState | None = None
+        self.driver = driver
+        self.backup_ready = False
+        self.heartbeat = heartbeat
+        self.internal_control = StopPath.DRIVER in paths
+        self._model = model
+        self._rules = RuleSet(reaction, rules)
+        self._plain = not rules and reaction.kind in ("stop", "retreat")
+        self._touches = TouchRecord(self._rules)
+        self.speed_reduction = SpeedReduction(model, self.needs_slider)
+        if planner is None and self._rules.move:
+            raise RobotRefused("a reaction that moves the arm away needs a planner")
+        self._limits = limits
+        self._away = MotionAway(planner, self.internal_control)
+        self._clock = ControllerClock()
+        self._stops = StopEscalation(limits, paths)
+        self._reaction = reaction  # the one that is under way
+        self._fresh = -math.inf  # host time of the newest state that was a new one
+        self._why = ""
+        self._watch = StandstillWatch(limits.standstill)
+        self.stop_number = 0  # of the newest stop, counted since the guard's start
+
+    @property
+    def needs_slider(self) -> bool:
+        """True where a reaction may use the controller's speed slider."""
+        return "slow" in self._rules.kinds
+
+    @property
+    def stops_by_slider(self) -> bool:
+        """True where the speed slider is one of the stop paths."""
+        return StopPath.SLIDER in self._stops.paths
+
+    @property
+    def needs_setpoints(self) -> bool:
+        """True where a reaction may move an externally controlled arm, through a setpoint program."""
+        return self._rules.move and not self.internal_control
+
+    def release(self, number: int, out: Outputs) -> None:
+        """Ask the process that moves or holds the arm to let the program move it, and to acknowledge this number."""
+        out.append(Release(number))
+
+    def withdraw(self, out: Outputs) -> None:
+        """Take a release back."""
+        if self.internal_control:
+            out.append(StopProgram(self._rules.default.deceleration))
+
+    def activate(self, out: Outputs) -> None:
+        """React from now on; the program may move the arm."""
+        self.phase, self._reaction = Phase.ACTIVE, self._rules.default
+        self._watch.forget()
+        self.speed_reduction.release(out)
+
+    def touch(self, now: float, contact: Contact, began: bool, out: Outputs) -> None:
+        """Take a touch that has begun, or has changed, at a host time [s]."""
+        phase, touches = self.phase, self._touches
+        if phase is Phase.ACTIVE:
+            if self._plain:  # nothing to choose: the stop is out before anything is looked at
+                self._stop_now(now, "touch", True, out, contact)
+            speed = math.inf if self.state is None else self.state.speed
+            touches.begin(contact, speed)
+            if self._plain:
+                return
+            reaction = self._reaction = touches.note(contact)
+            if reaction.kind == "slow" and self.speed_reduction.begin(now, self.state, reaction, self._limits, out):
+                self.phase = Phase.SLOWED
+            else:
+                self._stop_now(now, "touch", True, out, contact)
+            return
+        reaction, away = touches.note(contact), self._away
+        if phase is Phase.SLOWED and reaction.kind != "slow":
+            self._reaction = reaction
+            self._stop_now(now, "touch", True, out, contact)
+        elif away.yields:
+            if reaction.kind not in ("slow", "comply", self._reaction.kind):
+                self._reaction = reaction
+                self._halt(now, "touch", out, contact)
+        elif away.under_way and began:
+            away.oppose()
+            self._halt(now, "touch", out, contact)
+
+    def follow(self, now: float, contacts: Sequence[Contact], out: Outputs) -> None:
+        """Take what the newest frames say of every touch that there is, at a host time [s]."""
+        for contact in contacts:
+            self.touch(now, contact, False, out)
+        self._touches.follow(contacts, self.phase is Phase.STOPPING)
+        away, state = self._away, self.state
+        if away.under_way and state is not None and contacts:
+            over = away.resisted(state, now, self._touches.contacts)
+            if over is not None:
+                self._end_motion(now, over, out)
+
+    def abandon_motion(self, now: float, why: str, out: Outputs) -> None:
+        """End the motion away at a host time [s], and let none follow: it cannot be supervised any more."""
+        self._end_motion(now, self._away.abandoned(why), out)
+        self._away.permitted = False
+
+    def fault(self, now: float, why: str, out: Outputs) -> None:
+        """Stop because something is wrong, and do not move any more."""
+        if self.phase in (Phase.ACTIVE, Phase.SLOWED):
+            self._stop_now(now, why, False, out)
+        elif self.phase is Phase.RETREATING:
+            self._halt(now, why, out)
+            self._away.permitted = False
+        elif self.phase.stopping:
+            self._why, self._away.permitted = self._again(why), False
+
+    def lose(self, paths: frozenset[StopPath], now: float, for_good: bool = True) -> None:
+        """Drop stop paths that are lost, or that this stop must not count on, and use the next one at once."""
+        self._stops.lose(paths, now, for_good)
+
+    def sample(self, state: ControllerState, out: Outputs) -> None:
+        """Take a measured state."""
+        if self.state is None or state.controller_time != self.state.controller_time:
+            self._fresh = state.time
+        self.state = state
+        measured_at = self._clock.measured_at(state.time, state.controller_time)
+        self._away.note(measured_at, state)
+        if self._stops.under_way:
+            self._follow(state, measured_at, out)
+        elif self._away.under_way:
+            self._move(state, out)
+        elif self.phase is Phase.SLOWED:
+            self.speed_reduction.sample(state, self._touches.contacts)
+        elif self._watch.moved(state, bool(self._touches.contacts)):
+            self._stop_now(state.time, self._again(self._watch.why), False, out)
+        elif self._watch.under_way and self._away.undecided:
+            self._decide(state, out)
+        elif self._watch.under_way and self.phase is not Phase.LATCHED:
+            self._stops.insist(state, self._reaction.deceleration, out)
+            self._latch(state, out)
+
+    def look(self, now: float, out: Outputs) -> None:
+        """Decide what only the passing of time shows."""
+        if self._stops.under_way:
+            self._stops.escalate(now, self._reaction.deceleration, self.state, out)
+            self._note_slider()
+        elif self.phase is Phase.SLOWED:
+            if why := self.speed_reduction.look(now, bool(self._touches.contacts)):
+                approach = self.speed_reduction.approach
+                self._stop_now(now, why, False, out, self._touches.find(approach.exceeded if approach else 0))
+            elif self.speed_reduction.over(now):
+                self.phase = Phase.ACTIVE
+                self.speed_reduction.put_back(now, out)
+                emit(out, EventName.RESUMED, now, slider=self.speed_reduction.slider)
+        elif self._watch.under_way and self.silent(now):
+            self._stop_now(now, self._again("the controller fell silent"), False, out)
+
+    def quiet_until(self) -> float:
+        """Return the host time before which a moving arm under guard makes nothing happen [s]; -inf in another phase.
+
+        That is as long as its states show the same of power, safety system and program.
+        """
+        at_work = self._stops.under_way or self._away.under_way or self._watch.under_way
+        heard = self.heartbeat is None or self.heartbeat.silent
+        if self.phase is not Phase.ACTIVE or at_work or not heard:
+            return -math.inf
+        return self._fresh + self._limits.arm_silence
+
+    def silent(self, now: float) -> bool:
+        """Tell whether the controller's newest state is too old; one that repeats itself is."""
+        return now - self._fresh > self._limits.arm_silence
+
+    def blockers(self, now: float) -> list[str]:
+        """Return why the guard must not become active, one line each."""
+        blockers = []
+        if not self.backup_ready:
+            process = "the arm's driver" if self.internal_control else "the guard watchdog"
+            blockers.append(f"{process} is not ready")
+        if self.needs_slider and not self.speed_reduction.knows(now):
+            blockers.append("the position of the controller's speed slider is not known")
+        if self.heartbeat is not None and (blocker := self.heartbeat.blocker()):
+            blockers.append(blocker)
+        if self.state is None or self.silent(now):
+            return [*blockers, "the controller is silent"]
+        return blockers + arm_blockers(self._model, self.state)
+
+    # ---- what it does
+
+    def _again(self, what: str) -> str:
+        """Return why an arm is stopped, once there is another reason: the first, which is the cause, and the newest."""
+        return f"{self._why.partition('; then ')[0]}; then {what}"
+
+    def _stop_now(self, now: float, why: str, may_move: bool, out: Outputs, contact: Contact | None = None) -> None:
+        self._begin(now, Phase.STOPPING, StopProgram(self._reaction.deceleration), out)
+        self._why = why
+        self._touches.placed = ()
+        self._away.prepare(self.state, may_move)
+        self.stop_number += 1
+        self._report_stop(now, why, contact, out)
+
+    def _halt(self, now: float, why: str, out: Outputs, contact: Contact | None = None) -> None:
+        self._begin(now, Phase.HALTING, EndReaction(self._reaction.deceleration), out)
+        self._why = why
+        self._report_stop(now, why, contact, out)
+
+    def _report_stop(self, now: float, why: str, contact: Contact | None, out: Outputs) -> None:
+        named = {} if contact is None else {"contact": contact.summary()}
+        emit(out, EventName.STOPPING, now, why=why, stop=self.stop_number, **named)
+
+    def _begin(self, now: float, phase: Phase, command: StopProgram | EndReaction, out: Outputs) -> None:
+        self._stops.send(command, self._watch.insists, out)
+        self._note_slider()
+        self._away.end(out)
+        state = self.state
+        speed = None if state is None or self.silent(now) else state.speed
+        self._stops.begin(now, speed, command.deceleration)
+        self._watch.end()
+        self.phase = phase
+
+    def _follow(self, state: ControllerState, measured_at: float, out: Outputs) -> None:
+        if not self._stops.sample(state, measured_at, out):
+            return
+        self.speed_reduction.put_back(state.time, out)
+        self._away.await_place(state.time)
+        self._watch.begin(state.time, math.inf)
+        self._decide(state, out)
+
+    def _decide(self, state: ControllerState, out: Outputs) -> None:
+        """Decide what the standing arm does; the place of a touch may need a while to become certain."""
+        stopping, enough = self.phase is Phase.STOPPING, self._stops.first_was_enough
+        decision = self._away.decide(state, self._reaction, stopping, enough, self._touches, out)
+        self._reaction = decision.reaction
+        if decision.waits:
+            return
+        self._watch.end()
+        if decision.begun:
+            self.phase = Phase.RETREATING
+            self._move(state, out)
+        else:
+            self._stay(state.time, f"{self._why}; {decision.refusal}" if decision.refusal else self._why, out)
+
+    def _move(self, state: ControllerState, out: Outputs) -> None:
+        over = self._away.step(state, self._touches.contacts, out)
+        if over is not None:
+            self._end_motion(state.time, over, out)
+
+    def _end_motion(self, now: float, over: Done, out: Outputs) -> None:
+        self._begin(now, Phase.HALTING, EndReaction(self._reaction.deceleration), out)
+        self._why += f"; {self._away.report(now, over, out)}"
+
+    def _stay(self, now: float, why: str, out: Outputs) -> None:
+        """Latch, at once where no other program can start, else at the end of a watch."""
+        assert self.state is not None
+        self._why = why
+        watched = not self.internal_control or self._stops.unconfirmed(self.state)
+        self._watch.begin(now, WATCH if watched else 0.0)
+        self._latch(self.state, out)
+
+    def _latch(self, state: ControllerState, out: Outputs) -> None:
+        if not (self._watch.confirmed or state.stopped_by_safety):
+            return
+        self.phase = Phase.LATCHED
+        if self._stops.unconfirmed(state):
+            self._why += "; the controller does not show the protective stop"
+        emit(out, EventName.LATCHED, state.time, why=self._why, stop=self.stop_number)
+
+    def _note_slider(self) -> None:
+        """Remember where the slider was before a stop put it to 0; a person's reset puts it back."""
+        if StopPath.SLIDER in self._stops.used:
+            self.speed_reduction.halt()

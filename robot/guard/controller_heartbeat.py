@@ -1,0 +1,71 @@
+"""Supervision of the program that moves an externally controlled arm: does it end where the guard falls silent? Pure.
+
+The guard sends a count, and the program reports the count that it found at its start (``ArmDriver.heartbeat_lines``). A
+report that is older than the program belongs to one before it.
+"""
+
+from __future__ import annotations
+
+__all__ = ["PERIOD", "ControllerHeartbeat", "heartbeat_count"]
+
+PERIOD = 0.02  #: s between two counts
+_MASK = 0x3FFFFFFF  # counts are whole numbers of 30 bits
+_MARGIN = 5  # counts by which a report may be older than the first state that shows the program
+_GRACE = 0.5  # s that a program has to report after its start
+_WITHOUT = "the program on the controller does not depend on the guard's heartbeat, and goes on if the network is cut"
+
+
+def heartbeat_count(now: float) -> int:
+    """Return the count that is sent at a host time [s]; never 0."""
+    return int(now / PERIOD) & _MASK or 1
+
+
+class ControllerHeartbeat:
+    """Supervision of the programs on one controller, one after the other.
+
+    Args:
+        required: a program without the heartbeat must not move the arm.
+    """
+
+    def __init__(self, required: bool) -> None:
+        self.required = required
+        self._echo = 0
+        self._running = False
+        self._began: float | None = None  # when the program that runs was first seen; None where it ran before
+        self._reported = False
+
+    def note(self, count: int) -> None:
+        """Take the count that the newest program with the heartbeat found at its start."""
+        self._echo = count
+
+    def sample(self, now: float, running: bool) -> None:
+        """Take whether a program runs, as read at a host time [s]."""
+        if running and not self._running:
+            self._began, self._reported = now, False
+        elif not running:
+            self._began = None
+        self._running = running
+
+    def blocker(self) -> str:
+        """Return why the guard must not become active; empty where it may."""
+        return _WITHOUT if self.required and self._running and not self._depends() else ""
+
+    def trouble(self, now: float) -> str:
+        """Return what is wrong with the program that runs, once for each program; empty where nothing is."""
+        if not self._running or self._reported or self._depends():
+            return ""
+        if self._began is not None and now - self._began < _GRACE:
+            return ""
+        self._reported = True
+        return _WITHOUT
+
+    @property
+    def silent(self) -> bool:
+        """True where nothing is said before a program starts, ends, or reports."""
+        return not self._running or self._reported or self._depends()
+
+    def _depends(self) -> bool:
+        if self._began is None or not self._echo:
+            return False
+        first = heartbeat_count(self._began) - _MARGIN
+        return (self._echo - first) & _MASK < _MASK // 2

@@ -1,0 +1,297 @@
+"""Live loop of the guard: one thread in a process of its own that joins source, core and arm.
+
+Order of work after each wake: read the skin, decide, send the command; only then report to the recorder. Whatever
+stalls beside it (disk, terminal, driver) is on the other side of a channel that never makes it wait.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import selectors
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+from coneskin.channel import Channel
+from coneskin.errors import ConeSkinError, SkinTimeout
+from coneskin.recording import Block, encode_block
+from coneskin.robot.driver.messages import HEARTBEAT_PERIOD, Heartbeat, Shutdown
+from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SpeedSlider, StopConnections
+from coneskin.skin.sources.source import Source
+from coneskin.skin.sources.source_reopening import SourceReopening
+
+from .controller_heartbeat import heartbeat_count
+from .core import GuardCore
+from .journal import BlockKind
+from .outbox import Outbox
+from .phase import Phase
+from .ports import GuardPorts
+
+__all__ = ["GuardLoop"]
+
+_HEARTBEAT = Heartbeat().encode()
+_SESSION_GONE_TIMEOUT = 1.5  # s that the arm has to stand when there is nobody left to tell
+#: what can be lost -> the attribute of ``GuardPorts``
+_PORTS = {
+    "skin": "source",
+    "controller": "reader",
+    "slider": "slider",
+    "heartbeat": "heartbeat",
+    "watchdog": "watchdog",
+    "driver": "driver",
+}
+_TICK = 0.002  # s between two looks at the clocks where nothing else happens
+_OVERRUN = 0.02  # s between two rounds, from which on the loop reports that it was held up
+_SUSPENSION = 1.0  # s between two rounds, from which on nobody has guarded; the driver process waits half of it
+_FLUSH_TIMEOUT = 1.0  # s that the recorder has to take what waits for it
+_SHUTDOWN_TIMEOUT = 3.0  # s that the arm has to stand when the guard is told to end
+
+
+def _boot_time() -> float:
+    """Return monotonic seconds that count the computer's sleep as well, where the system has such a clock."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
+
+
+class GuardLoop:
+    """Loop of one core on its ports.
+
+    Args:
+        core: decides.
+        ports: what it is connected to.
+        clock: monotonic seconds.
+        sleepless_clock: the same, which goes on while the computer sleeps.
+    """
+
+    def __init__(
+        self,
+        core: GuardCore,
+        ports: GuardPorts,
+        clock: Callable[[], float] = time.monotonic,
+        sleepless_clock: Callable[[], float] = _boot_time,
+    ) -> None:
+        self._core = core
+        self._ports = ports
+        self._clock = clock
+        self._sleepless_clock = sleepless_clock
+        self._rounds_at = (clock(), sleepless_clock())  # when the newest round began
+        self._selector = selectors.DefaultSelector()
+        self._quit = False
+        self._took = False  # anything, in this step
+        self._beat = -HEARTBEAT_PERIOD
+        self._count = 0  # sent last
+        self._out: list[bytes] = []
+        self._outbox = Outbox(ports)
+        self._gone: Source | None = None  # the skin's source, where it may be opened again
+        self._reopening: SourceReopening | None = None
+
+    def stop(self) -> None:
+        """Stop the arm, see it stand, and leave ``run``. May be called from a signal handler."""
+        self._quit = True
+
+    def run(self) -> None:
+        """Serve until told to end, or until the session is gone; the arm is stopped before this returns."""
+        self._open()
+        gc.collect()
+        gc.freeze()
+        gc.disable()  # nothing here lives longer than a frame
+        try:
+            while not self._quit:
+                self.step(_TICK)
+            self._end()
+        finally:
+            gc.enable()
+            self._close()
+
+    def _open(self) -> None:
+        ports = self._ports
+        for item in (ports.session, ports.driver, ports.watchdog, ports.reader, ports.slider, ports.heartbeat):
+            if item is not None:
+                self._selector.register(item, selectors.EVENT_READ)
+        if ports.source is not None:
+            self._watch_skin(ports.source)
+        for sock in ports.stops.sockets().values() if ports.stops else ():
+            self._selector.register(sock, selectors.EVENT_READ, "stops")
+        for what, why in ports.absent.items():
+            self._take(BlockKind.ABSENT, f"{what}\n{why}".encode())
+
+    def _watch_skin(self, source: Source) -> None:
+        if (descriptor := source.fileno()) is not None:
+            self._selector.register(descriptor, selectors.EVENT_READ, "skin")
+
+    def _close(self) -> None:
+        if self._reopening is not None:
+            self._reopening.stop()
+        self._selector.close()
+
+    def step(self, timeout: float) -> None:
+        """Wait for input, or for the timeout [s], and serve it."""
+        ports = self._ports
+        ready = {key.data or key.fileobj for key, _ in self._selector.select(timeout)}
+        self._note_overrun()
+        arm_first = self._core.phase.stopping  # states that wait may show that the stop under way works
+        if arm_first and ports.reader is not None and ports.reader in ready:
+            self._read_arm(ports.reader)
+        if ports.source is not None and ("skin" in ready or ports.source.fileno() is None):
+            self._read_skin(ports.source)
+        if self._gone is not None and self._core.phase is Phase.LATCHED:
+            self._open_skin_again(self._gone)
+        for channel in (ports.driver, ports.watchdog):  # before the states: they show what was announced here
+            if channel is not None and channel in ready:
+                self._read_channel(channel)
+        if not arm_first and ports.reader is not None and ports.reader in ready:
+            self._read_arm(ports.reader)
+        if ports.slider is not None and ports.slider in ready:
+            self._read_slider(ports.slider)
+        if ports.heartbeat is not None:
+            self._keep_heartbeat(ports.heartbeat, ports.heartbeat in ready)
+        if self._clock() - self._beat >= HEARTBEAT_PERIOD:
+            self._send_heartbeat()
+        if "stops" in ready and ports.stops is not None:
+            self._drain(ports.stops)
+        if ports.session in ready:
+            for message in ports.session.receive():
+                if message == _HEARTBEAT:
+                    self._take(BlockKind.PROGRAM, b"")
+                elif message.startswith(b"reset "):
+                    self._take(BlockKind.RESET, message.removeprefix(b"reset "))
+                elif message == b"quit":
+                    self._quit = True
+        if ports.session.closed:
+            self._quit = True
+            self._forget(ports.session)  # its end would be ready for ever
+        if not self._took:
+            self._take(BlockKind.TICK, b"")
+        self._took = False
+        self._report()
+
+    def _note_overrun(self) -> None:
+        """Report how late this round is; where it is so late that nobody has guarded, to the core as well."""
+        (before, sleepless_before), now, sleepless = self._rounds_at, self._clock(), self._sleepless_clock()
+        self._rounds_at = now, sleepless
+        if now - before > _OVERRUN:
+            self._record(Block(BlockKind.OVERRUN, now, json.dumps({"late": now - before}).encode()))
+        if sleepless - sleepless_before > _SUSPENSION:
+            self._take(BlockKind.SUSPENDED, b"%.3f" % (sleepless - sleepless_before))
+
+    def _report(self) -> None:
+        if self._out:
+            self._ports.session.send(b"".join(self._out))
+            self._out.clear()
+
+    def _read_channel(self, channel: Channel) -> None:
+        for message in channel.receive():
+            self._take(BlockKind.DRIVER, message)
+        if channel.closed:
+            driver = channel is self._ports.driver
+            name, what = ("driver", "the driver process") if driver else ("watchdog", "the guard watchdog")
+            self._lose(name, f"{what} has ended", channel)
+
+    def _send_heartbeat(self) -> None:
+        self._beat = self._clock()
+        for channel in (self._ports.driver, self._ports.watchdog):
+            if channel is not None:
+                channel.send(_HEARTBEAT)
+
+    def _read_skin(self, source: Source) -> None:
+        try:
+            data = source.read(0.0 if source.fileno() is not None else _TICK)
+        except SkinTimeout:
+            return
+        except ConeSkinError as exc:
+            self._lose("skin", str(exc), source.fileno())
+            return
+        self._take(BlockKind.SKIN, data)
+
+    def _open_skin_again(self, source: Source) -> None:
+        """Open a skin that is gone, while the arm stands latched; a person's reset has to follow."""
+        ports, reopening = self._ports, self._reopening
+        if reopening is None:
+            self._reopening = ports.reopen(source) if ports.reopen is not None else None
+        elif reopening.done:
+            self._gone = self._reopening = None
+            if reopening.opened:
+                ports.source = source
+                self._watch_skin(source)
+                self._take(BlockKind.REOPENED, b"skin")
+            else:
+                why = f"{source.name} is gone and could not be opened again: start the guard anew"
+                self._take(BlockKind.LOST, f"skin\n{why}".encode())
+
+    def _read_arm(self, reader: PayloadReader) -> None:
+        try:
+            for payload in reader.read():
+                self._take(BlockKind.ARM, payload)
+        except ConeSkinError as exc:
+            self._lose("controller", str(exc), reader)
+
+    def _read_slider(self, slider: SpeedSlider) -> None:
+        try:
+            for payload in slider.read():
+                self._take(BlockKind.SLIDER, payload)
+        except ConeSkinError as exc:
+            self._lose("slider", str(exc), slider)
+
+    def _keep_heartbeat(self, heartbeat: HeartbeatWriter, ready: bool) -> None:
+        """Send the count that is due, and read what the program has seen of it."""
+        count = heartbeat_count(self._clock())
+        if count != self._count:
+            self._count = count
+            heartbeat.write(count)
+        try:
+            for payload in heartbeat.read() if ready else []:
+                self._take(BlockKind.ECHO, payload)
+        except ConeSkinError as exc:
+            self._lose("heartbeat", str(exc), heartbeat)
+
+    def _drain(self, stops: StopConnections) -> None:
+        for name, sock in stops.drain():
+            self._forget(sock)
+            sock.close()
+            why = f"the controller has closed the {name} connection, which a stop may need"
+            self._take(BlockKind.LOST, f"{name}\n{why}".encode())
+
+    def _take(self, kind: BlockKind, payload: bytes) -> None:
+        """Feed the core, which sends its commands at once; then record all of it."""
+        self._took = True
+        block = Block(kind, self._clock(), payload)
+        outbox = self._outbox
+        self._core.take(block, outbox)
+        self._record(block)
+        if outbox.sent or outbox.events:
+            done = self._clock()
+            for line in outbox.sent:
+                self._record(Block(BlockKind.COMMAND, done, line))
+            for event in outbox.events:
+                self._record(event.block())
+            outbox.sent.clear()
+            outbox.events.clear()
+
+    def _record(self, block: Block) -> None:
+        self._out.append(encode_block(block))
+
+    def _lose(self, what: str, why: str, fileobj: object) -> None:
+        self._forget(fileobj)
+        if what == "skin" and self._ports.reopen is not None:
+            self._gone = self._ports.source
+        setattr(self._ports, _PORTS[what], None)
+        self._take(BlockKind.LOST, f"{what}\n{why}".encode())
+        if what == "controller" and (driver := self._ports.driver) is not None:
+            # it would connect again by itself, and its program start with whatever command is still there
+            driver.close()
+            self._lose("driver", "the driver process must not connect to the controller again by itself", driver)
+
+    def _forget(self, fileobj: object) -> None:
+        with suppress(KeyError, ValueError, OSError):
+            self._selector.unregister(fileobj)  # type: ignore[arg-type]
+
+    def _end(self) -> None:
+        """Stop the arm and see it stand."""
+        self._take(BlockKind.LOST, b"session\nthe guard was told to end")
+        end = self._clock() + (_SESSION_GONE_TIMEOUT if self._ports.session.closed else _SHUTDOWN_TIMEOUT)
+        while (self._core.phase.stopping or self._core.phase is Phase.RETREATING) and self._clock() < end:
+            self.step(_TICK)
+        if self._ports.watchdog is not None and not (self._core.phase.stopping or self._core.phase is Phase.RETREATING):
+            self._ports.watchdog.send(Shutdown().encode())
+        self._report()
+        self._ports.session.finish(_FLUSH_TIMEOUT)

@@ -1,0 +1,33 @@
+"""Phases of a guard."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+__all__ = ["Phase"]
+
+
+class Phase(Enum):
+    """Phase of a guard; the transitions are drawn in ``arm_supervisor``."""
+
+    STARTING = "starting"
+    ACTIVE = "active"
+    SLOWED = "slowed"
+    STOPPING = "stopping"
+    RETREATING = "retreating"
+    HALTING = "halting"
+    LATCHED = "latched"
+
+    @property
+    def watched(self) -> bool:
+        """True where a fault has to stop the arm now."""
+        return self in _WATCHED
+
+    @property
+    def stopping(self) -> bool:
+        """True while a stop is under way."""
+        return self in _STOPPING
+
+
+_WATCHED = frozenset({Phase.ACTIVE, Phase.SLOWED, Phase.RETREATING})
+_STOPPING = frozenset({Phase.STOPPING, Phase.HALTING})

@@ -1,0 +1,215 @@
+"""Reaction motion: it plans the motion away from a touch and streams its setpoints. Pure.
+
+In every second control cycle a new target goes out, to the driver process; or, for an arm that another program moves,
+to a program of ours in the controller. Built only where a reaction of the scene may move the arm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
+from coneskin.robot.arm.workspace import TablePlane, Workspace
+from coneskin.robot.driver.messages import SetJointVelocity
+from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram
+from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.reaction.backtrack import PathHistory
+from coneskin.robot.reaction.contact_supervision import ContactSupervision
+from coneskin.robot.reaction.motion import ReactionMotion, plan_answer, plan_reaction_motion
+from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
+
+from .following_error import FollowingErrorMonitor
+from .joint_current import JointCurrentMonitor
+from .journal import EventName, describe_way
+from .outputs import Outputs, emit
+
+__all__ = ["MotionStream", "ReactionPlanner"]
+
+_SETPOINT_PERIOD = 0.004  # s; every second controller cycle, so that no setpoint queues
+_START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will not start any more
+
+
+class ReactionPlanner:
+    """Planner that knows where the arm has been and begins the motion that a reaction wants.
+
+    Args:
+        model: the arm.
+        watchdog_hz: of the setpoint program in the controller; None where the driver process moves the arm.
+        table: what the arm must not go below while it moves.
+    """
+
+    def __init__(self, model: ArmModel, watchdog_hz: float | None = None, table: TablePlane | None = None) -> None:
+        self._model = model
+        self._watchdog_hz = watchdog_hz
+        self._token = 0
+        self._workspace = Workspace(model, table)
+        self._history = PathHistory()
+
+    def note(self, time: float, q: Joints) -> None:
+        """Take measured joint positions [rad] of a time [s]."""
+        self._history.note(time, q)
+
+    def begin(
+        self,
+        reaction: Reaction,
+        at_touch: ArmState,
+        here: ArmState,
+        contacts: Sequence[ContactOnLink],
+        out: Outputs,
+    ) -> MotionStream | str:
+        """Begin to move away, or return why that cannot be.
+
+        Args:
+            reaction: its kind is "retreat" or "comply".
+            at_touch: the arm when the touch was seen.
+            here: the arm now, standing.
+            contacts: the touches, as they were last seen.
+            out: takes commands and events.
+        """
+        motion = plan_reaction_motion(self._model, reaction, at_touch, here, contacts, self._history, self._workspace)
+        if isinstance(motion, str):
+            return motion
+        answered = reaction.on_resistance == "comply" or (reaction.on_resistance == "back" and not motion.how)
+        return self._stream(motion, reaction, here, contacts, answered and motion.how != "push", out)
+
+    def answer(
+        self, reaction: Reaction, here: ArmState, contacts: Sequence[ContactOnLink], since: float, out: Outputs
+    ) -> MotionStream | str:
+        """Begin the motion that follows where one away was resisted, or return why that cannot be.
+
+        Args:
+            reaction: its ``on_resistance`` is "back" or "comply".
+            here: the arm now, standing.
+            contacts: the touches there are now.
+            since: when the motion away began [s].
+            out: takes commands and events.
+        """
+        motion = plan_answer(self._model, reaction, here, contacts, self._history, self._workspace, since)
+        if isinstance(motion, str):
+            return motion
+        return self._stream(motion, reaction, here, contacts, False, out)
+
+    def _stream(
+        self,
+        motion: ReactionMotion,
+        reaction: Reaction,
+        here: ArmState,
+        contacts: Sequence[ContactOnLink],
+        answered: bool,
+        out: Outputs,
+    ) -> MotionStream:
+        supervision = ContactSupervision(self._model, here.q, contacts, motion.how == "push")
+        program = None
+        if self._watchdog_hz is not None:
+            self._token += 1
+            program = SetpointProgram(self._token, reaction.deceleration, self._watchdog_hz)
+        return MotionStream(motion, supervision, here.time, program, answered, out)
+
+
+class MotionStream:
+    """Stream of setpoints for one motion that is under way.
+
+    Args:
+        motion: what to do.
+        supervision: of the touches meanwhile.
+        now: host time [s].
+        program: that follows the setpoints; None where the driver process does.
+        answered: True where another motion follows if this one is resisted.
+        out: takes commands and events.
+
+    Attributes:
+        how: as of the motion.
+        began: when [s].
+        progress: how far it has got [m].
+        answered: True where another motion follows if this one is resisted.
+    """
+
+    def __init__(
+        self,
+        motion: ReactionMotion,
+        supervision: ContactSupervision,
+        now: float,
+        program: SetpointProgram | None,
+        answered: bool,
+        out: Outputs,
+    ) -> None:
+        self._motion = motion
+        self._supervision = supervision
+        self.answered = answered
+        self.progress = 0.0
+        self.how = motion.how
+        self._program = program
+        self.began = now
+        self._sent = -math.inf
+        self._braking: float | None = None  # how far the touched surface went on until this began [m]
+        self._following_error = FollowingErrorMonitor(now)
+        self._currents = JointCurrentMonitor() if motion.how != "push" else None  # a firmer push is what that follows
+        emit(out, EventName.RETREATING, now, **self.details)
+
+    @property
+    def details(self) -> dict[str, str]:
+        """Details that the events of this motion carry on how the arm moves away."""
+        return {"how": self.how} if self.how else {}
+
+    def resisted(self, now: float, q: Joints, contacts: Sequence[ContactOnLink]) -> Done | None:
+        """Return Done where a touch shows that the motion must end.
+
+        Args:
+            now: host time [s].
+            q: measured joint positions [rad].
+            contacts: the touches there are, by the newest frame of each.
+        """
+        why = self._supervision.resistance(now, q, contacts)
+        return Done(why, self.progress, resisted=True) if why else None
+
+    def step(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
+        """Go on, or return Done where the motion is over.
+
+        Args:
+            state: as measured.
+            contacts: the touches there are now.
+            out: takes commands and events.
+        """
+        step = self._motion.step(ArmState(state.time, state.q, state.qd), contacts)
+        self.progress = step.progress
+        if self._braking is None:
+            self._braking = max(-step.progress, 0.0)
+        if isinstance(step, Done):
+            return step
+        if contacts and (over := self.resisted(state.time, state.q, contacts)) is not None:
+            return over
+        if self._currents is not None and (why := self._currents.resistance(state)):
+            return Done(why, step.progress, resisted=True)
+        program, first = self._program, self._sent == -math.inf
+        exceeded = self._following_error.exceeded(state, step.progress)
+        started = state.program_running or state.time - self.began < _START_TIMEOUT
+        if program is not None and not state.program_running and (exceeded or not started):
+            return Done("its program does not run on the controller", step.progress)
+        if exceeded:
+            return Done("the arm does not move as commanded: something else moves it", step.progress)
+        if state.time - self._sent >= _SETPOINT_PERIOD - 1e-9:
+            if program is None:
+                out.append(SetJointVelocity(step.qd, step.acceleration))
+            else:
+                out.append(JointVelocitySetpoint(program.token, step.qd, step.acceleration))
+                if first:
+                    out.append(program)
+            if step.clipped_by and first:
+                emit(out, EventName.MOTION_LIMITED, state.time, by=list(step.clipped_by))
+            self._sent = state.time
+            self._following_error.command(step)
+        return None
+
+    def report(self, now: float, over: Done, out: Outputs) -> str:
+        """Report the end of the motion at a host time [s], and return it in words."""
+        details = {"progress": over.progress, "complete": over.complete, "why": over.reason, **self.details}
+        if over.progress < 0.0:
+            details["braking"] = self._braking
+        emit(out, EventName.RETREATED, now, **details)
+        return f"{describe_way(details, 'retreat')}: {over.reason}"
+
+    def end(self, out: Outputs) -> None:
+        """Void the setpoints, after a stop has been sent."""
+        if self._program is not None:
+            out.append(JointVelocitySetpoint(0, ZERO_VELOCITY, 0.0))

@@ -1,0 +1,217 @@
+"""Speed reduction: the reaction that lowers the controller's speed slider while the skin is touched. Pure.
+
+The slider slows whatever moves the arm, except a stream of servo setpoints. So its value alone is not trusted: the
+measured speed of the touched surface has to fall, or to be low anyway, within the budget of a stop, and to stay so; and
+the surface may move into the touch little farther than in a stop (``contact_approach``). What a person does with the
+slider meanwhile has priority: it is not put back over it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.driver.setpoint import SetSpeedSlider
+from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.reaction.types import ContactOnLink, Reaction
+from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES
+
+from .journal import EventName
+from .outputs import Outputs, emit
+
+if TYPE_CHECKING:  # a scene without a slow reaction does not load it
+    from coneskin.robot.reaction.contact_approach import ContactApproach
+
+__all__ = ["HOLD", "ReducedSpeedTouch", "SpeedReduction"]
+
+HOLD = 0.5  #: s without a touch after which the arm goes on at the speed it had
+_MAX_SPEED_RATIO = 0.9  # ratio; speed after the reduction to speed at the touch
+_SLIDER_TOLERANCE = 0.02  # ratio; allowed difference of the slider from its setting
+_MAX_SLIDER_AGE = 0.5  # s; it is read 50 times a second
+
+
+class ReducedSpeedTouch:
+    """One touch during which the arm is slow.
+
+    Args:
+        now: when it began [s].
+        top: largest speed of the touched surface in a touch just before [m/s]; first where its place was not certain,
+            so that it was a bound, then where it was.
+        before: where the slider was.
+        fraction: where it is to be.
+        budget: within which the arm must be slower [s].
+        longest: that the touch may last [s].
+        slow: speed of the surface below which the arm counts as slow [m/s].
+
+    Attributes:
+        before: where the slider was.
+        fraction: where it is to be.
+        top: largest speeds around the touch, as above.
+    """
+
+    def __init__(
+        self,
+        now: float,
+        top: Sequence[float],
+        before: float,
+        fraction: float,
+        budget: float,
+        longest: float,
+        slow: float,
+    ) -> None:
+        self.before = before
+        self.fraction = min(before, fraction)
+        self.top = list(top)
+        self._slow = slow
+        self._deadline = now + budget
+        self._end = now + longest
+        self._free_since: float | None = None
+        self._fast = 0  # samples in a row
+
+    def sample(self, time: float, speed: float, certain: bool = True) -> None:
+        """Take the measured speed of the touched surface at a time [s, m/s]; ``certain`` where it is no bound."""
+        top = self.top
+        if time < self._deadline and speed > top[certain]:
+            top[certain] = speed  # it may still have been speeding up
+        self._fast = self._fast + 1 if speed > max(_MAX_SPEED_RATIO * top[certain], self._slow) else 0
+
+    def touched(self, now: float, touched: bool) -> None:
+        """Say whether anything touches."""
+        if touched:
+            self._free_since = None
+        elif self._free_since is None:
+            self._free_since = now
+
+    def trouble(self, now: float, slider: float | None) -> str:
+        """Return why the arm has to be stopped after all; empty where it has not.
+
+        Args:
+            now: [s].
+            slider: where it is.
+        """
+        if now >= self._deadline:
+            if self._fast >= STANDSTILL_SAMPLES:
+                return "the arm did not become slower"
+            if self._free_since is None and slider is not None and slider > self.fraction + _SLIDER_TOLERANCE:
+                return f"the speed slider is at {slider:.0%} again while the skin is touched"
+        if self._free_since is None and now >= self._end:
+            return "the touch lasts too long"
+        return ""
+
+    def puts_back(self, slider: float | None) -> bool:
+        """Tell whether the slider is where it was set, or not yet seen there, so that no person has moved it since.
+
+        Args:
+            slider: where it is.
+        """
+        if slider is None:
+            return False
+        return min(abs(slider - self.fraction), abs(slider - self.before)) <= _SLIDER_TOLERANCE
+
+    def over(self, now: float) -> bool:
+        """Tell whether the arm may go on as before."""
+        return self._free_since is not None and now - self._free_since >= HOLD
+
+
+class SpeedReduction:
+    """Reaction "slow" of one arm: it lowers the speed slider, monitors the effect and puts it back.
+
+    Args:
+        model: the arm.
+        used: True where a reaction of the scene slows the arm.
+
+    Attributes:
+        slider: where the controller's speed slider was last; None where that is not known.
+        now: the touch that is under way, or None.
+        approach: of the arm to what touches it, as of that touch.
+    """
+
+    def __init__(self, model: ArmModel, used: bool) -> None:
+        self._model = model
+        if used:  # here, so that no touch waits for it
+            from coneskin.robot.reaction.contact_approach import ContactApproach
+
+            self._approach_of = ContactApproach
+        self.approach: ContactApproach | None = None
+        self.slider: float | None = None
+        self._read_at = -math.inf
+        self.now: ReducedSpeedTouch | None = None
+        self._last: tuple[float, ReducedSpeedTouch] | None = None  # when it was over, and what
+        self._halted_from: float | None = None  # where the slider was before a stop put it to 0
+
+    def note(self, time: float, slider: float | None) -> None:
+        """Take where the slider is, as read at a time [s]; None where it cannot be read any more."""
+        self.slider, self._read_at = slider, time
+
+    def knows(self, time: float) -> bool:
+        """Tell whether the position of the slider is known at a time [s]."""
+        return self.slider is not None and time - self._read_at <= _MAX_SLIDER_AGE
+
+    def begin(
+        self, time: float, state: ControllerState | None, reaction: Reaction, limits: MonitoringLimits, out: Outputs
+    ) -> bool:
+        """Reduce the speed; return False where the position of the slider, or the state of the arm, is not known.
+
+        Args:
+            time: host time [s].
+            state: of the arm, the newest.
+            reaction: its kind is "slow".
+            limits: of the monitoring; the arm has the time of a stop to become slower.
+            out: takes commands and events.
+        """
+        before, top = self.slider, [0.0, 0.0]
+        if before is None or state is None or not self.knows(time):
+            return False
+        if self._last is not None and time - self._last[0] < HOLD:  # slider and speed may not yet be as before
+            before, top = self._last[1].before, self._last[1].top
+        budget = limits.stop_budget(state.speed, reaction.deceleration)
+        longest, slow = reaction.time_budget, reaction.slow_speed
+        self.now = ReducedSpeedTouch(time, top, before, reaction.slow_to, budget, longest, slow)
+        self.approach = self._approach_of(self._model, state.q, state.qd, reaction.deceleration, reaction.press)
+        out.append(SetSpeedSlider(self.now.fraction))
+        emit(out, EventName.SPEED_REDUCED, time, slider=self.now.fraction, before=before)
+        return True
+
+    def sample(self, state: ControllerState, contacts: Sequence[ContactOnLink]) -> None:
+        """Take a measured state, and the touches there are by their newest frames."""
+        if self.now is not None and self.approach is not None:
+            self.approach.note(state.q, state.qd, contacts)
+            self.now.sample(state.time, self.approach.speed, self.approach.certain)
+
+    def look(self, time: float, touched: bool) -> str:
+        """Return why the arm has to be stopped after all; empty where it has not."""
+        if self.now is None:
+            return ""
+        self.now.touched(time, touched)
+        if self.approach is not None and self.approach.exceeded:
+            return f"while slow, the surface has moved {1e3 * self.approach.way:.1f} mm into the touch"
+        if not self.knows(time):
+            return "the controller does not report its speed slider any more"
+        return self.now.trouble(time, self.slider)
+
+    def over(self, time: float) -> bool:
+        """Tell whether the arm may go on as before."""
+        return self.now is None or self.now.over(time)
+
+    def put_back(self, time: float, out: Outputs) -> None:
+        """End it: put the slider back where it was, unless a stop needs it at 0 or a person has moved it since."""
+        touch, self.now = self.now, None
+        if touch is not None and self._halted_from is None and self.knows(time) and touch.puts_back(self.slider):
+            out.append(SetSpeedSlider(touch.before))
+            self.slider, self._last = touch.before, (time, touch)
+
+    def halt(self) -> None:
+        """Note that a stop puts the slider to 0; where it was is kept until ``release``."""
+        before = self.slider if self.now is None else self.now.before
+        if self._halted_from is None and before is not None and before > _SLIDER_TOLERANCE:
+            self._halted_from = before
+
+    def release(self, out: Outputs) -> None:
+        """Put a slider that a stop has put to 0 back where it was, unless a person has moved it since."""
+        before, self._halted_from = self._halted_from, None
+        if before is not None and self.slider is not None and self.slider <= _SLIDER_TOLERANCE:
+            out.append(SetSpeedSlider(before))
+            self.slider = before

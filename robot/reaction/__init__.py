@@ -1,0 +1,1 @@
+"""Reactions to a touch: retreat, admittance, backtrack and the rules that choose one. Pure functions."""

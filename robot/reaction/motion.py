@@ -1,0 +1,194 @@
+"""Reaction motions of an arm that stands after a touch: along the normal, back the way it came, or with the push. Pure.
+
+The three are used in the same way: ``step`` returns in each control cycle how the joints are to move, or the end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.workspace import Workspace
+
+from .admittance import AdmittanceState, admittance_step, begin_admittance
+from .backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
+from .contact_supervision import clamped
+from .retreat import RetreatPlan, plan_retreat, retreat_step
+from .sweep import ArmSweep
+from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
+
+__all__ = [
+    "AdmittanceMotion",
+    "BacktrackMotion",
+    "ReactionMotion",
+    "RetreatMotion",
+    "plan_answer",
+    "plan_reaction_motion",
+]
+
+
+_MIN_APPROACH_SPEED = 0.02  # rad/s; a slower arm has not run into anything
+_STOOD = "the arm stood when it was touched"
+
+
+class ReactionMotion(Protocol):
+    """Bounded motion away from a touch.
+
+    Attributes:
+        how: "", "path" or "push": how the arm leaves.
+    """
+
+    how: str
+
+    def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
+        """Return what to do in this control cycle, with the current touches."""
+
+
+class RetreatMotion:
+    """Retreat along the normal of the touch (``retreat.py``)."""
+
+    how = ""
+
+    def __init__(self, plan: RetreatPlan) -> None:
+        self._plan = plan
+
+    def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
+        """Return the next step; later touches do not change the direction."""
+        return retreat_step(self._plan, state)
+
+
+class BacktrackMotion:
+    """Backtrack along the arm's own recent path (``backtrack.py``)."""
+
+    how = "path"
+
+    def __init__(self, plan: BacktrackPlan) -> None:
+        self._plan = plan
+
+    def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
+        """Return the next step; the touches do not change the path."""
+        return backtrack_step(self._plan, state)
+
+
+class AdmittanceMotion:
+    """Motion with the push (``admittance.py``)."""
+
+    how = "push"
+
+    def __init__(self, start: AdmittanceState) -> None:
+        self._now = start
+
+    def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
+        """Return the next step, as firm as the current push."""
+        self._now, step = admittance_step(self._now, state, contacts)
+        return step
+
+
+def plan_reaction_motion(
+    model: ArmModel,
+    reaction: Reaction,
+    at_touch: ArmState,
+    state: ArmState,
+    contacts: Sequence[ContactOnLink],
+    history: PathHistory,
+    space: Workspace,
+) -> ReactionMotion | str:
+    """Return the motion that a reaction wants, or why there is none.
+
+    Args:
+        model: the arm.
+        reaction: its kind is "retreat" or "comply".
+        at_touch: the arm when the touch was seen.
+        state: the arm now, standing.
+        contacts: the touches, as they were last seen.
+        history: where the arm has been.
+        space: the room that the arm has; on the way back, which it has just come, its own links do not count.
+    """
+    if reaction.kind == "comply":
+        return _comply(model, reaction, state, space)
+    moved = max(map(abs, at_touch.qd)) >= _MIN_APPROACH_SPEED
+    if clamped(contacts):
+        why = "touches on opposite sides, or on two links, may hold the arm between them"
+        if reaction.on_clamp == "comply":
+            return _comply(model, reaction, state, space)
+        if reaction.on_clamp == "path":
+            back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD
+            return f"{why}; no way back: {back}" if isinstance(back, str) else back
+        return why
+    plan = plan_retreat(model, at_touch, contacts, reaction, space, ArmSweep.begin(model, state.q))
+    if not isinstance(plan, Done):
+        return RetreatMotion(plan)
+    if reaction.fallback != "path":
+        return plan.reason
+    back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD
+    return f"{plan.reason}; no way back: {back}" if isinstance(back, str) else back
+
+
+def plan_answer(
+    model: ArmModel,
+    reaction: Reaction,
+    state: ArmState,
+    contacts: Sequence[ContactOnLink],
+    history: PathHistory,
+    space: Workspace,
+    since: float,
+) -> ReactionMotion | str:
+    """Return the motion that follows where one away was resisted, or why there is none.
+
+    Args:
+        model: the arm.
+        reaction: its ``on_resistance`` is "back" or "comply".
+        state: the arm now, standing.
+        contacts: the touches there are now.
+        history: where the arm has been.
+        space: the room that the arm has.
+        since: when the motion away began [s]; the way back ends there.
+    """
+    if not contacts:
+        return "nothing touches any more"
+    if reaction.on_resistance == "comply":
+        return _comply(model, reaction, state, space)
+    return _way_back(model, reaction, state, contacts, history, space, since)
+
+
+def _comply(model: ArmModel, reaction: Reaction, state: ArmState, space: Workspace) -> AdmittanceMotion:
+    return AdmittanceMotion(begin_admittance(model, state, reaction, space))
+
+
+def _way_back(
+    model: ArmModel,
+    reaction: Reaction,
+    state: ArmState,
+    contacts: Sequence[ContactOnLink],
+    history: PathHistory,
+    space: Workspace,
+    since: float = -math.inf,
+) -> BacktrackMotion | str:
+    """Return the motion back along the arm's path, or why there is none: it must not press on any touch."""
+    if any(not contact.location_valid for contact in contacts):
+        return "the place of a touch is not certain, and it might press on it"
+    back = plan_backtrack(model, state, history, reaction, replace(space, avoid_self=False), since)
+    if isinstance(back, Done):
+        return back.reason
+    return _approached_touch(model, state, contacts, back) or BacktrackMotion(back)
+
+
+def _approached_touch(model: ArmModel, state: ArmState, contacts: Sequence[ContactOnLink], back: BacktrackPlan) -> str:
+    """Return why going back would press on a touch; empty where it does not."""
+    from coneskin.robot.arm.kinematics import link_pose, point_jacobian
+
+    first = backtrack_step(back, ArmState(state.time, state.q))
+    if isinstance(first, Done):
+        return first.reason
+    for contact in contacts:
+        rows = point_jacobian(model, state.q, contact.link, contact.point)
+        normal = link_pose(model, state.q, contact.link).rotate(contact.normal)
+        speed = sum(
+            n * sum(j * v for j, v in zip(row, first.qd, strict=True)) for n, row in zip(normal, rows, strict=True)
+        )
+        if speed > 1e-3:
+            return f"it leads towards the touch on link {contact.link}"
+    return ""

@@ -1,0 +1,261 @@
+"""Retreat: it moves the touched point away from what touched it. Pure: the state of the arm in, joint speeds out.
+
+The skin's normal n points out of the link, at the obstacle; the touched point therefore moves along -n. The direction
+is fixed in the base frame at the touch, and the progress is measured along it from where the point was then, so that
+what the arm still moved while it stopped is made good as well.
+
+Objective: of all joint speeds below the touched link, those whose point velocity is nearest to the wanted one in the
+least-squares sense, damped (``damped_least_squares.py``); the joints beyond stand still. The result is scaled down as
+a whole, so that its direction is kept. A joint that could no longer brake before its limit is locked, and the rest is
+solved again without it. With several touches none of the touched points moves towards its obstacle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from coneskin.errors import KinematicsError
+from coneskin.geometry.pose import Vector
+from coneskin.robot.arm.compiled_kinematics import compile_contact
+from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds, damping_squared, stacked_speeds
+from coneskin.robot.arm.joint_limits import REACTION_TIME, JointLimits
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.workspace import Workspace
+
+from .sweep import ArmSweep
+from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
+
+__all__ = ["DISTANCE_TOLERANCE", "LEAST_PROGRESS", "RetreatPlan", "plan_retreat", "retreat_step"]
+
+#: part of the wanted speed that a retreat must reach; otherwise it is not begun, or ends. In a regular place it is the
+#: squared cosine of the angle between the wanted motion and the nearest possible one: 0.25 is 60 deg, where the point
+#: slides 1.7 times as far along the obstacle as it gets away from it.
+LEAST_PROGRESS = 0.25
+#: distance that may be missing at the end of a retreat [m]
+DISTANCE_TOLERANCE = 0.5e-3
+_ROOM_TOLERANCE = 2e-3  # m of the arm's way that may be missing; its speed is bounded by more than it has
+
+
+@dataclass(frozen=True, slots=True)
+class _Track:
+    """Path of one touched point.
+
+    Attributes:
+        link: that carries it.
+        point: in the DH frame of the link [m].
+        away: unit vector that it is to move along, in the base frame.
+        start: where it was at the touch, in the base frame [m].
+        drive: ``CompiledLink.drive`` of the link.
+        place: ``CompiledLink.place`` of the link.
+    """
+
+    link: int
+    point: Vector
+    away: Vector
+    start: Vector
+    drive: Callable[..., tuple[float, ...]] = field(repr=False)
+    place: Callable[..., tuple[float, ...]] = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class RetreatPlan:
+    """Plan of a retreat, made once, at the touch, for ``retreat_step``.
+
+    Attributes:
+        tracks: one for each touched point.
+        reaction: the settings.
+        limits: of the joints.
+        start_time: of the touch [s].
+        space: the room that the arm has, or None.
+        sweep: where the whole arm was when the motion began; None where its way is not bounded.
+    """
+
+    tracks: tuple[_Track, ...]
+    reaction: Reaction
+    limits: JointLimits
+    start_time: float
+    space: Workspace | None = None
+    sweep: ArmSweep | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """Joint speeds for a wanted speed of 1 m/s, and the speed away from the touch that they reach."""
+
+    speeds: Sequence[float]
+    away: float
+    damping: float
+
+
+def plan_retreat(
+    model: ArmModel,
+    state: ArmState,
+    contacts: Sequence[ContactOnLink],
+    reaction: Reaction,
+    space: Workspace | None = None,
+    sweep: ArmSweep | None = None,
+) -> RetreatPlan | Done:
+    """Fix direction, point and start of a retreat.
+
+    Args:
+        model: the arm.
+        state: the arm at the touch.
+        contacts: all touches at that time.
+        reaction: the settings.
+        space: the room that the arm has; without it nothing is in the way.
+        sweep: where the whole arm was when the motion began; without it its way is not bounded.
+
+    Returns:
+        the plan, or Done with the reason why no retreat is possible.
+
+    Raises:
+        KinematicsError: there is no contact, or one is on a link that the arm does not have.
+    """
+    if not contacts:
+        raise KinematicsError("a retreat needs at least one contact, got none")
+    if not all(math.isfinite(value) for value in (*state.q, *state.qd)):
+        return Done(f"joint positions and speeds must be finite, got {state.q} rad and {state.qd} rad/s")
+    tracks = []
+    for contact in contacts:
+        if not contact.location_valid:
+            return Done(f"the place of the touch on link {contact.link} is not known")
+        length = math.hypot(*contact.normal)
+        if not all(math.isfinite(value) for value in contact.point) or not 0.99 < length < 1.01:
+            return Done(f"touch on link {contact.link} at {contact.point} m has no unit normal: {contact.normal}")
+        if contact.link == 0:
+            return Done("the base was touched, and no joint moves it")
+        link = compile_contact(model, contact.link)
+        x, y, z, nx, ny, nz = link.place(*state.q, *contact.point, *contact.normal)[:6]
+        away = (-nx / length, -ny / length, -nz / length)
+        tracks.append(_Track(contact.link, contact.point, away, (x, y, z), link.drive, link.place))
+    limits = JointLimits.of(model, reaction.acceleration)
+    plan = RetreatPlan(tuple(tracks), reaction, limits, state.time, space, sweep)
+    first = retreat_step(plan, ArmState(state.time, state.q))  # from a standstill: the arm stops first
+    return first if isinstance(first, Done) else plan
+
+
+def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
+    """Return the command of this control cycle; the same for the same arguments.
+
+    Args:
+        plan: of this retreat.
+        state: the arm as measured.
+    """
+    reaction, limits = plan.reaction, plan.limits
+    q = state.q
+    if not math.isfinite(sum(q)):
+        return Done(f"joint positions must be finite, got {q} rad")
+    if len(plan.tracks) == 1:
+        track = plan.tracks[0]
+        ux, uy, uz = track.away
+        sx, sy, sz = track.start
+        x, y, z, away, damping, *speeds = track.drive(*q, *track.point, ux, uy, uz)
+        progress = (x - sx) * ux + (y - sy) * uy + (z - sz) * uz
+    else:
+        progress = max(_progress(track, q) for track in plan.tracks)
+        motion = _solve(plan, q, ())
+        speeds, away, damping = list(motion.speeds), motion.away, motion.damping
+    left = reaction.distance - progress
+    if not left > DISTANCE_TOLERANCE:
+        return Done("the distance is made", progress, complete=True)
+    if not state.time - plan.start_time < reaction.time_budget:
+        return Done(f"the time of {reaction.time_budget} s is over", progress)
+    room = math.inf if plan.sweep is None else reaction.arm_distance - plan.sweep.distance(q)
+    if not room > _ROOM_TOLERANCE:
+        return Done(
+            f"the arm has moved {1e3 * reaction.arm_distance:g} mm, as far as arm_distance_mm lets it", progress
+        )
+    locked: list[int] = []
+    while away >= LEAST_PROGRESS:
+        speed, clipped = _speed(reaction, limits, speeds, away, left, room)
+        wanted = [speed * value for value in speeds]
+        blocked = limits.blocked(q, state.qd, wanted)
+        if not blocked:
+            break
+        locked += blocked
+        motion = _solve(plan, q, locked)
+        speeds, away, damping = list(motion.speeds), motion.away, motion.damping
+    else:
+        return Done(_why_not(plan, locked, away, damping), progress)
+    if locked:
+        clipped += tuple(f"joint {i + 1} limit" for i in sorted(locked))
+    if damping > DAMPING_FLOOR:
+        clipped += ("singularity",)
+    wanted += [0.0] * (6 - len(wanted))
+    if plan.space is not None and (why := plan.space.obstruction(q, wanted, limits.braking)):
+        return Done(why, progress)
+    a, b, c, d, e, f = wanted
+    return JointVelocity((a, b, c, d, e, f), reaction.acceleration, speed * away, progress, clipped)
+
+
+def _speed(
+    reaction: Reaction, limits: JointLimits, speeds: Sequence[float], away: float, left: float, room: float
+) -> tuple[float, tuple[str, ...]]:
+    """Return the speed to want of the touched point [m/s], and the limits that keep it below the one that is set."""
+    leading = over = arm = 0.0
+    for value, most, reach in zip(speeds, limits.speed, limits.reach, strict=False):
+        size = value if value >= 0.0 else -value
+        leading = size if size > leading else leading
+        over = size / most if size / most > over else over
+        arm += size * reach
+    speed = reaction.speed
+    clipped: tuple[str, ...] = ()
+    if speed * over > 1.0:
+        speed, clipped = 1.0 / over, ("joint speed",)
+    if speed * arm > reaction.arm_speed:
+        speed, clipped = reaction.arm_speed / arm, ("arm speed",)
+    # braking takes speed^2 away leading / (2 a) plus the distance during the reaction time: no more than what is left
+    wait = limits.braking * REACTION_TIME / leading
+    ending = math.sqrt(wait * wait + 2.0 * limits.braking * left / (away * leading)) - wait
+    if speed > ending:
+        speed, clipped = ending, ("distance",)
+    if room < math.inf:  # the same for the point of the arm that moves farthest
+        ending = math.sqrt(wait * wait + 2.0 * limits.braking * room / (arm * leading)) - wait
+        if speed > ending:
+            speed, clipped = ending, ("arm distance",)
+    return speed, clipped
+
+
+def _solve(plan: RetreatPlan, q: Sequence[float], locked: Sequence[int]) -> _Motion:
+    """Solve as ``CompiledLink.drive`` does, for any number of touches and with locked joints."""
+    joints = max(track.link for track in plan.tracks)
+    free = [i for i in range(joints) if i not in locked]
+    points = []
+    for track in plan.tracks:
+        flat = track.place(*q, *track.point, 0.0, 0.0, 1.0)[6:]
+        flat += (0.0, 0.0, 0.0) * (joints - track.link)
+        points.append(([(flat[3 * i], flat[3 * i + 1], flat[3 * i + 2]) for i in free], track.away))
+    if len(points) == 1:
+        columns, away = points[0]
+        some = damped_speeds(columns, away)
+        damping = damping_squared(columns) if columns else DAMPING_FLOOR
+    else:
+        some, damping = stacked_speeds(points)
+    made = sum(
+        value * (column[0] * u[0] + column[1] * u[1] + column[2] * u[2])
+        for columns, u in points
+        for value, column in zip(some, columns, strict=True)
+    )
+    speeds = [0.0] * joints
+    for i, value in zip(free, some, strict=True):
+        speeds[i] = value
+    return _Motion(speeds, made / len(points), damping)
+
+
+def _progress(track: _Track, q: Sequence[float]) -> float:
+    place = track.place(*q, *track.point, 0.0, 0.0, 1.0)
+    return sum((place[k] - track.start[k]) * track.away[k] for k in range(3))
+
+
+def _why_not(plan: RetreatPlan, locked: Sequence[int], away: float, damping: float) -> str:
+    joints = ", ".join(str(i + 1) for i in sorted(locked))
+    part = f"{100.0 * away:.0f} % of the wanted speed could be reached, {100.0 * LEAST_PROGRESS:.0f} % is the least"
+    if locked:
+        return f"no feasible motion with joint {joints} at its limit: {part}"
+    if len(plan.tracks) > 1:
+        return f"no feasible motion away from all {len(plan.tracks)} touches: {part}"
+    if damping > DAMPING_FLOOR:
+        return f"no feasible motion near a singularity: {part}"
+    return f"link {plan.tracks[0].link} cannot move away from the touch: {part}"

@@ -1,0 +1,176 @@
+"""Values of a reaction: its inputs, its settings and its answers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from coneskin.errors import RobotRefused
+from coneskin.geometry.pose import Vector
+from coneskin.robot.arm.model import ZERO_VELOCITY
+
+if TYPE_CHECKING:
+    from coneskin.robot.arm.model import Joints
+
+__all__ = ["CLAMP", "KINDS", "RESISTANCE", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction"]
+
+#: what an arm can do when it is touched, gentlest first
+KINDS = ("slow", "comply", "retreat", "stop")
+#: what follows where a motion away is resisted
+RESISTANCE = ("stop", "back", "comply")
+#: what follows where touches may hold the arm between them
+CLAMP = ("stop", "path", "comply")
+
+
+@dataclass(frozen=True, slots=True)
+class ArmState:
+    """Arm as measured at one time. Not checked: one is made in each control cycle.
+
+    Attributes:
+        time: of the measurement, on the clock of the guard [s].
+        q: joint positions [rad].
+        qd: joint speeds [rad/s].
+    """
+
+    time: float
+    q: Joints
+    qd: Joints = ZERO_VELOCITY
+
+
+@dataclass(frozen=True, slots=True)
+class ContactOnLink:
+    """Touch on a link, as the reaction sees it.
+
+    Attributes:
+        link: index of the DH frame that moves with the touched link, 0 (base) to 6.
+        point: where, in that frame [m].
+        normal: outward unit normal of the skin there, in that frame; what touches is on its side.
+        level: how strong, in the detector's unit.
+        location_valid: False when it is known that there is a touch, but not where.
+        threshold: level from which the sensor is touched at all.
+        number: of the touch; one that begins anew has another.
+        firm: level from which the touch should have a place; a firmer one without is a doubtful one.
+    """
+
+    link: int
+    point: Vector
+    normal: Vector
+    level: float = 1.0
+    location_valid: bool = True
+    threshold: float = 0.0
+    number: int = 0
+    firm: float = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """Settings of a reaction to a touch.
+
+    Attributes:
+        kind: "stop"; "retreat" to stop and then move the touched point away; "comply" to stop and then give way as
+            firmly as it is pushed; "slow" to go on slowly while the touch lasts.
+        deceleration: of the leading joint while stopping [rad/s^2].
+        distance: how far the touched point retreats, or gives way [m].
+        speed: of the touched point [m/s]; of comply, at ``full_level``.
+        acceleration: of the leading joint while retreating [rad/s^2].
+        time_budget: after which the retreat ends wherever it is; a touch that slows for longer stops the arm [s].
+        arm_speed: that no point of the bare arm exceeds while retreating [m/s]; a bound by the reach of each joint.
+        arm_distance: that no point of the bare arm goes from where the motion began [m].
+        fallback: where no retreat along the normal is possible, "stop" stays there and "path" goes back the way that
+            the arm came.
+        on_resistance: where the touch does not become lighter, or another one comes, "stop" stays there, "back" goes
+            back the way of the retreat, not beyond where it began, and "comply" gives way to all touches.
+        on_clamp: where touches, each with a certain place, may hold the arm between them, "stop" stays there, "path"
+            goes back the way that the arm came if that leads into none of them, and "comply" gives way to all of
+            them, to none where they push against each other.
+        full_level: level at which comply gives way with its full speed.
+        slow_to: the controller's speed slider while slow, 0..1.
+        slow_speed: of the touched surface, below which an arm counts as slow whatever it was before [m/s].
+        press: how much farther than in a stop the surface may move into a touch while the arm is slow [m].
+
+    Raises:
+        RobotRefused: a value is out of its range; no guard starts with such settings.
+    """
+
+    kind: str = "stop"
+    deceleration: float = 10.0
+    distance: float = 0.05
+    speed: float = 0.15
+    acceleration: float = 4.0
+    time_budget: float = 2.0
+    arm_speed: float = 0.25
+    arm_distance: float = 0.1
+    fallback: str = "stop"
+    on_resistance: str = "stop"
+    on_clamp: str = "stop"
+    full_level: float = 0.6
+    slow_to: float = 0.2
+    slow_speed: float = 0.05
+    press: float = 0.001
+
+    def __post_init__(self) -> None:
+        for name, choices in (
+            ("kind", KINDS),
+            ("fallback", ("stop", "path")),
+            ("on_resistance", RESISTANCE),
+            ("on_clamp", CLAMP),
+        ):
+            if (word := getattr(self, name)) not in choices:
+                raise RobotRefused(f"reaction {name} must be one of {', '.join(choices)}, got {word!r}")
+        # 40 rad/s^2 is the most that the UR driver lets through; 1.5 m/s the fastest tool of that family
+        for name, unit, most in (
+            ("deceleration", "rad/s^2", 40.0),
+            ("distance", "m", 0.5),
+            ("speed", "m/s", 1.5),
+            ("acceleration", "rad/s^2", 40.0),
+            ("time_budget", "s", 60.0),
+            ("arm_speed", "m/s", 5.0),
+            ("arm_distance", "m", 2.0),
+            ("full_level", "of 1", 1.0),
+            ("slow_to", "of 1", 0.9),
+            ("slow_speed", "m/s", 1.5),
+            ("press", "m", 0.1),
+        ):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0.0 < value <= most):
+                raise RobotRefused(f"reaction {name} must be above 0 and at most {most} {unit}, got {value!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class JointVelocity:
+    """Joint speeds to go to, ramped by the controller and then held.
+
+    Attributes:
+        qd: joint speeds [rad/s].
+        acceleration: of the leading joint on the way there [rad/s^2].
+        away: speed that the touched point will have away from the obstacle [m/s]; the mean over several touches.
+        progress: how far it has got so far [m]; the farthest over several touches.
+        clipped_by: what kept it from moving as set: "joint speed", "arm speed", "distance" or "arm distance"
+            (it brakes for the end),
+            "singularity", "joint 3 limit"; of comply also "level" (pushed less than fully), "damping",
+            "place" (it is not known).
+    """
+
+    qd: Joints
+    acceleration: float
+    away: float
+    progress: float
+    clipped_by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """End of a motion, or its impossibility: brake and stand.
+
+    Attributes:
+        reason: why.
+        progress: how far the touched point got [m].
+        complete: it got as far as it was to.
+        resisted: something was in the way: a touch, or a force on the joints.
+    """
+
+    reason: str
+    progress: float = 0.0
+    complete: bool = False
+    resisted: bool = False

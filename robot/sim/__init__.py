@@ -1,0 +1,1 @@
+"""Simulated UR controller that ur_rtde connects to."""

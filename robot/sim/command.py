@@ -1,0 +1,235 @@
+"""Command line of the simulated UR controller, ``coneskin sim-ur``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from coneskin.bounded_file import read_file
+from coneskin.errors import ConeSkinError, RobotRefused
+from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.sim.urscript.translator import MAX_LENGTH
+
+from .controller import Controller
+from .memory_bound import SIMULATOR, bounded_memory
+from .options import START_Q, Options, Version
+from .server import PORTS, Server, is_loopback
+
+__all__ = ["EXAMPLE", "add_arguments", "main", "run"]
+
+EXAMPLE = """example:
+  coneskin sim-ur --model ur10e --start-q-deg 0 -90 90 -90 -90 0
+  python -c "import rtde_receive; print(rtde_receive.RTDEReceiveInterface('127.0.0.1').getActualQ())"
+
+ur_rtde uses fixed ports, so each further arm on one machine needs an address of its own, such as --host 127.0.0.2.
+Ctrl-C stops the controller. Exit code: 0 stopped; 1 it cannot listen there, or an option is not possible."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``coneskin sim-ur``."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.description = "Simulate a UR controller. The unmodified ur_rtde package connects to it and moves its arm."
+    parser.epilog = EXAMPLE
+    add = parser.add_argument
+    add("--host", default="127.0.0.1", help="address to listen on; others can reach all but 127.* (%(default)s)")
+    add("--model", default="ur10e", help=f"arm: {', '.join(MODEL_NAMES)} (%(default)s)")
+    add("--version", default="5.25", metavar="MAJOR.MINOR", help="PolyScope version to report (%(default)s)")
+    add(
+        "--quirks",
+        choices=("real", "fixed"),
+        default="real",
+        help="run the control program of ur_rtde as it is, or with corrections (%(default)s)",
+    )
+    add(
+        "--start-q-deg",
+        type=float,
+        nargs=6,
+        metavar="Q",
+        default=[round(math.degrees(q), 2) for q in START_Q],
+        help="joint positions at the start [deg] (0 -90 90 -90 -90 0)",
+    )
+    add(
+        "--start-delay-ms",
+        type=float,
+        default=10.0,
+        metavar="T",
+        help="time from a program's last byte to its first cycle [ms] (%(default)g)",
+    )
+    add(
+        "--unlock-after-s",
+        type=float,
+        default=5.0,
+        metavar="T",
+        help="time after which a protective stop can be unlocked [s] (%(default)g)",
+    )
+    add(
+        "--protective-stop",
+        choices=("pause", "stop"),
+        default="pause",
+        help="effect of a protective stop on the running program (%(default)s)",
+    )
+    add(
+        "--wrong-size",
+        choices=("truncate", "drop"),
+        default="truncate",
+        help="treatment of data packets longer than their recipe (%(default)s)",
+    )
+    add("--program", type=Path, metavar="FILE", help="URScript program that the dashboard command play starts")
+    add("--programs", type=Path, metavar="FOLDER", help="programs and installations that the dashboard can load")
+    add(
+        "--external-control",
+        default="127.0.0.1:50002",
+        metavar="HOST:PORT",
+        help="where a loaded program with the node External Control asks for its script (%(default)s)",
+    )
+    add("--local-control", action="store_true", help="say that the robot is not under remote control")
+    add(
+        "--robot-api-port",
+        type=int,
+        default=0,
+        metavar="PORT",
+        help="serve the robot API of PolyScope X too, which its clients ask at port 80 (off)",
+    )
+    add("--log", type=Path, metavar="FILE", help="write a JSON line for each command and event")
+    add(
+        "--faults", action="store_true", help="open a port, to this computer alone, that takes faults (--json names it)"
+    )
+    add("--json", action="store_true", help="print the ready line as JSON")
+    add("--exit-with-parent", action="store_true", help="end with the process that started this one")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command by itself, as ``python -m coneskin.robot.sim.command``; return the exit code."""
+    parser = argparse.ArgumentParser(prog="coneskin sim-ur")
+    add_arguments(parser)
+    return run(parser.parse_args(arguments))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the controller until SIGTERM or SIGINT; return the exit code."""
+    try:
+        return _serve(args)
+    except ConeSkinError as exc:
+        print(f"coneskin sim-ur: {exc}", file=sys.stderr)
+        return 1
+
+
+def _serve(args: argparse.Namespace) -> int:
+    options = Options(
+        model=args.model,
+        version=_version(args.version),
+        start_q=_start_q(args.model, args.start_q_deg),
+        quirks=args.quirks,
+        wrong_size=args.wrong_size,
+        start_delay=args.start_delay_ms / 1000.0,
+        unlock_after=args.unlock_after_s,
+        after_protective_stop=args.protective_stop,
+        program=_read(args.program) if args.program else "",
+        programs=_folder(args.programs) if args.programs else None,
+        external_control=_address(args.external_control),
+        remote_control=not args.local_control,
+        robot_api_port=args.robot_api_port,
+    )
+    parent = os.getppid()
+    log = None
+    try:
+        if args.log:
+            log = args.log.open("w", buffering=1)
+    except OSError as exc:
+        raise RobotRefused(f"--log {args.log} cannot be written: {exc.strerror}") from exc
+    try:
+        controller = Controller(options, log)
+        with Server(controller, args.host, faults=args.faults) as server, bounded_memory(SIMULATOR):
+            for number in (signal.SIGTERM, signal.SIGINT):
+                signal.signal(number, lambda *_: server.stop())
+            _announce(args, controller, server)
+            server.run(alive=lambda: not args.exit_with_parent or os.getppid() == parent)
+    finally:
+        if log is not None:
+            log.close()
+    return 0
+
+
+def _announce(args: argparse.Namespace, controller: Controller, server: Server) -> None:
+    facts = {
+        "ready": True,
+        "host": args.host,
+        "model": controller.arm.model.name,
+        "version": args.version,
+        "ports": PORTS | ({"robot API": api_port} if (api_port := controller.options.robot_api_port) else {}),
+        "fault_address": server.fault_address,
+        "pid": os.getpid(),
+    }
+    if not server.local:
+        print(
+            f"coneskin sim-ur: WARNING: it listens on {args.host}, beyond this computer. Whoever can reach it may run "
+            "programs in it: it asks for no password, as a real controller does not. It moves no real arm.",
+            file=sys.stderr,
+            flush=True,
+        )
+    host, port = controller.options.external_control
+    if not is_loopback(host):
+        print(
+            f"coneskin sim-ur: WARNING: a program with the node External Control takes its script from {host} port "
+            f"{port}, beyond this computer.",
+            file=sys.stderr,
+            flush=True,
+        )
+    if args.json:
+        print(json.dumps(facts), flush=True)
+    else:
+        print(
+            f"simulated {facts['model']} (PolyScope {args.version}) ready on {args.host}: RTDE {PORTS['RTDE']}, "
+            f"dashboard {PORTS['dashboard']}, URScript {PORTS['primary']}-{PORTS['realtime']}; Ctrl-C stops it",
+            flush=True,
+        )
+
+
+def _start_q(name: str, degrees: Sequence[float]) -> list[float]:
+    """Return joint positions [rad]; refuse those outside the limits of the arm."""
+    arm = arm_model(name)
+    start = [math.radians(q) for q in degrees]
+    for joint, (low, q, high) in enumerate(zip(arm.joint_lower, start, arm.joint_upper, strict=True), 1):
+        if not low <= q <= high:
+            raise RobotRefused(
+                f"--start-q-deg: joint {joint} of the {arm.name} must be from {math.degrees(low):g} to "
+                f"{math.degrees(high):g} deg, got {math.degrees(q):g} deg"
+            )
+    return start
+
+
+def _version(text: str) -> Version:
+    major, _, minor = text.partition(".")
+    if not (major.isdigit() and minor.isdigit()):
+        raise RobotRefused(f"--version must be MAJOR.MINOR such as 5.25, got {text!r}")
+    return int(major), int(minor)
+
+
+def _folder(path: Path) -> Path:
+    if not path.is_dir():
+        raise RobotRefused(f"--programs must be a folder, got {path}")
+    return path
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not (host and port.isdecimal() and 0 < int(port) < 65536):
+        raise RobotRefused(f"--external-control must be HOST:PORT such as 127.0.0.1:50002, got {text!r}")
+    return host, int(port)
+
+
+def _read(path: Path) -> str:
+    try:
+        return read_file(path, MAX_LENGTH).decode()
+    except (OSError, UnicodeDecodeError) as exc:
+        raise RobotRefused(f"--program {path} cannot be read: {exc}") from exc
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,159 @@
+"""Translation of programs while the controller runs: short ones at once, long ones in a process of their own.
+
+The program of ur_rtde is 50 kB and takes about 40 ms to translate. In the controller's process that would delay 20
+control cycles, and a client that monitors the age of the controller's data would take it for a lost connection.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import marshal
+import pickle
+import signal
+import struct
+import subprocess
+import sys
+import threading
+from queue import SimpleQueue
+from typing import IO
+
+from coneskin.robot.sim.urscript.quirk_fixes import QUIRK_FIXES
+from coneskin.robot.sim.urscript.translator import Translation, translate
+from coneskin.robot.sim.urscript.values import ScriptError
+
+from .builtins import Builtins
+from .memory_bound import TRANSLATOR, bounded_memory
+
+__all__ = ["Compiler"]
+
+TRANSLATION_TIME = 10.0  #: s; a translation that takes longer is ended, and the program refused
+MOST_KNOWN = 100  #: programs whose translation is kept
+IN_PLACE_LIMIT = 4000  #: characters; a shorter program is translated in place, in about a millisecond
+_LENGTH_PREFIX = struct.Struct(">I")  #: bytes that follow, before each message of the translating process
+
+#: number of a program, and its translation or what is wrong with it
+Result = tuple[int, Translation | ScriptError]
+
+
+class Compiler:
+    """Translator that never delays a control cycle. Use it in a ``with``: it has a process and a thread."""
+
+    def __init__(self, quirks: str) -> None:
+        self._fix_quirks = quirks == "fixed"
+        self._known: dict[str, Translation] = {}
+        self._todo: SimpleQueue[tuple[int, str] | None] = SimpleQueue()
+        self._done: SimpleQueue[Result] = SimpleQueue()
+        self._thread = threading.Thread(target=self._translate_long_ones, daemon=True)
+
+    def __enter__(self) -> Compiler:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._todo.put(None)
+        self._thread.join()
+
+    def submit(self, number: int, text: str) -> None:
+        """Translate a program; `results` returns it with its number, at once if it was translated before."""
+        if text in self._known:
+            self._done.put((number, self._known[text]))
+        elif len(text) <= IN_PLACE_LIMIT:
+            try:
+                self._done.put((number, _translate(text, self._fix_quirks)))
+            except ScriptError as exc:
+                self._done.put((number, exc))
+        else:
+            self._todo.put((number, text))
+
+    def check(self, text: str) -> None:
+        """Translate a program that is short enough to be translated in place, and forget the result.
+
+        Raises:
+            ScriptError: it cannot be translated.
+        """
+        if text not in self._known and len(text) <= IN_PLACE_LIMIT:
+            _translate(text, self._fix_quirks)
+
+    def results(self) -> list[Result]:
+        """Return what has been translated since the last call."""
+        ready = []
+        while not self._done.empty():
+            ready.append(self._done.get())
+        return ready
+
+    def _translate_long_ones(self) -> None:
+        worker = _start_worker()
+        try:
+            while (job := self._todo.get()) is not None:
+                number, text = job
+                try:
+                    made = _ask(worker, text, self._fix_quirks)
+                except (OSError, struct.error, EOFError, pickle.UnpicklingError) as exc:  # it has died of this program
+                    why = f"the translation has failed, or took more than {TRANSLATION_TIME:g} s: {type(exc).__name__}"
+                    self._done.put((number, ScriptError(why)))
+                    _end(worker)
+                    worker = _start_worker()
+                    continue
+                if isinstance(made, Translation):
+                    if len(self._known) >= MOST_KNOWN:
+                        self._known.clear()
+                    self._known[text] = made
+                self._done.put((number, made))
+        finally:
+            _end(worker)
+
+
+def _start_worker() -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-c", "from coneskin.robot.sim.compiler import serve; serve()"]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+
+def _end(worker: subprocess.Popen[bytes]) -> None:
+    """Let the translating process come to its end: it reads until its pipe is closed."""
+    with contextlib.suppress(OSError):
+        worker.communicate()
+
+
+def _ask(worker: subprocess.Popen[bytes], text: str, fix_quirks: bool) -> Translation | ScriptError:
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    deadline = threading.Timer(TRANSLATION_TIME, worker.kill)  # the read below then ends
+    deadline.start()
+    try:
+        _send(worker.stdin, pickle.dumps((text, fix_quirks)))
+        (length,) = _LENGTH_PREFIX.unpack(worker.stdout.read(_LENGTH_PREFIX.size))
+        name, secondary, code, problem = pickle.loads(worker.stdout.read(length))
+    finally:
+        deadline.cancel()
+    if problem:
+        return ScriptError(problem.pop("message"), **problem)
+    return Translation(name, secondary, marshal.loads(code))
+
+
+def serve() -> None:
+    """Translate what comes on stdin until it ends: the main function of the translating process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the controller, which ends this process
+    with bounded_memory(TRANSLATOR):
+        _serve(sys.stdin.buffer, sys.stdout.buffer)
+
+
+def _serve(source: IO[bytes], target: IO[bytes]) -> None:
+    answer: tuple[str, bool, bytes, dict[str, object]]
+    while len(head := source.read(_LENGTH_PREFIX.size)) == _LENGTH_PREFIX.size:
+        text, fix_quirks = pickle.loads(source.read(_LENGTH_PREFIX.unpack(head)[0]))
+        try:
+            made = _translate(text, fix_quirks)
+            answer = (made.name, made.secondary, marshal.dumps(made.code), {})
+        except ScriptError as exc:
+            problem = {"message": str(exc), "title": exc.title, "line": exc.line, "column": exc.column}
+            answer = ("", False, b"", problem)
+        _send(target, pickle.dumps(answer))
+
+
+def _translate(text: str, fix_quirks: bool) -> Translation:
+    return translate(text, Builtins.names(), Builtins.blocking(), QUIRK_FIXES if fix_quirks else None)
+
+
+def _send(pipe: IO[bytes], data: bytes) -> None:
+    pipe.write(_LENGTH_PREFIX.pack(len(data)) + data)
+    pipe.flush()

@@ -1,0 +1,313 @@
+"""Simulated controller: registers, programs, safety system, and the control cycle that joins them. No sockets.
+
+Order of a cycle: the registers hold what clients have written since the last one; a program that is due starts; the
+watchdog is checked; every thread of the program takes its turn; the arm moves for 2 ms; clients are sent the new state.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import IO, Any
+
+from coneskin.errors import RobotRefused
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.sim.urscript.translator import Translation
+from coneskin.robot.sim.urscript.values import ScriptError, values_of
+from coneskin.robot.ur.rtde_codec import Value
+
+from .client_inputs import ClientInputs, InputWatchdog
+from .event_log import write_event
+from .motion.arm import CYCLE, SimulatedArm
+from .notices import ErrorNotice, Notice, ProgramFailed, ProgramNotice, Report, SafetyNotice
+from .options import Options
+from .program import Program
+from .safety import MOVING, RobotMode, Runtime, SafetyMode
+from .secondary_programs import SecondaryPrograms
+from .terminals import Terminals, digital_outputs
+
+__all__ = ["Controller"]
+
+MAX_NOTICES = 1000  #: that wait to be sent; a program that writes more in a cycle loses the oldest
+HISTORY = 500  #: cycles; the range of get_actual_joint_positions_history
+REDUCED_SHARE = 0.5  #: of the speed slider, in reduced mode; a real controller has limits of its own instead
+_AT_STANDSTILL = {Runtime.STOPPING: Runtime.STOPPED, Runtime.PAUSING: Runtime.PAUSED}
+_PROTECTIVE_STOP = 209  # number of its log entry, "a protective stop was triggered"; a real one has others by cause
+
+
+class Controller:
+    """Controller of one arm.
+
+    Attributes:
+        cycle: number of control cycles since power-on.
+        inputs: what clients write.
+        program: main program; None while none is loaded.
+        secondary: ``sec`` programs that run beside it.
+        protective_stop_cycle: cycle of the last protective stop.
+        notices: what clients are still to be told.
+        history: joint positions of the last cycles, oldest first [rad].
+    """
+
+    def __init__(self, options: Options, log: IO[str] | None = None) -> None:
+        self.options = options
+        self.arm = SimulatedArm(arm_model(options.model), options.start_q)
+        for i, (low, q, high) in enumerate(
+            zip(self.arm.model.joint_lower, self.arm.q, self.arm.model.joint_upper, strict=True), 1
+        ):
+            if not low <= q <= high:
+                raise RobotRefused(f"start position of joint {i} must be in [{low:.3f}, {high:.3f}] rad, got {q:.3f}")
+        self.cycle = 0
+        self.inputs = ClientInputs(self.arm, options.quirks == "fixed", self.log)
+        self.output_ints = [0] * 48
+        self.output_doubles = [0.0] * 48
+        self.digital_outputs = 0
+        self.terminals = Terminals()
+        self.beyond = False  # programs may connect to other computers
+        self.slider = 1.0
+        self.resistance = [0.0] * 6  # current that each motor takes beyond the model of the arm [A]
+        self.gravity: tuple[float, ...] = (0.0, 0.0, 9.82)
+        self.payload = 0.0
+        self.payload_cog: tuple[float, ...] = (0.0, 0.0, 0.0)
+        self.payload_inertia: tuple[float, ...] = (0.0,) * 6
+        self.program: Program | None = None
+        self.secondary = SecondaryPrograms(self)
+        self.runtime = Runtime.STOPPED
+        self.robot_mode = RobotMode.RUNNING
+        self.safety = SafetyMode.NORMAL
+        self._reduced = False
+        self.protective_stop_cycle = 0
+        self.history: deque[list[float]] = deque([list(self.arm.q)], maxlen=HISTORY)
+        self.notices: deque[Notice] = deque(maxlen=MAX_NOTICES)
+        self._arrived = 0  # cycle in which the last program came in
+        self._due: tuple[int, Translation] | None = None
+        self._log = log
+
+    # control cycle
+
+    @property
+    def timestamp(self) -> float:
+        """Time since power-on [s]."""
+        return self.cycle * CYCLE
+
+    @property
+    def speed_scaling(self) -> float:
+        """Share of the commanded speeds at which paths run; the safety system's own stops are not in it."""
+        return self.slider * REDUCED_SHARE if self.safety is SafetyMode.REDUCED else self.slider
+
+    def step(self) -> None:
+        """Run one control cycle."""
+        self.cycle += 1
+        if self._due is not None and self.cycle >= self._due[0]:
+            self._start(self._due[1])
+        for watchdog in list(self.inputs.watchdogs.values()):
+            self._check_watchdog(watchdog)
+        self._turn_programs()
+        was_moving = self.arm.moving
+        held = self.runtime.paused or self.safety not in MOVING
+        fault = self.arm.step(self.speed_scaling, hold=held)
+        if was_moving and not self.arm.moving:
+            self.log("standstill", q=self.arm.q)
+        if not self.arm.moving:
+            self.runtime = _AT_STANDSTILL.get(self.runtime, self.runtime)
+        if fault:
+            self.protective_stop(fault)
+            self.stop_program("ended by the safety system")
+        self.history.append(self.arm.q)
+
+    def _turn_programs(self) -> None:
+        self.secondary.turn()
+        program = self.program
+        if program is None or self.runtime is not Runtime.PLAYING:
+            return
+        try:
+            program.turn()
+        except ScriptError as exc:
+            self.fail(program.name, exc)
+        if not program.running:
+            self.stop_program("end of the program")
+        elif program.driven != self.cycle and self.runtime is Runtime.PLAYING and not self.arm.blends:
+            self.arm.motion = None  # no thread commands a motion in this cycle: the arm brakes
+
+    # programs
+
+    def program_arrived(self) -> None:
+        """End the running program, because the last byte of a new one has come; the new one starts after the delay."""
+        if self.ready:
+            self.stop_program("replaced by another")
+        self._arrived = self.cycle
+
+    def load(self, translation: Translation) -> None:
+        """Start a translated program: a ``sec`` program now, another once the start delay is over."""
+        if translation.secondary:
+            self.secondary.start(translation)
+            return
+        delay = max(1, round(self.options.start_delay / CYCLE))
+        self._due = (self._arrived + delay, translation)
+
+    def _start(self, translation: Translation) -> None:
+        self._due = None
+        if not self.ready:
+            self.log("refused", program=translation.name, reason=f"{self.robot_mode.name}, {self.safety.name}")
+            return
+        self.stop_program("replaced by another")
+        self.program = Program(self, translation)
+        self.runtime = Runtime.PLAYING
+        self.log("program", program=translation.name)
+        self.tell(ProgramNotice(translation.name, "STARTED"))
+
+    @property
+    def ready(self) -> bool:
+        """True where a program may start."""
+        return self.robot_mode is RobotMode.RUNNING and self.safety in MOVING
+
+    def stop_program(self, reason: str) -> None:
+        """End the program; the arm brakes if it moves. Registers keep their values."""
+        self._due = None
+        self.inputs.watchdogs.clear()
+        if self.program is not None:
+            self.log("stopped", program=self.program.name, reason=reason)
+            self.tell(ProgramNotice(self.program.name, "STOPPED"))
+            self.program.close()
+        self.program = None
+        self.arm.motion = None
+        self.runtime = Runtime.STOPPING if self.arm.moving else Runtime.STOPPED
+
+    def pause_program(self) -> bool:
+        """Hold the program and the arm; return False where no program plays."""
+        if self.program is None or self.runtime is not Runtime.PLAYING:
+            return False
+        self.runtime = Runtime.PAUSING if self.arm.moving else Runtime.PAUSED
+        self.log("paused", program=self.program.name)
+        self.tell(ProgramNotice(self.program.name, "PAUSED"))
+        return True
+
+    def resume_program(self) -> bool:
+        """Go on after a pause, with the motion that was interrupted; return False where that is not possible."""
+        if self.program is None or not self.runtime.paused or self.safety not in MOVING:
+            return False
+        self.runtime = Runtime.PLAYING
+        for watchdog in self.inputs.watchdogs.values():
+            watchdog.fed = self.cycle
+        self.log("resumed", program=self.program.name)
+        self.tell(ProgramNotice(self.program.name, "RESUMED"))
+        return True
+
+    def _check_watchdog(self, watchdog: InputWatchdog) -> None:
+        if self.runtime is not Runtime.PLAYING or not watchdog.expired(self.cycle):
+            return
+        self.log("watchdog", variable=watchdog.variable, action=watchdog.action)
+        if watchdog.action == "stop":
+            self.stop_program(f"watchdog of {watchdog.variable}")
+        elif watchdog.action == "pause":
+            self.pause_program()
+        self.inputs.watchdogs.pop(watchdog.variable, None)
+
+    # safety system
+
+    def protective_stop(self, reason: str) -> None:
+        """Stop the arm and hold the program, until a person unlocks it."""
+        if self.safety not in MOVING:
+            return
+        self.safety = SafetyMode.PROTECTIVE_STOP
+        self.protective_stop_cycle = self.cycle
+        self.log("protective_stop", reason=reason)
+        self.tell(SafetyNotice(self.safety))
+        self.tell(ErrorNotice(_PROTECTIVE_STOP, 0, Report.WARNING, reason))
+        if self.options.after_protective_stop == "stop":
+            self.stop_program("protective stop")
+        else:
+            self.pause_program()
+
+    def unlock(self, early: bool = False) -> bool:
+        """End a protective stop; return False where it is too early, and that is not allowed."""
+        if self.safety is SafetyMode.PROTECTIVE_STOP:
+            if not early and (self.cycle - self.protective_stop_cycle) * CYCLE < self.options.unlock_after:
+                return False
+            self.log("unlocked")
+            self._release()
+        return True
+
+    def safeguard(self, open: bool) -> str:
+        """Open or close the safeguard: the arm brakes, the program is held, and a person has to start it again."""
+        if open and self.safety in MOVING:
+            self.safety = SafetyMode.SAFEGUARD_STOP
+            self.log("safeguard_stop")
+            self.tell(SafetyNotice(self.safety))
+            self.pause_program()
+        elif not open and self.safety is SafetyMode.SAFEGUARD_STOP:
+            self._release()
+        return self.safety.name
+
+    def reduce(self, on: bool) -> str:
+        """Begin or end reduced mode, in which paths and speeds are at most `REDUCED_SHARE` of what is commanded."""
+        self._reduced = on
+        if self.safety in MOVING:
+            self._release()
+        return self.safety.name
+
+    def _release(self) -> None:
+        self.safety = SafetyMode.REDUCED if self._reduced else SafetyMode.NORMAL
+        self.tell(SafetyNotice(self.safety))
+
+    def emergency_stop(self) -> None:
+        """Act on the emergency stop button: the arm brakes and loses power, the program ends."""
+        self.safety = SafetyMode.ROBOT_EMERGENCY_STOP
+        self.robot_mode = RobotMode.POWER_OFF
+        self.log("emergency_stop")
+        self.tell(SafetyNotice(self.safety))
+        self.stop_program("emergency stop")
+
+    # inputs
+
+    def write_inputs(self, values: Mapping[str, Value]) -> None:
+        """Take the values of a client's data packet, name -> value, in the order of its recipe."""
+        self.inputs.write(values, self.cycle)
+        if values.get("speed_slider_mask"):
+            self.slider = min(1.0, max(0.0, float(values["speed_slider_fraction"])))  # type: ignore[arg-type]
+            self.log("slider", fraction=self.slider)
+        for bit, on in digital_outputs(values):
+            self.set_digital(1 << bit, on)
+        self.terminals.write_analog(values)
+
+    def set_digital(self, bit: int, on: bool) -> None:
+        """Switch digital outputs: bits 0-7 standard, 8-15 configurable, 16-17 tool."""
+        self.digital_outputs = self.digital_outputs | bit if on else self.digital_outputs & ~bit
+        self.log("digital", outputs=self.digital_outputs)
+
+    # clients and log
+
+    def tell(self, notice: Notice) -> None:
+        """Keep a notice until the server sends it to every client of the primary interface."""
+        self.notices.append(notice)
+
+    def fail(self, program: str, problem: ScriptError) -> None:
+        """Report a program that cannot be run, or that has failed."""
+        self.log("abort", program=program, reason=str(problem))
+        self.tell(ProgramFailed(problem.title, problem.line, problem.column))
+
+    def log(self, event: str, **facts: Any) -> None:
+        """Write one JSON line: cycle, controller time, this machine's monotonic clock, event and its facts."""
+        if self._log is None:
+            return
+        write_event(self._log, self.cycle, self.timestamp, event, facts)
+
+    def resist(self, joint: int, current: float) -> list[float]:
+        """Let a motor, counted from 0, take so much current beyond the model of the arm [A]; return all of them."""
+        self.resistance[joint] = current
+        return self.resistance
+
+    def describe(self) -> dict[str, Any]:
+        """Return the state, for a person or a test."""
+        return {
+            "cycle": self.cycle,
+            "q": list(self.arm.q),
+            "qd": list(self.arm.qd),
+            "tcp": list(values_of(self.arm.tcp_pose())),
+            "program": self.program.name if self.program is not None else "",
+            "runtime": self.runtime.name,
+            "robot_mode": self.robot_mode.name,
+            "safety": self.safety.name,
+            "slider": self.slider,
+            "resistance": list(self.resistance),
+            "digital_outputs": self.digital_outputs,
+        }

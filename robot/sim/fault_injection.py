@@ -1,0 +1,124 @@
+"""Faults that a test injects while the simulated controller runs: a line in, a line of JSON out.
+
+A frozen controller is not among them: `SimulatedController.freeze` stops the process, and with it the arm. A cut
+network leaves the arm alive: no packet goes through in either direction, nothing is closed, nothing can be opened.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Protocol
+
+from coneskin.errors import RobotRefused
+
+from .controller import Controller
+
+__all__ = ["FaultInjector", "Services"]
+
+_WITH_NUMBERS = ("resist JOINT AMPERES", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
+#: word of a line -> the services that it means
+_SERVICES = {
+    "rtde": ("RTDE",),
+    "dashboard": ("dashboard",),
+    "scripts": ("primary", "secondary", "realtime"),
+    "network": ("RTDE", "dashboard", "primary", "secondary", "realtime"),
+}
+
+
+class Services(Protocol):
+    """Services of a controller on the network, by name; see `Server`."""
+
+    def drop_all(self, name: str, /) -> int:
+        """Close all connections, and return how many there were."""
+
+    def cut(self, name: str, /) -> None:
+        """Let the network drop every packet."""
+
+    def restore(self, name: str, /) -> None:
+        """End `cut`."""
+
+
+class FaultInjector:
+    """Faults of the controller and of its network, switched by lines of text.
+
+    Attributes:
+        dashboard_silent: True while the dashboard takes connections and commands, but answers nothing.
+        rtde_silent: True while RTDE connections stay open, but no outputs are sent.
+    """
+
+    def __init__(self, controller: Controller, services: Services) -> None:
+        self._c = controller
+        self.dashboard_silent = False
+        self.rtde_silent = False
+        self._lines: dict[str, Callable[[], Any]] = {
+            "state": controller.describe,
+            "dashboard silent": lambda: self._set("dashboard_silent", True),
+            "dashboard normal": lambda: self._set("dashboard_silent", False),
+            "rtde silent": lambda: self._set("rtde_silent", True),
+            "rtde normal": lambda: self._set("rtde_silent", False),
+            "protective stop": lambda: controller.protective_stop("fault injection"),
+            "emergency stop": controller.emergency_stop,
+            "safeguard open": lambda: controller.safeguard(True),
+            "safeguard closed": lambda: controller.safeguard(False),
+            "reduced mode on": lambda: controller.reduce(True),
+            "reduced mode off": lambda: controller.reduce(False),
+        }
+        for word, names in _SERVICES.items():
+            if word != "network":
+                self._lines[f"close {word}"] = partial(_sum, services.drop_all, names)
+            self._lines[f"cut {word}"] = partial(_each, services.cut, names)
+            self._lines[f"restore {word}"] = partial(_each, services.restore, names)
+
+    def answer(self, line: str) -> str:
+        """Act on one line; return JSON: the result, or an error and the known lines."""
+        command = line.strip()
+        self._c.log("fault", line=command)
+        action = self._lines.get(command) or self._resisting(command) or self._applying(command)
+        if action is None:
+            return json.dumps({"error": f"unknown fault {command!r}", "known": [*sorted(self._lines), *_WITH_NUMBERS]})
+        try:
+            return json.dumps({"result": action()})
+        except RobotRefused as exc:
+            return json.dumps({"error": str(exc)})
+
+    def _applying(self, command: str) -> Callable[[], Any] | None:
+        """Return what applies a value to an input, where a line says so."""
+        match = re.fullmatch(r"(digital|analog) input (\d{1,3}) (\d+(?:\.\d*)?)", command)
+        if match is None:
+            return None
+        index, value, terminals = int(match[2]), float(match[3]), self._c.terminals
+        if match[1] == "analog":
+            return partial(terminals.apply_analog, index, value)
+        return partial(terminals.apply_digital, index, value != 0.0) if value in (0.0, 1.0) else None
+
+    def _resisting(self, command: str) -> Callable[[], Any] | None:
+        """Return what adds a current to a joint, where a line says so: ``resist JOINT AMPERES``."""
+        word, _, numbers = command.partition(" ")
+        joint, _, amperes = numbers.partition(" ")
+        if word != "resist" or joint not in tuple("123456"):
+            return None
+        try:
+            current = float(amperes)
+        except ValueError:
+            return None
+        if not math.isfinite(current):
+            return None
+        return partial(self._c.resist, int(joint) - 1, current)
+
+    def _set(self, name: str, value: bool) -> bool:
+        setattr(self, name, value)
+        return value
+
+
+def _sum(action: Callable[[str], int], names: tuple[str, ...]) -> int:
+    return sum(action(name) for name in names)
+
+
+def _each(action: Callable[[str], None], names: tuple[str, ...]) -> bool:
+    for name in names:
+        action(name)
+    return True

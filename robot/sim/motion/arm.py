@@ -1,0 +1,198 @@
+"""Simulated arm: positions, speeds, its tool, and the checks of its safety system.
+
+The model is ideal tracking: the arm does what the trajectory generator commands, so measured and commanded speeds are
+equal. No dynamics, no friction, no vibration. Every stop ends in a ramp of joint speeds down to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from coneskin.geometry.pose import Pose
+from coneskin.robot.arm.kinematics import flange_jacobian, forward
+from coneskin.robot.arm.model import ArmModel
+
+__all__ = [
+    "CYCLE",
+    "DEFAULT_DECELERATION",
+    "JOINT_ACCELERATION",
+    "MAX_ACCELERATION",
+    "Motion",
+    "MotionFault",
+    "SimulatedArm",
+    "decelerate",
+    "integrate",
+    "max_abs",
+    "solve_linear",
+]
+
+CYCLE = 0.002  #: control cycle of an e-Series controller [s]
+DEFAULT_DECELERATION = 10.0  #: of the leading joint where the command gives none [rad/s^2]; an assumption
+JOINT_ACCELERATION = 40.0  #: highest acceleration of a joint, as a UR5e reports it in its configuration [rad/s^2]
+MAX_ACCELERATION = 100.0  #: of a joint; a step of speed beyond it is a trajectory fault [rad/s^2]
+SPEED_MARGIN = 1.01  #: share of its highest speed at which the safety system stops a joint
+
+
+class MotionFault(Exception):
+    """Trajectory that cannot go on: the controller makes a protective stop of it."""
+
+
+class Motion(Protocol):
+    """Command that moves the arm."""
+
+    done: bool
+
+    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle.
+
+        Args:
+            arm: the arm as it is now.
+            scale: speed slider, 0..1.
+            hold: slow down to a standstill.
+        """
+
+
+class SimulatedArm:
+    """State of the arm, and the motion that drives it.
+
+    Attributes:
+        q: joint positions [rad].
+        qd: joint speeds [rad/s].
+        qdd: joint accelerations [rad/s^2].
+        tcp: tool centre point in the flange frame.
+        motion: command that moves the arm; None where the arm brakes or stands.
+    """
+
+    def __init__(self, model: ArmModel, q: Sequence[float]) -> None:
+        self.model = model
+        self.q = [float(angle) for angle in q]
+        self.qd = [0.0] * 6
+        self.qdd = [0.0] * 6
+        self.tcp = Pose()
+        self.motion: Motion | None = None
+
+    def step(self, scale: float, hold: bool) -> str:
+        """Advance by one cycle; return why the safety system must stop the arm, or an empty string."""
+        fault = ""
+        motion = self.motion
+        if motion is None and not any(self.qd) and not any(self.qdd):
+            return ""
+        try:
+            if motion is None:
+                q, qd = decelerate(self.q, self.qd, DEFAULT_DECELERATION)
+            else:
+                q, qd = motion.step(self, scale, hold)
+                self._check(q, qd)
+        except (MotionFault, ArithmeticError, ValueError) as exc:  # numbers of a program that are finite, but huge
+            fault = str(exc)
+            self.motion = None
+            q, qd = decelerate(self.q, self.qd, DEFAULT_DECELERATION)
+        if motion is not None and motion.done:
+            self.motion = None
+        self.qdd = [(new - old) / CYCLE for new, old in zip(qd, self.qd, strict=True)]
+        self.q, self.qd = q, qd
+        return fault
+
+    @property
+    def moving(self) -> bool:
+        """True while any joint turns."""
+        return any(self.qd)
+
+    @property
+    def blends(self) -> bool:
+        """True while a path goes on that the program no longer waits for, as it has a blend radius."""
+        return bool(getattr(self.motion, "blends", False))
+
+    def _check(self, q: list[float], qd: list[float]) -> None:
+        model = self.model
+        for i in range(6):
+            speed = qd[i]
+            if not math.isfinite(q[i] + speed):
+                raise MotionFault(f"joint {i + 1}: its position or its speed is not a number")
+            if abs(speed) > SPEED_MARGIN * model.joint_speed[i]:
+                raise MotionFault(f"joint {i + 1}: speed {speed:.2f} rad/s above its limit {model.joint_speed[i]:.2f}")
+            if abs(speed - self.qd[i]) > MAX_ACCELERATION * CYCLE:
+                raise MotionFault(f"joint {i + 1}: speed jumps by {speed - self.qd[i]:.2f} rad/s in one cycle")
+            if speed:
+                rest = q[i] + speed * abs(speed) / (2.0 * DEFAULT_DECELERATION)  # where braking at once would end
+                if (speed > 0.0 and rest > model.joint_upper[i]) or (speed < 0.0 and rest < model.joint_lower[i]):
+                    raise MotionFault(f"joint {i + 1}: position {q[i]:.3f} rad is about to leave its limits")
+
+    # tool
+
+    def tcp_pose(self, q: Sequence[float] | None = None) -> Pose:
+        """Return the pose of the tool centre point in the base frame, by default at the present position."""
+        return forward(self.model, self.q if q is None else q) @ self.tcp
+
+    def jacobian(self) -> list[list[float]]:
+        """Return the Jacobian of the tool centre point: three rows of velocity [m/rad], three of angular velocity."""
+        rows = [list(row) for row in flange_jacobian(self.model, self.q)]
+        x, y, z = forward(self.model, self.q).rotate(self.tcp.translation)
+        for i in range(6):
+            wx, wy, wz = rows[3][i], rows[4][i], rows[5][i]
+            rows[0][i] += wy * z - wz * y
+            rows[1][i] += wz * x - wx * z
+            rows[2][i] += wx * y - wy * x
+        return rows
+
+    def twist(self) -> list[float]:
+        """Return velocity [m/s] and angular velocity [rad/s] of the tool centre point."""
+        if not any(self.qd):
+            return [0.0] * 6
+        return [sum(a * b for a, b in zip(row, self.qd, strict=True)) for row in self.jacobian()]
+
+    def joint_speeds(self, twist: Sequence[float]) -> list[float]:
+        """Return the joint speeds [rad/s] that give the tool centre point a velocity and an angular velocity.
+
+        Raises:
+            MotionFault: the arm is in, or within 1e-4 of, a singular position.
+        """
+        return solve_linear(self.jacobian(), twist)
+
+
+def solve_linear(rows: Sequence[Sequence[float]], right: Sequence[float]) -> list[float]:
+    """Solve six linear equations (Gauss, partial pivoting).
+
+    Raises:
+        MotionFault: no pivot is above 1e-4: the arm is in a singular position.
+    """
+    m = [[*row, value] for row, value in zip(rows, right, strict=True)]
+    n = len(m)
+    for k in range(n):
+        lead = max(range(k, n), key=lambda i: abs(m[i][k]))
+        if abs(m[lead][k]) < 1e-4:
+            raise MotionFault("the arm is in a singular position")
+        m[k], m[lead] = m[lead], m[k]
+        pivot = m[k]
+        for i in range(k + 1, n):
+            factor = m[i][k] / pivot[k]
+            if factor:
+                row = m[i]
+                for j in range(k + 1, n + 1):
+                    row[j] -= factor * pivot[j]
+    x = [0.0] * n
+    for k in range(n - 1, -1, -1):
+        x[k] = (m[k][n] - sum(m[k][j] * x[j] for j in range(k + 1, n))) / m[k][k]
+    return x
+
+
+def max_abs(values: Sequence[float]) -> float:
+    """Return the greatest magnitude: that of the leading joint."""
+    return max(abs(value) for value in values)
+
+
+def decelerate(q: Sequence[float], qd: Sequence[float], rate: float) -> tuple[list[float], list[float]]:
+    """Slow all joints down in proportion for one cycle, the leading one at a rate [rad/s^2]; return q and qd."""
+    lead = max_abs(qd)
+    if lead == 0.0:
+        return list(q), [0.0] * 6
+    share = max(0.0, 1.0 - rate * CYCLE / lead)
+    slower = [speed * share for speed in qd]
+    return integrate(q, qd, slower), slower
+
+
+def integrate(q: Sequence[float], before: Sequence[float], after: Sequence[float]) -> list[float]:
+    """Return joint positions one cycle later, the speed changing evenly [rad]."""
+    return [a + 0.5 * (b + c) * CYCLE for a, b, c in zip(q, before, after, strict=True)]

@@ -1,0 +1,150 @@
+"""Motions of the simulated arm that follow a speed or a stream of positions, and stops, in steps of 2 ms.
+
+Continuous position and speed, bounded acceleration. Assumed, because no manual says it: the deceleration of a pause, of
+a protective stop and of a program that ends while the arm moves (`DEFAULT_DECELERATION`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from .arm import (
+    CYCLE,
+    DEFAULT_DECELERATION,
+    JOINT_ACCELERATION,
+    MAX_ACCELERATION,
+    SimulatedArm,
+    decelerate,
+    integrate,
+    max_abs,
+)
+
+__all__ = ["ServoJoints", "SpeedJoints", "SpeedTool", "StopJoints", "StopTool"]
+
+
+class SpeedJoints:
+    """Constant joint speeds, reached with one acceleration of the leading joint and held (speedj)."""
+
+    done = False
+
+    def __init__(self, target: Sequence[float], acceleration: float) -> None:
+        self.retarget(target, acceleration)
+
+    def retarget(self, target: Sequence[float], acceleration: float) -> None:
+        """Set a new speed [rad/s] and acceleration [rad/s^2]."""
+        self.target, self.acceleration = list(target), abs(acceleration)
+        self.reached = False
+
+    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+        if hold:
+            return decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
+        delta = [scale * a - b for a, b in zip(self.target, arm.qd, strict=True)]
+        lead, step = max_abs(delta), self.acceleration * CYCLE
+        if lead <= step:
+            self.reached = True
+            qd = [scale * a for a in self.target]
+        else:
+            qd = [speed + change * step / lead for speed, change in zip(arm.qd, delta, strict=True)]
+        return integrate(arm.q, arm.qd, qd), qd
+
+
+class SpeedTool:
+    """Constant velocity and angular velocity of the tool centre point in the base frame (speedl)."""
+
+    done = False
+
+    def __init__(self, arm: SimulatedArm, target: Sequence[float], acceleration: float, angular: float) -> None:
+        self.twist = arm.twist()
+        self.retarget(target, acceleration, angular)
+
+    def retarget(self, target: Sequence[float], acceleration: float, angular: float) -> None:
+        """Set a new velocity [m/s, rad/s], acceleration [m/s^2] and angular acceleration [rad/s^2]."""
+        self.target, self.acceleration, self.angular = list(target), abs(acceleration), abs(angular)
+        self.reached = False
+
+    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+        if hold:
+            q, qd = decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
+            self.twist = arm.twist()
+            return q, qd
+        delta = [scale * a - b for a, b in zip(self.target, self.twist, strict=True)]
+        needed = max(
+            math.hypot(*delta[:3]) / max(self.acceleration, 1e-9), math.hypot(*delta[3:]) / max(self.angular, 1e-9)
+        )
+        share = 1.0 if needed <= CYCLE else CYCLE / needed
+        self.reached = share == 1.0
+        self.twist = [a + b * share for a, b in zip(self.twist, delta, strict=True)]
+        qd = arm.joint_speeds(self.twist) if any(self.twist) else [0.0] * 6
+        return integrate(arm.q, arm.qd, qd), qd
+
+
+class ServoJoints:
+    """Follower of a stream of positions, smoothed by look-ahead time and gain (servoj).
+
+    As the URScript manual has it: the gain is the P-term towards the position, and the look-ahead time projects the
+    present position forward in time with the present speed; a short one overshoots. So the acceleration [rad/s^2] is
+    gain (target - (q + lookahead qd)); its unit, 1/s^2, is an assumption. The speed slider does not act.
+    """
+
+    done = False
+
+    def __init__(self, target: Sequence[float], lookahead: float, gain: float) -> None:
+        self.retarget(target, lookahead, gain)
+
+    def retarget(self, target: Sequence[float], lookahead: float, gain: float) -> None:
+        """Set a new position [rad], look-ahead time [s] and gain."""
+        self.target = list(target)
+        self.lookahead = min(0.2, max(0.03, lookahead))
+        self.gain = min(2000.0, max(100.0, gain))
+
+    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+        if hold:
+            return decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
+        largest = JOINT_ACCELERATION * CYCLE
+        qd = []
+        for target, q, speed, limit in zip(self.target, arm.q, arm.qd, arm.model.joint_speed, strict=True):
+            error = target - q
+            change = max(-largest, min(largest, self.gain * (error - self.lookahead * speed) * CYCLE))
+            still = abs(error) < 1e-9 and abs(speed) < 1e-9
+            qd.append(0.0 if still else max(-limit, min(limit, speed + change)))
+        return integrate(arm.q, arm.qd, qd), qd
+
+
+class StopJoints:
+    """Ramp of all joints to a standstill in proportion, the leading one at a deceleration [rad/s^2] (stopj).
+
+    The speed slider does not act.
+    """
+
+    def __init__(self, deceleration: float) -> None:
+        self.deceleration = max(abs(deceleration), 1e-3)
+        self.done = False
+
+    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+        q, qd = decelerate(arm.q, arm.qd, max(self.deceleration, DEFAULT_DECELERATION) if hold else self.deceleration)
+        self.done = not any(qd)
+        return q, qd
+
+
+class StopTool:
+    """Ramp of the tool to a standstill at a deceleration [m/s^2, rad/s^2], joints in proportion (stopl)."""
+
+    def __init__(self, arm: SimulatedArm, deceleration: float, angular: float) -> None:
+        twist = arm.twist()
+        duration = max(
+            math.hypot(*twist[:3]) / max(abs(deceleration), 1e-3), math.hypot(*twist[3:]) / max(abs(angular), 1e-3)
+        )
+        lead = max_abs(arm.qd)
+        self.rate = min(lead / duration if duration > 0.0 else DEFAULT_DECELERATION, MAX_ACCELERATION / 2.0)
+        self.done = False
+
+    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+        q, qd = decelerate(arm.q, arm.qd, max(self.rate, DEFAULT_DECELERATION) if hold else self.rate)
+        self.done = not any(qd)
+        return q, qd

@@ -1,0 +1,203 @@
+"""Robot API of PolyScope X, as far as Universal Robots' client library asks it: requests in, answers out. No sockets.
+
+The library reads version 1.0 of the API (PolyScope 10.11) and 3.1.4 (from 10.12 on). Where an action cannot be carried
+out the answer is 409; for what does not exist 404, for a request that cannot be read 400.
+
+Source: the calls of Universal Robots' client library, c5d1e26; the published specification was not at hand.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from coneskin.robot.sim.power import power
+from coneskin.robot.sim.safety import SafetyMode
+from coneskin.robot.sim.urscript.values import ScriptError
+
+from .http_message import Answer, Request, uploaded_file
+from .program_file import program_information
+from .user_interface import NO_MODE, UserInterface
+
+__all__ = ["BASE", "RobotApi"]
+
+BASE = "/universal-robots/robot-api"  #: with which every path begins
+DEFAULT_PROGRAM = "Default program"  #: name of the one that is loaded at first
+_SUFFIXES = (".urpx", ".urp", ".script")  # of the files that a name may stand for
+_EMERGENCY = (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP)
+#: action -> command of the power
+_POWER = {
+    "POWER_ON": "power on",
+    "POWER_OFF": "power off",
+    "BRAKE_RELEASE": "brake release",
+    "RESTART_SAFETY": "restart safety",
+}
+
+
+class RobotApi:
+    """Robot API of one controller."""
+
+    def __init__(self, interface: UserInterface) -> None:
+        self._i = interface
+        self._c = interface.controller
+        self._early = self._c.options.version < (10, 12)
+        self._gets: dict[str, Callable[[], object]] = {
+            "/openapi.json": self._specification,
+            "/program/v1/state": self._state,
+        }
+        self._puts: dict[str, Callable[[Request], Answer]] = {
+            "/program/v1/state": self._act_on_program,
+            "/robotstate/v1/state": self._act_on_robot,
+        }
+        if self._early:
+            self._puts["/program/v1/load"] = lambda request: self._load(request, "programName")
+            return
+        self._puts |= {"/program/v1/loaded": lambda request: self._load(request, "name")}
+        self._gets |= {
+            "/program/v1/loaded": lambda: {"name": self._loaded},
+            "/programs/v1/": self._programs,
+            "/robotstate/v1/robotmode": lambda: {"mode": self._c.robot_mode.name},
+            "/robotstate/v1/safetymode": self._mode_of_stop,
+            "/system/v1/controlmode": lambda: {"mode": "REMOTE" if self._c.options.remote_control else "LOCAL"},
+            "/system/v1/operationalmode": self._operational_mode,
+        }
+
+    def answer(self, request: Request) -> Answer:
+        """Act on a request, and return the answer."""
+        self._c.log("robot_api", method=request.method, path=request.path)
+        if "origin" in request.headers:  # a browser sends it, and whose page it shows nobody knows
+            return _refuse(403, "the robot API takes no requests of web pages")
+        path = request.path.removeprefix(BASE)
+        try:
+            if path == request.path:
+                return _refuse(404, f"there is nothing at {request.path}; every path begins with {BASE}")
+            if request.method == "GET" and path in self._gets:
+                return Answer(200, self._gets[path]())
+            if request.method == "PUT" and path in self._puts:
+                return self._puts[path](request)
+            if not self._early and path.startswith("/programs/v1/"):
+                return self._file(request, path.removeprefix("/programs/v1/"))
+        except ValueError as exc:  # json.JSONDecodeError is one
+            return _refuse(400, str(exc))
+        known = path in self._gets or path in self._puts
+        return _refuse(405 if known else 404, f"{request.method} {path} is not part of the robot API")
+
+    # what is asked
+
+    def _specification(self) -> object:
+        version = "1.0.0" if self._early else "3.1.4"
+        paths: dict[str, dict[str, object]] = {}
+        for method, known in (("get", self._gets), ("put", self._puts)):
+            for path in known:
+                paths.setdefault(path, {})[method] = {}
+        return {"openapi": "3.1.0", "info": {"title": "Robot API", "version": version}, "paths": paths}
+
+    def _state(self) -> object:
+        return {"state": self._c.runtime.word}
+
+    def _mode_of_stop(self) -> object:
+        mode = self._c.safety
+        return {"mode": "EMERGENCY_STOP" if mode in _EMERGENCY else mode.name}
+
+    def _operational_mode(self) -> object:
+        mode = self._i.operational_mode
+        return {"mode": "MANUAL" if mode == NO_MODE else mode}
+
+    @property
+    def _loaded(self) -> str:
+        return self._i.loaded.name.rpartition(".")[0] if self._i.loaded is not None else DEFAULT_PROGRAM
+
+    def _programs(self) -> object:
+        found = []
+        for name in self._i.folder.names(*_SUFFIXES):
+            stem, _, suffix = name.rpartition(".")
+            facts: dict[str, object] = {"name": stem, "description": "", "programState": "FINAL"}
+            facts |= {"createdDate": 0, "lastSavedDate": None, "lastModifiedDate": None}
+            if suffix == "urpx":
+                try:
+                    facts |= program_information(self._i.folder.read(name))
+                except (OSError, ValueError) as exc:
+                    self._c.log("refused", program=name, reason=str(exc))
+                    continue
+            found.append(facts)
+        return {"programs": found}
+
+    # what is done
+
+    def _act_on_program(self, request: Request) -> Answer:
+        action = _field(request, "action").lower()
+        runtime = self._c.runtime
+        if action == "play":
+            done = not runtime.paused and self._i.play()
+        elif action == "resume":
+            done = self._c.resume_program()
+        elif action == "pause":
+            done = self._c.pause_program()
+        elif action == "stop":
+            done = True
+            self._i.stop("robot API")
+        else:
+            return _refuse(400, f"action must be play, pause, resume or stop, got {action!r}")
+        state = f"{runtime.name}, {self._c.safety.name}, {self._c.robot_mode.name}"
+        return _done(done, f"{action} is not possible: {state}")
+
+    def _act_on_robot(self, request: Request) -> Answer:
+        action = _field(request, "action")
+        if action == "UNLOCK_PROTECTIVE_STOP":
+            return _done(self._c.unlock(early=True), "it cannot be unlocked")
+        if action not in _POWER:
+            known = ", ".join((*_POWER, "UNLOCK_PROTECTIVE_STOP"))
+            return _refuse(400, f"action must be one of {known}, got {action!r}")
+        power(self._c, _POWER[action])
+        return Answer(200, {"message": action})
+
+    def _load(self, request: Request, key: str) -> Answer:
+        name = _field(request, key)
+        file = self._stored(name)
+        if file is None:
+            return _refuse(404, f"there is no program {name!r}")
+        try:
+            self._i.load(file)
+        except (OSError, ScriptError) as exc:
+            return _refuse(400, str(exc))
+        return Answer(200, {"name": name})
+
+    def _stored(self, name: str) -> str | None:
+        """Return the file of a program; None where there is none."""
+        return next((name + suffix for suffix in _SUFFIXES if self._i.folder.has(name + suffix)), None)
+
+    def _file(self, request: Request, name: str) -> Answer:
+        if request.method == "GET":
+            file = self._stored(name)
+            if file is None or not file.endswith(".urpx"):
+                return _refuse(404, f"there is no program {name!r} of PolyScope X")
+            return Answer(200, json.loads(self._i.folder.read(file)))
+        if name or request.method not in ("POST", "PUT"):
+            return _refuse(405, f"{request.method} is not possible for a program")
+        data = uploaded_file(request)
+        known = str(program_information(data)["name"])
+        exists = self._stored(known) is not None
+        if exists != (request.method == "PUT"):
+            problem = "exists already" if exists else "does not exist"
+            return _refuse(400 if exists else 404, f"the program {known!r} {problem}")
+        try:
+            self._i.folder.save(f"{known}.urpx", data)
+        except OSError as exc:
+            return _refuse(400, f"the program {known!r} cannot be stored: {type(exc).__name__}")
+        self._c.log("stored", program=known)
+        return Answer(200, {"programName": known})
+
+
+def _field(request: Request, key: str) -> str:
+    found = json.loads(request.body or b"null")
+    if not isinstance(found, dict) or not isinstance(found.get(key), str):
+        raise ValueError(f"the request needs the text {key!r} as JSON")
+    return str(found[key])
+
+
+def _done(done: bool, problem: str) -> Answer:
+    return Answer(200, {"message": "done"}) if done else _refuse(409, problem)
+
+
+def _refuse(status: int, problem: str) -> Answer:
+    return Answer(status, {"message": problem, "details": problem})

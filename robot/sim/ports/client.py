@@ -1,0 +1,89 @@
+"""Client of the simulated controller: its connection, and what it has not read yet."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+
+__all__ = ["MAX_LINE", "MAX_UNSENT", "Client", "LineReader"]
+
+MAX_LINE = 10_000  #: bytes of a line to the dashboard
+MAX_UNSENT = 1_000_000  #: bytes that a client may leave unread
+
+
+def _release_nothing() -> None:
+    """Release nothing: such a client owns no inputs."""
+
+
+def _stay() -> bool:
+    """Return False: such a client never takes its leave."""
+    return False
+
+
+class Client:
+    """Connection of one client.
+
+    Args:
+        sock: the connection.
+        receive: bytes of the client in, bytes for it out.
+        closed: called once the connection is gone.
+        outputs: data of a cycle that it is sent without asking; None where it is sent none.
+        left: whether the client has taken its leave, so that its connection ends with the answer.
+
+    Attributes:
+        unsent: bytes that the client has not read yet.
+        stuck_since: when it last took any while some waited [s, monotonic].
+    """
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        receive: Callable[[bytes], bytes],
+        closed: Callable[[], None] = _release_nothing,
+        *,
+        outputs: Callable[[], bytes] | None = None,
+        left: Callable[[], bool] = _stay,
+    ) -> None:
+        self.socket, self.receive, self.closed, self.outputs, self.left = sock, receive, closed, outputs, left
+        self.unsent = b""
+        self.stuck_since = 0.0
+
+    def send(self, data: bytes) -> None:
+        """Send as much as the client takes, after what it has not taken yet.
+
+        Raises:
+            OSError: it is gone, or has left too much unread.
+        """
+        self.unsent += data
+        if not self.unsent:
+            return
+        if len(self.unsent) > MAX_UNSENT:
+            raise OSError("the client does not read the answers")
+        try:
+            sent = self.socket.send(self.unsent)
+        except BlockingIOError:
+            sent = 0
+        self.unsent = self.unsent[sent:]
+        if sent or not self.stuck_since:
+            self.stuck_since = time.monotonic()
+
+
+class LineReader:
+    """Reader of lines: bytes in, answers to whole lines out."""
+
+    def __init__(self, answer_line: Callable[[str], str]) -> None:
+        self._answer = answer_line
+        self._rest = b""
+
+    def __call__(self, data: bytes) -> bytes:
+        """Take bytes, and return the answers to the lines that they complete.
+
+        Raises:
+            ValueError: a line is too long.
+        """
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if len(self._rest) > MAX_LINE:
+            raise ValueError(f"a line has at most {MAX_LINE} bytes")
+        replies = (self._answer(line.decode("utf-8", "replace").rstrip("\r")) for line in lines)
+        return b"".join([reply.encode() + b"\n" for reply in replies if reply])

@@ -1,0 +1,166 @@
+"""RTDE outputs of the simulated controller: name of an output -> how to get its value.
+
+Outputs that need a dynamic model or sensors that are not simulated (currents, torques, forces, temperatures) hold the
+constants below, which an arm at rest without load might show. The measured currents differ from the constant target
+currents by what a fault line adds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from coneskin.geometry.pose import Vector
+from coneskin.robot.arm.kinematics import link_pose, point_jacobian
+from coneskin.robot.sim.client_inputs import INPUTS
+from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.motion.arm import SimulatedArm
+from coneskin.robot.sim.options import Version
+from coneskin.robot.sim.safety import MOVING, RobotMode, Runtime, robot_bits, safety_bits
+from coneskin.robot.sim.urscript.values import values_of
+from coneskin.robot.ur.rtde_codec import Value
+from coneskin.robot.ur.rtde_variables import VARIABLES
+
+__all__ = ["RtdeOutputs", "available"]
+
+_ELBOW = 2  # number of the frame at the elbow
+_JOINT_OFF = 239
+_JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.IDLE: 255}  # of joints, and of the tool
+_ZEROS = (0.0,) * 6  #: six zeros, for any vector of that length
+#: output -> constant value of a sensor that is not simulated, in the unit of RTDE
+_CONSTANTS: dict[str, Value] = {
+    "joint_temperatures": (30.0,) * 6,
+    "actual_main_voltage": 48.0,
+    "actual_robot_voltage": 48.0,
+    "actual_robot_current": 0.5,
+    "actual_joint_voltage": (48.0,) * 6,
+    "actual_tool_accelerometer": (0.0, 0.0, -9.81),
+    "target_gravity": (0.0, 0.0, -9.81),
+    "io_current": 0.1,
+    "tool_temperature": 30.0,
+}
+
+#: output that older controllers lack -> first minor version of PolyScope 5, and of CB3 (None: never)
+_SINCE: dict[str, tuple[int, int | None]] = {
+    "actual_current_as_torque": (23, None),
+    "ft_raw_wrench": (9, None),
+    "wrench_calc_from_currents": (9, None),
+    "payload": (5, 11),
+    "payload_cog": (5, 11),
+    "payload_inertia": (11, 15),
+    "script_control_line": (6, None),
+    "time_scale_source": (17, None),
+}
+
+
+def available(name: str, version: Version) -> bool:
+    """Return whether a controller of that version has this output. The input registers are outputs too."""
+    if name not in VARIABLES or (name in INPUTS and not name.startswith("input_")):
+        return False
+    since, cb3 = _SINCE.get(name, (0, 0))
+    if version[0] == 3:
+        return cb3 is not None and version[1] >= cb3
+    return version[0] > 5 or version[1] >= since
+
+
+class RtdeOutputs:
+    """Values of one controller by name of the output; costly ones are computed once a cycle."""
+
+    def __init__(self, controller: Controller) -> None:
+        self._c = c = controller
+        self._pose_at: tuple[object, object] = (None, None)
+        self._pose: Value = _ZEROS
+        self._twist_at = -1
+        self._twist: Value = _ZEROS
+        arm = c.arm
+        self._getters: dict[str, Callable[[], Value | Sequence[float]]] = {
+            "timestamp": lambda: c.timestamp,
+            "control_step": lambda: c.cycle,
+            "actual_q": lambda: arm.q,
+            "target_q": lambda: arm.q,
+            "actual_qd": lambda: arm.qd,
+            "target_qd": lambda: arm.qd,
+            "target_qdd": lambda: arm.qdd,
+            "actual_current": lambda: c.resistance,
+            "actual_TCP_pose": self._tcp_pose,
+            "target_TCP_pose": self._tcp_pose,
+            "actual_TCP_speed": self._tcp_speed,
+            "target_TCP_speed": self._tcp_speed,
+            "tcp_offset": lambda: tuple(values_of(arm.tcp)),
+            "runtime_state": lambda: int(c.runtime),
+            "robot_mode": lambda: int(c.robot_mode),
+            "safety_mode": lambda: int(c.safety),
+            "safety_status": lambda: int(c.safety),
+            "robot_status_bits": lambda: robot_bits(c.robot_mode, c.runtime is Runtime.PLAYING),
+            "safety_status_bits": lambda: safety_bits(c.safety),
+            "speed_scaling": lambda: c.speed_scaling if c.safety in MOVING else 0.0,
+            "target_speed_fraction": lambda: c.slider,
+            "actual_digital_output_bits": lambda: c.digital_outputs,
+            "actual_digital_input_bits": lambda: c.terminals.digital_inputs,
+            "standard_analog_input0": lambda: c.terminals.analog_inputs[0],
+            "standard_analog_input1": lambda: c.terminals.analog_inputs[1],
+            "tool_analog_input0": lambda: c.terminals.analog_inputs[2],
+            "tool_analog_input1": lambda: c.terminals.analog_inputs[3],
+            "standard_analog_output0": lambda: c.terminals.analog_output(0),
+            "standard_analog_output1": lambda: c.terminals.analog_output(1),
+            "analog_io_types": c.terminals.analog_types,
+            "tool_analog_input_types": c.terminals.tool_types,
+            "tool_output_voltage": lambda: c.terminals.tool_voltage,
+            "output_bit_registers0_to_31": lambda: c.terminals.output_bits & 0xFFFFFFFF,
+            "output_bit_registers32_to_63": lambda: c.terminals.output_bits >> 32 & 0xFFFFFFFF,
+            "joint_mode": lambda: (_JOINT_MODES.get(c.robot_mode, _JOINT_OFF),) * 6,
+            "tool_mode": lambda: _JOINT_MODES.get(c.robot_mode, _JOINT_OFF),
+            "elbow_position": lambda: link_pose(arm.model, arm.q, _ELBOW).translation,
+            "elbow_velocity": lambda: elbow_velocity(arm),
+            "actual_TCP_force": c.inputs.wrench,
+            "tcp_force_scalar": lambda: math.hypot(*c.inputs.wrench()[:3]),
+            "payload": lambda: c.payload,
+            "payload_cog": lambda: c.payload_cog,
+            "payload_inertia": lambda: c.payload_inertia,
+        }
+
+    @property
+    def simulated(self) -> frozenset[str]:
+        """Names of the outputs that follow the arm, the programs or the clients; registers apart, the others stay."""
+        return frozenset(self._getters)
+
+    def getter(self, name: str) -> Callable[[], Value | Sequence[float]]:
+        """Return a function that returns the present value of an output."""
+        c = self._c
+        if name in self._getters:
+            return self._getters[name]
+        if name.startswith("output_int_register_"):
+            index = int(name.rsplit("_", 1)[1])
+            return lambda: c.output_ints[index]
+        if name.startswith("output_double_register_"):
+            index = int(name.rsplit("_", 1)[1])
+            return lambda: c.output_doubles[index]
+        if name.startswith("output_bit_register_"):
+            index = int(name.rsplit("_", 1)[1])
+            return lambda: c.terminals.output_bits >> index & 1
+        if name in c.inputs and name.startswith("input_"):
+            return lambda: c.inputs[name]
+        kind = VARIABLES[name]
+        zero: Value = (0.0,) * int(kind[6]) if kind.startswith("VECTOR") else 0
+        constant = _CONSTANTS.get(name, zero)
+        return lambda: constant
+
+    def _tcp_pose(self) -> Value:
+        arm = self._c.arm
+        if self._pose_at[0] is not arm.q or self._pose_at[1] is not arm.tcp:  # a moving arm makes a new list
+            self._pose = tuple(values_of(arm.tcp_pose()))
+            self._pose_at = (arm.q, arm.tcp)
+        return self._pose
+
+    def _tcp_speed(self) -> Value:
+        if self._twist_at != self._c.cycle:
+            self._twist = tuple(self._c.arm.twist())
+            self._twist_at = self._c.cycle
+        return self._twist
+
+
+def elbow_velocity(arm: SimulatedArm) -> Vector:
+    """Return the velocity of the elbow in the base frame [m/s]."""
+    rows = point_jacobian(arm.model, arm.q, _ELBOW)
+    x, y, z = (sum(a * b for a, b in zip(row, arm.qd, strict=False)) for row in rows)
+    return x, y, z

@@ -1,0 +1,242 @@
+"""Process of a simulated controller, for a test or a demonstration.
+
+    with SimulatedController(host="127.0.0.2", start_q=(0, -1.2, 1.4, -1.6, -1.5, 0)) as simulated:
+        receive = RTDEReceiveInterface(simulated.host)
+
+It is a process of its own because the constructors of ur_rtde hold Python's lock: a thread could never answer them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import queue
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Container, Sequence
+from pathlib import Path
+from typing import Any
+
+from coneskin.errors import RobotConnectionError, RobotTimeout
+
+from .server import PORTS
+
+__all__ = ["SimulatedController", "free_host"]
+
+
+def free_host(used: Container[str] = ()) -> str:
+    """Return a loopback address on which no other simulated controller listens, so that several can run at once.
+
+    Linux answers on all of 127.0.0.0/8; elsewhere there may be 127.0.0.1 alone.
+
+    Args:
+        used: addresses not to return again, even if nothing listens there any more.
+    """
+    if not sys.platform.startswith("linux"):
+        return "127.0.0.1"
+    start = os.getpid() * 7
+    for number in range(start, start + 20_000):
+        host = f"127.{1 + number // 62500 % 250}.{number // 250 % 250}.{1 + number % 250}"
+        if host in used:
+            continue
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((host, PORTS["RTDE"]))
+            except OSError:
+                continue
+            return host
+    raise RobotConnectionError("no loopback address is free for a simulated controller; 20 000 were tried")
+
+
+class SimulatedController:
+    """Simulated UR controller as a process of its own; use it in a ``with``.
+
+    Args:
+        model: name of the arm.
+        host: address to listen on; controllers at 127.0.0.1, 127.0.0.2 ... can run at once.
+        start_q: joint positions at the start [rad]; clear of every singular position if not given.
+        log: file for a JSON line for each command and event.
+        version: PolyScope version to report.
+        quirks: "real" runs the program of ur_rtde as it is, "fixed" with the corrections of docs/sim-ur.md.
+        start_delay: from a program's last byte to its first cycle [s].
+        unlock_after: time before a protective stop can be unlocked [s].
+        protective_stop: "pause" or "stop", the effect of a protective stop on the running program.
+        program: URScript file that the dashboard command ``play`` starts.
+        programs: folder of the programs and installations that the dashboard can load.
+        external_control: HOST:PORT at which such a program asks for the script of its External Control node.
+        remote_control: whether the robot says that it is under remote control.
+        robot_api_port: on which the robot API of PolyScope X is served; 0 where it is not.
+        ready_within: time allowed until it listens [s].
+
+    Raises:
+        RobotTimeout: on entry, it is not ready in time.
+        RobotConnectionError: on entry, it did not start; the message says why.
+    """
+
+    def __init__(
+        self,
+        model: str = "ur10e",
+        host: str = "127.0.0.1",
+        start_q: Sequence[float] | None = None,
+        *,
+        log: Path | None = None,
+        version: str = "5.25",
+        quirks: str = "real",
+        start_delay: float = 0.010,
+        unlock_after: float = 5.0,
+        protective_stop: str = "pause",
+        program: Path | None = None,
+        programs: Path | None = None,
+        external_control: str = "127.0.0.1:50002",
+        remote_control: bool = True,
+        robot_api_port: int = 0,
+        ready_within: float = 15.0,
+    ) -> None:
+        self.host = host
+        self.log = log
+        self.ready_within = ready_within
+        self.facts: dict[str, Any] = {}
+        self._process: subprocess.Popen[str] | None = None
+        self._arguments = [
+            *("--host", host, "--model", model, "--version", version, "--quirks", quirks),
+            *("--start-delay-ms", repr(start_delay * 1000.0), "--unlock-after-s", repr(unlock_after)),
+            *("--protective-stop", protective_stop, "--external-control", external_control),
+            *("--robot-api-port", str(robot_api_port)),
+        ]
+        if start_q is not None:
+            self._arguments += ["--start-q-deg", *(repr(math.degrees(q)) for q in start_q)]
+        if log is not None:
+            self._arguments += ["--log", str(log)]
+        if program is not None:
+            self._arguments += ["--program", str(program)]
+        if programs is not None:
+            self._arguments += ["--programs", str(programs)]
+        if not remote_control:
+            self._arguments.append("--local-control")
+
+    def __enter__(self) -> SimulatedController:
+        command = [sys.executable, "-m", "coneskin.robot.sim.command", "--json", "--faults", "--exit-with-parent"]
+        self._process = process = subprocess.Popen(
+            [*command, *self._arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # Ctrl-C is for the program, which ends this process once the arm stands
+        )
+        lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        threading.Thread(target=lambda: lines.put(_first_line(process)), daemon=True).start()
+        try:
+            line = lines.get(timeout=self.ready_within)
+        except queue.Empty:
+            self.close()
+            raise RobotTimeout(
+                f"the simulated controller on {self.host} was not ready within {self.ready_within:g} s"
+            ) from None
+        if not line:
+            _, problem = process.communicate()
+            self.close()
+            raise RobotConnectionError(f"the simulated controller did not start: {problem.strip() or 'no message'}")
+        self.facts = json.loads(line)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._running().pid
+
+    def freeze(self) -> None:
+        """Suspend the process, and with it the arm; `thaw` resumes it. POSIX only."""
+        os.kill(self.pid, signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        """Resume the process after `freeze`."""
+        os.kill(self.pid, signal.SIGCONT)
+
+    def kill(self) -> None:
+        """Kill the process, as a power cut would."""
+        process = self._running()
+        process.kill()
+        process.wait()
+
+    def call(self, line: str, timeout: float = 5.0) -> Any:
+        """Inject a fault, or ask for the state; docs/sim-ur.md lists the lines.
+
+        Raises:
+            RobotConnectionError: the process has ended, or does not know the line.
+        """
+        try:
+            with socket.create_connection(tuple(self.facts["fault_address"]), timeout) as sock:
+                sock.sendall(line.encode() + b"\n")
+                reply = json.loads(sock.makefile().readline() or "{}")
+        except OSError as exc:
+            raise RobotConnectionError(f"the simulated controller on {self.host} does not answer: {exc}") from exc
+        if "result" not in reply:
+            raise RobotConnectionError(f"the simulated controller refuses {line!r}: {reply.get('error', 'no answer')}")
+        return reply["result"]
+
+    def state(self) -> dict[str, Any]:
+        """Return joint positions [rad], speeds [rad/s], and the state of program and safety system."""
+        state: dict[str, Any] = self.call("state")
+        return state
+
+    def events(self, kind: str = "") -> list[dict[str, Any]]:
+        """Return the events in the log so far, all or those of one kind.
+
+        Raises:
+            ValueError: the controller was made without ``log``.
+        """
+        if self.log is None:
+            raise ValueError("events need a SimulatedController with log=, a file to write them to")
+        lines = self.log.read_text().splitlines() if self.log.exists() else []
+        events = [json.loads(line) for line in lines if line.endswith("}")]
+        return [event for event in events if not kind or event["event"] == kind]
+
+    def wait_for_standstill(self, timeout: float = 10.0) -> dict[str, Any]:
+        """Wait until no joint turns, and return the state.
+
+        Raises:
+            RobotTimeout: the arm still moves after the timeout [s].
+        """
+        deadline = time.monotonic() + timeout
+        while any((state := self.state())["qd"]):
+            if time.monotonic() > deadline:
+                raise RobotTimeout(f"the simulated arm still moves after {timeout:g} s")
+            time.sleep(0.005)
+        return state
+
+    def close(self) -> None:
+        """End the process, whatever its state; may be called twice."""
+        process = self._process
+        if process is None:
+            return
+        self._process = None
+        if process.poll() is None:
+            if hasattr(signal, "SIGCONT"):
+                process.send_signal(signal.SIGCONT)  # a frozen process does not act on SIGTERM
+            process.terminate()
+            try:
+                process.wait(2.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        for pipe in (process.stdout, process.stderr):
+            if pipe is not None:
+                pipe.close()
+
+    def _running(self) -> subprocess.Popen[str]:
+        if self._process is None:
+            raise RobotConnectionError("the simulated controller is not running; use it in a 'with'")
+        return self._process
+
+
+def _first_line(process: subprocess.Popen[str]) -> str:
+    return process.stdout.readline() if process.stdout is not None else ""

@@ -1,0 +1,107 @@
+"""Connections that a program opens to other computers: never waited for, and with a bound to what they hold."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import ipaddress
+import socket
+
+from coneskin.robot.sim.urscript.values import ScriptError
+
+__all__ = ["ScriptSocket", "may_connect"]
+
+_PENDING = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
+MAX_UNREAD = 65_536  #: bytes that have come and that the program has not read; more wait in the network
+
+
+def may_connect(address: str, beyond: bool) -> str:
+    """Return the numeric address to which a program may connect.
+
+    Args:
+        address: IPv4 address, or "localhost"; the simulator looks no names up, as that could take seconds.
+        beyond: whether it may be another computer: only where others reach the simulator as well.
+
+    Raises:
+        ScriptError: the program may not connect to it.
+    """
+    try:
+        found = ipaddress.IPv4Address("127.0.0.1" if address == "localhost" else address)
+    except ValueError as exc:
+        raise ScriptError(f"socket_open takes an IPv4 address or localhost, got {address[:99]!r}") from exc
+    if not (found.is_loopback or beyond):
+        raise ScriptError(
+            f"socket_open({address!r}): a simulator that listens on this computer alone connects to nothing beyond it; "
+            "start it with --host 0.0.0.0"
+        )
+    return str(found)
+
+
+class ScriptSocket:
+    """Connection to a server.
+
+    Args:
+        address: numeric address.
+        port: of the server.
+
+    Attributes:
+        unread: bytes that have come.
+        ended: the other side has closed it, or it is broken.
+    """
+
+    def __init__(self, address: str, port: int) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._peer = (address, port)
+        self.unread = bytearray()
+        self.ended = False
+
+    def connect(self) -> bool | None:
+        """Return whether it is connected; None while that is not known yet."""
+        error = self._socket.connect_ex(self._peer)
+        if error in _PENDING:
+            return None
+        return error in (0, errno.EISCONN)
+
+    def fill(self) -> None:
+        """Take what has come, as far as there is room."""
+        while not self.ended and (room := MAX_UNREAD - len(self.unread)) > 0:
+            try:
+                data = self._socket.recv(room)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            if not data:
+                self.ended = True
+            self.unread += data
+
+    def take(self, count: int) -> bytes:
+        """Return the first bytes of what has come, and forget them."""
+        data = bytes(self.unread[:count])
+        del self.unread[:count]
+        return data
+
+    def forget_if_full(self) -> None:
+        """Forget what has come where it leaves no room for what a program looks for."""
+        if len(self.unread) >= MAX_UNREAD:
+            self.unread.clear()
+
+    def send(self, data: bytes) -> bool:
+        """Send bytes; return False where the connection is broken, or the other side does not read."""
+        if self.ended:
+            return False
+        try:
+            sent = self._socket.send(data)
+        except OSError:
+            return False
+        if sent < len(data):  # what follows would not be understood
+            self.ended = True
+        return not self.ended
+
+    def close(self) -> None:
+        """Close it."""
+        self.ended = True
+        with contextlib.suppress(OSError):
+            self._socket.close()

@@ -1,0 +1,297 @@
+"""Sockets of the simulated controller, and the loop that keeps its 500 Hz cycle.
+
+One thread and `select`: its timeout is exact to microseconds, that of epoll is rounded up to whole milliseconds.
+"""
+
+from __future__ import annotations
+
+import errno
+import gc
+import os
+import selectors
+import socket
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+
+from coneskin.errors import RobotRefused
+from coneskin.robot.sim.urscript.translator import Translation
+
+from .compiler import Compiler
+from .controller import Controller
+from .fault_injection import FaultInjector
+from .motion.arm import CYCLE
+from .polyscope.user_interface import UserInterface
+from .ports.client import Client
+from .ports.publisher import Publisher
+from .services import SCRIPT_PORTS, PortServices
+
+__all__ = ["PORTS", "Server", "is_loopback"]
+
+#: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
+PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
+OPTIONAL = ("robot API", "faults")  #: services with a port of one's own choice
+MAX_LATENESS = 0.05  #: s; later cycles are skipped, not made up for: the process was frozen
+_LOOPBACK = "127."  # of every address that no other computer can reach
+_BACKLOG = 16  # connections that wait to be accepted
+MAX_CLIENTS = 50  #: of each service
+#: option of a connection -> s of silence before the first question whether the other side lives, s between, questions
+_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
+UNREAD_TIMEOUT = 10.0  #: s; a client that reads nothing for so long is dropped
+
+
+def _notice_half_open(sock: socket.socket) -> None:
+    """Let the operating system close a connection whose other side is gone without a word, and keep its place free."""
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in _KEEPALIVE.items():
+        if (option := getattr(socket, name, None)) is not None:  # not every system has them
+            sock.setsockopt(socket.IPPROTO_TCP, option, value)
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether no other computer can have an address."""
+    return host.startswith(_LOOPBACK) or host == "localhost"
+
+
+class Server:
+    """Server on the ports of a UR controller, which also runs its control cycle.
+
+    Args:
+        controller: what it serves.
+        host: address to listen on.
+        faults: whether to open a port on which `FaultInjector` takes lines. It is open to this computer alone.
+
+    Attributes:
+        fault_address: address and port of that; None without one.
+        local: True where only this computer can reach the controller.
+    """
+
+    def __init__(self, controller: Controller, host: str, *, faults: bool = False) -> None:
+        self.controller = controller
+        self.host = host
+        self.faults = FaultInjector(controller, self)
+        self.fault_address: tuple[str, int] | None = None
+        self.local = True
+        self._with_faults = faults
+        self._publisher = Publisher(controller)
+        self._selector = selectors.SelectSelector()
+        self._listeners: dict[str, socket.socket] = {}
+        self._clients: dict[str, list[Client]] = {name: [] for name in (*PORTS, *OPTIONAL)}
+        self._compiler = Compiler(controller.options.quirks)
+        self._interface = UserInterface(controller, self._program, self._compiler.check)
+        self._services = PortServices(self._interface, self.faults, self._publisher)
+        self._cut: set[str] = set()  # services that the network does not reach
+        self._fillers: dict[str, socket.socket] = {}
+        self._programs = 0
+        self._stopping = False
+
+    # open and close
+
+    def __enter__(self) -> Server:
+        with ExitStack() as undo:
+            undo.callback(self.close)
+            for name, port in PORTS.items():
+                address = self._listen(name, self.host, port)
+            self.local = is_loopback(address[0])
+            if api_port := self.controller.options.robot_api_port:
+                self._listen("robot API", self.host, api_port)
+            self.controller.beyond = not self.local
+            if self._with_faults:
+                self.fault_address = self._listen("faults", self.host if self.local else "127.0.0.1", 0)
+            undo.enter_context(self._compiler)
+            undo.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._compiler.__exit__()
+        self.close()
+
+    def close(self) -> None:
+        """Close every socket."""
+        for name in PORTS:
+            self.restore(name)  # what is cut is not in the selector
+        for key in list(self._selector.get_map().values()):
+            self._selector.unregister(key.fileobj)
+            key.fileobj.close()  # type: ignore[union-attr]
+
+    def stop(self) -> None:
+        """End `run` after the present cycle."""
+        self._stopping = True
+
+    def _listen(self, name: str, host: str, port: int) -> tuple[str, int]:
+        sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        if os.name == "posix":  # elsewhere this option would let two servers share a port
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            sock.bind((host, port))
+            sock.listen(_BACKLOG)
+        except OSError as exc:
+            sock.close()
+            taken = exc.errno == errno.EADDRINUSE
+            advice = "ur_rtde uses fixed ports, so choose another" if taken else "choose an address of this machine as"
+            raise RobotRefused(
+                f"the simulated controller cannot listen on {host} port {port} ({name}): {exc.strerror}; {advice} "
+                "--host, such as 127.0.0.2"
+            ) from exc
+        sock.setblocking(False)
+        self._listeners[name] = sock
+        self._selector.register(sock, selectors.EVENT_READ, name)
+        address: tuple[str, int] = sock.getsockname()
+        return address
+
+    # network
+
+    def cut(self, name: str) -> None:
+        """Let the network drop every packet of a service: nothing is read, sent or accepted, nothing is closed."""
+        if name in self._cut:
+            return
+        self._cut.add(name)
+        listener = self._listeners[name]
+        for sock in (listener, *(client.socket for client in self._clients[name])):
+            self._selector.unregister(sock)
+        listener.listen(0)  # Linux drops the packets of whoever connects once the queue of one is full
+        self._fillers[name] = filler = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        filler.setblocking(False)
+        filler.connect_ex(listener.getsockname())
+
+    def restore(self, name: str) -> None:
+        """End `cut`: what clients have sent meanwhile arrives now, as TCP sends it again."""
+        if name not in self._cut:
+            return
+        self._cut.remove(name)
+        self._fillers.pop(name).close()
+        self._listeners[name].listen(_BACKLOG)
+        self._selector.register(self._listeners[name], selectors.EVENT_READ, name)
+        for client in self._clients[name]:
+            self._selector.register(client.socket, selectors.EVENT_READ, (name, client))
+
+    # loop
+
+    def run(self, alive: Callable[[], bool] = lambda: True) -> None:
+        """Run the control cycle until `stop`, or until alive(), called five times a second, returns False."""
+        gc.collect()
+        gc.freeze()  # what exists now stays: the garbage collector need not look at it again within a cycle
+        asked = 0
+        due = time.monotonic() + CYCLE
+        while not self._stopping:
+            wait = due - time.monotonic()
+            if wait > 0.0:
+                self._poll(wait)
+                continue
+            self._poll(0.0)
+            if wait < -MAX_LATENESS:
+                due = time.monotonic()
+            while due <= time.monotonic():
+                self._cycle()
+                due += CYCLE
+            self._publish()
+            if self.controller.cycle >= asked + 100:
+                asked = self.controller.cycle
+                if not alive():
+                    return
+
+    def _poll(self, timeout: float) -> None:
+        for key, _ in self._selector.select(timeout):
+            if isinstance(key.data, str):
+                self._accept(key.fileobj, key.data)  # type: ignore[arg-type]
+            else:
+                self._read(key.data[0], key.data[1])
+
+    def _cycle(self) -> None:
+        for number, result in self._compiler.results():
+            if not isinstance(result, Translation):
+                self.controller.fail("", result)
+            elif result.secondary or number == self._programs:  # a program is not started once a newer one has come
+                self.controller.load(result)
+        self._interface.turn()
+        self.controller.step()
+
+    def _publish(self) -> None:
+        listening = frozenset(name for name in SCRIPT_PORTS if self._clients[name])
+        for name, data in self._publisher.due(listening).items():
+            for client in list(self._clients[name]) if name not in self._cut else ():
+                self._send(name, client, b"" if client.unsent else data)  # one that does not read misses it
+        if self.faults.rtde_silent or "RTDE" in self._cut:
+            return
+        now = time.monotonic()
+        for client in list(self._clients["RTDE"]):
+            if client.unsent:  # a slow client misses packets, and gets the newest when it reads again
+                if now - client.stuck_since > UNREAD_TIMEOUT:
+                    self._drop("RTDE", client)
+                    continue
+                self._send("RTDE", client, b"")
+            elif client.outputs is not None:
+                self._send("RTDE", client, client.outputs())
+
+    # clients
+
+    def _accept(self, listener: socket.socket, name: str) -> None:
+        if name in self._cut:
+            return
+        try:
+            sock, _ = listener.accept()
+        except OSError:
+            return
+        if len(self._clients[name]) >= MAX_CLIENTS:
+            sock.close()
+            return
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        _notice_half_open(sock)
+        client = self._services.client(name, sock)
+        self._clients[name].append(client)
+        self._selector.register(sock, selectors.EVENT_READ, (name, client))
+        self._send(name, client, self._services.greeting(name))
+
+    def _read(self, name: str, client: Client) -> None:
+        if client not in self._clients[name] or name in self._cut:
+            return  # dropped, or cut, while this batch of events was handled
+        try:
+            data = client.socket.recv(65536)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._drop(name, client)
+            return
+        try:
+            reply = client.receive(data)
+        except Exception as exc:  # whatever a client sends ends its connection, never the controller
+            self.controller.log("dropped", service=name, reason=f"{type(exc).__name__}: {exc}"[:1000])
+            self._drop(name, client)
+            return
+        self._send(name, client, reply)
+        if client.left():
+            self._drop(name, client)
+
+    def _send(self, name: str, client: Client, data: bytes) -> None:
+        try:
+            client.send(data)
+        except OSError:
+            self._drop(name, client)
+
+    def _drop(self, name: str, client: Client) -> None:
+        if client in self._clients[name]:
+            self._clients[name].remove(client)
+            if name not in self._cut:
+                self._selector.unregister(client.socket)
+            client.socket.close()
+            client.closed()
+
+    def drop_all(self, name: str) -> int:
+        """Close all connections of a port, and return how many there were."""
+        clients = list(self._clients[name])
+        for client in clients:
+            self._drop(name, client)
+        return len(clients)
+
+    # programs
+
+    def _program(self, text: str) -> None:
+        first = text.lstrip().partition("\n")[0].strip()
+        self.controller.log("script", first_line=first, size=len(text))
+        if not first.startswith("sec "):
+            self._programs += 1
+            self.controller.program_arrived()
+        self._compiler.submit(self._programs, text)

@@ -1,0 +1,1 @@
+"""URScript of the simulated controller: values, syntax, translation to Python and mathematical functions."""

@@ -1,0 +1,144 @@
+"""URScript functions that compute with poses, lists and numbers, and need no controller.
+
+Source: Universal Robots, "The URScript Programming Language", module urmath.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Any
+
+from coneskin.geometry.pose import Pose
+
+from .arithmetic import MAX_ITEMS, make_list
+from .values import (
+    Array,
+    PoseValue,
+    ScriptError,
+    interpolate,
+    pose_of,
+    rotation_of,
+    rotvec_between,
+    rotvec_of,
+    show,
+    values_of,
+)
+
+__all__ = ["MathFunctions"]
+
+
+class MathFunctions:
+    """URScript functions of poses, lists and numbers."""
+
+    _random = random.Random(0)
+
+    def pose_trans(self, first: Any, second: Any) -> PoseValue:
+        """Return one pose after another."""
+        return values_of(pose_of(first) @ pose_of(second))
+
+    def pose_inv(self, pose: Any) -> PoseValue:
+        """Return the inverse of a pose."""
+        return values_of(pose_of(pose).inverse())
+
+    def pose_add(self, first: Any, second: Any) -> PoseValue:
+        """Add positions, and turn by one rotation after the other, both in the base frame."""
+        turn = Pose(rotation_of(first[3:])) @ Pose(rotation_of(second[3:]))
+        return PoseValue((*(a + b for a, b in zip(first[:3], second[:3], strict=True)), *rotvec_of(turn.rotation)))
+
+    def pose_sub(self, first: Any, second: Any) -> PoseValue:
+        """Subtract positions, and return the rotation from the second to the first, in the base frame."""
+        turn = Pose(rotation_of(first[3:])) @ Pose(rotation_of(second[3:])).inverse()
+        return PoseValue((*(a - b for a, b in zip(first[:3], second[:3], strict=True)), *rotvec_of(turn.rotation)))
+
+    def inv(self, m: Any) -> Any:
+        """Return the inverse of a pose; that of a matrix is not simulated."""
+        if not isinstance(m, PoseValue):
+            raise ScriptError("inv of a matrix is not simulated, only that of a pose")
+        return self.pose_inv(m)
+
+    def transpose(self, m: Any) -> Array:
+        """Return a matrix, a list of rows, with its columns as rows."""
+        if not all(isinstance(row, list) for row in m):
+            raise ScriptError(f"transpose takes a list of lists, got {show(m)}")
+        return Array(map(Array, zip(*m, strict=True)))
+
+    def norm(self, values: Any) -> float:
+        """Return the Euclidean length."""
+        return math.hypot(*values) if isinstance(values, list) else abs(values)
+
+    def length(self, values: Any) -> int:
+        """Return the number of elements."""
+        return len(values)
+
+    get_list_length = size = length
+
+    def point_dist(self, p_from: Any, p_to: Any) -> float:
+        """Return the distance of two positions [m]."""
+        return math.dist(p_from[:3], p_to[:3])
+
+    def pose_dist(self, p_from: Any, p_to: Any) -> float:
+        """Return the length of the difference of two poses, positions [m] and rotation vector [rad] together."""
+        return math.hypot(*self.pose_sub(p_to, p_from))
+
+    def interpolate_pose(self, p_from: Any, p_to: Any, alpha: float) -> PoseValue:
+        """Return a pose on the straight path between two, turning about one axis; alpha is 0 at the first."""
+        first, last = pose_of(p_from), pose_of(p_to)
+        a, b = first.translation, last.translation
+        shift = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+        return values_of(interpolate(first, shift, rotvec_between(first, last), float(alpha)))
+
+    def rotvec2rpy(self, rotation_vector: Any) -> Array:
+        """Return roll, pitch and yaw [rad] of a rotation vector: about x, then y, then z, all fixed axes."""
+        (a, _, _), (d, _, _), (g, h, i) = rotation_of(rotation_vector)
+        return Array((math.atan2(h, i), math.asin(max(-1.0, min(1.0, -g))), math.atan2(d, a)))
+
+    def rpy2rotvec(self, rpy_vector: Any) -> Array:
+        """Return the rotation vector [rad] of roll, pitch and yaw."""
+        roll, pitch, yaw = (float(angle) for angle in rpy_vector)
+        turns = (rotation_of(axis) for axis in ((0.0, 0.0, yaw), (0.0, pitch, 0.0), (roll, 0.0, 0.0)))
+        whole = Pose()
+        for turn in turns:
+            whole = whole @ Pose(turn)
+        return Array(rotvec_of(whole.rotation))
+
+    def normalize(self, v: Any) -> Array:
+        """Return a list of the same direction and of length 1."""
+        return Array(value / math.hypot(*v) for value in v)
+
+    def binary_list_to_integer(self, l: Any) -> int:  # noqa: E741 (its name in URScript)
+        """Return the number of which a list has the bits, the lowest first."""
+        if len(l) > 32:
+            raise ScriptError(f"a list of at most 32 bits was expected, got {len(l)}")
+        value = sum(1 << place for place, bit in enumerate(l) if bit)
+        return value - (1 << 32) if value >= 1 << 31 else value
+
+    def integer_to_binary_list(self, x: int) -> Array:
+        """Return the 32 bits of a whole number, the lowest first."""
+        return Array(bool(int(x) >> place & 1) for place in range(32))
+
+    def make_list(self, length: int, initial_value: Any, capacity: int = 0) -> Array:
+        """Return a list of a value; the lists of this simulation do not grow."""
+        if not 0 <= int(length) <= MAX_ITEMS or int(capacity) > MAX_ITEMS:
+            raise ScriptError(f"a list has at most {MAX_ITEMS} elements, got {show(length)} and {show(capacity)}")
+        return make_list(tuple([initial_value] * int(length)))
+
+    def log(self, b: float, n: float) -> float:
+        """Return the logarithm of n to the base b."""
+        return math.log(n) / math.log(b)
+
+    def random(self) -> float:
+        """Return a number from 0 to 1; each controller has the same sequence."""
+        return self._random.random()
+
+    def d2r(self, degrees: float) -> float:
+        """Convert degrees to radians."""
+        return math.radians(degrees)
+
+    def r2d(self, radians: float) -> float:
+        """Convert radians to degrees."""
+        return math.degrees(radians)
+
+
+for _name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "floor", "ceil", "pow"):
+    setattr(MathFunctions, _name, staticmethod(getattr(math, _name)))

@@ -1,0 +1,157 @@
+"""Values of URScript: lists, poses p[x, y, z, rx, ry, rz], and what a program may give the arm.
+
+A pose's rotation is a rotation vector: the axis times the angle [rad] (Universal Robots calls it axis-angle).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from coneskin.geometry.pose import Pose, Vector
+
+__all__ = [
+    "Array",
+    "PoseValue",
+    "ScriptError",
+    "copy",
+    "interpolate",
+    "number",
+    "numbers",
+    "pose_of",
+    "rotation_of",
+    "rotvec_between",
+    "rotvec_of",
+    "show",
+    "values_of",
+]
+
+_LARGEST = 1e6  # of a position, a speed, a time, an acceleration
+_MOST_SHOWN, _LONGEST_SHOWN = 50, 1000  # elements of a list, characters of a text
+_Rotation = tuple[Vector, Vector, Vector]
+
+
+class ScriptError(Exception):
+    """Program that cannot be understood, or that has failed: the controller logs it and stops the program.
+
+    Args:
+        message: what is wrong, for a person.
+        title: the same in the controller's own words, which its clients compare; empty where it has none.
+        line: of the program, from 1; 0 where it is not known.
+        column: in that line, from 1; 0 where it is not known.
+    """
+
+    def __init__(self, message: str, *, title: str = "", line: int = 0, column: int = 0) -> None:
+        super().__init__(message)
+        self.title, self.line, self.column = title or message, line, column
+
+
+class Array(list[Any]):
+    """URScript list."""
+
+
+class PoseValue(Array):
+    """URScript pose: position [m] and rotation vector [rad], six numbers."""
+
+
+def copy(value: Any) -> Any:
+    """Return a copy of a list, or the value itself: URScript assigns lists by value."""
+    return type(value)(value) if isinstance(value, list) else value
+
+
+def numbers(values: Any, count: int, name: str) -> list[float]:
+    """Return the values of a program as finite numbers.
+
+    Raises:
+        ScriptError: their count is not ``count``, or one is not a finite number.
+    """
+    if not isinstance(values, list) or len(values) != count or not all(isinstance(v, int | float) for v in values):
+        raise ScriptError(f"{name} must be {count} numbers, got {show(values)}")
+    return [number(value, name) for value in values]
+
+
+def number(value: Any, name: str) -> float:
+    """Return a value of a program as a number that an arm may have to do with.
+
+    Raises:
+        ScriptError: it is no number, or not from -1e6 to 1e6.
+    """
+    if not isinstance(value, int | float) or not abs(value) <= _LARGEST:
+        raise ScriptError(f"{name} must be finite, at most {_LARGEST:g}, got {show(value)}")
+    return float(value)
+
+
+def show(value: Any) -> str:
+    """Return a value as text for the log, shortened where it is long."""
+    if isinstance(value, list):
+        rest = ", ..." if len(value) > _MOST_SHOWN else ""
+        shown = (repr(item)[:99] if isinstance(item, str) else show(item) for item in value[:_MOST_SHOWN])
+        return f"{'p' * isinstance(value, PoseValue)}[{', '.join(shown)}{rest}]"
+    return str(value)[:_LONGEST_SHOWN]
+
+
+def rotation_of(rotvec: Sequence[float]) -> _Rotation:
+    """Return the rotation matrix of a rotation vector [rad] (Rodrigues)."""
+    x, y, z = rotvec
+    angle = math.sqrt(x * x + y * y + z * z)
+    if angle < 1e-12:
+        return (1.0, -z, y), (z, 1.0, -x), (-y, x, 1.0)
+    x, y, z = x / angle, y / angle, z / angle
+    c, s = math.cos(angle), math.sin(angle)
+    k = 1.0 - c
+    return (
+        (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
+        (y * x * k + z * s, c + y * y * k, y * z * k - x * s),
+        (z * x * k - y * s, z * y * k + x * s, c + z * z * k),
+    )
+
+
+def rotvec_of(rotation: _Rotation) -> Vector:
+    """Return the rotation vector [rad] of a rotation matrix, its angle in [0, pi]; exact near 0 and near pi."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    x, y, z = h - f, c - g, d - b  # 2 sin(angle) axis
+    twice_sine, cosine = math.sqrt(x * x + y * y + z * z), (a + e + i - 1.0) / 2.0
+    angle = math.atan2(twice_sine / 2.0, cosine)
+    if cosine > -0.9:
+        factor = 0.5 * (1.0 + angle * angle / 6.0) if angle < 1e-4 else angle / twice_sine
+        return x * factor, y * factor, z * factor
+    # near pi the sine hardly determines the axis: take the axis from the symmetric part, its sign from the sine
+    k = 1.0 - cosine
+    diagonal = (a - cosine) / k, (e - cosine) / k, (i - cosine) / k
+    lead = max(range(3), key=diagonal.__getitem__)
+    first = math.sqrt(max(0.0, diagonal[lead]))
+    symmetric = ((b + d) / (2 * k), (c + g) / (2 * k), (f + h) / (2 * k))  # xy, xz, yz
+    if lead == 0:
+        axis = (first, symmetric[0] / first, symmetric[1] / first)
+    elif lead == 1:
+        axis = (symmetric[0] / first, first, symmetric[2] / first)
+    else:
+        axis = (symmetric[1] / first, symmetric[2] / first, first)
+    sign = -1.0 if axis[0] * x + axis[1] * y + axis[2] * z < 0.0 else 1.0
+    factor = sign * angle / math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+    return axis[0] * factor, axis[1] * factor, axis[2] * factor
+
+
+def pose_of(values: Iterable[float]) -> Pose:
+    """Return the rigid motion of x, y, z [m], rx, ry, rz [rad]."""
+    x, y, z, rx, ry, rz = (float(value) for value in values)
+    return Pose(rotation_of((rx, ry, rz)), (x, y, z))
+
+
+def values_of(pose: Pose) -> PoseValue:
+    """Return x, y, z [m], rx, ry, rz [rad] of a rigid motion."""
+    return PoseValue((*pose.translation, *rotvec_of(pose.rotation)))
+
+
+def rotvec_between(first: Pose, second: Pose) -> Vector:
+    """Return the rotation vector from one orientation to another [rad], in the axes of the first."""
+    return rotvec_of((first.inverse() @ second).rotation)
+
+
+def interpolate(start: Pose, shift: Vector, turn: Vector, share: float) -> Pose:
+    """Return a pose on the straight path: start moved by share * shift [m] and turned by share * turn [rad]."""
+    spin = Pose(rotation_of((turn[0] * share, turn[1] * share, turn[2] * share)))
+    p = start.translation
+    here = (p[0] + share * shift[0], p[1] + share * shift[1], p[2] + share * shift[2])
+    return Pose((Pose(start.rotation) @ spin).rotation, here)

@@ -1,0 +1,177 @@
+"""Backup stop: it stops an arm by one stop path after the other until it is measured standing, without a guard.
+
+The first stop goes out through whatever connection is open, before anything that may block; what is missing is opened
+meanwhile, the reader of states too. Without any state the arm cannot be seen to stand: then a stop ends after a while,
+and ``StandstillHold`` repeats it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+from coneskin.channel import wait_readable
+from coneskin.errors import ConeSkinError
+from coneskin.robot.driver.protocol import ArmDriver, PayloadReader, StopConnections
+from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.stop_path import StopPath
+
+from .limits import MonitoringLimits
+from .monitor import PROTECTIVE_PATIENCE, StopMonitor
+
+__all__ = ["BLIND_TIMEOUT", "BackupStop"]
+
+_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE)
+_STRONGEST_FIRST = (StopPath.PROTECTIVE, StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER)
+_REOPEN_PERIOD = 0.05  # s between two attempts to open what is missing
+BLIND_TIMEOUT = 2.0  #: s without a state after which a stop is given up, and the reader opened anew
+_CONNECT_TIMEOUT = 0.5  # s that opening the reader may take
+
+
+def _never() -> bool:
+    return False
+
+
+class BackupStop:
+    """Stop of one arm from outside its guard.
+
+    Args:
+        driver: of the arm.
+        connections: open, or to be opened as far as that is possible.
+        limits: of the monitoring.
+        deceleration: of the stop [rad/s2].
+        reader: of the controller's state, open; None where there is none yet.
+        clock: monotonic seconds.
+    """
+
+    def __init__(
+        self,
+        driver: ArmDriver,
+        connections: StopConnections,
+        limits: MonitoringLimits,
+        deceleration: float,
+        reader: PayloadReader | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._driver = driver
+        self._connections = connections
+        self._limits = limits
+        self._deceleration = deceleration
+        self._reader = reader
+        self._clock = clock
+        self._state: ControllerState | None = None  # the newest
+        self._fresh = -math.inf  # when it came
+        self._opened = -math.inf if reader is None else clock()  # when the reader was last opened, or tried
+        self._quiet_until = -math.inf
+        self._used: list[StopPath] = []  # by the newest stop
+
+    @property
+    def reader(self) -> PayloadReader | None:
+        """Connection that tells of new states; None while there is none."""
+        return self._reader
+
+    def states_missing(self, at_least: float = _CONNECT_TIMEOUT) -> bool:
+        """Tell whether no new state has come for so long that the arm's motion is unknown; not before a time [s]."""
+        return self._clock() - self._fresh > max(2.0 * self._limits.arm_silence, at_least)
+
+    def stop(
+        self, deceleration: float | None = None, over: Callable[[], bool] = _never, strongest: bool = False
+    ) -> bool:
+        """Stop the arm and return whether it was seen standing.
+
+        While states show that the arm moves, the stop is not given up.
+
+        Args:
+            deceleration: of the stop [rad/s2]; by default that of the constructor.
+            over: asked continuously; True ends the stop as it is.
+            strongest: begin with the protective stop.
+        """
+        gentle = self._deceleration if deceleration is None else deceleration
+        limits = self._limits
+        self.read()
+        paths = _STRONGEST_FIRST if strongest else _PATHS
+        if not self._use(paths[0], gentle):
+            self._use(StopPath.COMMAND, gentle)
+        now = start = self._clock()
+        speed = None if self._state is None or self.states_missing() else self._state.speed
+        budget = limits.stop_budget(speed or 0.0, gentle)
+        stop = StopMonitor(now, speed, paths, limits.escalate, budget, limits.standstill, limits.arm_silence)
+        look_at = now
+        while stop.standing_at is None and now - max(start, self._fresh) < BLIND_TIMEOUT and not over():
+            if now >= look_at:
+                self.reconnect(gentle)
+                look_at = self._clock() + _REOPEN_PERIOD
+            wait_readable([] if self._reader is None else [self._reader], 0.002)
+            self.read(stop)
+            now = self._clock()
+            for path in stop.next_paths(now):
+                self._use(path, gentle)
+        self._used = stop.used
+        return stop.standing_at is not None
+
+    def insist(self) -> None:
+        """Repeat the protective stop, where the newest stop took one that the controller does not show."""
+        if StopPath.PROTECTIVE in self._used and self._state is not None and not self._state.stopped_by_safety:
+            self._use(StopPath.PROTECTIVE, self._deceleration)
+
+    def repeat(self) -> None:
+        """Send a gentle stop once more, through both connections, without looking at its effect."""
+        self.reconnect(self._deceleration)
+        for path in (StopPath.PROGRAM, StopPath.COMMAND):
+            self._use(path, self._deceleration)
+
+    def reconnect(self, deceleration: float) -> None:
+        """Open what is missing; where a stop path comes back, a stop with this deceleration goes through it."""
+        if self._connections.reopen():  # what was sent over the old ones may be lost
+            self._use(StopPath.PROGRAM, deceleration)
+        now = self._clock()
+        if now - max(self._fresh, self._opened) < (BLIND_TIMEOUT if self._reader is not None else _CONNECT_TIMEOUT):
+            return
+        self._close_reader()
+        with suppress(ConeSkinError):  # the next look tries again
+            self._reader = self._driver.state_reader(self._connections.host, _CONNECT_TIMEOUT).__enter__()
+        self._opened = self._clock()
+
+    def read(self, stop: StopMonitor | None = None) -> list[ControllerState]:
+        """Return the states that have come, oldest first, without waiting."""
+        states = []
+        try:
+            for payload in [] if self._reader is None else self._reader.read():
+                state = self._driver.decode_state(self._clock(), payload)
+                states.append(state)
+                if self._state is None or state.controller_time != self._state.controller_time:
+                    self._fresh = state.time
+                    if stop is not None:
+                        stop.sample(state.time, state.speed)
+                self._state = state
+        except ConeSkinError:  # reported elsewhere; here only the stops are left, until it can be opened again
+            self._close_reader()
+        for _, sock in self._connections.drain():
+            sock.close()
+        return states
+
+    def close(self) -> None:
+        """Close all connections; may be called again."""
+        self._close_reader()
+        self._connections.close()
+
+    def _close_reader(self) -> None:
+        if self._reader is not None:
+            self._reader.close()
+            self._reader = None
+
+    def _use(self, path: StopPath, deceleration: float) -> bool:
+        """Send a stop, unless it would replace the program of a protective stop that has only just been sent.
+
+        Returns:
+            whether this path is there.
+        """
+        now = self._clock()
+        if now < self._quiet_until:
+            return True
+        taken = self._connections.use(path, deceleration)
+        if taken and path is StopPath.PROTECTIVE:
+            self._quiet_until = now + PROTECTIVE_PATIENCE * self._limits.escalate
+        return taken

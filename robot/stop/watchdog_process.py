@@ -1,0 +1,132 @@
+"""Guard watchdog: a process that stops an externally controlled arm when its guard is gone.
+
+Its connections are open before they are needed, and it imports nothing that can block. It acts when the guard's channel
+ends without a shutdown message, brings no heartbeat, or asks for a stop because its own connections are gone. From then
+on it holds the arm at standstill, until the guard lives again or the guarded program has left.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+
+from coneskin.channel import Channel, decode_json, wait_readable
+from coneskin.child_process import inherit
+from coneskin.errors import ConeSkinError
+from coneskin.robot.driver.messages import (
+    HEARTBEAT_TIMEOUT,
+    REPORT_PERIOD,
+    Release,
+    Shutdown,
+    StatusReport,
+    StopProgram,
+    decode_command,
+)
+from coneskin.robot.driver.protocol import PayloadReader
+from coneskin.robot.driver.registry import load_driver
+
+from .backup_stop import BackupStop
+from .limits import MonitoringLimits
+from .standstill_hold import StandstillHold
+
+__all__ = ["GuardWatchdog", "main"]
+
+_STEP = 0.01  # s between two looks
+
+
+class GuardWatchdog:
+    """Watchdog over one guard.
+
+    Args:
+        guard: the guard's channel.
+        session: the guarded program's channel, which ends when the program leaves.
+        hold: of the arm.
+        clock: monotonic seconds.
+    """
+
+    def __init__(
+        self, guard: Channel, session: Channel, hold: StandstillHold, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._guard = guard
+        self._session = session
+        self._hold = hold
+        self._clock = clock
+        self._heard: float | None = None  # None until the guard's first heartbeat
+        self._alone = False  # the guard is gone, or hangs
+        self._beaten = -math.inf
+
+    def run(self) -> None:
+        """Serve until the guard has left and the arm stands."""
+        while self.step(_STEP):
+            pass
+
+    def step(self, timeout: float) -> bool:
+        """Wait for messages [s] and serve them; return False once there is nothing left to do."""
+        inputs: list[Channel | PayloadReader] = [one for one in (self._guard, self._session) if not one.closed]
+        if (reader := self._hold.reader) is not None:
+            inputs.append(reader)
+        wait_readable(inputs, timeout)
+        now = self._clock()
+        self._beat()
+        self._session.receive()
+        asked: StopProgram | None = None
+        for message in self._guard.receive():
+            self._heard, self._alone = now, False
+            match decode_command(message):
+                case Shutdown():
+                    return False
+                case Release(number):
+                    self._guard.send(StatusReport("released", str(number)).encode())
+                case StopProgram() as stop:
+                    asked = stop  # of several that have waited the newest
+        if asked is not None:
+            self._hold.begin(asked.deceleration, self._beat)
+        gone = self._guard.closed
+        if gone and self._heard is None:
+            return False  # it never guarded anything
+        if not gone and (self._heard is None or now - self._heard <= HEARTBEAT_TIMEOUT):
+            self._hold.rest()
+        elif not self._alone:
+            self._alone = True
+            what = f"the guard was silent for {HEARTBEAT_TIMEOUT:g} s, the arm was stopped"
+            self._guard.send(StatusReport("error", what).encode())
+            self._hold.begin(over=self._beat)
+        else:
+            self._hold.look(self._beat)
+        return not (gone and self._session.closed and (self._hold.stands or self._hold.failed))
+
+    def _beat(self) -> bool:
+        """Send a heartbeat where one is due; return False, because no stop under way is over with it."""
+        if (now := self._clock()) - self._beaten >= REPORT_PERIOD:
+            self._beaten = now
+            self._guard.send(StatusReport("alive").encode())
+        return False
+
+
+def main(arguments: list[str]) -> int:
+    """Run as ``python -m coneskin.robot.stop.watchdog_process``: take the channels, wait for the settings, serve."""
+    lifeline, (guard, session) = inherit(arguments, parent=1)
+    while not (hello := session.receive()) and not session.closed:
+        wait_readable([session], 1.0)
+    if not hello:
+        return 1
+    settings = decode_json(hello[0])
+    limits = MonitoringLimits(**settings["monitoring"])
+    host = settings["host"]
+    try:
+        driver = load_driver(settings["family"])
+        with driver.stop_connections(host) as connections, driver.state_reader(host) as reader:
+            lifeline.hold()
+            guard.send(StatusReport("ready").encode())
+            stop = BackupStop(driver, connections, limits, settings["deceleration"], reader)
+            GuardWatchdog(guard, session, StandstillHold(stop, limits.standstill)).run()
+    except ConeSkinError as exc:
+        guard.send(StatusReport("error", str(exc)).encode())
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

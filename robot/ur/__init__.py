@@ -1,0 +1,1 @@
+"""Driver of Universal Robots arms: RTDE, URScript, dashboard and the ur_rtde wheel."""

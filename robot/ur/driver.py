@@ -1,0 +1,100 @@
+"""Driver of Universal Robots arms, as ``coneskin.robot.driver.protocol`` describes one.
+
+What a scene does not need is not imported: setpoints and speed slider have modules of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from coneskin.finding import Finding
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.driver.examination import ExaminationScope
+from coneskin.robot.driver.protocol import ArmDriver
+from coneskin.robot.driver.stop_path import StopPath
+
+from .state_reader import StateReader, decode_state
+from .stop_sockets import StopSockets
+
+if TYPE_CHECKING:
+    from .heartbeat_registers import HeartbeatRegisters
+    from .output_writer import RtdeOutputWriter
+    from .setpoint_writer import RegisterWriter
+    from .speed_slider import RtdeSpeedSlider
+    from .variable_reader import RtdeVariableReader
+
+__all__ = ["UR_DRIVER"]
+
+
+class _UrDriver:
+    """Driver of the UR family."""
+
+    process = "coneskin.robot.ur.driver_process"
+    #: a protective stop is a program too, sent over the same connection
+    lost_with: ClassVar[Mapping[str, frozenset[StopPath]]] = {
+        "program": frozenset({StopPath.PROGRAM, StopPath.PROTECTIVE}),
+        "command": frozenset({StopPath.COMMAND}),
+        "slider": frozenset({StopPath.SLIDER}),
+    }
+    decode_state = staticmethod(decode_state)
+
+    def decode_speed_fraction(self, payload: bytes) -> float:
+        from .speed_slider import decode_fraction
+
+        return decode_fraction(payload)
+
+    def check_model(self, arm: ArmModel, host: str) -> None:
+        from .model_check import check_model, read_pose
+
+        if (pose := read_pose(host)) is not None:
+            check_model(arm, pose, host)
+
+    def state_reader(self, host: str, timeout: float = 2.0) -> StateReader:
+        return StateReader(host, timeout)
+
+    def setpoint_writer(self, host: str) -> RegisterWriter:
+        from .setpoint_writer import RegisterWriter
+
+        return RegisterWriter(host)
+
+    def speed_slider(self, host: str) -> RtdeSpeedSlider:
+        from .speed_slider import RtdeSpeedSlider
+
+        return RtdeSpeedSlider(host)
+
+    def heartbeat_writer(self, host: str) -> HeartbeatRegisters:
+        from .heartbeat_registers import HeartbeatRegisters
+
+        return HeartbeatRegisters(host)
+
+    def heartbeat_lines(self, frequency: float) -> str:
+        from .heartbeat_registers import program_lines
+
+        return program_lines(frequency)
+
+    def decode_heartbeat(self, payload: bytes) -> int:
+        from .heartbeat_registers import decode_echo
+
+        return decode_echo(payload)
+
+    def variable_reader(self, host: str) -> RtdeVariableReader:
+        from .variable_reader import RtdeVariableReader
+
+        return RtdeVariableReader(host)
+
+    def output_writer(self, host: str) -> RtdeOutputWriter:
+        from .output_writer import RtdeOutputWriter
+
+        return RtdeOutputWriter(host)
+
+    def stop_connections(self, host: str, timeout: float = 2.0) -> StopSockets:
+        return StopSockets(host, timeout)
+
+    def examine(self, arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
+        from .examination import examine
+
+        return examine(arm, host, scope)
+
+
+UR_DRIVER: ArmDriver = _UrDriver()

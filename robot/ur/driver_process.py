@@ -1,0 +1,283 @@
+"""Driver process: it moves the arm through ur_rtde for the program, and stops it for the guard.
+
+It has two channels: the guard's, which always comes first, and the program's. After a ``StopProgram`` the program is
+refused until the guard sends ``Release``. When either channel ends, or the guard sends no heartbeat, the arm is
+stopped; when this process ends or hangs, the controller's watchdog stops the arm.
+
+A request of the program has a number, which its answer repeats, and the time at which it was sent: one that has waited
+for long is void, because the program has given it up. Speeds and servo positions expire: they are not kept for a
+program that sends no more.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+from coneskin.channel import Channel, decode_json, encode_json, wait_readable
+from coneskin.child_process import inherit
+from coneskin.errors import ConeSkinError
+from coneskin.robot.driver.deadman import Deadman
+from coneskin.robot.driver.messages import (
+    HEARTBEAT_TIMEOUT,
+    SETPOINT_TIMEOUT,
+    EndReaction,
+    GuardCommand,
+    Heartbeat,
+    Release,
+    SetJointVelocity,
+    StatusReport,
+    StopProgram,
+    decode_command,
+)
+
+from .program_request import carry_out, stop_acceleration
+from .ur_rtde import UrArm, stop_time
+
+__all__ = ["DriverProcess", "main"]
+
+_MOTIONS = (StopProgram, EndReaction, SetJointVelocity)
+_START_TIMEOUT = 3.0  # s for the controller to start the control program again
+_MOVE_STEP = 0.005  # s between two looks at a move whose end the program waits for
+_IDLE_STEP = 0.01  # s between two rounds; a message is served at once
+_KICK_PERIOD = 0.02  # s; well within the watchdog's period, and no load for the controller
+
+
+class DriverProcess:
+    """Server of both channels; one step at a time, so that it can be tested with a mocked arm.
+
+    Args:
+        arm: the arm, already open.
+        guard: the guard's channel.
+        program: the program's channel.
+        clock: monotonic seconds.
+        on_end: called before the last stop.
+        work: called in each step, and with a time [s] before a call that may block for so long.
+        request_lifetime: time after which a request that was not taken is void [s].
+        deceleration: of the leading joint, for a stop that the guard does not command any more [rad/s2].
+    """
+
+    def __init__(
+        self,
+        arm: UrArm,
+        guard: Channel,
+        program: Channel,
+        clock: Callable[[], float] = time.monotonic,
+        on_end: Callable[[], None] = lambda: None,
+        work: Callable[[float], None] = lambda _: None,
+        deceleration: float = 10.0,
+        request_lifetime: float = 0.2,
+    ) -> None:
+        self._clock = clock
+        self._on_end = on_end
+        self._quit = False
+        self._heard = clock()
+        self._arm = arm
+        self._guard = guard
+        self._program = program
+        self._allowed = False
+        self._patience = math.inf  # s for which the guard may be silent; without limit while nothing moves
+        self._waiting: list[int] = []  # numbers of the requests whose end the program waits for
+        self._expires = math.inf  # when the speeds or positions of the program are void
+        self._work = work
+        self._request_lifetime = request_lifetime
+        self._kicked = -1.0
+        self._deceleration = deceleration
+
+    def run(self) -> None:
+        """Serve until one of the channels ends, or until ``end``; then stop the arm."""
+        self._guard.send(StatusReport("ready").encode())
+        try:
+            while not self._quit and self.step(_MOVE_STEP if self._waiting else _IDLE_STEP):
+                pass
+        finally:
+            self._on_end()
+            self._stop(self._deceleration)
+
+    def end(self) -> None:
+        """End ``run``. May be called from a signal handler."""
+        self._quit = True
+
+    def step(self, timeout: float) -> bool:
+        """Wait for messages [s] and serve them; return False once a channel has ended."""
+        self._work(timeout)
+        wait_readable([self._guard, self._program], timeout)
+        now = self._clock()
+        self._take_guard(now)
+        for count, message in enumerate(self._program.receive()):
+            if count:  # a stop must not wait behind all that the threads of a program have asked for
+                self._take_guard(self._clock())
+                self._kick(self._clock())
+            if self._guard.closed:
+                return False
+            self._serve_program(message)
+        if self._guard.closed:
+            return False
+        if self._program.closed:
+            return False
+        if self._waiting and not self._arm.moving():
+            self._answer_waiting(ok=True)
+        if now > self._expires:
+            self._expire()
+        if now - self._heard > self._patience:
+            self._forbid(f"the guard has been silent for {self._patience:g} s")
+        self._kick(now)
+        return True
+
+    def _take_guard(self, now: float) -> None:
+        """Serve what the guard has sent."""
+        commands = [decode_command(message) for message in self._guard.receive()]
+        newest = max((n for n, command in enumerate(commands) if isinstance(command, _MOTIONS)), default=0)
+        for number, command in enumerate(commands):
+            if isinstance(command, SetJointVelocity) and number < newest:
+                continue  # a newer motion command has overtaken it
+            if self._patience != SETPOINT_TIMEOUT or not isinstance(command, Heartbeat):
+                self._heard = now
+            self._serve_guard(command)
+
+    def _kick(self, now: float) -> None:
+        if now - self._kicked >= _KICK_PERIOD:
+            self._arm.kick()
+            self._kicked = now
+
+    def _serve_guard(self, command: GuardCommand) -> None:
+        try:
+            match command:
+                case StopProgram(deceleration) | EndReaction(deceleration):
+                    self._allowed, self._patience = False, math.inf
+                    self._deceleration = deceleration
+                    self._refuse_waiting("the guard has stopped the arm")
+                    self._stop(deceleration)
+                    self._guard.send(StatusReport("done").encode())
+                case SetJointVelocity(qd, acceleration):
+                    self._allowed, self._patience, self._expires = False, SETPOINT_TIMEOUT, math.inf
+                    self._arm.speed_j(qd, acceleration)
+                case Release(number):
+                    self._work(_START_TIMEOUT)
+                    self._arm.revive()
+                    self._allowed, self._patience = True, HEARTBEAT_TIMEOUT
+                    self._guard.send(StatusReport("released", str(number)).encode())
+        except ConeSkinError as exc:
+            self._guard.send(StatusReport("error", str(exc)).encode())
+
+    def _forbid(self, why: str) -> None:
+        """Stop the arm because the guard itself, or a stop, has failed."""
+        self._allowed, self._patience = False, math.inf
+        self._refuse_waiting(why)
+        self._guard.send(StatusReport("error", why).encode())
+        try:
+            self._stop(self._deceleration)
+        except ConeSkinError as exc:
+            self._guard.send(StatusReport("error", str(exc)).encode())
+
+    def _expire(self) -> None:
+        """Stop what the program has not renewed."""
+        what = "no new speed or servo command of the program has come in time: the arm was stopped"
+        try:
+            self._stop(self._deceleration, at_once=False)
+            self._guard.send(StatusReport("remark", what).encode())
+        except ConeSkinError as exc:
+            self._guard.send(StatusReport("error", str(exc)).encode())
+
+    def _stop(self, deceleration: float, at_once: bool = True) -> None:
+        self._expires = math.inf
+        self._work(stop_time(deceleration))
+        self._arm.stop(deceleration, at_once)
+        self._work(0.0)
+
+    def _serve_program(self, message: bytes) -> None:
+        number = 0
+        try:
+            request = decode_json(message)
+            number, now = int(request["number"]), self._clock()
+            sent = min(float(request["sent"]), now)  # what is said to come from later holds no longer
+            age = now - sent
+            if request["do"] != "stop" and not age <= self._request_lifetime:
+                self._reply(number, ok=False, stopped=False, why=_void(age, self._request_lifetime))
+            elif not self._allowed:
+                self._reply(number, ok=False, stopped=True, why="the guard does not let the arm move")
+            elif request["do"] == "stop":
+                self._stop_for_program(stop_acceleration(request))
+                self._answer_waiting(ok=False, stopped=False, why="the program itself has stopped the arm")
+                self._reply(number, ok=True)
+            else:
+                self._carry_out(number, sent, request)
+        except (ConeSkinError, ValueError, KeyError, TypeError, ArithmeticError) as exc:
+            self._reply(number, ok=False, stopped=False, why=f"{type(exc).__name__}: {exc}")
+
+    def _stop_for_program(self, deceleration: float) -> None:
+        try:
+            self._stop(deceleration, at_once=False)
+        except ConeSkinError as exc:  # what was under way may go on, and nothing would let it expire
+            self._forbid(f"a stop of the program has failed: {exc}")
+            raise
+
+    def _carry_out(self, number: int, sent: float, request: dict[str, Any]) -> None:
+        """Do what the program asks for, and answer it now or at the end of the motion.
+
+        What was under way expires as before until this was taken: a request that is refused must not renew it.
+        """
+        outcome = carry_out(self._arm, request, self._work, self._report_restart)
+        if outcome.started:
+            self._expires = sent + outcome.holds
+            self._answer_waiting(ok=False, stopped=False, why="another motion of the program has replaced it")
+        if outcome.waits:
+            self._waiting.append(number)
+        else:
+            self._reply(number, ok=True, **outcome.answer)
+
+    def _report_restart(self, over: bool) -> None:
+        self._guard.send(StatusReport("restarted" if over else "restarts").encode())
+
+    def _refuse_waiting(self, why: str) -> None:
+        self._answer_waiting(ok=False, stopped=True, why=why)
+
+    def _answer_waiting(self, **answer: Any) -> None:
+        waiting, self._waiting = self._waiting, []
+        for number in waiting:
+            self._reply(number, **answer)
+
+    def _reply(self, number: int, **answer: Any) -> None:
+        self._program.send(encode_json({"number": number, **answer}))
+
+
+def _void(age: float, lifetime: float) -> str:
+    """Return why a request of this age [s] is not carried out."""
+    return f"it is void: it was sent {age:.2f} s ago, and holds for {lifetime:g} s; this process was held up"
+
+
+def main(arguments: list[str]) -> int:
+    """Run as ``python -m coneskin.robot.ur.driver_process``: take the channels, wait for the host, serve."""
+    lifeline, (guard, program) = inherit(arguments, parent=1)
+    while not (hello := program.receive()) and not program.closed:
+        wait_readable([program], 1.0)
+    if not hello:
+        return 1
+    settings = decode_json(hello[0])
+    try:
+        with Deadman(guard, program) as deadman, UrArm(settings["host"], settings["watchdog_hz"]) as arm:
+            driver = DriverProcess(
+                arm,
+                guard,
+                program,
+                on_end=deadman.end_soon,
+                work=deadman.work,
+                deceleration=settings["deceleration"],
+                request_lifetime=settings["request_lifetime"],
+            )
+            signal.signal(signal.SIGTERM, lambda *_: driver.end())
+            lifeline.hold()
+            driver.run()
+    except ConeSkinError as exc:
+        guard.send(StatusReport("error", str(exc)).encode())
+        program.send(encode_json({"number": 0, "ok": False, "stopped": False, "why": str(exc)}))
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,161 @@
+"""Examination of a UR controller: ports, model, state, registers, slider, latency. It moves nothing and writes nothing.
+
+Registers are only asked for and given back: RTDE gives each to one client, and what another one holds is named here
+rather than at the start of the guard. An EtherNet/IP or PROFINET adapter that is enabled on the controller holds the
+lower half of the registers, which is the half of ur_rtde.
+"""
+
+from __future__ import annotations
+
+import socket
+import statistics
+import time
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+
+from coneskin.channel import wait_readable
+from coneskin.errors import ConeSkinError, RobotRefused
+from coneskin.finding import Finding, Verdict
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.driver.examination import ExaminationScope
+
+from . import heartbeat_registers, speed_slider
+from .model_check import check_model, read_pose
+from .rtde_connection import PORT, RtdeConnection
+from .setpoint_program import REGISTERS
+from .state_reader import StateReader, decode_state
+
+__all__ = ["examine"]
+
+_TIMEOUT = 1.5  # s for connecting, and for each reply
+_DASHBOARD, _SCRIPT = 29999, 30003  # TCP ports
+_LISTEN = 1.0  # s of states
+_PERIOD, _GAP = 0.0025, 0.025  # s: the median between two states, and the longest; half of arm_silence_ms
+_CONTROL = ("input_int_register_0", *(f"input_double_register_{number}" for number in range(6)))  # of ur_rtde
+_FREE = "end the other program; or disable EtherNet/IP, PROFINET and MODBUS in the controller's Installation, Fieldbus"
+
+
+def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
+    """Look at a controller; what cannot be tried says why.
+
+    Args:
+        arm: that the scene names.
+        host: of the controller.
+        scope: what the scene needs of it.
+    """
+    try:
+        with RtdeConnection(host, _TIMEOUT):
+            found = [Finding("arm, RTDE", "ok", f"{host}:{PORT} answers")]
+    except ConeSkinError as exc:
+        rest = ("model", "state", "registers", "latency", "dashboard")
+        return [
+            Finding("arm, RTDE", "bad", str(exc), f"{host}:{PORT} answers", "for a simulated one: coneskin sim-ur"),
+            *(Finding(f"arm, {item}", "not tried", "no controller answers") for item in rest),
+        ]
+    found += _tried("arm, model", lambda: _model(arm, host))
+    found += _tried("arm, state", lambda: list(_state(host)))
+    found += _dashboard(host)
+    found += _port("arm, script port", host, _SCRIPT)
+    found += list(_registers(host, scope))
+    return found
+
+
+def _tried(item: str, look: Callable[[], list[Finding]]) -> list[Finding]:
+    try:
+        return look()
+    except ConeSkinError as exc:
+        return [Finding(item, "bad", str(exc))]
+
+
+def _model(arm: ArmModel, host: str) -> list[Finding]:
+    pose = read_pose(host, _TIMEOUT)
+    if pose is None:
+        return [Finding("arm, model", "not tried", "an old controller, which does not report its TCP's offset")]
+    try:
+        check_model(arm, pose, host)
+    except RobotRefused as exc:
+        return [Finding("arm, model", "bad", str(exc), "the scene's model has the flange where the controller has it")]
+    return [Finding("arm, model", "ok", f"the flange is where a {arm.name} has it")]
+
+
+def _state(host: str) -> Iterator[Finding]:
+    """Look at the newest state, and at the times at which states come."""
+    times: list[float] = []
+    with StateReader(host, _TIMEOUT) as reader:
+        state = reader.wait(_TIMEOUT)
+        end = time.monotonic() + _LISTEN
+        while (now := time.monotonic()) < end:
+            wait_readable([reader], end - now)
+            for payload in reader.read():
+                state = decode_state(time.monotonic(), payload)
+                times.append(state.time)
+    power = "on, its brakes released" if state.powered else "not running"
+    remedy = "" if state.powered else "power it on and release its brakes on the pendant"
+    yield Finding("arm, power", "ok" if state.powered else "bad", power, "running", remedy)
+    stopped = state.stopped_by_safety
+    remedy = "clear it on the pendant; coneskin unlocks nothing" if stopped else ""
+    value = "a protective, safeguard or emergency stop is in force" if stopped else "no stop is in force"
+    yield Finding("arm, safety", "bad" if stopped else "ok", value, "", remedy)
+    steps = [b - a for a, b in pairwise(times)]
+    if len(steps) < 20:
+        yield Finding("arm, latency", "bad", f"{len(times)} states in {_LISTEN:g} s", "500 a second", "a wired network")
+        return
+    middle, longest = statistics.median(steps), max(steps)
+    verdict: Verdict = "ok" if middle <= _PERIOD and longest <= _GAP else "warning"
+    remedy = "" if verdict == "ok" else "a cable of its own, no wireless network, a quieter computer"
+    value = f"a state each {1e3 * middle:.2f} ms (median), the longest gap {1e3 * longest:.1f} ms"
+    yield Finding("arm, latency", verdict, value, f"{1e3 * _PERIOD:g} ms, {1e3 * _GAP:g} ms", remedy)
+
+
+def _port(item: str, host: str, port: int) -> list[Finding]:
+    try:
+        socket.create_connection((host, port), _TIMEOUT).close()
+    except OSError as exc:
+        why = f"{host}:{port}: {exc.strerror or exc}"
+        return [Finding(item, "bad", why, "it answers", "enable it: Settings, Security, Services")]
+    return [Finding(item, "ok", f"{host}:{port} answers")]
+
+
+def _dashboard(host: str) -> list[Finding]:
+    """Ask the dashboard for the version and whether the controller is in remote control."""
+    item = "arm, dashboard"
+    try:
+        with socket.create_connection((host, _DASHBOARD), _TIMEOUT) as sock:
+            lines = sock.makefile("rw", encoding="utf-8", newline="\n")
+            lines.readline()  # the welcome
+            answers = []
+            for question in ("PolyscopeVersion", "is in remote control"):
+                lines.write(question + "\n")
+                lines.flush()
+                answers.append(lines.readline().strip())
+    except OSError as exc:
+        why = f"{host}:{_DASHBOARD}: {exc.strerror or exc}"
+        return [Finding(item, "bad", why, "it answers", "enable it: Settings, Security, Services")]
+    version, remote = answers
+    found = [Finding(item, "ok", version or "it answers")]
+    if "true" in remote.lower():
+        return [*found, Finding("arm, remote control", "ok", "it is in remote control")]
+    remedy = "choose Remote Control at the top right of the pendant"
+    return [*found, Finding("arm, remote control", "bad", f"it answers {remote!r}", "remote control", remedy)]
+
+
+def _registers(host: str, scope: ExaminationScope) -> Iterator[Finding]:
+    """Ask for the inputs that the scene needs, and give them back."""
+    wanted: list[tuple[str, bool, Sequence[str]]] = [
+        ("ur_rtde's registers", scope.control, _CONTROL),
+        ("the speed slider", scope.slider, speed_slider.INPUTS),
+        ("the setpoints' registers", scope.setpoints, REGISTERS),
+        ("the heartbeat's register", scope.heartbeat, heartbeat_registers.INPUTS),
+    ]
+    for what, needed, names in wanted:
+        item = f"arm, {what}"
+        if not needed:
+            yield Finding(item, "not tried", "this scene does not need them")
+            continue
+        try:
+            with RtdeConnection(host, _TIMEOUT) as connection:
+                connection.ask_inputs(names)
+        except ConeSkinError as exc:
+            yield Finding(item, "bad", str(exc), "no other client has them", _FREE)
+        else:
+            yield Finding(item, "ok", "free")

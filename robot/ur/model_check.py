@@ -1,0 +1,93 @@
+"""Model check: the arm on the controller must be the arm of the scene, judged by where it says that its flange is.
+
+A wrong model puts every point in the wrong place, and a retreat goes in the wrong direction. The controller reports
+joint positions and the pose of its TCP; with the TCP's offset taken off, that is the flange, which the kinematics of
+the scene's model must give as well. Neither the name on the dashboard (UR10 for UR10 and UR10e) nor a label is as sure.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from coneskin.errors import RobotRefused
+from coneskin.geometry.pose import Pose, Vector
+from coneskin.robot.arm.kinematics import forward
+from coneskin.robot.arm.model import ArmModel, Joints
+from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+
+from .rtde_connection import RtdeConnection
+
+__all__ = ["ArmPose", "check_model", "flange_distance", "read_pose"]
+
+NAMES = ("actual_q", "actual_TCP_pose", "tcp_offset")
+#: distance that the flange may be from where the model has it [m]; calibration makes a millimetre or two, another model
+#: of the family centimetres
+TOLERANCE = 0.01
+
+
+class ArmPose(NamedTuple):
+    """Pose of an arm as its controller reports it.
+
+    Attributes:
+        q: joint positions [rad].
+        tcp: pose of the TCP in the base frame: x, y, z [m] and a rotation vector [rad].
+        offset: pose of the TCP in the flange's frame, likewise.
+    """
+
+    q: Joints
+    tcp: Joints
+    offset: Joints
+
+
+def read_pose(host: str, timeout: float = 2.0) -> ArmPose | None:
+    """Ask the controller once and return its answer; None from an old one that does not report its TCP's offset.
+
+    Raises:
+        RobotConnectionError: it cannot be reached.
+        RobotTimeout: it does not answer.
+    """
+    with RtdeConnection(host, timeout) as connection:
+        try:
+            recipe = connection.ask_outputs(NAMES, 10.0)
+        except RobotRefused:
+            return None
+        connection.start()
+        return ArmPose(*recipe.unpack(connection.wait_data(timeout)))  # type: ignore[arg-type]
+
+
+def flange_distance(arm: ArmModel, pose: ArmPose) -> float:
+    """Return the distance of the flange of a model from the flange that the controller reports [m]."""
+    base_flange = _pose(pose.tcp) @ _pose(pose.offset).inverse()
+    return math.dist(forward(arm, pose.q).translation, base_flange.translation)
+
+
+def check_model(arm: ArmModel, pose: ArmPose, host: str) -> None:
+    """Refuse an arm that is not the scene's.
+
+    Raises:
+        RobotRefused: the flange is not where the model has it; the message names the model that fits, if one does.
+    """
+    distance = flange_distance(arm, pose)
+    if distance <= TOLERANCE:
+        return
+    fits = [name for name in MODEL_NAMES if flange_distance(arm_model(name), pose) <= TOLERANCE]
+    raise RobotRefused(
+        f"the arm at {host} is no {arm.name}: its flange is {1e3 * distance:.0f} mm from where a {arm.name} would have "
+        f"it; " + (f"it is where a {' or '.join(fits)} has it: correct arm.model" if fits else "no model fits")
+    )
+
+
+def _pose(values: Joints) -> Pose:
+    """Return the pose of x, y, z [m] and a rotation vector [rad]."""
+    x, y, z, rx, ry, rz = values
+    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
+    s = math.sin(angle) / angle if angle > 1e-9 else 1.0
+    h = math.sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
+    c = 2.0 * h * h  # (1 - cos) / angle^2, without its cancellation
+    rows: tuple[Vector, Vector, Vector] = (
+        (1.0 - c * (ry * ry + rz * rz), c * rx * ry - s * rz, c * rx * rz + s * ry),
+        (c * rx * ry + s * rz, 1.0 - c * (rx * rx + rz * rz), c * ry * rz - s * rx),
+        (c * rx * rz - s * ry, c * ry * rz + s * rx, 1.0 - c * (rx * rx + ry * ry)),
+    )
+    return Pose(rows, (x, y, z))

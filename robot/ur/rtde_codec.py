@@ -1,0 +1,254 @@
+"""Wire format of RTDE protocol version 2: packets and recipes. Pure: bytes in, values out.
+
+A packet is ``size:uint16 kind:uint8 payload``, big endian; the size counts its own three header bytes. A data packet's
+payload is a recipe id (one byte) followed by the values in the order of the recipe.
+
+Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide"; widths confirmed against ur_rtde 1.6.5, which decodes
+by its own table of names and so only understands the true ones.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+from coneskin.errors import RobotConnectionError, RobotRefused
+
+from .rtde_variables import VARIABLES, WIRE_TYPES
+
+__all__ = [
+    "HEADER",
+    "IN_USE",
+    "NOT_FOUND",
+    "PROTOCOL_VERSION",
+    "Packet",
+    "PacketKind",
+    "Recipe",
+    "Value",
+    "pack",
+    "pack_inputs_request",
+    "pack_outputs_request",
+    "pack_pause_request",
+    "pack_start_request",
+    "pack_version_request",
+    "split",
+    "split_names",
+    "unpack_types",
+]
+
+#: One value on the wire: a scalar, or the tuple of a vector.
+Value = float | int | bool | tuple[float, ...]
+
+HEADER = struct.Struct(">HB")
+PROTOCOL_VERSION = 2
+NOT_FOUND = "NOT_FOUND"  #: the type that a controller answers for a name that it does not know
+IN_USE = "IN_USE"  #: the type that it answers for an input that another client owns
+
+
+class PacketKind(IntEnum):
+    """Type byte of a packet."""
+
+    PROTOCOL_VERSION = ord("V")
+    CONTROLLER_VERSION = ord("v")
+    TEXT = ord("M")
+    DATA = ord("U")
+    OUTPUTS = ord("O")
+    INPUTS = ord("I")
+    START = ord("S")
+    PAUSE = ord("P")
+
+
+class Packet(NamedTuple):
+    """Packet without its header."""
+
+    kind: PacketKind
+    payload: bytes
+
+
+def pack(kind: int, payload: bytes = b"") -> bytes:
+    """Put the header before a payload.
+
+    Raises:
+        ValueError: the packet would be longer than its 16-bit size can say.
+    """
+    size = HEADER.size + len(payload)
+    if size > 0xFFFF:
+        raise ValueError(f"an RTDE packet must not be longer than 65535 bytes, got {size}")
+    return HEADER.pack(size, kind) + payload
+
+
+_KINDS = {int(kind): kind for kind in PacketKind}
+
+
+def split(buffer: bytes) -> tuple[list[Packet], bytes]:
+    """Cut what has arrived into packets; never raises, whatever the bytes are.
+
+    TCP does not lose bytes, so a header that cannot be (size below 3, unknown kind) means that the peer is not speaking
+    RTDE; such bytes are skipped one at a time. How the stream was chopped makes no difference to the packets.
+
+    Args:
+        buffer: the rest of the last call followed by the bytes that came since.
+
+    Returns:
+        the packets that are complete, and the bytes that are not yet one.
+    """
+    packets: list[Packet] = []
+    position, end = 0, len(buffer)
+    while end - position >= HEADER.size:
+        size, code = HEADER.unpack_from(buffer, position)
+        kind = _KINDS.get(code)
+        if size < HEADER.size or kind is None:
+            position += 1
+            continue
+        if position + size > end:
+            break
+        packets.append(Packet(kind, bytes(buffer[position + HEADER.size : position + size])))
+        position += size
+    return packets, bytes(buffer[position:])
+
+
+class Recipe:
+    """Ordered list of variables, and the layout of its values in a data packet.
+
+    Attributes:
+        names: the variables, in order.
+        types: their types on the wire.
+        ident: the id that stands in the first byte of each data packet.
+        size: the length of a data packet's payload [bytes], the id included.
+    """
+
+    __slots__ = ("_scalar", "_spans", "_struct", "ident", "names", "size", "types")
+
+    def __init__(self, names: Sequence[str], ident: int = 1) -> None:
+        unknown = [name for name in names if name not in VARIABLES]
+        if unknown:
+            raise ValueError(f"RTDE has no variable named {', '.join(unknown)}")
+        self.names = tuple(names)
+        self.types = tuple(VARIABLES[name] for name in names)
+        self.ident = ident
+        layout, spans, start = ">B", [], 1
+        for kind in self.types:
+            code, count = WIRE_TYPES[kind]
+            layout += f"{count}{code}" if count > 1 else code
+            spans.append((start, start + count) if count > 1 else (start, 0))
+            start += count
+        self._struct = struct.Struct(layout)
+        self._spans = tuple(spans)
+        self._scalar = all(stop == 0 for _, stop in spans)
+        self.size = self._struct.size
+
+    def pack(self, values: Sequence[Value]) -> bytes:
+        """Lay the values out as the payload of a data packet, the id first.
+
+        Args:
+            values: one for each name, in order; a vector is a tuple.
+
+        Raises:
+            ValueError: too many or too few values, or one that its type cannot hold.
+        """
+        flat: list[float | int | bool] = []
+        for value in values:
+            if isinstance(value, tuple | list):
+                flat.extend(value)
+            else:
+                flat.append(value)
+        return self.pack_flat(flat)
+
+    def pack_flat(self, values: Sequence[float | int | bool]) -> bytes:
+        """Return the payload of values whose vectors are already flat: quicker than ``pack``, for a 500 Hz loop."""
+        try:
+            return self._struct.pack(self.ident, *values)
+        except struct.error as exc:
+            raise ValueError(f"RTDE recipe {self.ident} ({', '.join(self.names)}): {exc}") from exc
+
+    def unpack(self, payload: bytes) -> tuple[Value, ...]:
+        """Take the values out of the payload of a data packet.
+
+        Returns:
+            one value for each name, in order; a vector is a tuple.
+
+        Raises:
+            RobotConnectionError: the payload has another length, so the two sides do not agree on the recipe.
+        """
+        flat = self.unpack_flat(payload)
+        if self._scalar:
+            return flat
+        return tuple(flat[start - 1 : stop - 1] if stop else flat[start - 1] for start, stop in self._spans)
+
+    def unpack_flat(self, payload: bytes) -> tuple[Any, ...]:
+        """Return the values of a data packet whose vectors stay flat: quicker than ``unpack``, for a 500 Hz loop.
+
+        Raises:
+            RobotConnectionError: as of ``unpack``.
+        """
+        if len(payload) != self.size:
+            raise RobotConnectionError(
+                f"an RTDE data packet of recipe {self.ident} must hold {self.size} bytes, got {len(payload)}: "
+                "the controller and the reader disagree about its variables"
+            )
+        return self._struct.unpack(payload)[1:]
+
+
+# What a client asks while it sets a connection up.
+
+
+def pack_version_request(version: int = PROTOCOL_VERSION) -> bytes:
+    """Return the request for a protocol version; the reply's payload is one byte, 1 for accepted."""
+    return pack(PacketKind.PROTOCOL_VERSION, struct.pack(">H", version))
+
+
+def pack_outputs_request(names: Sequence[str], frequency_hz: float = 500.0) -> bytes:
+    """Return the request for outputs at a frequency [Hz]; the reply goes to `unpack_types`."""
+    return pack(PacketKind.OUTPUTS, struct.pack(">d", frequency_hz) + ",".join(names).encode("ascii"))
+
+
+def pack_inputs_request(names: Sequence[str]) -> bytes:
+    """Return the request for sole use of inputs; the reply goes to `unpack_types`."""
+    return pack(PacketKind.INPUTS, ",".join(names).encode("ascii"))
+
+
+def pack_start_request() -> bytes:
+    """Return the request to start the stream of data; the reply's payload is one byte, 1 for accepted."""
+    return pack(PacketKind.START)
+
+
+def pack_pause_request() -> bytes:
+    """Return the request to pause the stream of data; the reply's payload is one byte, 1 for accepted."""
+    return pack(PacketKind.PAUSE)
+
+
+def split_names(text: bytes) -> tuple[str, ...]:
+    """Return the variable names of a set-up request. ur_rtde ends its list with a comma, other clients do not."""
+    return tuple(name for name in text.decode("ascii", "replace").split(",") if name)
+
+
+def unpack_types(payload: bytes, names: Sequence[str]) -> Recipe:
+    """Read the reply to a request for outputs or inputs.
+
+    Args:
+        payload: the payload of the reply.
+        names: the variables asked for, in order.
+
+    Returns:
+        the recipe, under the id that the controller gave it.
+
+    Raises:
+        RobotRefused: the controller does not know a variable, or another client owns it, or it has another type here.
+    """
+    types = split_names(payload[1:])
+    if len(types) != len(names):
+        raise RobotRefused(f"the controller answered {len(types)} types to {len(names)} RTDE variables")
+    wrong = [
+        f"{name} is not known to this controller"
+        if got == NOT_FOUND
+        else f"{name} is in use by another client"
+        if got == IN_USE
+        else f"{name} should be {VARIABLES.get(name)}, the controller says {got}"
+        for name, got in zip(names, types, strict=True)
+        if got != VARIABLES.get(name)
+    ]
+    if wrong:
+        raise RobotRefused("the controller refuses RTDE variables: " + "; ".join(wrong))
+    return Recipe(names, payload[0])

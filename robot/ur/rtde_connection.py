@@ -1,0 +1,207 @@
+"""RTDE connection to a controller: set-up with a time limit, then data without waiting.
+
+Its users decide what is read and written: ``state_reader``, ``setpoint_writer``, ``speed_slider``, ``model_check``.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Sequence
+
+from coneskin.channel import wait_readable
+from coneskin.errors import RobotConnectionError, RobotRefused, RobotTimeout
+
+from . import rtde_codec as rtde
+
+__all__ = ["PORT", "RtdeConnection"]
+
+PORT = 30004
+_CHECK = (
+    "check the address (arm.host), that the controller is on, that RTDE is enabled on it (Settings, Security, "
+    "Services), and that it is in remote control"
+)
+
+
+class RtdeConnection:
+    """One connection; open it in a ``with``, ask for variables, then ``start``.
+
+    Args:
+        host: the controller.
+        timeout: how long connecting and each reply may take [s].
+        clock: monotonic seconds.
+
+    Raises:
+        RobotConnectionError: the controller cannot be reached, or refuses.
+        RobotTimeout: it does not answer.
+    """
+
+    def __init__(self, host: str, timeout: float = 2.0, clock: Callable[[], float] = time.monotonic) -> None:
+        self.host = host
+        self._timeout = timeout
+        self._clock = clock
+        self._sock: socket.socket | None = None
+        self._rest = b""
+        self._waiting: list[bytes] = []
+
+    def __enter__(self) -> RtdeConnection:
+        try:
+            self._sock = socket.create_connection((self.host, PORT), self._timeout)
+        except TimeoutError as exc:
+            raise self._silent() from exc
+        except OSError as exc:
+            raise RobotConnectionError(
+                f"cannot reach the controller {self.host}:{PORT}: {exc.strerror or exc}; {_CHECK}"
+            ) from exc
+        self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self._ask(rtde.pack_version_request(), rtde.PacketKind.PROTOCOL_VERSION) != b"\x01":
+            self.close()
+            raise RobotConnectionError(f"{self.host}:{PORT} does not speak RTDE version {rtde.PROTOCOL_VERSION}")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection; may be called again."""
+        if self._sock is not None:
+            self._sock.close()
+            self._sock = None
+
+    def ask_outputs(self, names: Sequence[str], frequency_hz: float = 500.0) -> rtde.Recipe:
+        """Ask for variables that the controller sends at a frequency [Hz].
+
+        Raises:
+            RobotRefused: it does not know one of them.
+        """
+        return self._recipe(rtde.pack_outputs_request(names, frequency_hz), rtde.PacketKind.OUTPUTS, names)
+
+    def ask_inputs(self, names: Sequence[str]) -> rtde.Recipe:
+        """Ask for variables that the controller takes from here.
+
+        Raises:
+            RobotRefused: it does not know one of them, or another client has taken it.
+        """
+        return self._recipe(rtde.pack_inputs_request(names), rtde.PacketKind.INPUTS, names)
+
+    def claim(self, what: str, outputs: Sequence[str], inputs: Sequence[str], frequency_hz: float) -> rtde.Recipe:
+        """Ask for outputs and inputs, start, and return the recipe of the inputs.
+
+        Args:
+            what: the inputs are, for people.
+            outputs: variables that the controller sends.
+            inputs: variables that it takes from here.
+            frequency_hz: of the outputs [Hz].
+
+        Raises:
+            RobotRefused: another client has taken one of the inputs, or the controller does not know a variable.
+        """
+        try:
+            self.ask_outputs(outputs, frequency_hz)
+            recipe = self.ask_inputs(inputs)
+        except RobotRefused as exc:
+            raise RobotRefused(f"the guard cannot have {what} of {self.host}: {exc}") from exc
+        self.start()
+        return recipe
+
+    def start(self) -> None:
+        """Let the data flow; from now on nothing waits."""
+        if self._ask(rtde.pack_start_request(), rtde.PacketKind.START) != b"\x01":
+            self.close()
+            raise RobotConnectionError(f"{self.host}:{PORT} does not start its RTDE output")
+        if self._sock is not None:
+            self._sock.setblocking(False)
+
+    def fileno(self) -> int:
+        """Return the descriptor, for select and poll; -1 when closed."""
+        return -1 if self._sock is None else self._sock.fileno()
+
+    def read(self) -> list[bytes]:
+        """Return the payloads of the data packets that have arrived, oldest first. Never waits.
+
+        Raises:
+            RobotConnectionError: the controller has closed the connection.
+        """
+        payloads, self._waiting = self._waiting, []
+        if self._sock is None:
+            raise RobotConnectionError(f"the connection to the controller {self.host} is not open")
+        try:
+            data = self._sock.recv(1 << 16)
+        except BlockingIOError:
+            return payloads
+        except OSError as exc:
+            raise RobotConnectionError(f"the controller {self.host} is gone: {exc.strerror or exc}") from exc
+        if not data:
+            raise RobotConnectionError(f"the controller {self.host} has closed the connection")
+        packets, self._rest = rtde.split(self._rest + data)
+        return payloads + [packet.payload for packet in packets if packet.kind is rtde.PacketKind.DATA]
+
+    def wait_data(self, timeout: float) -> bytes:
+        """Wait for a data packet and return the payload of the newest one.
+
+        Args:
+            timeout: how long to wait [s].
+
+        Raises:
+            RobotTimeout: none came.
+            RobotConnectionError: the controller is gone.
+        """
+        end = self._clock() + timeout
+        while (left := end - self._clock()) > 0.0:
+            if payloads := self.read():
+                return payloads[-1]
+            wait_readable([self], left)
+        raise RobotTimeout(f"the controller {self.host} sent no state within {timeout:g} s")
+
+    def send(self, recipe: rtde.Recipe, values: Sequence[rtde.Value]) -> bool:
+        """Send inputs without waiting; return whether the system took the bytes."""
+        data = rtde.pack(rtde.PacketKind.DATA, recipe.pack(values))
+        try:
+            return self._sock is not None and self._sock.send(data) == len(data)
+        except OSError:
+            return False
+
+    def _recipe(self, request: bytes, kind: rtde.PacketKind, names: Sequence[str]) -> rtde.Recipe:
+        reply = self._ask(request, kind)
+        try:
+            return rtde.unpack_types(reply, names)
+        except BaseException:
+            self.close()
+            raise
+
+    def _ask(self, request: bytes, kind: rtde.PacketKind) -> bytes:
+        """Send a request and wait for the reply of its kind; close the connection where that fails."""
+        assert self._sock is not None
+        end = self._clock() + self._timeout
+        try:
+            self._sock.sendall(request)
+            reply: bytes | None = None
+            while reply is None:
+                if self._clock() >= end:
+                    raise TimeoutError
+                data = self._sock.recv(1 << 16)
+                if not data:
+                    raise RobotConnectionError(
+                        f"the controller {self.host}:{PORT} has closed the connection during set-up, so perhaps "
+                        f"something else answers there; {_CHECK}"
+                    )
+                packets, self._rest = rtde.split(self._rest + data)
+                for packet in packets:
+                    if packet.kind is kind and reply is None:
+                        reply = packet.payload
+                    elif packet.kind is rtde.PacketKind.DATA:
+                        self._waiting.append(packet.payload)
+        except TimeoutError as exc:
+            self.close()
+            raise self._silent() from exc
+        except OSError as exc:
+            self.close()
+            if isinstance(exc, RobotConnectionError):
+                raise
+            raise RobotConnectionError(
+                f"the controller {self.host}:{PORT} is gone: {exc.strerror or exc}; {_CHECK}"
+            ) from exc
+        return reply
+
+    def _silent(self) -> RobotTimeout:
+        return RobotTimeout(f"no answer from the controller {self.host}:{PORT} within {self._timeout:g} s; {_CHECK}")

@@ -1,0 +1,183 @@
+"""Variable reader: any RTDE output, for the program that is guarded and not for the guard.
+
+A thread keeps the newest packet; nothing is decoded before somebody asks. Unlike the wheel's receive interface it never
+returns an old value: it waits for a new one, and raises where none comes.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Self
+
+from coneskin.channel import wait_readable
+from coneskin.errors import ConeSkinError, RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.robot.driver.arm_reading import ArmReading
+
+from . import rtde_codec as rtde
+from .rtde_connection import RtdeConnection
+from .rtde_variables import VARIABLES
+
+__all__ = ["RtdeVariableReader"]
+
+_READING = (
+    *("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_speed", "actual_TCP_force"),
+    *("robot_mode", "safety_mode", "target_speed_fraction", "runtime_state"),
+    *("actual_digital_input_bits", "actual_digital_output_bits"),
+    *("standard_analog_input0", "standard_analog_input1", "tool_analog_input0", "tool_analog_input1"),
+    *("standard_analog_output0", "standard_analog_output1"),
+)
+_USUAL = (*_READING, "safety_status_bits", "robot_status_bits", "target_q", "target_qd", "speed_scaling")
+_FRESH = 0.1  # s; an older packet is waited out
+_LOOK_PERIOD = 0.1  # s in which the thread notices that it is to end
+_PROGRAM_RUNNING = 2  # value of runtime_state
+#: robot_mode and safety_mode as Universal Robots' RTDE guide names them
+_ROBOT_MODES = {
+    **{-1: "NO_CONTROLLER", 0: "DISCONNECTED", 1: "CONFIRM_SAFETY", 2: "BOOTING", 3: "POWER_OFF", 4: "POWER_ON"},
+    **{5: "IDLE", 6: "BACKDRIVE", 7: "RUNNING", 8: "UPDATING_FIRMWARE"},
+}
+_SAFETY_MODES = {
+    **{1: "NORMAL", 2: "REDUCED", 3: "PROTECTIVE_STOP", 4: "RECOVERY", 5: "SAFEGUARD_STOP"},
+    **{6: "SYSTEM_EMERGENCY_STOP", 7: "ROBOT_EMERGENCY_STOP", 8: "VIOLATION", 9: "FAULT"},
+    **{10: "VALIDATE_JOINT_ID", 11: "UNDEFINED_SAFETY_MODE"},
+}
+
+
+class RtdeVariableReader:
+    """Reader of the newest value of any variable; open it in a ``with``. Any thread may ask.
+
+    Args:
+        host: the controller.
+        timeout: how long connecting, each reply and a fresh value may take [s].
+        clock: monotonic seconds.
+
+    Raises:
+        RobotConnectionError: on entering, where the controller cannot be reached.
+        RobotTimeout: on entering, where it does not answer.
+    """
+
+    def __init__(self, host: str, timeout: float = 2.0, clock: Callable[[], float] = time.monotonic) -> None:
+        self._host, self._timeout, self._clock = host, timeout, clock
+        self._asking = threading.Lock()  # one thread opens the connection anew
+        self._news = threading.Condition()
+        self._connection: RtdeConnection | None = None
+        self._recipe = rtde.Recipe(_USUAL)
+        self._thread: threading.Thread | None = None
+        self._newest: tuple[float, rtde.Recipe, bytes] | None = None  # when it was read
+        self._error: ConeSkinError | None = None
+        self._closing = False
+
+    def __enter__(self) -> Self:
+        self._open(_USUAL)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection; may be called again."""
+        with self._asking:
+            self._end()
+
+    def value(self, name: str) -> rtde.Value:
+        """Return the newest value of a variable; a vector is a tuple.
+
+        Args:
+            name: as Universal Robots' RTDE guide has it. One that was not asked for before takes some 10 ms.
+
+        Raises:
+            RobotRefused: the controller has no such variable.
+            RobotTimeout: it sends nothing.
+            RobotConnectionError: it is gone.
+        """
+        if name not in VARIABLES:
+            raise RobotRefused(f"RTDE has no variable named {name}")
+        with self._asking:
+            names = self._recipe.names
+            if name not in names or self._thread is None:
+                self._end()
+                self._open(names if name in names else (*names, name))
+        recipe, payload = self._fresh()
+        return recipe.unpack(payload)[recipe.names.index(name)]
+
+    def reading(self) -> ArmReading:
+        """Return what the controller says at one moment.
+
+        Raises:
+            RobotTimeout, RobotConnectionError: as ``value``.
+        """
+        with self._asking:
+            if self._thread is None:
+                self._end()
+                self._open(self._recipe.names)
+        recipe, payload = self._fresh()
+        values: dict[str, Any] = dict(zip(recipe.names, recipe.unpack(payload), strict=True))
+        timestamp, q, qd, pose, speed, force, mode, safety, fraction, runtime, *rest = (values[n] for n in _READING)
+        return ArmReading(
+            timestamp,
+            q,
+            qd,
+            pose,
+            speed,
+            force,
+            _ROBOT_MODES.get(mode, str(mode)),
+            _SAFETY_MODES.get(safety, str(safety)),
+            fraction,
+            runtime == _PROGRAM_RUNNING,
+            rest[0],
+            rest[1],
+            (rest[2], rest[3], rest[4], rest[5]),
+            (rest[6], rest[7]),
+        )
+
+    def _open(self, names: tuple[str, ...]) -> None:
+        connection = RtdeConnection(self._host, self._timeout, self._clock)
+        connection.__enter__()
+        try:
+            self._recipe = connection.ask_outputs(names)
+            connection.start()
+        except BaseException:
+            connection.close()
+            raise
+        self._connection, self._newest, self._error, self._closing = connection, None, None, False
+        self._thread = threading.Thread(
+            target=self._run, args=(connection, self._recipe), name="coneskin states", daemon=True
+        )
+        self._thread.start()
+
+    def _end(self) -> None:
+        self._closing = True
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+    def _run(self, connection: RtdeConnection, recipe: rtde.Recipe) -> None:
+        try:
+            while not self._closing:
+                wait_readable([connection], _LOOK_PERIOD)
+                if payloads := connection.read():
+                    with self._news:
+                        self._newest = (self._clock(), recipe, payloads[-1])
+                        self._news.notify_all()
+        except ConeSkinError as exc:
+            with self._news:
+                self._error = exc
+                self._news.notify_all()
+
+    def _fresh(self) -> tuple[rtde.Recipe, bytes]:
+        """Return the newest payload, which is not old; wait for it where need be."""
+        end = self._clock() + self._timeout
+        with self._news:
+            while self._newest is None or self._clock() - self._newest[0] > _FRESH:
+                if self._error is not None:
+                    self._thread = None  # the next question opens the connection anew
+                    raise RobotConnectionError(f"the state of the arm cannot be read: {self._error}") from self._error
+                left = end - self._clock()
+                if left <= 0.0:
+                    raise RobotTimeout(f"the controller {self._host} has sent no state for {self._timeout:g} s")
+                self._news.wait(left)
+            return self._newest[1:]

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from coneskin.errors import KinematicsError
+from coneskin.robot.arm.inertia import effective_mass, mass_matrix
+from coneskin.robot.arm.kinematics import point_jacobian
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.ur_inertias import arm_inertia
+from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+
+#: published weights [kg]: user manuals, "Weight", cable not counted
+WEIGHTS = {"UR3": 11.0, "UR5": 18.4, "UR10": 28.9, "UR3e": 11.2, "UR5e": 20.6}
+WEIGHTS |= {"UR7e": 20.6, "UR10e": 33.5, "UR16e": 33.1, "UR20": 64.0, "UR30": 63.5}
+ARMS = pytest.mark.parametrize("name", MODEL_NAMES)
+
+
+@ARMS
+def test_the_links_can_exist_and_weigh_what_the_arm_weighs(name: str) -> None:
+    inertia = arm_inertia(name)
+    for link in inertia.links:
+        a, b, c = np.linalg.eigvalsh(np.array(link.tensor))
+        assert a > 0.0
+        assert c < a + b  # no body turns harder about one axis than about the two others together
+    moving = sum(link.mass for link in inertia.links)
+    assert 0.72 < moving / WEIGHTS[name] < 1.0  # without the base, which has 2 to 4 kg
+
+
+@ARMS
+def test_the_mass_matrix_is_that_of_pinocchio(name: str) -> None:
+    pytest.importorskip("pinocchio", reason="the independent dynamics are pinocchio's (PyPI: pin)")
+    from coneskin.testing.pinocchio_arm import pin_mass_matrix
+
+    model, inertia, source = arm_model(name), arm_inertia(name), np.random.default_rng(1)
+    for _ in range(10):
+        q = list(source.uniform(-2 * np.pi, 2 * np.pi, 6))
+        wanted = pin_mass_matrix(model, inertia, q)
+        # rounding of sums of about 100 products
+        np.testing.assert_allclose(mass_matrix(model, inertia, q), wanted, rtol=0, atol=1e-13 * wanted.max())
+
+
+def test_a_blow_feels_the_effective_mass() -> None:
+    """By definition: an impulse p along n changes the velocity of the point along n by p / m."""
+    model, inertia = arm_model("UR5e"), arm_inertia("UR5e")
+    q, point = (0.3, -1.2, 1.4, -0.5, 0.7, 0.2), (0.1, 0.05, -0.02)
+    n = np.array([0.6, 0.0, 0.8])
+    jacobian = np.array(point_jacobian(model, q, 3, point))
+    change = np.linalg.solve(np.array(mass_matrix(model, inertia, q)), jacobian.T @ n)  # of the joint speeds, for 1 N s
+    moved = float(n @ jacobian @ change)
+    assert effective_mass(model, inertia, q, 3, point, (0.6, 0.0, 0.8)) == pytest.approx(1.0 / moved, rel=1e-12)
+    assert effective_mass(model, inertia, q, 3, point, (6.0, 0.0, 8.0)) == pytest.approx(1.0 / moved, rel=1e-12)
+
+
+def test_what_cannot_move_is_infinitely_heavy() -> None:
+    model = arm_model("UR5e")
+    assert effective_mass(model, arm_inertia(model), (0.0,) * 6, 0, (0.1, 0.0, 0.0), (1.0, 0.0, 0.0)) == math.inf
+
+
+def test_mistakes_are_named() -> None:
+    with pytest.raises(KinematicsError, match="direction"):
+        effective_mass(arm_model("UR5e"), arm_inertia("UR5e"), (0.0,) * 6, 3, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    bare = ArmModel("other", *((0.0,) * 6,) * 3, (-1.0,) * 6, (1.0,) * 6, (1.0,) * 6)
+    with pytest.raises(KinematicsError, match="inertias are known for"):
+        arm_inertia(bare)

@@ -1,0 +1,261 @@
+"""The processes beside the guard: who falls silent stops the arm, and nothing goes on without an acknowledgement."""
+
+import random
+
+import pytest
+
+from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
+from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.guard.heartbeat_monitor import HeartbeatMonitor
+from coneskin.robot.guard.journal import BlockKind, stopping_contact
+from coneskin.robot.guard.phase import Phase
+from coneskin.robot.reaction.rules import Rule
+from coneskin.robot.reaction.types import Reaction
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.testing.guard_rig import GuardRig, touch
+
+from ...sweep import sweep
+
+BOTH = pytest.mark.parametrize("external", [False, True], ids=["internal", "external"])
+
+
+def stopping_time(rig, since):
+    """Time from a moment to the stop, in the rig's own time [s]."""
+    return rig.event("stopping").time - since
+
+
+# ---- silence
+
+
+@BOTH
+def test_a_program_that_is_frozen_stops_its_arm_within_200_ms(external):
+    rig = GuardRig(speed=1.0, external=external).run(0.5)
+    rig.companions.program_is_mute = True
+    since = rig.now
+    rig.run(2.0)
+    assert rig.core.phase is Phase.LATCHED
+    assert stopping_time(rig, since) < 0.2
+    assert "the program that guards: no heartbeat for 150 ms" in rig.event("latched").details["why"]
+    rig.companions.program_is_mute = False
+    rig.run(1.0)
+    assert rig.core.phase is Phase.LATCHED  # alive again is not enough
+    rig.reset()
+    rig.arm.target = None
+    rig.run(0.3)
+    assert rig.core.phase is Phase.ACTIVE
+
+
+@BOTH
+def test_a_frozen_process_is_a_fault_although_nobody_needs_it_and_another_path_stops_the_arm(external):
+    rig = GuardRig(speed=1.0, external=external, obeys=frozenset({StopPath.PROGRAM})).run(0.5)
+    rig.companions.process_is_mute = True
+    since = rig.now
+    rig.run(2.0)
+    assert stopping_time(rig, since) < 0.25
+    name = "the guard watchdog" if external else "the driver process"
+    assert f"{name}: no heartbeat for 200 ms" in rig.event("latched").details["why"]
+    assert rig.event("standstill").details["paths"][-1] == "program"
+    if not external:  # at once: it is known that the driver does not act
+        assert rig.event("escalated").time - rig.event("stopping").time < 0.003
+
+
+def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
+    monitor = HeartbeatMonitor({"it": 0.15})
+    monitor.note("it", 1.0)
+    assert monitor.silent(1.0) == {}
+    assert monitor.silent(1.5) == {}  # its heartbeats wait to be read
+    for step in range(1, 150):
+        assert monitor.silent(1.5 + 0.001 * step) == {}
+    assert "no heartbeat for 150 ms" in monitor.silent(1.652)["it"]
+    monitor.note("it", 1.653)
+    assert monitor.silent(1.653) == {}
+    monitor.forget("it")
+    assert monitor.silent(1.66) == {}
+
+
+def test_a_guard_that_is_held_up_again_and_again_notices_silence():
+    """Held up for 30 ms after each 3 ms it took 1.3 s, and a frozen program's arm moved on by 64 deg."""
+    monitor = HeartbeatMonitor({"it": 0.15})
+    monitor.note("it", 0.0)
+    now = 0.0
+    while not monitor.silent(now):
+        now += 0.03
+        if not monitor.silent(now):
+            now += 0.003
+    assert 0.15 < now < 0.15 + 0.03 + 0.034
+    monitor.note("it", now)
+    assert not monitor.silent(now)
+
+
+def test_what_has_never_been_heard_is_a_blocker():
+    rig = GuardRig()
+    rig.companions.program_is_mute = True
+    rig.run(1.0)
+    assert rig.core.phase is Phase.STARTING
+    assert any("no heartbeat yet" in reason for reason in rig.core.blockers(rig.now))
+
+
+# ---- releases
+
+
+@BOTH
+def test_it_is_active_only_after_the_acknowledgement(external):
+    rig = GuardRig(external=external)
+    take = rig.companions.take
+    rig.companions.take = lambda output: None  # it beats, and does not answer
+    rig.run(1.0)
+    assert Release(1) in rig.outputs
+    assert rig.core.phase is Phase.STARTING
+    rig.feed(BlockKind.DRIVER, StatusReport("released", "7").encode())
+    rig.feed(BlockKind.DRIVER, StatusReport("released", "nonsense").encode())
+    assert rig.core.phase is Phase.STARTING
+    rig.feed(BlockKind.DRIVER, StatusReport("released", "1").encode())
+    assert rig.core.phase is Phase.ACTIVE
+    rig.companions.take = take
+
+
+def test_a_release_that_nobody_acknowledges_is_taken_back_and_its_late_answer_counts_for_nothing():
+    rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
+    rig.companions.take = lambda output: None
+    rig.reset()
+    rig.run(0.2)
+    assert rig.outputs.count(Release(2)) == 1
+    seen = len(rig.outputs)
+    rig.companions.process_is_mute = True
+    rig.run(0.4)
+    refused = rig.event("refused")
+    assert refused.details["request"] == 1
+    assert any("the driver process: no heartbeat" in reason for reason in refused.details["reasons"])
+    assert any(isinstance(output, StopProgram) for output in rig.outputs[seen:])
+    rig.feed(BlockKind.DRIVER, StatusReport("released", "2").encode())
+    rig.run(0.1)
+    assert rig.core.phase is Phase.LATCHED
+    assert rig.names.count("activated") == 1
+
+
+def test_a_reset_while_the_driver_hangs_is_refused_with_its_name():
+    rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
+    rig.companions.process_is_mute = True
+    rig.run(0.5)
+    rig.reset()
+    assert any("the driver process: no heartbeat" in reason for reason in rig.event("refused").details["reasons"])
+    rig.run(1.0)
+    assert not any(output == Release(2) for output in rig.outputs)
+
+
+# ---- resets
+
+
+def test_a_reset_of_another_stop_than_the_newest_forgives_nothing():
+    rig = GuardRig(touch(0.5, 0.7), touch(2.5, 2.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
+    rig.reset()
+    rig.arm.target = None
+    rig.run(2.0)
+    assert [event.details["stop"] for event in rig.events if event.name == "latched"] == [1, 2]
+    for payload in (b"", b"0 1", b"1 1", b"3 1", b"99 1", b"x y", b"2", b"2 1 1", b"-2 1"):
+        rig.feed(BlockKind.RESET, payload)
+        assert "stop 2 has latched the arm" in rig.events[-1].details["reasons"][0]
+    rig.run(0.3)
+    assert rig.core.phase is Phase.LATCHED
+    rig.feed(BlockKind.RESET, b"2 5")
+    rig.run(0.5)
+    assert rig.core.phase is Phase.ACTIVE
+    assert rig.events[-1].details["request"] == 5
+
+
+def test_resets_that_came_before_any_stop_forgive_none_that_comes():
+    rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(0.4)
+    for number in range(3):
+        rig.feed(BlockKind.RESET, b"1 %d" % number)
+    rig.run(1.5)
+    assert rig.core.phase is Phase.LATCHED
+    refused = [event for event in rig.events if event.name == "refused"]
+    assert [event.details["request"] for event in refused] == [0, 1, 2]
+    assert all("nothing to reset" in event.details["reasons"][0] for event in refused)
+
+
+# ---- the contact that stopped
+
+
+def names_the_right_one(seed):
+    """Tell whether the stop names the firm touch, and not the soft one that has slowed the arm before."""
+    chance = random.Random(seed)
+    soft, hard = chance.sample(("one", "two"), 2)
+    begin = chance.uniform(0.25, 0.35)
+    later = begin + chance.uniform(0.02, 0.15)
+    places = [{"u": chance.uniform(0.03, 0.23), "phi": chance.uniform(0.3, 6.0)} for _ in range(2)]
+    touches = (
+        ScriptedTouch(begin, 9.0, **places[0], force=chance.uniform(0.9, 1.5), rise=0.0005, sensor=soft),
+        ScriptedTouch(later, 9.0, **places[1], force=chance.uniform(15.0, 60.0), rise=0.0005, sensor=hard),
+    )
+    rules = (Rule(Reaction(kind="stop"), level_above=0.82),)
+    rig = GuardRig(*touches, sensors=2, reaction=Reaction(kind="slow"), rules=rules).run(later + 0.06)
+    assert rig.names.index("speed_reduced") < rig.names.index("stopping")
+    contact = stopping_contact(rig.event("stopping"), rig.events)
+    assert contact is not None
+    right = contact.details["sensor"] == hard
+    return right and abs(contact.details["u"] - places[1]["u"]) < 0.01
+
+
+@pytest.mark.parametrize("seeds", sweep([range(20), range(20, 70)]))
+def test_the_touch_that_stopped_is_named_in_each_of_70_runs(seeds):
+    assert all(map(names_the_right_one, seeds))
+
+
+# ---- the driver's program ends, announced or not
+
+
+def report(rig, kind):
+    rig.feed(BlockKind.DRIVER, StatusReport(kind).encode())
+
+
+def test_the_driver_s_program_may_end_where_that_was_announced_and_for_no_longer_than_5_s():
+    rig = GuardRig(speed=0.0).run(0.5)
+    report(rig, "restarts")
+    rig.run(0.05)  # it still runs
+    rig.arm.runtime_state = 1
+    rig.run(0.3)
+    rig.arm.runtime_state = 2
+    rig.run(0.01)
+    report(rig, "restarted")
+    rig.run(0.5)
+    assert rig.core.phase is Phase.ACTIVE
+    report(rig, "restarts")
+    rig.arm.runtime_state = 1
+    rig.run(4.9)
+    assert rig.core.phase is Phase.ACTIVE
+    rig.run(0.5)
+    assert rig.core.phase is Phase.LATCHED
+    assert "the driver's program has ended on the controller" in rig.event("latched").details["why"]
+
+
+def test_a_restart_that_is_announced_again_and_again_has_no_more_than_5_s():
+    rig = GuardRig(speed=0.0).run(0.5)
+    rig.arm.runtime_state = 1
+    for _ in range(4):  # of a program whose paths are refused
+        report(rig, "restarts")
+        rig.run(1.4)
+    assert rig.core.phase is Phase.LATCHED
+    assert "the driver's program has ended on the controller" in rig.event("latched").details["why"]
+
+
+def test_a_restart_that_was_refused_leaves_the_next_one_its_time():
+    rig = GuardRig(speed=0.0).run(0.5)
+    report(rig, "restarts")
+    rig.run(6.0)  # the old program goes on
+    report(rig, "restarts")
+    rig.arm.runtime_state = 1
+    rig.run(4.9)
+    assert rig.core.phase is Phase.ACTIVE
+    rig.run(0.5)
+    assert rig.core.phase is Phase.LATCHED
+
+
+def test_the_driver_s_program_that_ends_unannounced_is_a_fault():
+    rig = GuardRig(speed=0.0).run(0.5)
+    report(rig, "restarts")
+    report(rig, "restarted")
+    rig.run(0.1)
+    rig.arm.runtime_state = 1
+    rig.run(0.3)
+    assert rig.core.phase is Phase.LATCHED

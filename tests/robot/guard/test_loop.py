@@ -1,0 +1,105 @@
+"""The loop's clock: whatever else talks, the core hears that time passes."""
+
+import socket
+
+import pytest
+
+from coneskin.channel import Channel, pair
+from coneskin.recording import Block, decode_blocks, encode_block
+from coneskin.robot.guard.journal import BlockKind
+from coneskin.robot.guard.loop import GuardLoop
+from coneskin.robot.guard.overflow import RecordingOverflowFilter
+from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.ports import GuardPorts
+
+
+class Core:
+    """Counts what it takes."""
+
+    phase = Phase.LATCHED
+
+    def __init__(self):
+        self.taken = []
+
+    def take(self, block, out):
+        self.taken.append(block.kind)
+
+
+class Talkative:
+    """Connections on which the controller says something all the time."""
+
+    def __init__(self):
+        self.near, self.far = socket.socketpair()
+
+    def sockets(self):
+        return {"program": self.near}
+
+    def drain(self):
+        self.near.recv(1 << 16)
+        return []
+
+
+@pytest.fixture
+def ends():
+    ours, theirs = pair()
+    channels = Channel(ours), Channel(theirs)
+    yield channels
+    for channel in channels:
+        channel.close()
+
+
+def test_a_connection_that_talks_does_not_stop_the_clock(ends):
+    core, stops = Core(), Talkative()
+    loop = GuardLoop(core, GuardPorts(ends[0], None, stops=stops))
+    loop._open()
+    for number in range(1, 50):
+        stops.far.send(b"state")
+        loop.step(0.002)
+        assert len(core.taken) == number
+    loop._close()
+    stops.near.close()
+    stops.far.close()
+
+
+def test_a_program_that_has_gone_does_not_stop_the_clock(ends):
+    core = Core()
+    loop = GuardLoop(core, GuardPorts(ends[0], None))
+    loop._open()
+    ends[1].close()
+    for number in range(1, 20):
+        loop.step(0.001)
+        assert len(core.taken) == number
+    loop._close()
+
+
+@pytest.mark.parametrize("asleep", [False, True])
+def test_a_guard_that_was_suspended_says_so_to_its_core_before_anything_else(ends, asleep):
+    """While a computer sleeps, its monotonic clock may stand still, and with it every silence that is measured."""
+    core, now, sleepless = Core(), [10.0], [20.0]
+    loop = GuardLoop(core, GuardPorts(ends[0], None), lambda: now[0], lambda: sleepless[0])
+    loop._open()
+    ends[1].send(b"heartbeat")
+    loop.step(0.0)
+    assert BlockKind.SUSPENDED not in core.taken
+    core.taken.clear()
+    now[0], sleepless[0] = now[0] + (0.001 if asleep else 5.0), sleepless[0] + 5.0
+    loop.step(0.0)
+    assert core.taken == [BlockKind.SUSPENDED]
+    loop.step(0.0)
+    assert core.taken == [BlockKind.SUSPENDED, BlockKind.TICK]
+    loop._close()
+
+
+def test_the_last_word_is_handed_over_to_a_reader_who_is_slow(ends):
+    ours, theirs = ends
+    ours.overflow = RecordingOverflowFilter()
+    block = encode_block(Block(1, 0.0, bytes(10_000)))
+    for _ in range(500):  # 5 MB, more than the channel keeps
+        ours.send(block)
+    assert ours.dropped
+    read = b""
+    while not ours.finish(0.0):
+        read += b"".join(theirs.receive())
+    read += b"".join(theirs.receive())
+    blocks = [block for _, block in decode_blocks(read)]
+    assert b"not recorded" in blocks[-1].payload

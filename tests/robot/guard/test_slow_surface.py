@@ -1,0 +1,91 @@
+"""Slow is slow at the surface: how far it moves into what touches it, beside a bare stop; receding goes on."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from coneskin.robot.arm.kinematics import link_pose
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.guard.phase import Phase
+from coneskin.robot.reaction.contact_approach import ContactApproach
+from coneskin.robot.reaction.rules import Rule
+from coneskin.robot.reaction.types import ContactOnLink, Reaction
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.testing.guard_rig import GuardRig, touch
+
+from .test_resisted_retreat import HAND, PHI, collide, excess
+
+SLOW = Reaction("slow", time_budget=5.0)
+FOREARM = ContactOnLink(3, (0.2, 0.0, 0.05), (0.0, 0.0, 1.0), 0.8, True, 0.1, 1)
+
+
+@pytest.mark.parametrize("heeds", [True, False])
+def test_a_slow_arm_presses_no_farther_than_one_that_is_stopped(heeds):
+    """587 mm before, where the slider was not heeded and the joints were slower than 0.25 rad/s."""
+    hand = replace(HAND, hardest=200.0)
+    rig = collide(SLOW, hand, heeds=heeds)
+    assert rig.core.phase is Phase.LATCHED
+    assert excess(rig, hand) < 0.002
+    assert "while slow, the surface has moved" in next(e for e in rig.events if e.name == "stopping").details["why"]
+
+
+def test_an_arm_that_recedes_from_the_touch_goes_on():
+    rig = GuardRig(touch(0.5, 1.0, phi=(PHI + math.pi) % (2.0 * math.pi)), reaction=SLOW, speed=0.3).run(2.0)
+    assert "stopping" not in rig.names
+    assert "resumed" in rig.names
+
+
+def test_level_rules_see_a_press_that_grows_slowly():
+    """Events come in steps of a tenth of the level: from 2 N, 0.81, to 200 N, 0.91, there is none."""
+    firm = Rule(Reaction("stop"), level_above=0.82)
+    press = ScriptedTouch(0.5, 9.0, 0.13, 1.57, force=200.0, rise=4.0)
+    rig = GuardRig(press, reaction=replace(SLOW, press=0.1, time_budget=9.0), rules=(firm,), speed=0.01).run(2.0)
+    named = rig.event("stopping").details
+    assert named["why"] == "touch"
+    assert 0.82 < named["contact"]["level"] < 0.83
+
+
+def test_the_speed_of_the_surface_counts_and_not_that_of_the_joint():
+    """0.24 rad/s of the base of a UR10e: 0.25 m/s and more at its forearm, which is not slow."""
+    q, qd = (0.0, -0.5, 0.3, 0.0, 0.0, 0.0), (0.24, 0.0, 0.0, 0.0, 0.0, 0.0)
+    approach = ContactApproach(arm_model("UR10e"), q, qd, 10.0, 0.001)
+    approach.note(q, qd, [FOREARM])
+    assert 0.15 < approach.speed < 0.35
+    approach.note(q, qd, [replace(FOREARM, location_valid=False)])
+    assert approach.speed > 0.24  # any point, where the place is not certain
+
+
+def test_where_the_place_is_not_certain_every_motion_counts():
+    q, qd = (0.0, -0.5, 0.3, 0.0, 0.0, 0.0), (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
+    later = (0.01, *q[1:])
+    vague = replace(FOREARM, location_valid=False)
+    approach = ContactApproach(arm_model("UR10e"), q, qd, 10.0, 0.001)
+    approach.note(q, qd, [vague])
+    assert not approach.exceeded
+    approach.note(later, qd, [vague])
+    assert approach.exceeded == 1
+
+
+def test_a_place_that_comes_late_leaves_no_room_that_a_stop_would_not_have_used():
+    """Before, the allowance stayed that of the fastest point of the arm: 7.8 mm, where a stop takes 1.5."""
+    q, qd = (0.0, -0.5, 0.3, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    across = replace(FOREARM, normal=(0.0, 0.0, 1.0))  # the base's joint would approach it, the shoulder's does not
+    approach = ContactApproach(arm_model("UR10e"), q, qd, 10.0, 0.001)
+    approach.note(q, qd, [replace(across, location_valid=False)])
+    approach.note(q, qd, [across])
+    assert not approach.exceeded
+    per_radian = way_into(across, q, (1e-6, *q[1:])) / 1e-6
+    for way, exceeded in ((0.0005, 0), (0.0015, 1)):
+        turn = way / per_radian
+        approach.note((turn, *q[1:]), (1e-3 * turn, 0.0, 0.0, 0.0, 0.0, 0.0), [across])
+        assert approach.exceeded == exceeded
+    assert approach.way == pytest.approx(0.0015, rel=0.01)
+
+
+def way_into(contact, q, later):
+    """Return how far the surface moves towards a touch between two joint positions [m]."""
+    model = arm_model("UR10e")
+    before, after = link_pose(model, q, contact.link), link_pose(model, later, contact.link)
+    change = [b - a for a, b in zip(before.apply(contact.point), after.apply(contact.point), strict=True)]
+    return sum(n * c for n, c in zip(before.rotate(contact.normal), change, strict=True))

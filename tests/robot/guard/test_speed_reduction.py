@@ -1,0 +1,111 @@
+"""An arm that goes on slowly while it is touched."""
+
+from coneskin.robot.arm.model import ZERO_VELOCITY
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.setpoint import SetSpeedSlider
+from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.guard.speed_reduction import HOLD, ReducedSpeedTouch, SpeedReduction
+from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES
+
+SLOW = 0.05  # m/s
+
+
+def slowing(speed=1.0, before=1.0, fraction=0.2):
+    return ReducedSpeedTouch(10.0, (speed, speed), before, fraction, 0.2, 1.0, SLOW)
+
+
+def fast(one, time, speed):
+    for _ in range(STANDSTILL_SAMPLES):
+        one.sample(time, speed)
+
+
+def test_no_trouble_where_it_becomes_slower_in_time():
+    one = slowing()
+    one.sample(10.1, 0.95)
+    assert one.trouble(10.19, 0.2) == ""
+    fast(one, 10.3, 0.89)
+    assert one.trouble(10.5, 0.2) == ""
+
+
+def test_trouble_where_it_becomes_faster_again():
+    one = slowing()
+    fast(one, 10.1, 0.3)
+    fast(one, 10.4, 1.5)  # another motion: servoj does not heed the slider
+    assert one.trouble(10.5, 0.2) == "the arm did not become slower"
+
+
+def test_trouble_where_somebody_raises_the_slider_while_it_is_touched():
+    one = slowing(speed=0.2)
+    one.touched(10.0, True)
+    assert one.trouble(10.1, 1.0) == ""  # what is read may be older than what was set
+    assert one.trouble(10.3, 0.5) == "the speed slider is at 50% again while the skin is touched"
+    assert one.trouble(10.3, 0.1) == ""
+    one.touched(10.4, False)
+    assert one.trouble(10.4, 0.5) == ""
+
+
+def test_the_slider_is_put_back_only_where_nobody_has_moved_it():
+    assert slowing().puts_back(0.2)
+    assert slowing().puts_back(1.0)  # what is read may be older than what was set
+    assert not slowing().puts_back(0.05)
+    assert not slowing().puts_back(None)
+
+
+def test_trouble_at_the_budget_where_it_does_not():
+    one = slowing()
+    for speed in (1.0, 1.2, 1.1):  # it was still speeding up: a tenth of the top is what counts
+        fast(one, 10.1, speed)
+    assert one.trouble(10.199, 0.2) == ""
+    assert one.trouble(10.2, 0.2) == "the arm did not become slower"
+    one.sample(10.2, 1.07)
+    assert one.trouble(10.3, 0.2) == ""
+
+
+def test_a_slow_arm_need_not_become_slower():
+    one = slowing(speed=SLOW)
+    assert one.trouble(10.9, 0.2) == ""
+
+
+def test_a_touch_may_last_so_long_and_no_longer():
+    one = slowing(speed=0.0)
+    one.touched(10.0, True)
+    assert one.trouble(10.99, 0.2) == ""
+    assert one.trouble(11.0, 0.2) == "the touch lasts too long"
+    one.touched(11.0, False)
+    assert one.trouble(11.0, 0.2) == ""
+
+
+def test_it_is_over_a_while_after_the_last_touch():
+    one = slowing()
+    for now, touched, over in (
+        (10.1, True, False),
+        (10.2, False, False),
+        (10.2 + HOLD - 0.01, False, False),
+        (10.3 + HOLD, True, False),  # touched again in time
+        (10.4 + HOLD, False, False),
+        (10.4 + 2 * HOLD, False, True),
+    ):
+        one.touched(now, touched)
+        assert one.over(now) is over
+
+
+def test_the_slider_is_never_raised():
+    assert slowing(before=0.1).fraction == 0.1
+    assert slowing().fraction == 0.2
+
+
+def test_a_slider_that_a_stop_has_put_to_0_stays_there_until_the_reset():
+    """The newest reading may be from before the stop: it must not look as if the slider were still where it was."""
+    reduction, out = SpeedReduction(arm_model("UR5e"), used=True), []
+    state = ControllerState(10.0, 1.0, (0.0, -1.5, 1.5, -1.5, -1.5, 0.0), ZERO_VELOCITY, True, False, True)
+    reduction.note(10.0, 1.0)
+    assert reduction.begin(10.0, state, Reaction(kind="slow", slow_to=0.2), MonitoringLimits(), out)
+    reduction.halt()
+    reduction.put_back(10.02, out)
+    reduction.note(10.04, 0.0)
+    before, out = out, []
+    reduction.release(out)
+    assert [one for one in before if isinstance(one, SetSpeedSlider)] == [SetSpeedSlider(0.2)]
+    assert out == [SetSpeedSlider(1.0)]

@@ -1,0 +1,232 @@
+"""Ways to leave: with the push, back along the path, above the table; the kinematics judge."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from coneskin.robot.arm.joint_limits import MARGIN
+from coneskin.robot.arm.kinematics import link_pose
+from coneskin.robot.arm.model import ZERO_VELOCITY
+from coneskin.robot.arm.skeleton import skeleton
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.workspace import TablePlane, Workspace
+from coneskin.robot.reaction.admittance import DAMPING, admittance_step, begin_admittance, wanted_speed
+from coneskin.robot.reaction.backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
+from coneskin.robot.reaction.motion import RetreatMotion
+from coneskin.robot.reaction.retreat import plan_retreat
+from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
+
+ARM = arm_model("UR5e")
+Q = (0.2, -1.4, 1.5, -1.6, -1.5, 0.3)
+CYCLE = 0.002
+FOREARM = ContactOnLink(3, (0.2, 0.0, 0.05), (0.0, 0.0, 1.0), 0.8, True, 0.1)
+bent = st.tuples(
+    st.floats(-3.0, 3.0), st.floats(-2.6, -0.5), st.floats(0.5, 2.5), *[st.floats(-2.0, 2.0) for _ in range(3)]
+)
+normals = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.3)
+
+
+def unit(vector):
+    length = math.hypot(*vector)
+    return tuple(value / length for value in vector)
+
+
+def ramped(qd, wanted, most):
+    gap = max(abs(b - a) for a, b in zip(qd, wanted, strict=True))
+    share = min(1.0, most / gap) if gap else 1.0
+    return tuple(a + share * (b - a) for a, b in zip(qd, wanted, strict=True))
+
+
+def follow(step, q=Q, time=0.0, longest=5.0):
+    """An arm that does as it is told; the states on the way, and how it ended."""
+    qd, states = ZERO_VELOCITY, []
+    while time < longest:
+        state = ArmState(time, q, qd)
+        states.append(state)
+        now = step(state)
+        if isinstance(now, Done):
+            return states, now
+        qd = ramped(qd, now.qd, now.acceleration * CYCLE)
+        q = tuple(a + CYCLE * v for a, v in zip(q, qd, strict=True))
+        time += CYCLE
+    return states, None
+
+
+def moved(contact, before, after):
+    """How far the touched point has come along -n of the start [m]."""
+    pose = link_pose(ARM, before, contact.link)
+    normal, start = pose.rotate(contact.normal), pose.apply(contact.point)
+    end = link_pose(ARM, after, contact.link).apply(contact.point)
+    return sum((b - a) * -n for a, b, n in zip(start, end, normal, strict=True))
+
+
+# ---- comply
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 0.3), st.floats(0.4, 1.0))
+def test_the_speed_rises_with_the_level_and_never_above_what_is_set(level, threshold, full):
+    reaction = Reaction(kind="comply", speed=0.2, full_level=full)
+
+    def at(value):
+        return wanted_speed(reaction, [ContactOnLink(3, (0, 0, 0), (0, 0, 1), value, True, threshold)])
+
+    assert 0.0 <= at(level) <= 0.2
+    assert at(threshold) == 0.0
+    assert at(full) == pytest.approx(0.2)
+    assert at(min(1.0, level + 0.1)) >= at(level)
+
+
+def comply(level, reaction=None):
+    """A complying arm that is pushed at the forearm, so firmly at each time."""
+    current = [begin_admittance(ARM, ArmState(0.0, Q), reaction or Reaction(kind="comply", speed=0.1, arm_speed=0.5))]
+
+    def step(state):
+        push = level(state.time)
+        contacts = [] if push is None else [ContactOnLink(*list_of(FOREARM)[:3], push, True, 0.1)]
+        current[0], answer = admittance_step(current[0], state, contacts)
+        return answer
+
+    return step
+
+
+def list_of(contact):
+    return [getattr(contact, name) for name in contact.__slots__]
+
+
+def test_half_a_push_is_half_the_speed_and_it_comes_up_as_the_damping_says():
+    states, _ = follow(comply(lambda _: 0.35), longest=0.4)  # (0.35 - 0.1) / (0.6 - 0.1)
+    speeds = [moved(FOREARM, a.q, b.q) / CYCLE for a, b in pairwise(states)]
+    assert speeds[-1] == pytest.approx(0.05, rel=0.01)
+    at = round(DAMPING / CYCLE)
+    assert speeds[at] == pytest.approx(0.05 * (1 - math.exp(-1)), rel=0.1)  # the arm's ramp is a cycle or two late
+    assert max(speeds) < 0.0505
+    assert all(b - a < 0.05 * CYCLE / DAMPING * 1.5 for a, b in pairwise(speeds))
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=20, max_size=20))
+@settings(max_examples=12)
+def test_however_it_is_pushed_it_moves_away_and_no_farther_than_allowed(levels):
+    reaction = Reaction(kind="comply", speed=0.1, distance=0.02, time_budget=0.8)
+    states, over = follow(comply(lambda t: levels[min(19, int(t / 0.04))], reaction))
+    assert isinstance(over, Done)
+    made = moved(FOREARM, Q, states[-1].q)
+    assert -1e-5 <= made <= 0.0201
+    assert over.progress == pytest.approx(made, abs=1e-3)  # progress is along the way, ``made`` along the first normal
+
+
+def test_no_push_no_motion_and_the_end_of_the_push_is_the_end():
+    states, over = follow(comply(lambda t: 0.05 if t < 0.1 else None))
+    assert states[-1].q == Q
+    assert over.reason == "the touch is over"
+
+
+def test_a_push_whose_place_is_not_known_holds_the_arm():
+    start = begin_admittance(ARM, ArmState(0.0, Q), Reaction(kind="comply"))
+    lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
+    after, step = admittance_step(start, ArmState(0.1, Q), [FOREARM, lost])
+    assert step.qd == ZERO_VELOCITY
+    assert step.clipped_by == ("place",)
+    assert after.plan is None
+
+
+# ---- back along the path
+
+
+def trail_of(points):
+    history = PathHistory()
+    for k, q in enumerate(points):
+        history.note(0.002 * k, q)
+    return history
+
+
+def arc(length, count=400):
+    """A way of two joints that is not straight."""
+    return [
+        tuple(
+            a + b for a, b in zip(Q, (length * s, 0.2 * math.sin(4 * length * s), 0.0, 0.1 * s, 0.0, 0.0), strict=True)
+        )
+        for s in (k / count for k in range(count + 1))
+    ]
+
+
+@pytest.mark.long
+@given(st.floats(0.1, 1.5), st.floats(0.02, 0.3))
+@settings(max_examples=12)
+def test_it_stays_on_the_way_and_no_point_goes_farther_than_the_distance(length, distance):
+    way = arc(length)
+    reaction = Reaction(kind="retreat", distance=distance, time_budget=10.0, arm_distance=1.0)
+    plan = plan_backtrack(ARM, ArmState(1.0, way[-1]), trail_of(way), reaction)
+    assert isinstance(plan, BacktrackPlan)
+    states, over = follow(lambda state: backtrack_step(plan, state), way[-1], 1.0, longest=11.0)
+    assert isinstance(over, Done), "it never ends"
+    for state in states[::10]:
+        # a centimetre ahead at most, at 1 m of reach or so: corners are cut by a part of 0.01 rad
+        assert min(max(abs(a - b) for a, b in zip(state.q, q, strict=True)) for q in way) < 0.01
+    here, there = (skeleton(ARM, state.q) for state in (states[0], states[-1]))
+    farthest = max(math.dist(a, b) for a, b in zip(here, there, strict=True))
+    assert farthest <= distance + 1e-4
+    assert over.complete == (plan.lengths[-1] >= distance)
+
+
+def test_an_arm_off_its_way_does_not_go_back():
+    way = arc(1.0)
+    plan = plan_backtrack(ARM, ArmState(1.0, way[-1]), trail_of(way), Reaction(kind="retreat"))
+    off = tuple(a + 0.06 for a in way[-1])
+    assert "rad off the way" in backtrack_step(plan, ArmState(1.0, off)).reason
+
+
+@pytest.mark.parametrize("points", [[], [Q], [Q] * 500])
+def test_an_arm_that_has_not_come_from_anywhere(points):
+    assert plan_backtrack(ARM, ArmState(1.0, Q), trail_of(points), Reaction(kind="retreat")) == Done(
+        "the arm has not come from anywhere"
+    )
+
+
+def test_a_trail_forgets():
+    history = trail_of(arc(1.0))
+    assert history.since(100.0) == []
+    for k in range(100_000):
+        history.note(float(k), (0.01 * k, 0, 0, 0, 0, 0))
+    assert len(history.since(-math.inf)) == 2000
+
+
+def test_a_joint_at_its_limit_ends_the_way_back():
+    top = ARM.joint_upper[2] - MARGIN
+    way = [(*Q[:2], top + 0.015 - 0.001 * k, *Q[3:]) for k in range(100)]  # it came from beyond the margin
+    plan = plan_backtrack(ARM, ArmState(1.0, way[-1]), trail_of(way), Reaction(kind="retreat", distance=0.3))
+    _, over = follow(lambda state: backtrack_step(plan, state), way[-1], 1.0)
+    assert over.reason == "joint 3 is at its limit on the way back"
+
+
+# ---- the table
+
+
+@pytest.mark.long
+@given(bent, normals, st.floats(-0.5, 0.8))
+@settings(max_examples=20)
+def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
+    contact = ContactOnLink(3, (0.2, 0.0, 0.0), unit(normal))
+    space = Workspace(ARM, TablePlane(height), avoid_self=False)
+    plan = plan_retreat(ARM, ArmState(0.0, q), [contact], Reaction(kind="retreat", distance=0.2), space)
+    assume(not isinstance(plan, Done))
+    states, over = follow(lambda state: RetreatMotion(plan).step(state, ()), q)
+    assert isinstance(over, Done)
+    before = skeleton(ARM, q)
+    last = states[-1]
+    braking = max(map(abs, last.qd)) / (2 * Reaction(kind="retreat").acceleration)
+    stood = tuple(a + braking * v for a, v in zip(last.q, last.qd, strict=True))  # where it comes to stand
+    for state_q in [*(state.q for state in states[::5]), stood]:
+        for was, now in zip(before[1:], skeleton(ARM, state_q)[1:], strict=True):
+            # one cycle at 0.5 m/s is 1 mm; the line between the corners is what is held above the table
+            assert now[2] >= min(height, was[2]) - 1.5e-3
+
+
+def test_the_table_is_named():
+    down = ContactOnLink(3, (0.2, 0.0, 0.0), unit(link_pose(ARM, Q, 3).inverse().rotate((0.0, 0.0, 1.0))))
+    plan = plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(kind="retreat"), Workspace(ARM, TablePlane(1.5)))
+    assert plan == Done("the table at 1500 mm is in the way")
+    low = Workspace(ARM, TablePlane(-1.0))
+    assert not isinstance(plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(kind="retreat"), low), Done)

@@ -1,0 +1,112 @@
+"""Each URScript function of the simulated controller does what its example says, and the page lists them all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from coneskin.robot.sim.builtins import Builtins
+from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.urscript.published_functions import NOT_SIMULATED
+from coneskin.robot.sim.urscript.translator import translate
+from coneskin.robot.sim.urscript.values import ScriptError
+
+from .function_examples import EXAMPLES, NO_EFFECT
+
+PAGE = Path(__file__).parents[3] / "docs" / "sim-ur.md"
+HOME = (0.1, -1.4, 1.5, -1.7, -1.4, 0.2)
+_ALL = {name: example for examples in EXAMPLES.values() for name, example in examples.items()}
+
+
+@pytest.mark.parametrize("name", _ALL)
+def test_the_example_of_each_function_holds(name: str) -> None:
+    *before, last = _ALL[name].splitlines()
+    body = [*before, f"if {last}:", "write_output_integer_register(0, 1)", "end"]
+    controller = Controller(Options(start_delay=0.0, start_q=HOME))
+    controller.load(translate("def p():\n" + "\n".join(body) + "\nend\n", Builtins.names(), Builtins.blocking()))
+    controller.step()
+    for _ in range(3000):
+        controller.step()
+        if controller.program is None:
+            break
+    assert f"{name}(" in _ALL[name]
+    assert controller.output_ints[0] == 1
+
+
+def test_every_function_has_an_example_and_none_is_simulated_and_refused_at_once() -> None:
+    assert set(_ALL) == Builtins.names()
+    assert set(_ALL) >= NO_EFFECT
+    assert not NOT_SIMULATED.keys() & Builtins.names()
+
+
+@pytest.mark.parametrize("name", ["modbus_add_signal", "path_offset_enable", "screw_driving"])
+def test_what_is_not_simulated_is_refused_by_name_and_line(name: str) -> None:
+    with pytest.raises(ScriptError, match=f"{name}: URScript, but not simulated") as refused:
+        translate(f"def p():\n  sync()\n  {name}(1)\nend\n", Builtins.names(), Builtins.blocking())
+    assert (refused.value.line, refused.value.column) == (3, 3)
+
+
+@pytest.mark.parametrize(
+    ("example", "words"),
+    [
+        ('str_at("Hello", 10)', "from 0 to 4"),
+        ('str_at("", 0)', "from 0 to -1"),
+        ('str_sub("abcde", -5, 50)', "from 0 to 5"),
+        ('to_num("one")', "is not a number"),
+        ('str_cat("' + "x" * 1000 + '", "' + "y" * 30 + '")', "at most 1023 characters"),
+        ('socket_open("192.0.2.1", 80)', "start it with --host"),
+        ('socket_open("example.org", 80)', "IPv4 address"),
+        ("set_tool_voltage(13)", "0, 12 or 24 V"),
+        ("set_standard_analog_out(0, 1.5)", "from 0 to 1"),
+        ("optimovej([0, 0, 0, 0, 0, 0], a=2)", "shares"),
+        ("movec(p[0,0,0,0,0,0], p[0,0,0,0,0,0], mode=3)", "mode of movec"),
+    ],
+)
+def test_what_no_controller_takes_ends_the_program(example: str, words: str) -> None:
+    controller = Controller(Options(start_delay=0.0))
+    failed: list[str] = []
+    controller.fail = lambda _, problem: failed.append(str(problem))  # type: ignore[method-assign]
+    controller.load(translate(f"def p():\n{example}\nend\n", Builtins.names(), Builtins.blocking()))
+    for _ in range(3):
+        controller.step()
+    assert words in failed[0]
+    assert controller.program is None
+
+
+@pytest.mark.parametrize(
+    "call",
+    ["direct_torque([1, 0, 0, 0, 0, 0])", "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,9,0,0,0], 2, [1,1,1,1,1,1])"],
+)
+def test_a_force_that_would_move_the_arm_is_told_once_and_moves_nothing(call: str) -> None:
+    controller = Controller(Options(start_delay=0.0))
+    text = f"def p():\n  while True:\n    {call}\n    sync()\n  end\nend\n"
+    controller.load(translate(text, Builtins.names(), Builtins.blocking()))
+    for _ in range(20):
+        controller.step()
+    assert ["not simulated" in str(notice) for notice in controller.notices].count(True) == 1
+    assert not controller.arm.moving
+
+
+def page_table() -> str:
+    """The page's list of functions, as this table has them."""
+    lines = ["| subject | functions |", "|---|---|"]
+    for subject, examples in EXAMPLES.items():
+        lines.append(f"| {subject} | {' '.join(f'`{name}`' for name in sorted(examples.keys() - NO_EFFECT))} |")
+    lines.append(f"| accepted, without an effect | {' '.join(f'`{name}`' for name in sorted(NO_EFFECT))} |")
+    subjects = sorted(set(NOT_SIMULATED.values()))
+    for subject in subjects:
+        names = sorted(name for name, of in NOT_SIMULATED.items() if of == subject)
+        lines.append(f"| refused by name: {subject} | {' '.join(f'`{name}`' for name in names)} |")
+    return "\n".join(lines)
+
+
+def test_the_page_lists_every_function() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    shown = text.split("<!-- functions -->")[1].split("<!-- end of functions -->")[0]
+    assert shown.strip() == page_table(), "python -m tests.robot.sim.test_functions prints the table anew"
+
+
+if __name__ == "__main__":
+    print(page_table())

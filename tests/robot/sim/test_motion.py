@@ -1,0 +1,233 @@
+"""The simulated arm: continuous, bounded, and it ends where it was sent."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coneskin.geometry.pose import Pose
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.sim.motion.arm import CYCLE, DEFAULT_DECELERATION, Motion, MotionFault, SimulatedArm, solve_linear
+from coneskin.robot.sim.motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
+from coneskin.robot.sim.motion.path_motions import JointLine, ToolLine
+
+ARM = arm_model("ur10e")
+HOME = (0.1, -1.4, 1.5, -1.7, -1.4, 0.2)
+LAW = settings(max_examples=40)
+
+
+def run(
+    arm: SimulatedArm, cycles: int, scale: float = 1.0, hold: bool = False
+) -> list[tuple[list[float], list[float]]]:
+    """The arm's positions and speeds, until it stands with nothing to do."""
+    track = []
+    for _ in range(cycles):
+        assert arm.step(scale, hold) == ""
+        track.append((arm.q, arm.qd))
+        if arm.motion is None and not arm.moving:
+            break
+    return track
+
+
+def lead(values: list[float]) -> float:
+    return max(abs(value) for value in values)
+
+
+def off(arm: SimulatedArm, target: list[float]) -> float:
+    return lead([a - b for a, b in zip(arm.q, target, strict=True)])
+
+
+@pytest.mark.parametrize(("speed", "acceleration"), [(1.0, 2.0), (0.3, 5.0), (2.0, 1.0)])
+def test_a_move_takes_the_time_of_its_trapezoid(speed: float, acceleration: float) -> None:
+    arm = SimulatedArm(ARM, HOME)
+    target = [q + 0.8 for q in HOME]
+    arm.motion = JointLine(arm, target, acceleration, speed)
+    cycles = len(run(arm, 5000))
+    peak = min(speed, math.sqrt(0.8 * acceleration))
+    # made up cycle by cycle: up to two cycles longer than the continuous one
+    assert 0 <= cycles * CYCLE - (0.8 / peak + peak / acceleration) <= 2 * CYCLE + 1e-9
+    assert off(arm, target) < 1e-12
+
+
+def test_a_tool_line_is_straight_and_ends_at_its_pose() -> None:
+    arm = SimulatedArm(ARM, HOME)
+    arm.tcp = Pose.from_xyz_rpy((0.0, 0.0, 0.1), (0.0, 0.1, 0.0))
+    start = arm.tcp_pose()
+    p, goal_p = start.translation, [a + b for a, b in zip(start.translation, (0.2, -0.1, 0.15), strict=True)]
+    goal = Pose((start @ Pose.from_xyz_rpy(rpy=(0.2, 0.1, -0.3))).rotation, (goal_p[0], goal_p[1], goal_p[2]))
+    arm.motion = ToolLine(arm, goal, 1.2, 0.25)
+    for q, _ in run(arm, 5000):
+        here = arm.tcp_pose(q).translation
+        along = math.dist(p, here) + math.dist(here, goal_p) - math.dist(p, goal_p)
+        assert along < 1e-12  # rounding of inverse kinematics
+    assert math.dist(arm.tcp_pose().translation, goal_p) < 1e-12
+
+
+def _motions(arm: SimulatedArm) -> dict[str, Callable[[], Motion]]:
+    pose = arm.tcp_pose()
+    x, y, z = pose.translation
+    return {
+        "line": lambda: JointLine(arm, [q + 0.3 for q in HOME], 3.0, 1.0),
+        "back": lambda: JointLine(arm, HOME, 3.0, 1.0),
+        "tool": lambda: ToolLine(arm, Pose(pose.rotation, (x + 0.05, y, z + 0.05)), 1.0, 0.3),
+        "speedj": lambda: SpeedJoints([0.2, -0.1, 0.3, 0.0, 0.1, 0.5], 3.0),
+        "speedl": lambda: SpeedTool(arm, [0.05, -0.03, 0.02, 0.0, 0.1, 0.0], 1.0, 1.0),
+        "servo": lambda: ServoJoints([q + 0.1 for q in HOME], 0.1, 300.0),
+        "stopj": lambda: StopJoints(5.0),
+        "stopl": lambda: StopTool(arm, 2.0, 5.0),
+    }
+
+
+@LAW
+@given(st.integers(0, 10_000))
+def test_any_sequence_is_continuous_with_bounded_acceleration(seed: int) -> None:
+    """Motions cut off at random by others, slider and holds at random."""
+    draw = random.Random(seed)
+    arm = SimulatedArm(ARM, HOME)
+    for _ in range(8):
+        motions = _motions(arm)
+        arm.motion = motions[draw.choice(list(motions))]() if draw.random() < 0.9 else None
+        scale, hold = draw.choice([1.0, 1.0, 0.5, 0.0]), draw.random() < 0.2
+        for _ in range(draw.randint(1, 150)):
+            q, qd = arm.q, arm.qd
+            assert arm.step(scale, hold) == ""
+            # servoj is given 40 rad/s2, and a new path may add its own acceleration to the dying speed of the last
+            assert lead([a - b for a, b in zip(arm.qd, qd, strict=True)]) < 45.0 * CYCLE
+            for a, b, c, d in zip(arm.q, q, arm.qd, qd, strict=True):
+                # the way of one cycle is that of the mean speed, to what 45 rad/s2 can change in it
+                assert abs(a - b - 0.5 * (c + d) * CYCLE) < 0.5 * 45.0 * CYCLE**2
+
+
+@pytest.mark.parametrize("name", ["line", "tool", "speedj", "speedl", "servo"])
+def test_a_hold_stops_every_motion_and_its_end_lets_it_go_on(name: str) -> None:
+    arm = SimulatedArm(ARM, HOME)
+    arm.motion = _motions(arm)[name]()
+    run(arm, 60)
+    fast = lead(arm.qd)
+    assert fast > 0.01
+    motion = arm.motion
+    run(arm, math.ceil(fast / DEFAULT_DECELERATION / CYCLE) + 3, hold=True)
+    assert lead(arm.qd) < 1e-9
+    arm.motion = motion
+    run(arm, 40)
+    assert lead(arm.qd) > 0.01
+
+
+def test_a_stop_takes_the_leading_joints_speed_over_its_deceleration() -> None:
+    arm = SimulatedArm(ARM, HOME)
+    arm.motion = SpeedJoints([1.0, 0.5, 0.0, -0.25, 0.0, 0.0], 10.0)
+    run(arm, 100)
+    before = arm.qd
+    arm.motion = StopJoints(4.0)
+    track = run(arm, 1000)
+    assert len(track) == 125  # 1 rad/s / 4 rad/s2 = 0.25 s
+    assert track[50][1] == pytest.approx([speed * (1 - 51 / 125) for speed in before])  # all in proportion
+
+
+def test_the_slider_scales_speed_and_a_stop_does_not_wait_for_it() -> None:
+    arm = SimulatedArm(ARM, HOME)
+    arm.motion = SpeedJoints([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 10.0)
+    run(arm, 200, scale=0.5)
+    assert arm.qd[0] == pytest.approx(0.5)
+    arm.motion = StopJoints(5.0)
+    assert len(run(arm, 1000, scale=0.0)) == 50  # 0.5 rad/s / 5 rad/s2
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_joint_limit_stops_the_arm_before_it_is_passed(joint: int, sign: float) -> None:
+    arm = SimulatedArm(ARM, HOME)
+    speeds = [0.0] * 6
+    speeds[joint] = sign * 1.5
+    arm.motion = SpeedJoints(speeds, 5.0)
+    faults = [fault for _ in range(6000) if (fault := arm.step(1.0, False))]
+    assert faults == [fault for fault in faults if f"joint {joint + 1}" in fault]
+    assert len(faults) == 1
+    assert not arm.moving
+    limit = (ARM.joint_upper if sign > 0 else ARM.joint_lower)[joint]
+    assert 0.0 <= sign * (limit - arm.q[joint]) < 0.01  # within one cycle's way of the limit
+
+
+def test_speeds_beyond_a_joints_limit_are_a_fault() -> None:
+    arm = SimulatedArm(ARM, HOME)
+    arm.motion = SpeedJoints([3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 40.0)
+    faults = [fault for _ in range(300) if (fault := arm.step(1.0, False))]
+    assert "joint 1: speed 2." in faults[0]
+    assert "above its limit 2.09" in faults[0]
+    assert not arm.moving
+
+
+def test_a_move_is_slowed_to_what_its_joints_can_do() -> None:
+    arm = SimulatedArm(ARM, HOME)
+    arm.motion = JointLine(arm, [HOME[0] + 2.0, *HOME[1:]], 20.0, 3.0)
+    assert max(lead(qd) for _, qd in run(arm, 2000)) == pytest.approx(ARM.joint_speed[0])
+
+
+def test_a_singular_position_stops_a_tool_speed() -> None:
+    arm = SimulatedArm(ARM, (0.1, -1.4, 0.3, -1.7, -1.4, 0.2))
+    arm.motion = SpeedTool(arm, [-0.05, 0.0, 0.3, 0.0, 0.0, 0.0], 1.0, 1.0)
+    faults = [fault for _ in range(6000) if (fault := arm.step(1.0, False))]
+    assert faults
+    assert not arm.moving
+
+
+def test_a_pose_out_of_reach_is_refused_before_the_arm_moves() -> None:
+    arm = SimulatedArm(ARM, HOME)
+    with pytest.raises(MotionFault, match="cannot bring its flange"):
+        ToolLine(arm, Pose(translation=(3.0, 0.0, 0.0)), 1.0, 0.25)
+
+
+def test_solve_solves_and_refuses_singular_equations() -> None:
+    draw = random.Random(1)
+    rows = [[draw.uniform(-1, 1) for _ in range(6)] for _ in range(6)]
+    x = [draw.uniform(-1, 1) for _ in range(6)]
+    right = [sum(a * b for a, b in zip(row, x, strict=True)) for row in rows]
+    assert solve_linear(rows, right) == pytest.approx(x, abs=1e-11)  # condition about 1e2
+    with pytest.raises(MotionFault, match="singular"):
+        solve_linear([rows[0], *rows[:5]], right)
+
+
+def test_joint_speeds_invert_the_jacobian() -> None:
+    arm = SimulatedArm(ARM, HOME)
+    arm.tcp = Pose.from_xyz_rpy((0.05, -0.02, 0.2), (0.1, 0.2, 0.3))
+    arm.qd = arm.joint_speeds([0.1, -0.2, 0.05, 0.3, -0.1, 0.2])
+    assert arm.twist() == pytest.approx([0.1, -0.2, 0.05, 0.3, -0.1, 0.2], abs=1e-12)
+    step = 1e-6  # truncation 1e-12, rounding 1e-10
+    ahead = arm.tcp_pose([q + step * qd for q, qd in zip(arm.q, arm.qd, strict=True)]).translation
+    behind = arm.tcp_pose([q - step * qd for q, qd in zip(arm.q, arm.qd, strict=True)]).translation
+    assert [(a - b) / (2 * step) for a, b in zip(ahead, behind, strict=True)] == pytest.approx(
+        [0.1, -0.2, 0.05], abs=1e-8
+    )
+
+
+@pytest.mark.parametrize(("lookahead", "gain"), [(0.1, 300.0), (0.2, 100.0), (0.03, 2000.0), (0.05, 600.0)])
+def test_servoj_is_the_second_order_follower_of_its_gain_and_look_ahead_time(lookahead: float, gain: float) -> None:
+    """A small step overshoots by exp(-pi z / sqrt(1 - z^2)), z = lookahead sqrt(gain) / 2; not at all where z >= 1."""
+    arm = SimulatedArm(ARM, HOME)
+    step = 1e-3  # so small that no limit acts
+    arm.motion = ServoJoints([q + step for q in HOME], lookahead, gain)
+    highest = 0.0
+    for _ in range(2000):
+        assert arm.step(1.0, False) == ""
+        highest = max(highest, arm.q[0] - HOME[0])
+    damping = lookahead * math.sqrt(gain) / 2.0
+    ideal = math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2)) if damping < 1.0 else 0.0
+    assert highest / step - 1.0 == pytest.approx(ideal, abs=0.02)  # steps of 2 ms: 1 / 22 of the quickest time constant
+    assert arm.q[0] == pytest.approx(HOME[0] + step, abs=1e-8)
+
+
+def test_servoj_lags_a_moving_target_by_its_look_ahead_time() -> None:
+    arm = SimulatedArm(ARM, HOME)
+    arm.motion = motion = ServoJoints(HOME, 0.1, 300.0)
+    speed = 0.5
+    for cycle in range(1, 1001):
+        target = [HOME[0] + speed * cycle * CYCLE, *HOME[1:]]
+        motion.retarget(target, 0.1, 300.0)
+        arm.step(1.0, False)
+    assert arm.qd[0] == pytest.approx(speed, abs=1e-6)
+    assert target[0] - arm.q[0] == pytest.approx(speed * 0.1, abs=speed * CYCLE)

@@ -1,0 +1,266 @@
+"""The sockets of the simulated controller, in this process and cycle by cycle: no wheel, no waiting."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+
+import pytest
+
+from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.process import free_host
+from coneskin.robot.sim.server import PORTS, Server
+from coneskin.robot.ur.rtde_codec import Packet, PacketKind, Recipe, pack_outputs_request, pack_start_request, split
+
+NAMES = ("timestamp", *(f"output_double_register_{i}" for i in range(48)))
+
+
+def turn(server: Server, cycles: int) -> None:
+    for _ in range(cycles):
+        server._poll(0.0)
+        server._cycle()
+        server._publish()
+
+
+def read_all(sock: socket.socket, server: Server, cycles: int) -> list[Packet]:
+    """Return the packets of a client that reads in each cycle while the server goes on."""
+    sock.setblocking(False)
+    packets, rest = [], b""
+    for _ in range(cycles):
+        turn(server, 1)
+        try:
+            while data := sock.recv(65536):
+                more, rest = split(rest + data)
+                packets += more
+        except BlockingIOError:
+            pass
+    return packets
+
+
+def test_a_client_that_does_not_read_gets_whole_packets_and_the_newest_later() -> None:
+    controller = Controller(Options())
+    with Server(controller, free_host()) as server, socket.socket() as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        deaf.connect((server.host, PORTS["RTDE"]))
+        deaf.sendall(pack_outputs_request(NAMES) + pack_start_request())
+        server._poll(1.0)
+        (client,) = server._clients["RTDE"]
+        client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+        turn(server, 2000)
+        assert controller.cycle == 2000  # the cycle does not wait for it
+        assert 0 < len(client.unsent) <= Recipe(NAMES).size + 3  # nothing piles up
+        packets = read_all(deaf, server, 200)
+        data = [packet for packet in packets if packet.kind is PacketKind.DATA]
+        stamps = [float(str(Recipe(NAMES).unpack(packet.payload)[0])) for packet in data]
+        assert stamps == sorted(stamps)
+        assert len(stamps) < 1000  # what it could not read was skipped
+        assert stamps[-1] > 2000 * 0.002  # and now it is up to date
+
+
+def test_a_client_that_reads_nothing_for_ten_seconds_is_dropped() -> None:
+    controller = Controller(Options())
+    with Server(controller, free_host()) as server, socket.socket() as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        deaf.connect((server.host, PORTS["RTDE"]))
+        deaf.sendall(pack_outputs_request(NAMES) + pack_start_request())
+        server._poll(1.0)
+        (client,) = server._clients["RTDE"]
+        client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+        since = None
+        while not client.unsent or client.stuck_since != since:  # until the system takes nothing more
+            since = client.stuck_since
+            turn(server, 200)
+        client.stuck_since -= 11.0
+        turn(server, 1)
+        assert server._clients["RTDE"] == []
+
+
+def test_a_client_that_goes_gives_its_inputs_back() -> None:
+    from coneskin.robot.ur.rtde_codec import pack_inputs_request
+
+    controller = Controller(Options())
+    with Server(controller, free_host()) as server:
+        with socket.create_connection((server.host, PORTS["RTDE"])) as sock:
+            sock.sendall(pack_inputs_request(("input_int_register_0",)))
+            server._poll(1.0)
+            server._poll(1.0)
+            assert list(controller.inputs.owners) == ["input_int_register_0"]
+        server._poll(1.0)
+        assert controller.inputs.owners == {}
+
+
+def test_a_program_that_another_overtakes_while_it_is_translated_never_starts() -> None:
+    controller = Controller(Options(start_delay=0.002))
+    long = "def long():\n" + "  set_standard_digital_out(0, True)\n" * 400 + "  sleep(100)\nend\n"
+    with Server(controller, free_host()) as server:
+        with socket.create_connection((server.host, PORTS["primary"])) as sock:
+            sock.sendall(long.encode() + b"def short():\n  sleep(100)\nend\n")
+            while controller.program is None:
+                turn(server, 1)
+        server._compiler.__exit__()  # the long one is translated by now
+        turn(server, 10)
+        assert controller.program.name == "short"
+        assert controller.digital_outputs == 0
+
+
+def test_a_cut_network_drops_packets_both_ways_and_closes_nothing() -> None:
+    controller = Controller(Options(start_delay=0.002))
+    with Server(controller, free_host()) as server:
+        script = socket.create_connection((server.host, PORTS["realtime"]))
+        rtde = socket.create_connection((server.host, PORTS["RTDE"]))
+        rtde.sendall(pack_outputs_request(NAMES) + pack_start_request())
+        turn(server, 5)
+        assert read_all(rtde, server, 20)
+        assert server.faults.answer("cut network") == '{"result": true}'
+        read_all(rtde, server, 1)  # what was on its way
+        script.sendall(b"def late():\n  sleep(100)\nend\n")
+        cycle = controller.cycle
+        assert read_all(rtde, server, 50) == []
+        assert controller.cycle == cycle + 50  # the arm lives
+        assert controller.program is None
+        with pytest.raises(TimeoutError):
+            socket.create_connection((server.host, PORTS["dashboard"]), 0.1)
+        server.faults.answer("restore scripts")
+        while controller.program is None:  # what was sent meanwhile arrives
+            turn(server, 1)
+        assert read_all(rtde, server, 20) == []  # the others are still cut
+        server.faults.answer("restore network")
+        assert read_all(rtde, server, 20)
+        with socket.create_connection((server.host, PORTS["dashboard"]), 1.0) as new:
+            turn(server, 20)
+            assert new.recv(100).startswith(b"Connected")
+        script.close()
+        rtde.close()
+
+
+def read_some(sock: socket.socket, server: Server, cycles: int) -> bytes:
+    sock.setblocking(False)
+    got = b""
+    for _ in range(cycles):
+        turn(server, 1)
+        with contextlib.suppress(BlockingIOError):
+            got += sock.recv(1 << 20)
+    return got
+
+
+def client_packets(data: bytes) -> list[tuple[int, bytes]]:
+    """Cut what a client interface has sent into (kind, packet)."""
+    found = []
+    while data:
+        size = int.from_bytes(data[:4], "big")
+        found.append((data[4], data[:size]))
+        data = data[size:]
+    return found
+
+
+def test_the_primary_interface_tells_of_a_program_and_of_its_mistake() -> None:
+    with Server(Controller(Options()), free_host()) as server, socket.socket() as client:
+        client.connect((server.host, PORTS["primary"]))
+        server._poll(1.0)  # each waits until the bytes are there
+        client.sendall(b'def good():\n  textmsg("hello")\n  sync()\nend\n')
+        server._poll(1.0)
+        got = read_some(client, server, 60)
+        client.sendall(b"def bad():\n  no_such()\nend\n")
+        server._poll(1.0)
+        packets = client_packets(got + read_some(client, server, 60))
+        assert [kind for kind, _ in packets[:2]] == [20, 16]  # version, state
+        messages = b"".join(packet for kind, packet in packets if kind == 20)
+        for text in (b"PROGRAM_XXX_STARTEDgood", b"hello", b"PROGRAM_XXX_STOPPEDgood"):
+            assert text in messages
+        assert b"\x0a\0\0\0\x02\0\0\0\x03compile_error_name_not_found:no_such:" in messages  # line 2, column 3
+        assert sum(kind == 16 for kind, _ in packets) == 3  # and ten more a second
+
+
+def test_the_secondary_interface_sends_the_state_alone_and_the_realtime_one_each_cycle() -> None:
+    with Server(Controller(Options()), free_host()) as server:
+        with socket.socket() as secondary, socket.socket() as realtime:
+            secondary.connect((server.host, PORTS["secondary"]))
+            realtime.connect((server.host, PORTS["realtime"]))
+            server._poll(1.0)
+            server._poll(1.0)
+            secondary.sendall(b'textmsg("hello")\n')
+            server._poll(1.0)
+            fast = read_some(realtime, server, 100)
+            slow = client_packets(read_some(secondary, server, 2))
+        assert [kind for kind, _ in slow] == [20, 16, 16, 16]
+        assert len(fast) // 1220 >= 100
+        assert len(fast) % 1220 == 0
+
+
+def test_one_that_uploads_and_never_reads_stays_connected_and_holds_nothing_up() -> None:
+    controller = Controller(Options())
+    with Server(controller, free_host()) as server, socket.socket() as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        deaf.connect((server.host, PORTS["realtime"]))
+        server._poll(1.0)
+        (client,) = server._clients["realtime"]
+        client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+        for _ in range(100):  # until the system takes nothing more for it
+            turn(server, 200)
+            if client.unsent:
+                break
+        assert 0 < len(client.unsent) <= 1220
+        deaf.sendall(b"def late():\n  while True:\n    sync()\n  end\nend\n")
+        server._poll(1.0)
+        turn(server, 20)
+        assert controller.program is not None
+        assert controller.program.name == "late"
+
+
+def test_the_commands_of_the_client_library_act_on_the_power_and_the_stop() -> None:
+    controller = Controller(Options())
+    with Server(controller, free_host()) as server, socket.socket() as client:
+        client.connect((server.host, PORTS["primary"]))
+        server._poll(1.0)
+
+        def send(line: str) -> str:
+            client.sendall(line.encode() + b"\n")
+            server._poll(1.0)
+            return f"{controller.robot_mode.name} {controller.safety.name}"
+
+        assert send("power off") == "POWER_OFF NORMAL"
+        assert send("power on") == "IDLE NORMAL"
+        assert send("set robotmode run") == "RUNNING NORMAL"
+        controller.protective_stop("test")
+        assert send("set unlock protective stop") == "RUNNING NORMAL"
+
+
+def test_the_dashboard_ends_a_connection_that_has_said_quit() -> None:
+    with Server(Controller(Options()), free_host()) as server, socket.socket() as client:
+        client.connect((server.host, PORTS["dashboard"]))
+        server._poll(1.0)
+        client.sendall(b"robotmode\nquit\n")
+        server._poll(1.0)
+        said = client.makefile("rb").read()  # until the other side has closed
+        assert said.splitlines()[1:] == [b"Robotmode: RUNNING", b"Disconnected"]
+        assert server._clients["dashboard"] == []
+
+
+def test_the_robot_api_is_served_where_it_is_asked_for() -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    options = Options(version=(10, 12), robot_api_port=port)
+    with Server(Controller(options), free_host()) as server, socket.socket() as client:
+        client.connect((server.host, port))
+        server._poll(1.0)
+        client.sendall(b"GET /universal-robots/robot-api/robotstate/v1/robotmode HTTP/1.1\r\nHost: a\r\n\r\n")
+        server._poll(1.0)
+        assert client.recv(65536).endswith(b'{"mode": "RUNNING"}')
+    with Server(Controller(Options()), free_host()) as server, pytest.raises(ConnectionRefusedError):
+        socket.create_connection((server.host, port), 1.0)
+
+
+def test_ten_clients_of_each_service_are_greeted_and_looked_after() -> None:
+    with Server(Controller(Options()), free_host()) as server, contextlib.ExitStack() as stack:
+        for name, port in PORTS.items():
+            for _ in range(10):
+                stack.enter_context(socket.create_connection((server.host, port), 1.0))
+                server._poll(1.0)
+            clients = server._clients[name]
+            assert len(clients) == 10
+            # one that is gone without a word is noticed by the operating system
+            assert all(client.socket.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) for client in clients)
+        turn(server, 100)
+        assert all(len(clients) == 10 for name, clients in server._clients.items() if name in PORTS)

@@ -1,0 +1,184 @@
+"""Stops without a guard: not given up while the arm moves, quiet while a protective stop works; blind, they end."""
+
+import pytest
+
+from coneskin.errors import RobotConnectionError
+from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.stop import backup_stop as module
+from coneskin.robot.stop.backup_stop import BackupStop
+from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.stop.standstill_hold import StandstillHold
+from coneskin.robot.ur.driver import UR_DRIVER
+from coneskin.robot.ur.state_reader import RECIPE
+
+Q = (0.0, -1.6, 1.6, -1.6, -1.6, 0.0)
+
+
+class World:
+    """Controller, ports and time in one: every look at the clock takes half a millisecond."""
+
+    host = "nowhere"
+
+    def __init__(self, monkeypatch, speed=1.0, obeys=()):
+        self.now, self.speed, self.obeys = 0.0, speed, obeys
+        self.used = []
+        self.safety = 1
+        self.playing, self.talks, self.told = True, True, 0.0
+        self.closed = self.opened = 0
+        monkeypatch.setattr(module, "wait_readable", lambda *_: [])
+
+    def clock(self):
+        self.now += 0.0005
+        return self.now
+
+    # driver
+
+    decode_state = staticmethod(UR_DRIVER.decode_state)
+
+    def state_reader(self, host, timeout):
+        return self
+
+    # stops
+
+    def use(self, path, deceleration):
+        self.used.append((self.now, path, deceleration))
+        if path in self.obeys:
+            self.speed = 0.0
+        return True
+
+    def reopen(self):
+        return False
+
+    def drain(self):
+        return []
+
+    # states
+
+    def __enter__(self):
+        if not self.talks:
+            raise RobotConnectionError("refused")
+        self.opened += 1
+        return self
+
+    def read(self):
+        if not self.talks or self.now - self.told < 0.002:
+            return []
+        self.told = self.now
+        qd = (self.speed, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return [RECIPE.pack([self.now, Q, qd, 7, self.safety, 2 if self.playing else 1, (0.0,) * 6, (0.0,) * 6])]
+
+    def close(self):
+        self.closed += 1
+
+    def paths(self, since=0.0):
+        return [path for time, path, _ in self.used if time >= since]
+
+
+@pytest.fixture
+def world(monkeypatch):
+    return World(monkeypatch)
+
+
+def stopper(world):
+    return BackupStop(world, world, MonitoringLimits(), 10.0, world, world.clock)
+
+
+def test_the_first_stop_is_out_before_anything_else_and_one_is_enough(world):
+    world.obeys = (StopPath.PROGRAM,)
+    assert stopper(world).stop() is True
+    assert [(path, a) for _, path, a in world.used] == [(StopPath.PROGRAM, 10.0)]
+    assert stopper(world).stop(4.0) is True
+    assert world.used[-1][2] == 4.0
+
+
+def test_while_the_arm_moves_it_is_not_given_up_and_a_protective_stop_is_left_to_work(world):
+    end = 60.0
+    assert stopper(world).stop(over=lambda: world.now > end) is False
+    assert world.now > end
+    last = 0.0
+    protective = [time for time, path, _ in world.used if path is StopPath.PROTECTIVE]
+    assert len(protective) > 10
+    for time in protective:  # nothing soon after it: the next program would replace it
+        later = [other for other, *_ in world.used if other > time]
+        assert not later or later[0] - time >= 4.0 * MonitoringLimits().escalate
+        last = time
+    assert last > end - 10.0
+
+
+def test_a_stop_begun_soon_after_a_protective_one_does_not_replace_it(world):
+    ours = stopper(world)
+    ours.stop(over=lambda: StopPath.PROTECTIVE in world.paths())
+    count, at = len(world.used), world.now
+    ours.stop(over=lambda: world.now > at + 0.05)
+    assert len(world.used) == count
+
+
+def test_without_a_state_it_ends_in_time(world):
+    world.talks = False
+    assert stopper(world).stop() is False
+    assert 2.0 <= world.now < 3.0
+    assert set(world.paths()) == {StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE}
+
+
+# ---- stop_settings watch
+
+
+def let_pass(world, hold, seconds):
+    end, stops = world.now + seconds, 0
+    while world.now < end:
+        stops += hold.look()
+    return stops
+
+
+def test_a_program_is_stopped_again_and_a_person_is_left_alone(world):
+    world.obeys = (StopPath.PROGRAM,)
+    hold = StandstillHold(stopper(world), MonitoringLimits().standstill, world.clock)
+    assert hold.look() is False  # the first stop; it may be a standstill between two starts
+    assert hold.stands is False
+    assert let_pass(world, hold, 1.0) == 1
+    assert hold.stands is True
+    assert let_pass(world, hold, 1.0) == 0
+    world.speed = 0.02  # just above what counts as standing
+    assert let_pass(world, hold, 0.1) == 0
+    assert world.speed == 0.0
+    assert hold.stands is False
+    assert let_pass(world, hold, 1.0) == 1
+    world.playing, world.speed = False, 0.5
+    assert let_pass(world, hold, 1.0) == 0
+    assert world.speed == 0.5
+
+
+def test_without_states_stops_are_repeated_and_with_them_it_sees_again(world):
+    world.obeys = (StopPath.PROGRAM,)
+    hold = StandstillHold(stopper(world), MonitoringLimits().standstill, world.clock)
+    hold.begin()
+    let_pass(world, hold, 1.0)
+    assert hold.stands is True
+    world.talks = False
+    since = world.now
+    let_pass(world, hold, 1.5)
+    assert hold.failed is False
+    let_pass(world, hold, 8.5)
+    assert hold.stands is False
+    assert hold.failed is True  # or a watchdog would stay for ever beside a controller that is gone
+    assert 5 <= world.paths(since).count(StopPath.PROGRAM) <= 12  # about one a second
+    assert StopPath.PROTECTIVE not in world.paths(since)  # nobody has seen it move
+    world.talks, world.speed = True, 1.0
+    let_pass(world, hold, 3.0)
+    assert hold.stands is True
+    assert hold.failed is False
+    assert world.opened >= 1
+
+
+def test_a_program_that_starts_again_gets_a_protective_stop_until_the_controller_shows_it(world):
+    world.obeys = (StopPath.PROGRAM, StopPath.PROTECTIVE)
+    hold = StandstillHold(stopper(world), MonitoringLimits().standstill, world.clock)
+    hold.begin()
+    assert StopPath.PROTECTIVE not in world.paths()
+    world.speed = 1.0
+    let_pass(world, hold, 0.3)
+    assert world.paths().count(StopPath.PROTECTIVE) > 1
+    assert hold.stands is False
+    world.safety = 0b10000000100
+    assert let_pass(world, hold, 0.01) == 1
+    assert hold.stands is True

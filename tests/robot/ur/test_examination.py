@@ -1,0 +1,40 @@
+"""Examination of a controller, against the simulated one: what another client holds, and what is not there."""
+
+import pytest
+
+from coneskin.finding import Finding
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.examination import ExaminationScope
+from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.ur.examination import examine
+from coneskin.robot.ur.rtde_connection import RtdeConnection
+
+ALL = ExaminationScope(control=True, slider=True, setpoints=True, heartbeat=True)
+
+
+def verdicts(findings: list[Finding]) -> dict[str, str]:
+    return {one.item.removeprefix("arm, "): one.verdict for one in findings}
+
+
+def test_where_no_controller_is_the_rest_is_not_tried() -> None:
+    first, *rest = examine(arm_model("UR5e"), free_host(), ALL)
+    assert (first.item, first.verdict) == ("arm, RTDE", "bad")
+    assert "coneskin sim-ur" in first.remedy
+    assert {one.verdict for one in rest} == {"not tried"}
+
+
+@pytest.mark.long
+def test_a_controller_is_examined_and_what_others_hold_is_named() -> None:
+    with SimulatedController("UR5e", free_host()) as simulated:
+        found = examine(arm_model("UR5e"), simulated.host, ALL)
+        assert {name for name, verdict in verdicts(found).items() if verdict not in ("ok", "warning")} == set()
+        assert verdicts(found).keys() >= {"RTDE", "model", "power", "safety", "dashboard", "remote control", "latency"}
+        held = ["input_int_register_0", "speed_slider_mask", "speed_slider_fraction"]
+        with RtdeConnection(simulated.host) as other:
+            other.ask_inputs(held)
+            again = examine(arm_model("UR10e"), simulated.host, ALL._replace(setpoints=False))
+        bad = {one.item: one for one in again if one.verdict == "bad"}
+        assert set(bad) == {"arm, model", "arm, ur_rtde's registers", "arm, the speed slider"}
+        assert "UR5e" in bad["arm, model"].value
+        assert "disable EtherNet/IP" in bad["arm, ur_rtde's registers"].remedy
+        assert verdicts(again)["the setpoints' registers"] == "not tried"

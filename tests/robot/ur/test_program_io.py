@@ -1,0 +1,59 @@
+"""Variables and outputs for the guarded program, against the simulated controller in a process of its own."""
+
+import time
+
+import pytest
+
+from coneskin.errors import RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.ur.variable_reader import RtdeVariableReader
+from coneskin.testing.forearm import START
+
+pytestmark = pytest.mark.long
+
+
+@pytest.fixture(scope="module")
+def controller():
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+        yield simulated
+
+
+def until(what):
+    for _ in range(2000):
+        if what():
+            return
+        time.sleep(0.005)
+    raise AssertionError("it did not happen in time")
+
+
+def until_refused(read):
+    """Read until the connection is known to be gone."""
+
+    def is_refused():
+        try:
+            read()
+        except RobotConnectionError as exc:
+            return "the state of the arm cannot be read" in str(exc)
+        return False
+
+    until(is_refused)
+
+
+def test_a_value_is_never_old_and_a_connection_that_is_gone_is_opened_again(controller) -> None:
+    with RtdeVariableReader(controller.host, timeout=0.3) as reader:
+        assert reader.value("actual_q") == pytest.approx(START)
+        assert reader.value("joint_temperatures") == (30.0,) * 6  # not among the usual ones
+        before = reader.value("timestamp")
+        controller.freeze()
+        try:
+            with pytest.raises(RobotTimeout, match=r"has sent no state for 0\.3 s"):
+                until(lambda: reader.reading() is None)  # the last state is fresh for 0.1 s
+        finally:
+            controller.thaw()
+        reader._timeout = 5.0
+        assert reader.value("timestamp") >= before
+        controller.call("close rtde")
+        until_refused(lambda: reader.value("timestamp"))
+        assert reader.reading().q == pytest.approx(START)
+        with pytest.raises(RobotRefused, match="RTDE has no variable named actual_qqq"):
+            reader.value("actual_qqq")

@@ -1,0 +1,162 @@
+"""State reader and stop sockets against the simulated controller, and against peers that misbehave."""
+
+import math
+import socket
+import threading
+
+import pytest
+
+from coneskin.errors import RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.ur import rtde_codec, rtde_connection
+from coneskin.robot.ur.state_reader import RECIPE, StateReader, decode_state
+from coneskin.robot.ur.stop_sockets import StopSockets
+
+ZEROS = (0.0,) * 6
+Q = (0.1, -1.2, 1.3, -1.4, -1.5, 0.6)
+
+
+@pytest.fixture(scope="module")
+def controller():
+    with SimulatedController(model="ur5e", host=free_host(), start_q=Q) as simulated:
+        yield simulated
+
+
+def test_it_reads_what_the_controller_does(controller):
+    with StateReader(controller.host) as reader:
+        first, second = reader.wait(2.0), reader.wait(2.0)
+    assert first.q == pytest.approx(Q, abs=1e-9)  # degrees on the simulator's command line
+    assert first.speed == 0.0
+    assert first.powered
+    assert not first.stopped_by_safety
+    cycles = (second.controller_time - first.controller_time) / 0.002
+    assert cycles == pytest.approx(round(cycles), abs=1e-6)
+    assert round(cycles) >= 1
+    reader.close()
+    with pytest.raises(RobotConnectionError, match="is not open"):
+        reader.read()
+
+
+def test_it_reads_the_currents_that_the_motors_take(controller):
+    controller.call("resist 2 3.5")
+    with StateReader(controller.host) as reader:
+        state = reader.wait(2.0)
+    controller.call("resist 2 0")
+    assert state.current == (0.0, 3.5, 0.0, 0.0, 0.0, 0.0)
+    assert state.target_current == ZEROS
+
+
+@pytest.mark.parametrize("line", ["resist 7 1", "resist 2", "resist 2 nan", "resist 2 1 1"])
+def test_a_current_that_cannot_be_is_refused(controller, line):
+    with pytest.raises(RobotConnectionError, match=r"refuses .resist"):
+        controller.call(line)
+
+
+def test_a_state_without_currents_has_none_and_one_with_nonsense_is_refused():
+    modes = (0.0, ZEROS, ZEROS, 7, 1, 2)
+    old = RECIPE.pack((*modes, ZEROS, ZEROS))[: -2 * 6 * 8]
+    assert decode_state(0.0, old).current is None
+    with pytest.raises(RobotConnectionError, match="motor currents are not finite"):
+        decode_state(0.0, RECIPE.pack((*modes, (math.nan,) * 6, ZEROS)))
+
+
+def test_safety_bits_and_modes_mean_what_the_manual_says():
+    def state(mode=7, bits=1, runtime=2):
+        qd = (0.0, -3.0, 2.0, 0.0, 0.0, 0.0)
+        return decode_state(0.0, RECIPE.pack((0.0, ZEROS, qd, mode, bits, runtime, ZEROS, ZEROS)))
+
+    assert state().speed == 3
+    assert not state(bits=0b11).stopped_by_safety  # normal and reduced
+    assert [bit for bit in range(11) if state(bits=1 << bit).stopped_by_safety] == [*range(2, 11)]
+    assert not state(mode=5).powered
+    assert state().program_running
+    assert not state(runtime=4).program_running
+    with pytest.raises(RobotConnectionError, match="must hold"):
+        decode_state(0.0, b"\x01")
+
+
+def test_external_stops_reach_the_arm(controller):
+    with StopSockets(controller.host) as stops, StateReader(controller.host) as reader:
+        assert list(stops.sockets()) == ["program", "command"]
+        stops.drain()
+        for path in (StopPath.PROGRAM, StopPath.COMMAND):
+            assert stops.use(path, 5.0)
+        assert stops.use(StopPath.PROTECTIVE, 5.0)
+        for _ in range(500):
+            if reader.wait(2.0).stopped_by_safety:
+                break
+        else:
+            pytest.fail("the protective stop did not reach the controller")
+    assert stops.use(StopPath.PROGRAM, 5.0) is False
+    stops.close()
+
+
+class Peer:
+    """Something on the RTDE port that is no controller: answers each read with the next of these bytes."""
+
+    def __init__(self, *answers, close=True):
+        self.host = free_host()
+        self._server = socket.create_server((self.host, rtde_connection.PORT))
+        self._answers, self._close = answers, close
+        self._thread = threading.Thread(target=self._serve)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def _serve(self):
+        client, _ = self._server.accept()
+        with client:
+            for answer in self._answers:
+                client.recv(4096)
+                client.sendall(answer)
+            if not self._close:
+                client.recv(4096)  # silent until the reader goes away
+                client.recv(4096)
+
+    def __exit__(self, *_):
+        self._thread.join(10)
+        self._server.close()
+
+
+GONE = "has closed the connection during set-up|is gone: Connection reset"  # whichever the system sees first
+ACCEPTED = rtde_codec.pack(ord("V"), b"\x01")
+NO_Q = rtde_codec.pack(ord("O"), b"\x01DOUBLE,NOT_FOUND,VECTOR6D,INT32,UINT32,UINT32,VECTOR6D,VECTOR6D")
+TYPES = rtde_codec.pack(ord("O"), b"\x01DOUBLE,VECTOR6D,VECTOR6D,INT32,UINT32,UINT32,VECTOR6D,VECTOR6D")
+
+
+@pytest.mark.parametrize(
+    ("answers", "close", "error", "words"),
+    [
+        ((), False, RobotTimeout, "no answer from the controller"),
+        ((rtde_codec.pack(ord("V"), b"\x00"),), True, RobotConnectionError, "does not speak RTDE version 2"),
+        ((ACCEPTED, NO_Q), True, RobotRefused, "actual_q is not known"),
+        ((ACCEPTED, TYPES, rtde_codec.pack(ord("S"), b"\x00")), True, RobotConnectionError, "does not start"),
+        ((ACCEPTED,), True, RobotConnectionError, GONE),
+        ((b"HTTP/1.1 400 Bad Request\r\n\r\n",), True, RobotConnectionError, GONE),
+    ],
+)  # fmt: skip
+def test_a_peer_that_is_no_controller_is_one_clear_line(answers, close, error, words):
+    with Peer(*answers, close=close) as peer:
+        reader = StateReader(peer.host, timeout=0.3)
+        with pytest.raises(error, match=words), reader:
+            pass
+        assert reader.fileno() == -1
+
+
+def test_the_end_of_the_connection_is_an_error_and_not_silence():
+    with (
+        Peer(ACCEPTED, TYPES, rtde_codec.pack(ord("S"), b"\x01")) as peer,
+        StateReader(peer.host, timeout=1.0) as reader,
+        pytest.raises(RobotConnectionError, match="has closed the connection"),
+    ):
+        reader.wait(5.0)
+
+
+def test_no_controller_there():
+    host = free_host()
+    with pytest.raises(RobotConnectionError, match=rf"cannot reach the controller {host}:30004"):
+        StateReader(host).__enter__()
+    with pytest.raises(RobotConnectionError, match=rf"cannot reach port 30003 of the controller {host}"):
+        StopSockets(host).__enter__()
