@@ -18,13 +18,15 @@ ConeSkinError
 │   └── Collision (RuntimeError)          the skin was touched and the arm has reacted
 └── RecordingError (ValueError)           a recording that cannot be read
 
-A leaf is also the builtin named behind it, so ``except ValueError`` works where nobody knows coneskin. Mistakes in
-calling (a wrong type) stay TypeError.
+A leaf is also the builtin named behind it, so ``except ValueError`` works in code that does not know coneskin.
+Mistakes in calling (a wrong type) stay TypeError.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 __all__ = [
     "Collision",
@@ -70,6 +72,10 @@ class SceneError(ConeSkinError, ValueError):
         self.problems = tuple(problems)
         count = f"{len(self.problems)} mistake" + ("s" if len(self.problems) != 1 else "")
         super().__init__("\n".join([f"{source}: {count}", *(f"  {line}" for line in self.problems)]))
+        self._source = source
+
+    def __reduce__(self) -> tuple[type[SceneError], tuple[tuple[str, ...], str]]:
+        return type(self), (self.problems, self._source)
 
 
 class MissingExtra(ConeSkinError, ImportError):
@@ -83,6 +89,10 @@ class MissingExtra(ConeSkinError, ImportError):
         self.package = package
         target = f"'coneskin[{extra}]'" if extra else package
         super().__init__(f"{job} needs the package {package}: pip install {target}")
+        self._made_of = (package, job, extra)
+
+    def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str, str | None]]:
+        return type(self), self._made_of
 
 
 class SkinError(ConeSkinError):
@@ -126,7 +136,47 @@ class RobotRefused(RobotError, RuntimeError):
 
 
 class Collision(RobotError, RuntimeError):
-    """The skin was touched and the arm has reacted."""
+    """The skin was touched and the arm has reacted.
+
+    Attributes:
+        sensor: name of the touched sensor.
+        link: name of the link that carries it.
+        u: slant distance of the touch from end 1 of the sensor [m].
+        phi: its azimuth [rad].
+        point: its place in the DH frame of the link [m].
+        normal: outward unit normal of the skin there, in that frame.
+        level: how firm it is, in the detector's unit.
+        location_valid: True where the place is certain.
+        time: when it was seen, on the clock of the events [s].
+        reaction: what the reaction did, such as "touch; retreat 49.5 mm: the distance is made"; empty where not known.
+        standstill_confirmed: True where the arm was measured standing and has not moved since.
+        number: of the stop, for ``Session.reset``.
+        event: the ``GuardEvent`` that reported it.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        event: Any = None,
+        standstill_confirmed: bool = False,
+        reaction: str = "",
+        number: int = 0,
+    ) -> None:
+        super().__init__(message)
+        self.number = number
+        details: Mapping[str, Any] = {} if event is None else event.details
+        self.sensor: str = details.get("sensor", "")
+        self.link: str = details.get("link", "")
+        self.u: float = details.get("u", math.nan)
+        self.phi: float = details.get("phi", math.nan)
+        self.point: tuple[float, ...] = tuple(details.get("point", ()))
+        self.normal: tuple[float, ...] = tuple(details.get("normal", ()))
+        self.level: float = details.get("level", math.nan)
+        self.location_valid: bool = details.get("location_valid", False)
+        self.time: float = math.nan if event is None else event.time
+        self.standstill_confirmed = standstill_confirmed
+        self.reaction = reaction
+        self.event = event
 
 
 class RecordingError(ConeSkinError, ValueError):

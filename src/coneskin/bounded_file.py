@@ -1,0 +1,85 @@
+"""Bounded reading of files: only regular ones and up to a limit, so that no file blocks a process or fills memory."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+__all__ = ["format_size", "open_file", "read_file"]
+
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+}
+#: a pipe that somebody puts there between the two looks must not hold the opening up
+_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+
+
+def read_file(path: Path, limit: int) -> bytes:
+    """Return the content of a file.
+
+    Args:
+        path: the file; a link is followed.
+        limit: its largest length [bytes].
+
+    Raises:
+        OSError: as of ``open_file``; or it has grown beyond the limit meanwhile.
+    """
+    with open_file(path, limit) as file:
+        data = file.read(limit + 1)
+    if len(data) > limit:
+        raise _too_long(path, len(data), limit)
+    return data
+
+
+def open_file(path: Path, limit: int) -> BinaryIO:
+    """Open a regular file for reading, without waiting for anything.
+
+    Args:
+        path: the file; a link is followed.
+        limit: its largest length [bytes], as it is now.
+
+    Raises:
+        OSError: it is not there, or may not be read; it is a folder, a device, a pipe or a socket; it is too long.
+            ``strerror`` says which.
+    """
+    try:
+        _check(path, os.stat(path), limit)  # opening a device may already have an effect
+        descriptor = os.open(path, _FLAGS)
+    except ValueError as exc:  # a NUL in the name
+        raise OSError(errno.EINVAL, str(exc), str(path)) from exc
+    try:
+        _check(path, os.fstat(descriptor), limit)
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def format_size(count: int) -> str:
+    """Return a number of bytes for people: "300 bytes", "1.5 MB"."""
+    if count < 1000:
+        return f"{count} bytes"
+    for factor, unit in ((1e9, "GB"), (1e6, "MB")):
+        if count >= factor:
+            return f"{count / factor:.3g} {unit}"
+    return f"{count / 1e3:.3g} kB"
+
+
+def _check(path: Path, found: os.stat_result, limit: int) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        kind = _KINDS.get(stat.S_IFMT(found.st_mode), "something else")
+        raise OSError(errno.EINVAL, f"it is {kind}, and only a regular file is read", str(path))
+    if found.st_size > limit:
+        raise _too_long(path, found.st_size, limit)
+
+
+def _too_long(path: Path, size: int, limit: int) -> OSError:
+    what = f"it has {format_size(size)} or more, and at most {format_size(limit)} are read; is it the right file?"
+    return OSError(errno.EFBIG, what, str(path))

@@ -1,0 +1,130 @@
+"""Start of a child process that speaks over channels, and the child's own ends of them.
+
+A child must not outlive its parent. The end of the channel between them says that the parent is gone, unless somebody
+else has a copy of it: a fork below Python, where nothing of ours runs, makes one. So the child has a descriptor of the
+parent's process as well, whose end nobody can hide. A thread waits for it from the child's first moment, because a
+child that imports or connects may not look for seconds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import socket
+import struct
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+
+from .channel import Channel
+from .errors import RobotConnectionError
+
+__all__ = ["Lifeline", "inherit", "spawn"]
+
+_LENGTH = struct.Struct("<I")  # of what a child is told over its standard input
+
+
+def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
+    """Start ``python -m module`` with these ends of pairs; the child takes them with ``inherit``.
+
+    The child does not look for modules in the current folder, where a file named like one of them may lie; PYTHONPATH
+    holds for it as for this process.
+
+    Args:
+        module: the module to run.
+        ends: sockets for the child, closed here afterwards.
+
+    Raises:
+        RobotConnectionError: the process cannot be started.
+    """
+    command = [sys.executable, "-I" if sys.flags.isolated else "-P", "-m", module]
+    try:
+        if sys.platform == "win32":  # written from the documentation of socket.share; not run by our tests
+            child = subprocess.Popen([*command, "shared"], stdin=subprocess.PIPE)
+            assert child.stdin is not None
+            for end in ends:
+                share = end.share(child.pid)
+                child.stdin.write(_LENGTH.pack(len(share)) + share)
+            child.stdin.close()
+        else:
+            with contextlib.ExitStack() as stack:
+                numbers = [end.fileno() for end in ends]
+                if hasattr(os, "pidfd_open"):  # Linux, from 5.3 on
+                    with contextlib.suppress(OSError):
+                        numbers.append(os.pidfd_open(os.getpid()))
+                        stack.callback(os.close, numbers[-1])
+                child = subprocess.Popen(
+                    [*command, str(len(ends)), *map(str, numbers)],
+                    pass_fds=numbers,
+                    stdin=subprocess.DEVNULL,
+                    start_new_session=True,
+                )
+    except OSError as exc:
+        raise RobotConnectionError(f"cannot start the process {module}: {exc.strerror or exc}") from exc
+    for end in ends:
+        end.close()
+    return child
+
+
+class Lifeline:
+    """Line of a child to its parent, which a thread watches.
+
+    Until ``hold`` the process ends at once where the parent is gone, or has closed the channel: nothing is under way.
+
+    Args:
+        channel: to the parent.
+        parent: descriptor of the parent's process; None where the system has none, and the channel alone counts.
+        end: ends this process.
+    """
+
+    def __init__(self, channel: Channel, parent: int | None, end: Callable[[], None] = lambda: os._exit(1)) -> None:
+        self._channel = channel
+        self._parent = parent
+        self._end = end
+        self._starting = True
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._watch, name="coneskin lifeline", daemon=True)
+        if sys.platform != "win32":  # it has no poll; there the process looks for itself
+            self._thread.start()
+
+    def hold(self) -> None:
+        """Let the parent's end be the end of the channel from now on: this process looks for it, and acts first."""
+        with self._lock:
+            self._starting = False
+
+    def _watch(self) -> None:
+        poll = select.poll()
+        poll.register(self._channel.fileno(), 0)  # its end is reported without being asked for
+        if self._parent is not None:
+            poll.register(self._parent, select.POLLIN)
+        poll.poll()
+        with self._lock:
+            if self._starting:
+                self._end()
+        if self._parent is None:
+            return
+        poll = select.poll()
+        poll.register(self._parent, select.POLLIN)
+        poll.poll()
+        self._channel.hang_up()
+
+
+def inherit(arguments: list[str], parent: int = 0) -> tuple[Lifeline, list[Channel]]:
+    """Return the channels that ``spawn`` gave to this process, and the line to its parent.
+
+    Args:
+        arguments: the command-line arguments of this process, without its name.
+        parent: position of the channel to the parent.
+    """
+    if arguments == ["shared"]:
+        stream = sys.stdin.buffer
+        shares = []
+        while head := stream.read(_LENGTH.size):
+            shares.append(stream.read(_LENGTH.unpack(head)[0]))
+        channels = [Channel(socket.fromshare(share)) for share in shares]  # type: ignore[attr-defined,unused-ignore]
+        return Lifeline(channels[parent], None), channels
+    count, *numbers = map(int, arguments)
+    channels = [Channel(socket.socket(fileno=number)) for number in numbers[:count]]
+    return Lifeline(channels[parent], numbers[count] if len(numbers) > count else None), channels

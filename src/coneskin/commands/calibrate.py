@@ -1,0 +1,206 @@
+"""``coneskin calibrate``: known places of a skin are touched, and what it reads wrongly is taken off from then on."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .person_at_terminal import LiveReading, Person
+
+if TYPE_CHECKING:
+    from coneskin.calibration.calibrate import CalibrationResult, Calibrator
+    from coneskin.scene.scene import Scene
+
+__all__ = ["add_arguments", "run"]
+
+_EXAMPLE = """\
+example:
+  coneskin calibrate scene.toml --by "A. Person"     touch each mark as it is named; "n" and Enter: out of reach
+  coneskin calibrate scene.toml --list
+  coneskin calibrate scene.toml --simulated --skin as_built.toml --picture residuals.png
+
+Touch with something narrow and blunt, such as the rounded end of a rod of 5 mm. Nothing guards the arm meanwhile, and
+nothing here moves it. The result is added to calibrations/device-<device>.json beside the scene, or to what the sensor
+names as its calibration; it applies once the sensor's table has `calibration = "calibrations"`. A commissioning made
+with another calibration is void. Exit code: 0 all sensors are calibrated, 1 not all, or not carried out.
+"""
+_FOLDER = "calibrations"
+_MARKS = "marks on each sensor, to be measured (default: those that its design has printed on the cover, else 9)"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    parser.add_argument("--by", default="", metavar="NAME", help="who touches; goes into the record")
+    parser.add_argument("--marks", type=int, choices=(4, 9, 16), default=0, help=_MARKS)
+    parser.add_argument(
+        "--mark-error-mm",
+        type=_mark_error,
+        default=0.3,
+        metavar="MM",
+        help="standard deviation with which marks are placed and touched, along and around (default: 0.3)",
+    )
+    parser.add_argument(
+        "--forces",
+        type=_forces,
+        default=(),
+        metavar="N,N,...",
+        help="then press three of the marks with these known forces [N], e.g. 1,2,5,10, for touch_force_n",
+    )
+    parser.add_argument("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
+    parser.add_argument(
+        "--skin", type=Path, metavar="SCENE", help="with --simulated: scene that says how the virtual skin was built"
+    )
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the residuals (png, svg, pdf)")
+    parser.add_argument("--list", action="store_true", help="list the marks, and touch nothing")
+    parser.add_argument("--json", action="store_true", help="print JSON objects, one per line")
+
+
+def _mark_error(text: str) -> float:
+    value = float(text)
+    if not 0.01 <= value <= 20.0:
+        raise argparse.ArgumentTypeError(f"must be from 0.01 to 20 mm, got {text}")
+    return value
+
+
+def _forces(text: str) -> tuple[float, ...]:
+    values = tuple(sorted({float(word) for word in text.split(",")}))
+    if len(values) < 2 or not (values[0] >= 0.05 and values[-1] <= 1000.0):
+        raise argparse.ArgumentTypeError(f"must be two or more forces from 0.05 to 1000 N, got {text}")
+    return values
+
+
+def _check_names(scene: Scene, built: Scene) -> None:
+    """Refuse a virtual skin whose sensors are not those that are touched."""
+    from coneskin.errors import SceneError
+
+    names, others = ({placed.sensor.name for placed in each.sensors} for each in (scene, built))
+    if names != others:
+        said = f"{', '.join(sorted(names))}, got {', '.join(sorted(others)) or 'none'}"
+        raise SceneError([f"--skin must have the sensors of {scene.name}: {said}"], built.name)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate the skin of a scene, or list its marks."""
+    from coneskin.calibration.calibrate import Calibrator
+    from coneskin.commissioning.commission import check_touchable
+    from coneskin.errors import SceneError
+    from coneskin.scene.link_tables import sensor_files
+    from coneskin.scene.reader import load_scene
+    from coneskin.skin.sources.kinds import is_simulated
+
+    scene = load_scene(args.scene, calibrated=False)
+    if args.skin and not args.simulated:
+        raise SceneError(["--skin says how a virtual skin was built: give --simulated too"], scene.name)
+    built = load_scene(args.skin, calibrated=False) if args.skin else None
+    if built is not None:
+        _check_names(scene, built)
+    simulated = args.simulated or (args.list and scene.source is not None and is_simulated(scene.source.kind))
+    check_touchable(scene, simulated)  # before the terminal is read
+    live = LiveReading(args.json)
+    person = None if args.simulated or args.list else Person()
+    calibrator = Calibrator(
+        scene,
+        args.marks,
+        1e-3 * args.mark_error_mm,
+        live.notice,
+        live.reading,
+        person.refuses if person else lambda: False,
+        simulated=simulated,
+        forces=args.forces,
+        files=sensor_files(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder),
+        wired_as=built,
+    )
+    if args.list:
+        _list(calibrator, args.json)
+        return 0
+    if not args.json:
+        print("coneskin calibrate: the arm stands, and nothing guards it. Touch each mark with something narrow and")
+        print('blunt, and hold it until it is read. "n" and Enter: out of reach. Ctrl-C ends it.', flush=True)
+    results = calibrator.run(args.by)
+    if args.picture:
+        from coneskin.calibration.residuals_picture import draw_residuals
+
+        draw_residuals(results, args.picture)
+    _write(args, scene, results)
+    return 0 if all(result.record for result in results) else 1
+
+
+def _write(args: argparse.Namespace, scene: Scene, results: list[CalibrationResult]) -> None:
+    """Add the results to the files of their devices, and show them."""
+    from coneskin.scene.calibration_file import add_calibration, calibration_path
+    from coneskin.scene.link_tables import named_calibrations
+
+    named = named_calibrations(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder)
+    for result, place in zip(results, named, strict=True):
+        path = None
+        if result.record is not None:
+            device = result.touches.sensor.device_id
+            path = calibration_path(place or scene.folder / _FOLDER, device)
+            add_calibration(path, device, result.record)
+        _show(result, path, place is None, args.json)
+
+
+def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: bool) -> None:
+    record, name = result.record, result.touches.sensor.name
+    if as_json:
+        line: dict[str, Any] = {
+            "kind": "end",
+            "sensor": name,
+            "calibrated": record is not None,
+            "cause": result.refusal,
+        }
+        if record is not None:
+            line |= {"file": str(path), "before_rms_mm": record.before_rms_mm, "after_rms_mm": record.after_rms_mm}
+            line |= {"before_largest_mm": record.before_largest_mm, "after_largest_mm": record.after_largest_mm}
+            line |= {
+                "map_error_mm": record.map_error_mm,
+                "map_along": record.map_along,
+                "map_around": record.map_around,
+            }
+            line |= {"fitted_along": record.fitted_along, "fitted_around": record.fitted_around}
+            line |= {"extra_ohm": record.extra_ohm, "sheet_ohm": record.sheet_ohm}
+            line |= {"forces_n": record.forces_n, "force_levels": record.force_levels}
+            line |= {"force_error": record.force_error}
+            line |= {"touches": len(record.touches), "used": sum(touch.used for touch in record.touches)}
+        print(json.dumps(line), flush=True)
+        return
+    if record is None:
+        print(f"NOT calibrated: {result.refusal}")
+        return
+    used = sum(touch.used for touch in record.touches)
+    leads = ", ".join(f"{letter} {ohm:+.1f}" for letter, ohm in zip("ABCD", record.extra_ohm, strict=True))
+    print(f"{name}: {len(record.touches)} touches, {used} used")
+    print(f"  before      {record.before_rms_mm:.2f} mm (rms), {record.before_largest_mm:.2f} mm at most")
+    print(
+        f"  calibrated  {record.after_rms_mm:.2f} mm (rms), {record.after_largest_mm:.2f} mm at most, cross-validated; "
+        "it holds how well the marks were placed and touched"
+    )
+    print(
+        f"  fitted      along: {record.fitted_along}; around: {record.fitted_around}; known to "
+        f"{record.map_error_mm:.2f} mm at the worst place"
+    )
+    print(f"  as leads    {leads} ohm more than lead_ohm, if it is leads")
+    print(f"  sheets      {record.sheet_ohm[0]:.0f} and {record.sheet_ohm[1]:.0f} ohm per square, by their currents")
+    if record.forces_n:
+        pairs = ", ".join(f"{n:g} N {x:.2f}" for n, x in zip(record.forces_n, record.force_levels, strict=True))
+        print(f"  forces      level of {pairs}; a force that is read is known to {100.0 * record.force_error:.0f} %")
+    hint = f'; it applies once the table of {name} has calibration = "{_FOLDER}"' if unnamed else ""
+    print(f"written to {path}{hint}; commission the skin again")
+
+
+def _list(calibrator: Calibrator, as_json: bool) -> None:
+    number = 0
+    for item in calibrator.sensors:
+        for mark in item.marks:
+            number += 1
+            if as_json:
+                line = {"number": number, "sensor": item.sensor.name, "where": mark.where}
+                print(json.dumps({"kind": "mark", **line, "u_mm": 1e3 * mark.u, "phi_rad": mark.phi}))
+            else:
+                print(f"{number:>3}  {item.sensor.name}: {mark.where}")

@@ -1,0 +1,120 @@
+"""``coneskin commission``: a person touches marks on a skin, and the skin must read them where they are."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .person_at_terminal import LiveReading, Person
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from coneskin.commissioning.procedure import Procedure
+
+__all__ = ["add_arguments", "run"]
+
+_EXAMPLE = """\
+example:
+  coneskin commission scene.toml --by "A. Person"    touch each mark as it is named; "n" and Enter: out of reach
+  coneskin commission scene.toml --list --picture marks.png
+  coneskin commission scene.toml --simulated         a virtual skin, which is touched by the command itself
+
+The arm stands: nothing here moves it, and nothing guards it either. The result is written beside the scene, as
+scene.commissioning.json. Without one that has passed, `coneskin guard` only stops the arm where the scene lets it
+retreat or comply. Ctrl-C writes nothing. Exit code: 0 passed, 1 not passed, or not carried out.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    parser.add_argument("--by", default="", metavar="NAME", help="who touches; goes into the record")
+    parser.add_argument("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
+    parser.add_argument(
+        "--posture-deg",
+        type=_posture,
+        metavar="Q1,...,Q6",
+        help="joint positions [deg] for which the marks are described; by default the controller is asked",
+    )
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the marks (png, svg, pdf)")
+    parser.add_argument("--list", action="store_true", help="list the marks, and touch nothing")
+    parser.add_argument("--json", action="store_true", help="print JSON objects, one per line")
+
+
+def _posture(text: str) -> tuple[float, ...]:
+    try:
+        values = tuple(math.radians(float(part)) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != 6 or not all(map(math.isfinite, values)):
+        raise argparse.ArgumentTypeError(f"must be six angles in degrees with commas between, got {text!r}")
+    return values
+
+
+def run(args: argparse.Namespace) -> int:
+    """Commission the skin of a scene, or list its marks."""
+    from coneskin.commissioning.commission import Commissioner
+    from coneskin.scene.commissioning_record import write_record
+    from coneskin.scene.reader import load_scene
+
+    scene = load_scene(args.scene)
+    show = _Show(args.json)
+    person = None if args.simulated or args.list else Person()
+    commissioner = Commissioner(
+        scene,
+        show.notice,
+        show.reading,
+        person.refuses if person else lambda: False,
+        q=args.posture_deg,
+        simulated=args.simulated,
+    )
+
+    def begin(procedure: Procedure, q: Sequence[float] | None) -> None:
+        if args.picture:
+            from coneskin.commissioning.marks_picture import draw_marks
+
+            draw_marks(scene, procedure, q, args.picture)
+
+    if args.list:
+        procedure, q = commissioner.plan()
+        begin(procedure, q)
+        show.plan(procedure)
+        return 0
+    if not args.json:
+        print("coneskin commission: the arm stands, and nothing guards it. Touch each mark with one finger, firmly,")
+        print('and hold it until it is read. "n" and Enter: out of reach, name another. Ctrl-C ends it.', flush=True)
+    record = commissioner.run(args.by, begin)
+    path = write_record(scene, record)
+    show.end(record.passed, record.cause, path)
+    return 0 if record.passed else 1
+
+
+class _Show(LiveReading):
+    """Output of the command."""
+
+    def plan(self, procedure: Procedure) -> None:
+        """List the marks."""
+        number = 0
+        for item in procedure.sensors:
+            for mark in item.plan:
+                number += 1
+                u_mm, phi_deg = round(1e3 * mark.u, 1), round(math.degrees(mark.phi), 1)
+                if self._json:
+                    line = {"number": number, "sensor": item.sensor.name, "where": mark.where}
+                    print(json.dumps({"kind": "mark", **line, "u_mm": u_mm, "phi_deg": phi_deg}))
+                else:
+                    print(f"{number:>3}  {item.sensor.name}: {mark.where}")
+
+    def end(self, passed: bool, cause: str, path: Path) -> None:
+        """Show the result."""
+        if self._json:
+            print(json.dumps({"kind": "end", "passed": passed, "cause": cause, "record": str(path)}))
+        else:
+            said = "passed: the arm may move away from touches" if passed else "NOT passed: the arm only stops"
+            print(f"{self.clear()}{said}; written to {path}")

@@ -1,0 +1,282 @@
+"""``coneskin demo``: a simulated arm moves, its virtual skin is touched, and the arm stops and retreats. No hardware.
+
+Everything between the two ends is the real thing: bytes through a pseudo-terminal and pyserial, the guard in its own
+process, the unmodified ur_rtde wheel against a controller in another process, a recording, and its replay.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import Collision, MissingExtra, RobotRefused
+from coneskin.robot.guard.journal import EventName, describe_way
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from coneskin.replay.replay import Run
+    from coneskin.robot.guard.journal import GuardEvent
+    from coneskin.scene.scene import Scene
+
+__all__ = ["SCENE", "add_arguments", "run"]
+
+_EXAMPLE = """\
+example:
+  coneskin demo                          about 15 s; writes runs/demo-.../
+  coneskin demo --reaction stop --json
+
+exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
+"""
+
+#: the scene of the demo: the tube of the UR5e's forearm as ``coneskin design`` finds it. The limits of
+#: silence are long because a pseudo-terminal on a busy machine can stall for that long
+SCENE = """\
+[arm]
+model = "UR5e"
+host = "{host}"
+
+[[link]]
+name = "forearm"
+
+[[link.sensor]]
+id = 1
+name = "forearm skin"
+radius1_mm = 37.62
+radius2_mm = 37.30
+height_mm = 240
+xyz_mm = [0, -0.4, 100]
+
+[source]
+kind = "virtual"
+rate_hz = 500
+
+[reaction]
+kind = "{reaction}"
+distance_mm = 20              # and back what it moved while it stopped: the whole arm may go 100 mm
+
+[monitoring]                  # defaults: 50 ms each; a pseudo-terminal on a busy machine can stall for longer
+skin_silence_ms = 250
+skin_late_ms = 250
+arm_silence_ms = 250
+"""
+_FROM_DEG = (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)  # joint positions at the start
+_TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)  # joint positions at the end
+_SPEED = 1.0  # rad/s, of the leading joint
+_ACCELERATION = 2.0  # rad/s2, of the leading joint
+_TOUCH_DELAY = 0.9  # s after the start of the second move: in the middle of it, at full speed
+_EVENT_TIMEOUT = 2.0  # s for an event that has happened to be printed
+_U = 0.13  # m; slant distance of the touch from end 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the run (default runs/demo-TIME)")
+    parser.add_argument(
+        "--reaction",
+        choices=("stop", "retreat"),
+        default="retreat",
+        help="what the arm does when it is touched (default retreat)",
+    )
+    parser.add_argument("--host", help="loopback address for the simulated controller (default: a free one)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object at the end")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the demo."""
+    from coneskin.replay.replay import read_run, replay
+    from coneskin.robot.sim.process import SimulatedController, free_host
+    from coneskin.scene.reader import parse_scene
+
+    folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
+    try:
+        folder.mkdir(parents=True)
+    except OSError as exc:
+        raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
+    host = args.host or free_host()
+    text = SCENE.format(host=host, reaction=args.reaction)
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
+    scene = parse_scene(text, "scene.toml", folder)
+
+    def say(line: str) -> None:
+        if not args.json:
+            print(line, flush=True)
+
+    say("coneskin demo: a simulated UR5e with a virtual skin on its forearm. Not a safety-rated device.")
+    start_q = [math.radians(q) for q in _FROM_DEG]
+    with SimulatedController(model="UR5e", host=host, start_q=start_q):
+        if scene.moves_away:
+            _commission(scene, say)
+        touched = _collide(scene, folder, say)
+    recorded = read_run(folder)
+    again = replay(recorded)
+    facts = _facts(recorded, touched)
+    facts["same_in_replay"] = again.same
+    facts["picture"] = _draw(recorded, folder, say)
+    (folder / "summary.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+    if args.json:
+        print(json.dumps({**facts, "folder": str(folder)}))
+    else:
+        _report(facts, folder, recorded.missing)
+    return 0 if facts["standstill_ms"] is not None and again.same and facts["contacts"] == 1 else 1
+
+
+class _Transcript:
+    """Lines of the guard, which come from a thread of their own, and of the program, in the order of their times.
+
+    Args:
+        say: prints a line.
+        began: gives the zero of the times, which is that of the recording [s].
+    """
+
+    def __init__(self, say: Callable[[str], None], began: Callable[[], float]) -> None:
+        self._say = say
+        self._began = began
+        self._seen: set[str] = set()
+        self._changed = threading.Condition()
+
+    def event(self, event: GuardEvent) -> None:
+        """Print an event of the guard."""
+        from coneskin.replay.event_text import describe
+
+        self._say(describe(event, self._began()))
+        with self._changed:
+            self._seen.add(event.name)
+            self._changed.notify_all()
+
+    def line(self, text: str, after: str) -> None:
+        """Print what the program does now, once the event after which it does so has been printed."""
+        now = time.monotonic()
+        with self._changed:
+            self._changed.wait_for(lambda: after in self._seen, _EVENT_TIMEOUT)
+        self._say(f"{now - self._began():9.4f} s  {text}")
+
+
+def _commission(scene: Scene, say: Callable[[str], None]) -> None:
+    """Touch marks on the virtual skin and write the record without which the arm would only stop.
+
+    Raises:
+        RobotRefused: the skin has not passed.
+    """
+    from coneskin.commissioning.commission import Commissioner
+    from coneskin.scene.commissioning_record import write_record
+
+    say("commissioning of the skin, by virtual touches (a real one: a person, with `coneskin commission`)")
+    record = Commissioner(scene, lambda notice: say(f"  {notice.kind}: {notice.text}"), simulated=True).run("the demo")
+    write_record(scene, record)
+    if not record.passed:
+        raise RobotRefused(f"the virtual skin has not passed its commissioning: {record.cause}")
+
+
+def _collide(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
+    """Move, touch the arm meanwhile, and print what the guard does; return when the touch began [s]."""
+    from coneskin.session.session import guard
+
+    touches: list[float] = []
+    transcript = _Transcript(say, lambda: guarded.began)
+    guarded = guard(scene, recording=folder / "run.rec", on_event=transcript.event)
+    with guarded as session:
+        transcript.line("the arm moves", after="activated")
+        phi = _leading_side(scene)
+        timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(session.touch(_U, phi, duration=0.15)))
+        timer.start()
+        try:
+            session.arm.move_j([math.radians(q) for q in _TO_DEG], _SPEED, _ACCELERATION)
+            print("coneskin demo: the arm arrived although it was touched", file=sys.stderr)
+        except Collision as exc:
+            transcript.line(f"the program gets Collision: {exc}", after="latched")
+        finally:
+            timer.join()
+    if not touches:
+        raise RobotRefused("the virtual skin was not touched: its process did not answer")
+    return touches[0]
+
+
+def _leading_side(scene: Scene) -> float:
+    """Return the azimuth of the sensor's leading side [rad]: there an obstacle would hit the arm."""
+    from coneskin.robot.arm.kinematics import link_pose, point_jacobian
+    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.scene.build import place_on_arm
+
+    (placed,) = place_on_arm(scene)
+    assert scene.arm is not None
+    arm = arm_model(scene.arm.model)
+    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+    qd = [math.radians(b - a) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+
+    def towards(phi: float) -> float:
+        point, normal = placed.place(_U, phi)
+        rows = point_jacobian(arm, middle, placed.link, point)
+        n = link_pose(arm, middle, placed.link).rotate(normal)
+        return sum(n[k] * sum(j * v for j, v in zip(rows[k], qd, strict=True)) for k in range(3))
+
+    return max((math.radians(degree) for degree in range(360)), key=towards)
+
+
+def _facts(run: Run, touched: float) -> dict[str, Any]:
+    """Return the times after the touch [ms], and what happened."""
+    from coneskin.robot.guard.journal import BlockKind
+
+    events = run.events
+    contact = next((e for e in events if e.name == EventName.CONTACT), None)
+
+    def after(name: str) -> float | None:
+        event = next((e for e in events if e.name == name and contact and e.time >= contact.time), None)
+        return None if event is None else round(1e3 * (event.time - touched), 3)
+
+    commands = [b.time for b in run.blocks if b.kind == BlockKind.COMMAND and contact and b.time >= contact.time]
+    retreated = next((e for e in events if e.name == EventName.RETREATED), None)
+    placed = next((e for e in events if e.name == EventName.CONTACT_LOCATED), contact)
+    return {
+        "contacts": sum(e.name == EventName.CONTACT for e in events),
+        "frame_ms": after("contact"),
+        "command_ms": round(1e3 * (commands[0] - touched), 3) if commands else None,
+        "slower_ms": after("decelerating"),
+        "standstill_ms": after("standstill"),
+        "latched_ms": after("latched"),
+        "retreat_mm": None if retreated is None else round(1e3 * retreated.details["progress"], 2),
+        "way": None if retreated is None else describe_way(retreated.details),
+        "cut_short": retreated.details["why"] if retreated is not None and not retreated.details["complete"] else None,
+        "u_mm": None if placed is None else round(1e3 * placed.details["u"], 2),
+        "phi_deg": None if placed is None else round(math.degrees(placed.details["phi"]), 2),
+    }
+
+
+def _draw(recorded: Run, folder: Path, say: Callable[[str], None]) -> str | None:
+    from coneskin.replay.run_picture import draw_run
+
+    try:
+        draw_run(recorded, folder / "run.png")
+    except MissingExtra as exc:
+        say(f"no picture: {exc}")
+        return None
+    return "run.png"
+
+
+def _report(facts: dict[str, Any], folder: Path, missing: str) -> None:
+    print("\nafter the touch began:")
+    for key, words in (
+        ("frame_ms", "frame over the threshold decoded"),
+        ("command_ms", "stop written to the driver process"),
+        ("slower_ms", "arm decelerating, as measured"),
+        ("standstill_ms", "standstill, as measured"),
+        ("latched_ms", "latched: standstill after the reaction"),
+    ):
+        value = facts[key]
+        print(f"  {'never' if value is None else f'{value:8.2f} ms'}  {words}")
+    if facts["retreat_mm"] is not None:
+        print(f"  {facts['way']}, along the normal")
+    if facts["cut_short"] is not None:
+        print(f"  the retreat was NOT made as far as it was to: {facts['cut_short']}; on a quieter machine it is")
+    print("replay: " + ("the same events, bit by bit" if facts["same_in_replay"] else "NOT the same events"))
+    if missing:
+        print(f"recording: {missing}")
+    print(f"written to {folder}: run.rec, scene.toml, summary.json" + (", run.png" if facts["picture"] else ""))

@@ -1,0 +1,74 @@
+"""Command-line options derived from key tables, and the dimensions of a link that they give."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
+
+from coneskin.errors import GeometryError, SceneError
+from coneskin.scene.schema import Key, check
+
+__all__ = ["add_dimension_options", "add_setting_option", "given_dimensions", "option_name"]
+
+
+def option_name(key: Key) -> str:
+    """Return the option for a key: ``--radius1-mm`` for ``radius1_mm``."""
+    return "--" + key.name.replace("_", "-")
+
+
+def add_dimension_options(
+    add: Callable[..., Any],
+    keys: Sequence[Key],
+    required: Collection[str] = (),
+    defaults: Mapping[str, str] | None = None,
+) -> None:
+    """Declare an option for each dimension of a link.
+
+    Args:
+        add: the ``add_argument`` of a parser or of a group.
+        keys: the dimensions.
+        required: plain names of the dimensions that must be given.
+        defaults: plain name -> what holds where the option is missing, in words.
+    """
+    for key in keys:
+        default = (defaults or {}).get(key.plain)
+        text = key.meaning + (f" (default: {default})" if default else "")
+        add(option_name(key), type=float, metavar=_metavar(key), required=key.plain in required, help=text)
+
+
+def add_setting_option(add: Callable[..., Any], key: Key) -> None:
+    """Declare an option with the default of a key, both in the unit of the key.
+
+    Args:
+        add: the ``add_argument`` of a parser or of a group.
+        key: a number with a default, or with None, which is chosen to match the rest.
+    """
+    default = None if key.default is None else key.kind(key.in_file_unit(key.default))
+    text = f"{key.meaning} ({'chosen to match' if default is None else f'default {default:g}'})"
+    add(option_name(key), type=key.kind, default=default, metavar=_metavar(key), help=text)
+
+
+def _metavar(key: Key) -> str:
+    """Return the unit of a key in capitals, as the placeholder of its value; N for a plain number."""
+    return key.suffix.removeprefix("_").upper() or "N"
+
+
+def given_dimensions(args: argparse.Namespace, keys: Sequence[Key]) -> dict[str, float]:
+    """Return the dimensions that were given, in SI, under the plain names of their keys.
+
+    Args:
+        args: parsed; options that the command does not have, or that were not given, are left out.
+        keys: the dimensions, with their ranges.
+
+    Raises:
+        GeometryError: one is out of range; where it looks like metres, the message says what it would be in mm.
+        SceneError: several are out of range; a line for each.
+    """
+    given = {key.name: value for key in keys if (value := getattr(args, key.name, None)) is not None}
+    problems: list[str] = []
+    values = check(given, tuple(key for key in keys if key.name in given), "--", problems)
+    if problems:
+        lines = [line.replace("--.", "--").replace("_", "-", 1) for line in problems]
+        raise GeometryError(lines[0]) if len(lines) == 1 else SceneError(lines, "the link")
+    return values

@@ -1,0 +1,116 @@
+"""``coneskin doctor``: examine the skin, the wires and the arm of a scene; each finding comes with its remedy."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coneskin.errors import SceneError
+from coneskin.terminal_text import painted
+
+from .simulated_arm import simulated_arm
+
+if TYPE_CHECKING:
+    from coneskin.doctor.doctor import Doctor
+    from coneskin.finding import Finding
+    from coneskin.scene.scene import Scene
+
+__all__ = ["add_arguments", "run"]
+
+_EXAMPLE = """\
+example:
+  coneskin doctor scene.toml                 the skin untouched, then touched near A, B, C and D; then the arm
+  coneskin doctor scene.toml --no-touches    nobody touches: what untouched frames and the controller say
+  coneskin doctor scene.toml --simulated     a virtual skin is touched by the command, the arm is simulated
+
+Nothing is moved, and nothing is guarded. What is not there is not tried, and said to be. Where exchanged wires can be
+mended by the scene, the change is shown and made after a "y" (--yes makes it unasked). Exit code: 0 nothing is bad, 1
+something is, or was mended: run it again.
+"""
+_COLORS = {"ok": "green", "warning": "yellow", "bad": "red", "not tried": "blue"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    parser.add_argument("--simulated", action="store_true", help="start a simulated controller at the scene's host")
+    parser.add_argument("--no-touches", action="store_true", help="ask for no touches: the wires are not tried")
+    parser.add_argument("--yes", action="store_true", help="make the changes of the scene without asking")
+    parser.add_argument("--json", action="store_true", help="print each finding as a JSON object, one per line")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Examine a scene."""
+    from coneskin.doctor.doctor import Doctor
+    from coneskin.finding import exit_code
+    from coneskin.scene.reader import load_scene
+
+    scene = load_scene(args.scene)
+
+    def tell(finding: Finding) -> None:
+        if args.json:
+            print(json.dumps(finding.as_message()), flush=True)
+        else:
+            verdict = painted(finding.verdict, _COLORS[finding.verdict], sys.stdout)
+            print(finding.text.replace(finding.verdict, verdict, 1), flush=True)
+
+    def ask(words: str) -> None:
+        print(f"       >>  {words}", file=sys.stderr, flush=True)
+
+    doctor = Doctor(scene, tell, ask, not args.no_touches)
+    with simulated_arm(scene) if args.simulated and scene.arm else contextlib.nullcontext():
+        doctor.examine()
+    code = exit_code(doctor.findings)
+    if doctor.patches:
+        _offer_patch(args, scene, doctor)
+    elif not args.json:
+        _say_next(args, scene, code)
+    return code
+
+
+def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None:
+    """Show what would mend the scene, and write it where a person agrees.
+
+    Raises:
+        SceneError: the scene is written in a way in which it cannot be changed, or cannot be written.
+    """
+    from coneskin.doctor.scene_patch import diff_texts, set_sensor_keys
+    from coneskin.scene.reader import parse_scene
+    from coneskin.scene.whole_file import write_whole
+
+    old = args.scene.read_text(encoding="utf-8")
+    names, text = [item.sensor.name for item in scene.sensors], old
+    for patch in doctor.patches:
+        text = set_sensor_keys(text, names.index(patch.sensor), patch.keys)
+    parse_scene(text, scene.name, scene.folder)
+    print(f"\n{diff_texts(old, text, str(args.scene))}", file=sys.stderr, flush=True)
+    if not (args.yes or (not args.json and _agrees())):
+        print(f"coneskin doctor: {args.scene} was left as it is", file=sys.stderr)
+        return
+    try:
+        write_whole(args.scene, text)
+    except OSError as exc:
+        raise SceneError([f"it cannot be written: {exc.strerror or exc}"], str(args.scene)) from exc
+    print(f"coneskin doctor: {args.scene} was changed; run it again", file=sys.stderr)
+
+
+def _agrees() -> bool:
+    print("change the scene so? [y/N] ", end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def _say_next(args: argparse.Namespace, scene: Scene, code: int) -> None:
+    name = shlex.quote(str(args.scene))
+    if code:
+        print(f"next: mend what is bad, then coneskin doctor {name}")
+    elif scene.moves_away:
+        print(f"next: coneskin commission {name}{' --simulated' if args.simulated else ''}")
+    else:
+        print(f"next: coneskin guard {name}{' --simulated' if args.simulated else ''}")

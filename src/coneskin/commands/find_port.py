@@ -1,0 +1,112 @@
+"""``coneskin find-port``: find the port of a device by unplugging it and plugging it in again."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from coneskin.errors import SkinTimeout
+from coneskin.time_argument import positive_seconds
+
+if TYPE_CHECKING:
+    from coneskin.skin.sources.port_list import PortFacts
+
+__all__ = ["add_arguments", "find_port", "run"]
+
+_PERIOD = 0.2  # s between two looks at the list of ports
+
+_EXAMPLE = """\
+example:
+  coneskin find-port                 unplug the device when told to, and plug it in again
+  coneskin find-port --list          the ports that are there, and what stands against their use
+
+The last line of the output is the port, under a name that stays where the system has one: write it into the scene, or
+give it to `coneskin monitor`. Exit code: 0 found and permitted, 1 not.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--list", action="store_true", help="list the ports that are there, and end")
+    parser.add_argument("--timeout-s", type=positive_seconds, default=60.0, help="give up after this time (default 60)")
+    parser.add_argument("--json", action="store_true", help="print the result as a JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Find a port, or list those that are there."""
+    from coneskin.monitor.port_search import port_trouble, stable_name
+    from coneskin.skin.sources.port_list import find_ports
+
+    if args.list:
+        return _list(find_ports(), args.json)
+
+    def say(words: str) -> None:
+        print(words, file=sys.stderr, flush=True)
+
+    port = find_port(find_ports, say, args.timeout_s)
+    trouble, name = port_trouble(port.device), stable_name(port.device)
+    if args.json:
+        print(json.dumps({"port": name, "device": port.device, "hardware": port.hardware, "trouble": trouble}))
+    else:
+        print(name)
+    if trouble:
+        say(trouble)
+    return 1 if trouble else 0
+
+
+def find_port(
+    look: Callable[[], Sequence[PortFacts]],
+    say: Callable[[str], None],
+    timeout: float,
+    clock: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> PortFacts:
+    """Watch the list of ports until one has come.
+
+    Args:
+        look: returns the ports that are there.
+        say: tells the person what to do, and what has happened.
+        timeout: longest time to wait [s].
+        clock: the time [s].
+        sleep: lets time pass [s].
+
+    Raises:
+        SkinTimeout: none has come.
+    """
+    from coneskin.monitor.port_search import PortSearch
+
+    search = PortSearch(look())
+    say(f"{search.request} (within {timeout:g} s; Ctrl-C ends)")
+    end = clock() + timeout
+    while search.found is None:
+        if clock() >= end:
+            raise SkinTimeout(
+                f"no port has come within {timeout:g} s; try another cable (some only charge) and another USB port, "
+                "and see whether `dmesg` names the device"
+            )
+        sleep(_PERIOD)
+        if words := search.look(look()):
+            say(words if search.found else f"{words}: {search.request}")
+    return search.found
+
+
+def _list(ports: Sequence[PortFacts], as_json: bool) -> int:
+    """List the ports with what stands against their use; return 0 where one can be used."""
+    from coneskin.monitor.port_search import port_trouble
+
+    rows = [(port, port_trouble(port.device)) for port in ports]
+    for port, trouble in rows:
+        if as_json:
+            facts = {"device": port.device, "description": port.description, "hardware": port.hardware}
+            print(json.dumps({**facts, "trouble": trouble}))
+        else:
+            print(f"{port}{f'  {trouble}' if trouble else ''}")
+    if not rows:
+        print("no serial port is there", file=sys.stderr)
+    return 0 if any(not trouble for _, trouble in rows) else 1

@@ -1,0 +1,289 @@
+"""``coneskin guard``: guard the arm of a scene, and move it if the scene says how."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import queue
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coneskin.errors import Collision, ConeSkinError, RobotRefused
+from coneskin.robot.guard.journal import EventName
+from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
+from coneskin.time_argument import positive_seconds
+
+from .simulated_arm import simulated_arm
+from .typed_lines import typed_lines
+
+if TYPE_CHECKING:
+    from coneskin.scene.scene import Scene
+    from coneskin.session.event_publisher import EventPublisher
+    from coneskin.session.session import Session
+
+__all__ = ["add_arguments", "run"]
+
+_START_TIMEOUT = 20.0  # s for the guard to become active
+_QUIET = 0.3  # s without a line after which all earlier ones have been read
+
+_EXAMPLE = """\
+example:
+  coneskin guard scene.toml              until Ctrl-C; type "reset" and Enter after a collision
+  coneskin guard scene.toml --check      read the scene, list what is in it, start nothing
+  coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm
+
+The scene's keys: docs/scene.md. Exit code: 0 nothing has happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
+SIGTERM do not change it. With --check: 0 a guard can start with this scene, 1 it has mistakes or lacks something.
+Without a valid commissioning record a guard can start, so that is 0 as well; the arm then only stops, and the last line
+says so.
+coneskin is not a safety-rated device; read docs/safety.md before you use it.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    parser.add_argument("--check", action="store_true", help="list what is in the scene, and start nothing")
+    parser.add_argument(
+        "--simulated", action="store_true", help="start a simulated controller at the scene's host, on this computer"
+    )
+    parser.add_argument(
+        "--publish",
+        metavar="URL",
+        action="append",
+        default=[],
+        help="send each event as JSON to udp://127.0.0.1:PORT; may be repeated",
+    )
+    parser.add_argument("--publish-beyond", action="store_true", help="allow an address of another computer")
+    parser.add_argument("--once", action="store_true", help="end after the first collision or fault")
+    parser.add_argument(
+        "--duration-s",
+        type=positive_seconds,
+        metavar="S",
+        help="end after this time [s], once the move under way is over",
+    )
+    parser.add_argument("--json", action="store_true", help="print each event as a JSON object, one per line")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Guard the arm of a scene, or check the scene."""
+    from coneskin.scene.commissioning_record import with_commissioning
+    from coneskin.scene.reader import load_scene
+
+    scene = load_scene(args.scene)
+    if args.check:
+        return _check(with_commissioning(scene, time.time()), args.json)
+    from coneskin.session.event_publisher import EventPublisher
+
+    with contextlib.ExitStack() as stack:
+        opened = (contextlib.closing(EventPublisher(url, args.publish_beyond)) for url in args.publish)
+        return _guard(args, scene, [stack.enter_context(publisher) for publisher in opened])
+
+
+def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPublisher]) -> int:
+    from coneskin.replay.event_text import EventLines
+    from coneskin.robot.guard.journal import GuardEvent
+    from coneskin.session.session import guard
+
+    lines = EventLines()
+
+    def show(event: GuardEvent) -> None:
+        for publisher in publishers:
+            publisher.publish(event, session.began)
+        if event.name == EventName.GUARD_EXITED:
+            return  # the error that ends this program contains it
+        if args.json:
+            print(json.dumps({"t": event.time - session.began, "name": event.name, **event.details}), flush=True)
+        else:
+            print(lines.describe(event, session.began), flush=True)
+
+    signal.signal(signal.SIGTERM, _as_interrupt)
+    start_timeout = _START_TIMEOUT if args.duration_s is None else min(_START_TIMEOUT, args.duration_s)
+    session = guard(scene, on_event=show, start_timeout=start_timeout)
+    work = _Work(session, math.inf if args.duration_s is None else args.duration_s, args.once)
+    try:
+        with simulated_arm(scene) if args.simulated else contextlib.nullcontext(), session:
+            if session.recording and not args.json:
+                print(f"recording to {session.recording}", flush=True)
+            work.run()
+    except KeyboardInterrupt:
+        print(f"coneskin guard: ended by you; {_last_words(session)}", file=sys.stderr)
+    else:
+        if scene.arm is not None and not stands(session.events):
+            print(f"coneskin guard: {_last_words(session)}", file=sys.stderr)
+    return max(work.code, exit_code(session.events, scene.arm is not None))
+
+
+def _check(scene: Scene, as_json: bool) -> int:
+    """List what is in a scene; return 1 where a guard would refuse it."""
+    from coneskin.scene.summary import missing_parts, summarize
+    from coneskin.scene.suspicions import suspicions
+
+    found, missing, doubts = summarize(scene), missing_parts(scene), suspicions(scene)
+    if as_json:
+        lacks = {"cannot_be_guarded_yet": missing} if missing else {}
+        print(json.dumps({**found, **lacks, **({"warnings": doubts} if doubts else {})}))
+    else:
+        width = max(map(len, found))
+        print("\n".join(f"{key:<{width}}  {value}" for key, value in found.items()))
+        if scene.commissioning and not scene.commissioning.valid:
+            print(f"the arm will only stop when it is touched; to let it move away: coneskin commission {scene.name}")
+    for line in doubts:
+        print(f"warning: {line}", file=sys.stderr)
+    for line in missing:
+        print(f"coneskin guard: {scene.name} cannot be guarded yet: {line}", file=sys.stderr)
+    return 1 if missing else 0
+
+
+def _last_words(session: Session) -> str:
+    """Return what is known of the arm when everything has ended."""
+    if session.scene.arm is None:
+        return "there is no arm in the scene"
+    if not any(event.name == EventName.ACTIVATED for event in session.events):
+        return "the guard was not active yet, and has not moved the arm"
+    return STANDS if stands(session.events) else f"{NOT_CONFIRMED}: look at the arm"
+
+
+def _as_interrupt(_signal: int, _frame: object) -> None:
+    """Take SIGTERM as Ctrl-C: the arm is stopped and the recording closed."""
+    raise KeyboardInterrupt
+
+
+class _Work:
+    """Work of the command while it guards.
+
+    Args:
+        session: entered before ``run``.
+        duration: of the whole [s].
+        once: end after the first collision or fault.
+
+    Attributes:
+        code: exit code of the errors so far.
+    """
+
+    def __init__(self, session: Session, duration: float, once: bool) -> None:
+        self.code = 0
+        self._session = session
+        self._duration = duration
+        self._once = once
+        self._end = math.inf
+
+    def run(self) -> None:
+        """Guard until the end."""
+        person, stopped = _Person(), False
+        self._end = time.monotonic() + self._duration
+        while time.monotonic() < self._end:
+            try:
+                if stopped:
+                    self._offer_reset(person)
+                    stopped = False
+                self._watch(person)
+                return
+            except ConeSkinError as exc:
+                self.code = 3 if isinstance(exc, Collision) else max(self.code, 1)
+                lost, stopped = self._lost(), isinstance(exc, Collision | RobotRefused)
+                if (lost and (self._once or not self._external)) or not (lost or stopped):
+                    raise
+                print(f"coneskin guard: {exc}", file=sys.stderr, flush=True)
+                if self._once:
+                    return
+                if lost:
+                    self._hold()
+
+    @property
+    def _external(self) -> bool:
+        arm = self._session.scene.arm
+        return arm is not None and arm.control == "external"
+
+    def _lost(self) -> bool:
+        """Tell whether the guard hangs, or is gone."""
+        try:
+            self._session.check_guard()
+        except ConeSkinError:
+            return True
+        return False
+
+    def _offer_reset(self, person: _Person) -> None:
+        """Wait for a person to let the arm move again."""
+        again = "; its motion then goes on" if self._session.scene.motion else ""
+        person.ignore_earlier_lines()
+        print(f'type "reset" and Enter to let the arm move again{again}', file=sys.stderr, flush=True)
+        while time.monotonic() < self._end and not person.serve(self._session, 0.2):
+            self._session.check_guard()
+
+    def _hold(self) -> None:
+        """Stay while an externally controlled arm has no guard, so that it is held at standstill."""
+        print(
+            "the arm is held at standstill from here until the guard lives again, or you end this with Ctrl-C",
+            file=sys.stderr,
+            flush=True,
+        )
+        while time.monotonic() < self._end and self._lost():
+            time.sleep(0.1)
+
+    def _watch(self, person: _Person) -> None:
+        """Make the scene's motion, or wait, until the end or until the guard stops the arm."""
+        moves = self._moves() if self._session.scene.motion else None
+        while time.monotonic() < self._end:
+            self._session.check()
+            if moves is None:
+                person.answer_idle_line(0.1)
+            elif next(moves, None) is None:
+                return
+
+    def _moves(self) -> Iterator[tuple[float, ...]]:
+        """Make the scene's motion, one move at a time."""
+        motion, done = self._session.scene.motion, 0
+        assert motion is not None
+        while motion.rounds == 0 or done < motion.rounds:
+            for point in motion.waypoints:
+                self._session.arm.move_j(point, motion.speed, motion.acceleration)
+                yield point
+            done += 1
+
+
+class _Person:
+    """Person at the terminal."""
+
+    def __init__(self) -> None:
+        self._lines = typed_lines()
+
+    def ignore_earlier_lines(self) -> None:
+        """Ignore what was typed before a person could know of the stop, and say so."""
+        ignored = 0
+        with contextlib.suppress(queue.Empty):
+            while self._lines.get(timeout=_QUIET):
+                ignored += 1
+        if ignored:
+            print(f"{ignored} line(s) typed before the arm was latched are ignored", file=sys.stderr, flush=True)
+
+    def answer_idle_line(self, timeout: float) -> None:
+        """Take a line, if one comes within the timeout [s], while there is nothing to reset."""
+        with contextlib.suppress(queue.Empty):
+            self._lines.get(timeout=timeout)
+            print("ignored: the arm is not latched", file=sys.stderr, flush=True)
+
+    def serve(self, session: Session, timeout: float) -> bool:
+        """Take a line, if one comes within the timeout [s]; return True after a reset."""
+        stop = session.latched_stop  # what has been said when the line comes
+        try:
+            line = self._lines.get(timeout=timeout)
+        except queue.Empty:
+            return False
+        if line.strip().lower() != "reset":
+            print('type "reset" and Enter to let the arm move again', flush=True)
+            return False
+        try:
+            session.reset(stop=stop)
+        except RobotRefused as exc:
+            print(exc, file=sys.stderr, flush=True)
+            return False
+        return True

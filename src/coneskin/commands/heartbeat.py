@@ -1,0 +1,48 @@
+"""``coneskin heartbeat``: the lines with which an external program depends on its guard, network or not."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from coneskin.errors import RobotRefused
+
+__all__ = ["add_arguments", "run"]
+
+_EXAMPLE = """\
+example:
+  coneskin heartbeat scene.toml          put what it prints at the beginning of the program on the controller
+
+The lines are URScript. In PolyScope they go into a script node before the first move; how a program with ur_rtde gets
+them: docs/guard/external.md. The scene's arm.controller_heartbeat = "required" stops a program without them.
+Exit code: 0; 1 the scene has mistakes, or control = internal.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML, with control = external")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the lines for the scene's arm."""
+    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.driver.registry import load_driver
+    from coneskin.scene.reader import load_scene
+
+    scene = load_scene(args.scene)
+    if scene.arm is None or scene.arm.control != "external":
+        raise RobotRefused(
+            f'{scene.name} must say control = "external" in [arm]: with internal control the driver\'s program has a '
+            "watchdog already"
+        )
+    frequency = scene.arm.watchdog_hz
+    print(load_driver(arm_model(scene.arm.model).family).heartbeat_lines(frequency), end="")
+    print(
+        f"the program ends {1000.0 / frequency:g} ms after the guard's last heartbeat (arm.watchdog_hz)",
+        file=sys.stderr,
+    )
+    return 0

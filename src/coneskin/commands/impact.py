@@ -1,0 +1,134 @@
+"""``coneskin impact``: the arm of a scene makes its motion and meets its bodies, in the physics engine.
+
+The same collision with each way to protect the body: the scene's guard, the guard with each reaction, the controller's
+own force limit imitated, and nothing. In virtual time; nothing that moves is real.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import SceneError
+
+if TYPE_CHECKING:
+    from coneskin.physics.impact_outcome import ImpactOutcome
+    from coneskin.scene.scene import Scene
+
+__all__ = ["add_arguments", "run"]
+
+_EXAMPLE = """\
+example:
+  coneskin impact scene.toml
+  coneskin impact scene.toml --ways "guard,stop,nothing" --json
+
+The scene needs an [arm], a [motion], skins and at least one [[body]] in the way of a skin (docs/physics.md).
+
+exit code: 0 if the arm met a body and the guard noticed it; 1 otherwise."""
+_REACTIONS = ("stop", "retreat", "comply", "slow")
+_UNGUARDED = ("force limit", "nothing")
+_WAYS = ("guard", *_REACTIONS, *_UNGUARDED)
+_COLUMNS = (
+    ("peak", 1.0, "N"),
+    ("clamp", 1.0, "N"),
+    ("impulse", 1.0, "Ns"),
+    ("depth", 1e3, "mm"),
+    ("noticed", 1e3, "ms"),
+    ("standstill", 1e3, "ms"),
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("scene", type=Path, help="scene file")
+    parser.add_argument(
+        "--ways",
+        default=",".join(_WAYS),
+        help="what protects the body: guard (as the scene says), a reaction, force limit, nothing (default: all)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the skins' noise (default 0)")
+    parser.add_argument("--longest-s", type=float, default=20.0, metavar="T", help="for which to look on (default 20)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the collision in each way, and print the forces."""
+    from coneskin.scene.commissioning_record import with_commissioning
+    from coneskin.scene.reader import load_scene
+
+    scene = load_scene(args.scene)
+    ways = [way.strip() for way in args.ways.split(",")]
+    _check(scene, ways)
+    scenes = {way: with_commissioning(_with_reaction(scene, way), time.time()) for way in ways}
+    found = {way: _collide(scenes[way], way, args) for way in ways}
+    if args.json:
+        print(json.dumps({way: _plain(outcome) for way, outcome in found.items()}))
+    else:
+        _print(scenes, found)
+    guarded = [outcome for way, outcome in found.items() if way not in _UNGUARDED]
+    return 0 if all(outcome.peak > 0.0 and not math.isnan(outcome.noticed) for outcome in guarded) else 1
+
+
+def _check(scene: Scene, ways: list[str]) -> None:
+    """Refuse a scene in which nothing can be met, and ways that do not exist."""
+    problems = [f"--ways: {way!r} is none of {', '.join(_WAYS)}" for way in ways if way not in _WAYS]
+    needed = {
+        "an [arm] that moves": scene.arm,
+        "a [motion] to make": scene.motion,
+        "a [[link]] with a [[link.sensor]]": scene.sensors,
+        "a [[body]] to run into": scene.bodies,
+    }
+    problems += [f"an impact needs {name}" for name, part in needed.items() if not part]
+    if problems:
+        raise SceneError(problems, scene.name)
+
+
+def _with_reaction(scene: Scene, way: str) -> Scene:
+    """Return the scene with the reaction of a way; as it is where the way is none."""
+    if way not in _REACTIONS:
+        return scene
+    return replace(scene, reaction=replace(scene.default_reaction, kind=way), rules=())
+
+
+def _collide(scene: Scene, way: str, args: argparse.Namespace) -> ImpactOutcome:
+    from coneskin.physics.collision_run import CollisionRun
+    from coneskin.physics.joint_program import Waypoints
+
+    assert scene.motion is not None
+    motion = scene.motion
+    protection = "guard" if way in ("guard", *_REACTIONS) else way
+    first, *rest = motion.waypoints
+    run = CollisionRun(scene, scene.bodies, first, protection=protection, seed=args.seed)
+    return run.run(Waypoints(rest, motion.speed, motion.acceleration), longest=args.longest_s)
+
+
+def _plain(outcome: ImpactOutcome) -> dict[str, Any]:
+    """Return an outcome for JSON, which has no NaN."""
+    return {name: None if math.isnan(value) else value for name, value in asdict(outcome).items()}
+
+
+def _print(scenes: dict[str, Scene], found: dict[str, ImpactOutcome]) -> None:
+    from coneskin.scene.build import withheld_motion
+
+    for way, scene in scenes.items():
+        if way not in _UNGUARDED and (why := withheld_motion(scene)):
+            print(f"{way}: the arm only stops where it would move away: {why}")
+    if not any(outcome.peak > 0.0 for outcome in found.values()):
+        print("the skin met no body on the way: bare parts of the arm meet nothing in this simulation")
+        return
+    speed = max(outcome.approach for outcome in found.values())
+    print(f"the surfaces meet at {speed:.2f} m/s")
+    print(f"{'':14}" + "".join(f"{f'{name} {unit}':>15}" for name, _, unit in _COLUMNS))
+    for way, outcome in found.items():
+        cells = (factor * getattr(outcome, name) for name, factor, _ in _COLUMNS)
+        print(f"{way:14}" + "".join(f"{'never' if math.isnan(cell) else f'{cell:.1f}':>15}" for cell in cells))
+    print(
+        "clamp: force 0.5 s after the first contact. Simulated, with assumed servos and padding: no safety assessment."
+    )

@@ -1,0 +1,75 @@
+"""``coneskin studio``: design the sheets for a link in a browser."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import sys
+import threading
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from coneskin.design.link import LinkMesh
+    from coneskin.studio.workbench import Workbench
+
+__all__ = ["add_arguments", "run"]
+
+_EXAMPLE = """\
+examples:
+  coneskin studio forearm.stl -o skin            the link, its cones, handles, layers; "write" makes the folder skin
+  coneskin studio robot.urdf#forearm_link -o skin --tolerance-mm 0.5
+
+The folder is the one that `coneskin design` writes. The page is served to this computer alone. Ctrl-C ends it.
+
+Exit code: 0 shown; 1 the link cannot be read, or a package is not installed; 2 wrong usage.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("link", metavar="LINK", help="mesh file (STL, OBJ, DAE, PLY), or FILE.urdf#LINK")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("skin"), metavar="DIR", help="to write (default skin)"
+    )
+    parser.add_argument("--force", action="store_true", help="replace an earlier design in the folder")
+    parser.add_argument(
+        "--tolerance-mm", type=float, default=1.0, metavar="MM", help="largest distance to the mesh (1)"
+    )
+    parser.add_argument("--unit", choices=("m", "cm", "mm", "inch"), help="unit of the mesh (default: guessed)")
+    parser.add_argument("--port", type=int, default=8090, help="to listen at, the next free one if it is taken (8090)")
+    parser.add_argument("--no-browser", action="store_true", help="open no browser: only print the address")
+    parser.add_argument("--json", action="store_true", help="print one JSON object: the address")
+    parser.add_argument("--duration-s", type=float, metavar="S", help="end after this time [s]")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show the studio."""
+    from coneskin.design.link import load_link
+    from coneskin.studio.studio_page import StudioPage
+    from coneskin.studio.workbench import Workbench
+    from coneskin.view.page_server import PageServer
+
+    def bench_of(link: LinkMesh) -> Workbench:
+        return Workbench.of(link, tolerance=1e-3 * args.tolerance_mm)
+
+    over = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: over.set())
+    with PageServer("coneskin studio", port=args.port, uploads=True) as server:
+        if not args.json:
+            print(f"looking for cones in {args.link} ...", file=sys.stderr, flush=True)
+        bench = bench_of(next(iter(load_link(args.link, args.unit))))
+        page = StudioPage(server, bench, args.output, args.force, bench_of)
+        if args.json:
+            print(json.dumps({"url": server.url}), flush=True)
+        else:
+            print(f"the studio is at {server.url} (Ctrl-C ends it)", flush=True)
+        if not args.no_browser:
+            webbrowser.open(server.url)
+        over.wait(args.duration_s)
+        del page
+    return 0

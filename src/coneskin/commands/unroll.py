@@ -1,0 +1,60 @@
+"""Command ``coneskin unroll``: the flat sector of a truncated cone."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+
+from coneskin.scene.cone_keys import LINK_CONE_KEYS
+
+from .dimension_arguments import add_dimension_options, given_dimensions
+
+__all__ = ["add_arguments", "run"]
+
+_EXAMPLES = """\
+examples:
+  coneskin unroll --radius1-mm 40 --radius2-mm 70 --height-mm 150
+  coneskin unroll --radius1-mm 54 --height-mm 434 --wrap-deg 300 --json     (a cylinder: one radius is enough)
+
+r1 belongs to radius 1 and r2 to radius 2, so r1 > r2 where the link narrows. The sector of a cylinder is a rectangle:
+r1 and r2 are infinite (null in JSON), theta0 is 0, and arc1 is the width.
+Exit code: 0; 1 there is no such cone; 2 wrong usage.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLES
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
+    add_dimension_options(parser.add_argument, LINK_CONE_KEYS, ("radius1", "height"), defaults)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the sector of the cone; the exit code is 0."""
+    from coneskin.geometry.frustum import Frustum
+    from coneskin.geometry.sector import unroll
+
+    dimensions = given_dimensions(args, LINK_CONE_KEYS)
+    cone = Frustum(**{"radius2": dimensions["radius1"], **dimensions})
+    sector = unroll(cone)
+    facts = {
+        "r1_mm": 1e3 * sector.r1,
+        "r2_mm": 1e3 * sector.r2,
+        "theta0_deg": math.degrees(sector.theta0),
+        "slant_mm": 1e3 * sector.slant,
+        "half_angle_deg": math.degrees(cone.half_angle),
+        "arc1_mm": 1e3 * sector.arc1,
+        "arc2_mm": 1e3 * sector.arc2,
+        "area_cm2": 1e4 * sector.area,
+    }
+    if args.json:
+        finite = {key: value if math.isfinite(value) else None for key, value in facts.items()}
+        print(json.dumps(finite, allow_nan=False))
+        return 0
+    for key, value in facts.items():
+        name, unit = key.rsplit("_", 1)
+        print(f"{name.replace('_', ' '):<11} {value:14.6f} {unit}")
+    return 0

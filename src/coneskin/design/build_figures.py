@@ -1,0 +1,118 @@
+"""Figures that a workshop needs to build one sheet: cable, readings, place on the link."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from coneskin.geometry.drawing.surface_shape import ShapeTab, SurfaceShape, drawing_point
+from coneskin.geometry.frustum import Frustum
+
+from .expected_readings import PairReading, expected_frame, pair_readings
+from .placement import SheetPlacement, find_placement
+from .sheets import SheetDesign
+from .wiring import CableExit, cable_exit
+
+if TYPE_CHECKING:
+    from coneskin.geometry.mesh import Mesh
+
+__all__ = ["BuildFigures", "measure_build"]
+
+
+@dataclass(frozen=True, slots=True)
+class BuildFigures:
+    """Figures for building one sheet.
+
+    Attributes:
+        cable: its wires and where they leave.
+        pairs: what a multimeter should read between A and B, and between C and D.
+        frame: counts of the untouched sensor, by field of a frame.
+        placement: where it belongs on the link.
+    """
+
+    cable: CableExit
+    pairs: tuple[PairReading, PairReading]
+    frame: dict[str, int]
+    placement: SheetPlacement
+
+    def as_data(self, design: SheetDesign) -> dict[str, Any]:
+        """Return the figures and the coordinates of holes and electrodes as plain data, in mm and degrees."""
+        cable, placement, feature = self.cable, self.placement, self.placement.feature
+        layout, surfaces = design.layout, {"CD": design.cuts[1].surface, "AB": design.cuts[5].surface}
+        return {
+            "holes": [_point(u, phi) for u, phi in layout.holes],
+            "hole_diameter_mm": _mm(layout.plan.hole),
+            "electrodes": {
+                name: _outline(foil, surfaces["AB" if name in "AB" else "CD"]) for name, foil in layout.foils.items()
+            },
+            "cable": {
+                "side": cable.side,
+                **_point(cable.u, cable.phi),
+                "tie_mm": _mm(cable.tie),
+                "connector_mm": _mm(cable.connector),
+                "wires": [
+                    {"electrode": w.electrode, "pin": w.pin, **_point(w.u, w.phi), "length_mm": _mm(w.length)}
+                    for w in cable.wires
+                ],
+            },
+            "multimeter_ohm": {pair.pair: round(pair.ohms, 2) for pair in self.pairs},
+            "squares": {pair.pair: round(pair.squares, 5) for pair in self.pairs},
+            "untouched_frame": self.frame,
+            "placement": {
+                "around_end1_mm": _mm(placement.around1),
+                "around_end2_mm": _mm(placement.around2),
+                "before_end1_mm": None if placement.before is None else _mm(placement.before),
+                "beyond_end2_mm": None if placement.beyond is None else _mm(placement.beyond),
+                "seam_direction": [round(value, 5) + 0.0 for value in placement.seam],
+                "feature": None
+                if feature is None
+                else {
+                    "radius_mm": _mm(feature.radius),
+                    "azimuth_deg": round(math.degrees(feature.azimuth), 3),
+                    "from_end1_mm": _mm(feature.height),
+                    "arc_mm": _mm(feature.arc),
+                    "at_end": feature.end,
+                },
+            },
+        }
+
+
+def measure_build(design: SheetDesign, index: int, frame: str = "mesh", mesh: Mesh | None = None) -> BuildFigures:
+    """Work out the figures for building one sheet.
+
+    Args:
+        design: the sheet.
+        index: its sensor number in the wire format.
+        frame: frame of the poses, in words.
+        mesh: of the link; None where it is known by its dimensions only.
+
+    Raises:
+        GeometryError: a scene would refuse its sensor, or the connector is out of range.
+    """
+    return BuildFigures(
+        cable_exit(design.layout, design.options.connector),
+        pair_readings(design),
+        expected_frame(design, index, frame),
+        find_placement(design.place, mesh),
+    )
+
+
+def _outline(foil: SurfaceShape, surface: Frustum) -> list[dict[str, float | str]]:
+    """Return the corners of a foil on the sheet, and on the flat pattern seen from outside."""
+    corners: list[dict[str, float | str]] = []
+    for step in foil:
+        x, y = drawing_point(surface, step.u, step.phi)
+        corner: dict[str, float | str] = {**_point(step.u, step.phi), "x_mm": _mm(x), "y_mm": _mm(y)}
+        if isinstance(step, ShapeTab):
+            corner |= {"tab_width_mm": _mm(step.width), "tab_length_mm": _mm(step.length), "side": step.side}
+        corners.append(corner)
+    return corners
+
+
+def _point(u: float, phi: float) -> dict[str, float]:
+    return {"u_mm": _mm(u), "phi_deg": round(math.degrees(phi), 4) + 0.0}
+
+
+def _mm(metres: float) -> float:
+    return round(1e3 * metres, 3) + 0.0

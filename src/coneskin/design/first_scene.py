@@ -1,0 +1,200 @@
+"""First scene for a design: what `coneskin init` writes, so that nobody has to write a scene by hand."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING
+
+from coneskin.bounded_file import read_file
+from coneskin.errors import GeometryError, KinematicsError
+from coneskin.robot.arm.link_frames import LINK_INDEX, link_index
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.scene.sensor_table import build_sensor
+from coneskin.skin.firmware.board_circuit import value_text
+
+from .files import DESIGN_FILE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from coneskin.geometry.frustum import Frustum
+    from coneskin.skin.firmware.board_circuit import BoardCircuit
+    from coneskin.skin.sensor import Sensor
+
+__all__ = ["ArmAddress", "DesignFolder", "first_scene", "read_design"]
+
+_MAX_BYTES = 4 << 20  # of design.json
+_TUBES = {"upper_arm": 1, "forearm": 2}  # link -> index of the DH length along which its mesh's z axis runs
+_HEAD = """\
+# Written by `coneskin init`; every key is described in docs/scene.md.
+"""
+_MOTION = """\
+# What a simulation needs from here on; take it out for real hardware.
+[motion]
+waypoints_deg = [[-40, -90, 90, -90, -90, 0], [60, -80, 80, -90, -90, 0]]
+speed_deg_s = 30
+acceleration_deg_s2 = 90
+"""
+_MONITORING = """\
+[monitoring]                  # a pseudo-terminal on a busy computer can stall for longer than 50 ms"""
+_STALL = 250  # ms
+_TOUCH_START = 2.5  # s after the skin's start: the arm moves at full speed until about 3.4 s
+_TOUCH_END = 2.8  # s
+
+
+@dataclass(frozen=True, slots=True)
+class ArmAddress:
+    """Arm of a scene that is still to be written.
+
+    Attributes:
+        model: such as "UR5e".
+        host: of its controller.
+    """
+
+    model: str
+    host: str
+
+
+@dataclass(frozen=True, slots=True)
+class DesignFolder:
+    """What a scene takes from the folder of a design.
+
+    Attributes:
+        sensor_files: one for each sheet, in order.
+        sensors: with the electronics that match them, in the same order.
+        link: the arm's link that the design was made for; None where its name is that of no link.
+        frame: "mesh" or "urdf", to which the poses of the sensors refer; None where the design was made from dimensions
+            and has no place on a link.
+    """
+
+    sensor_files: tuple[Path, ...]
+    sensors: tuple[Sensor, ...]
+    link: str | None
+    frame: str | None
+
+
+def read_design(folder: Path) -> DesignFolder:
+    """Read what `coneskin design` has written.
+
+    Raises:
+        GeometryError: the folder is no design.
+    """
+    try:
+        data = json.loads(read_file(folder / DESIGN_FILE, _MAX_BYTES))
+        frame, source, count = str(data["frame"]), str(data["link"]), len(data["sheets"])
+        if not count:
+            raise ValueError("it has no sheet")
+        files = (
+            [folder / "sensor.toml"] if count == 1 else [folder / f"sheet-{n + 1}/sensor.toml" for n in range(count)]
+        )
+        tables = [tomllib.loads(read_file(path, _MAX_BYTES).decode()) for path in files]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as exc:
+        why = (exc.strerror or exc) if isinstance(exc, OSError) else exc
+        raise GeometryError(f"{folder} is no design: {why}; make one with `coneskin design LINK -o {folder}`") from exc
+    problems: list[str] = []
+    built = [build_sensor(table, str(path), problems) for path, table in zip(files, tables, strict=True)]
+    if problems:
+        raise GeometryError(f"{folder} is no design that a scene can take: {'; '.join(problems)}")
+    sensors = tuple(item[0] for item in built if item is not None)
+    path, _, name = source.partition("#")
+    kinds = {"the mesh's coordinates": "mesh", "the URDF link": "urdf", "mesh": "mesh"}
+    kind = next((kind for words, kind in kinds.items() if frame.startswith(words)), None)
+    return DesignFolder(tuple(files), sensors, _link_of(name or PurePath(path).stem), kind)
+
+
+def _link_of(name: str) -> str | None:
+    try:
+        index = link_index(name)
+    except KinematicsError:
+        return None
+    return next(link for link, number in LINK_INDEX.items() if number == index)
+
+
+def first_scene(
+    design: DesignFolder,
+    target: Path,
+    arm: ArmAddress | None,
+    ports: Sequence[str],
+    link: str | None = None,
+    boards: Sequence[BoardCircuit] = (),
+) -> str:
+    """Return the text of a scene for a design: the arm stops when it is touched.
+
+    Args:
+        design: as ``read_design`` returns it.
+        target: the scene's file; the paths in it are relative to its folder.
+        arm: that carries the sensors; None to watch the skin alone.
+        ports: of the skin; empty for a virtual skin, which is touched while the arm moves.
+        link: of the arm; by default the one that the design was made for.
+        boards: one for each sensor, whose own values the scene says; none by default.
+
+    Raises:
+        GeometryError: the link, or the place of the sensors on it, is not known.
+        KinematicsError: there is no such arm or link.
+    """
+    name = link or design.link
+    if arm is not None and name is None:
+        raise GeometryError(f"which link of the arm was it designed for? Add --link, one of {', '.join(LINK_INDEX)}")
+    if arm is not None and name is not None:
+        name = next(known for known, number in LINK_INDEX.items() if number == link_index(name))
+    lines = [_HEAD]
+    if arm is not None:
+        lines.append(f'[arm]\nmodel = "{arm_model(arm.model).name}"\nhost = {json.dumps(arm.host)}\n')
+    lines.append(f'[[link]]\nname = {json.dumps(name or "link")}\nframe = "{design.frame or "mesh"}"\n')
+    for number, (path, sensor) in enumerate(zip(design.sensor_files, design.sensors, strict=True)):
+        file = os.path.relpath(path, target.parent).replace(os.sep, "/")
+        lines.append(
+            f"[[link.sensor]]\nfile = {json.dumps(file)}     # its dimensions, pose on the link and electronics"
+        )
+        if design.frame is None and arm is not None:
+            lines.append(_middle_of_tube(sensor.frustum, name or "", arm.model))
+        if boards:
+            lines.append(f"# as the board has it ({boards[number].facts.title}):")
+            lines += [f"{key} = {value_text(value)}" for key, value in boards[number].keys.items()]
+        lines.append("")
+    lines += _sources(ports, boards) if ports else [_virtual(design)]
+    if arm is not None:
+        lines.append('[reaction]\nkind = "stop"               # retreat and comply need `coneskin commission`\n')
+    lines.append('[recording]\nfolder = "runs"\n')
+    limits: dict[str, float] = dict(boards[0].monitoring) if boards else {}
+    if not ports:
+        limits |= {key: max(limits.get(key, 0), _STALL) for key in ("skin_silence_ms", "skin_late_ms")}
+        if arm is not None:
+            lines.append(_MOTION)
+            limits["arm_silence_ms"] = _STALL
+    if limits:
+        lines.append("[monitoring]" if ports else _MONITORING)
+        lines += [*(f"{key} = {value_text(value)}" for key, value in limits.items()), ""]
+    return "\n".join(lines)
+
+
+def _sources(ports: Sequence[str], boards: Sequence[BoardCircuit]) -> list[str]:
+    """Return the tables of the ports."""
+    head = "[source]" if len(ports) == 1 else "[[source]]"
+    baud = f"\nbaud = {boards[0].board.baud}" if boards else ""
+    return [f'{head}\nkind = "serial"\nport = {json.dumps(port)}{baud}\n' for port in ports]
+
+
+def _middle_of_tube(cone: Frustum, link: str, model: str) -> str:
+    """Return the pose of a sensor that was designed from dimensions: the middle of the tube, until it is measured."""
+    if link not in _TUBES:
+        raise GeometryError(
+            f"the design was made from dimensions, so where it is on the {link} is not known; design it from the "
+            f"link's mesh, or choose --link {' or '.join(_TUBES)}"
+        )
+    start = 0.5e3 * (abs(arm_model(model).a[_TUBES[link]]) - cone.height)
+    return f"xyz_mm = [0, 0, {start:.1f}]       # MEASURE: end 1 along the link from the joint; the design knew no link"
+
+
+def _virtual(design: DesignFolder) -> str:
+    cone = design.sensors[0].frustum
+    return (
+        '[source]\nkind = "virtual"\n\n'
+        f"[[source.touch]]\nstart_s = {_TOUCH_START:g}\nend_s = {_TOUCH_END:g}\n"
+        f"u_mm = {0.5e3 * cone.slant:.1f}\nphi_deg = {math.degrees(0.5 * cone.wrap):.1f}\n"
+    )

@@ -1,0 +1,93 @@
+"""Folder of a design: drawings, sensor files, report, pictures and design.json, written as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.geometry.drawing.nesting import nest_on_beds
+from coneskin.terminal_text import printable
+
+from .build_figures import measure_build
+from .files import FileOptions, new_folder, write_sheets
+from .report import report_text
+from .sheets import SheetDesign
+from .summary import design_summary
+
+if TYPE_CHECKING:
+    from coneskin.geometry.fit.cones import LinkFit
+    from coneskin.geometry.mesh import Mesh
+
+__all__ = ["write_design"]
+
+
+def write_design(
+    folder: Path | str,
+    designs: Sequence[SheetDesign],
+    *,
+    fit: LinkFit | None = None,
+    mesh: Mesh | None = None,
+    title: str = "a link",
+    source: str = "",
+    frame: str = "mesh",
+    notes: Sequence[str] = (),
+    options: FileOptions | None = None,
+    pictures: bool = True,
+    replace: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> dict[str, Any]:
+    """Write everything that a person needs to build the sheets, and the guard to use them.
+
+    Args:
+        folder: to write; it appears as a whole, or not at all.
+        designs: the sheets, as ``design_sheets`` makes them.
+        fit: the fit that they come from, for the report.
+        mesh: of the link, for the pictures.
+        title: name of the link, for the report.
+        source: file that the link comes from; by default the title.
+        frame: name of the frame of all poses.
+        notes: on the link, for the report.
+        options: of the drawings.
+        pictures: True to draw pictures too, which needs the extra ``pictures``.
+        replace: True to allow an earlier design in the folder; files that are not of that design stay.
+        progress: called with the name of each step.
+
+    Returns:
+        the content of design.json; "files" lists all files of the design, as paths in the folder.
+
+    Raises:
+        GeometryError: the folder is in use, or a scene would refuse a sensor of the design; nothing is written then.
+        MissingExtra: a package that the drawings or pictures need is not installed.
+    """
+    sheets = tuple(designs)
+    title, source, frame, *notes = map(printable, (title, source, frame, *notes))  # a file's name may be no text
+    figures = [measure_build(design, index, frame, mesh) for index, design in enumerate(sheets)]
+    data: dict[str, Any] = {"link": source or title, "frame": frame, "notes": list(notes)}
+    data["sheets"] = [
+        design_summary(design) | item.as_data(design) for design, item in zip(sheets, figures, strict=True)
+    ]
+    if fit is not None:
+        data["bare"] = [{"start_mm": 1e3 * b.start, "end_mm": 1e3 * b.end, "reason": b.reason} for b in fit.bare]
+        data["bare_areas"] = [{"share": round(b.share, 4), "reason": b.reason} for b in fit.bare_areas]
+    options = options or FileOptions()
+    beds, larger = nest_on_beds([cut for design in sheets for cut in design.cuts], *options.bed, options.bed_gap)
+    for sentence in larger:
+        progress(sentence)
+    data["beds"] = [
+        {"file": f"nested/{bed.slug}", "material": bed.material, "waste": round(bed.waste, 4)} for bed in beds
+    ]
+    data["larger_than_bed"] = list(larger)
+    with new_folder(Path(folder), replace) as draft:
+        drawn: list[tuple[str, str]] = []
+        if pictures:
+            from .pictures import draw_pictures
+
+            tolerance, areas = (0.0, ()) if fit is None else (fit.tolerance, fit.bare_areas)
+            drawn = draw_pictures(draft, sheets, figures, mesh, tolerance, progress, areas)
+        text = report_text(sheets, figures, title, (*notes, *larger, f"Frame of all poses: {frame}"), fit, drawn, beds)
+        (draft / "report.md").write_text(text, encoding="utf-8")
+        written = ["report.md", *(file for _, file in drawn)]
+        write_sheets(draft, sheets, data, options, progress, beds, written)
+        progress(f"{sum(1 for path in draft.rglob('*') if path.is_file())} files in {folder}")
+    return data

@@ -1,0 +1,105 @@
+"""Picture of the flat layout of a sheet with its dimensions, for the report."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from coneskin.geometry.drawing.outline import Outline
+from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw_shape, drawing_point
+from coneskin.geometry.sector import unroll
+
+from .sheets import SheetDesign
+
+__all__ = ["FOIL_COLOUR", "INK_COLOUR", "draw_layout"]
+
+INK_COLOUR = "#222222"
+FOIL_COLOUR = "#c27c0e"
+_ACTIVE_COLOUR = "#9fd3c7"
+
+
+def _xy(outline: Outline) -> tuple[list[float], list[float]]:
+    """Return the coordinates of an outline [mm]; the first point is repeated if it is closed."""
+    flat = outline.flattened(5e-5)
+    points = [(x * 1e3, y * 1e3) for x, y, _ in flat.vertices]
+    points += points[:1] if outline.closed else []
+    return [x for x, _ in points], [y for _, y in points]
+
+
+def draw_layout(figure: Any, design: SheetDesign) -> None:
+    """Draw the layout of a sheet on the cone of its upper conductive layer, with dimensions in mm.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        design: the sheet.
+    """
+    axes = figure.add_subplot()
+    layout = design.layout
+    cone = design.cuts[4].surface
+    box = layout.active
+    active = tuple(
+        ShapeCorner(u, p) for u, p in ((box.u1, box.phi1), (box.u1, box.phi2), (box.u2, box.phi2), (box.u2, box.phi1))
+    )
+    axes.fill(*_xy(draw_shape(cone, active)), color=_ACTIVE_COLOUR, alpha=0.6, lw=0, label="active area")
+    axes.plot(*_xy(draw_shape(cone, layout.rim)), color=INK_COLOUR, lw=1.4, label="substrates and isolation")
+    axes.plot(*_xy(draw_shape(cone, layout.upper)), color=INK_COLOUR, lw=0.8, ls="--", label="upper conductive layer")
+    axes.plot(*_xy(draw_shape(cone, layout.lower)), color=INK_COLOUR, lw=0.8, ls=":", label="lower conductive layer")
+    for name, foil in layout.foils.items():
+        upper = name in "AB"
+        label = {"A": "foil of A, B (upper sheet)", "C": "foil of C, D (lower sheet)"}.get(name)
+        style = {"facecolor": FOIL_COLOUR, "alpha": 0.45 if upper else 0.8, "edgecolor": INK_COLOUR, "lw": 0.4}
+        axes.fill(*_xy(draw_shape(cone, foil)), label=label, **style)
+    for number, (u, phi) in enumerate(layout.holes):
+        label = None if number else f"registration holes, diameter {1e3 * layout.plan.hole:g} mm"
+        hole = _xy(draw_hole(cone, u, phi, layout.plan.hole))
+        axes.fill(*hole, facecolor="white", edgecolor=INK_COLOUR, lw=0.8, label=label)
+    _dimensions(axes, design, cone)
+    axes.margins(0.08)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+
+
+def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
+    """Draw the dimensions of the flat pattern and the names of the electrodes."""
+    wrap, slant, layout = cone.wrap, cone.slant, design.layout
+    lift = 0.06 * max(slant, 0.3 * wrap * max(cone.radius1, cone.radius2))
+    style = {"ha": "center", "va": "center", "fontsize": 9, "color": INK_COLOUR}
+
+    def at(u: float, phi: float) -> tuple[float, float]:
+        x, y = drawing_point(cone, u, phi)
+        return x * 1e3, y * 1e3
+
+    x0, y0, x1, y1 = draw_shape(cone, layout.rim).bounds
+    far = 1.5e3 * lift
+    bottom, right = y0 * 1e3 - far - 12.0 * bool(layout.plan.wires == "end1"), x1 * 1e3 + far
+    arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.7, "shrinkA": 0, "shrinkB": 0}
+    axes.plot(
+        [x0 * 1e3, x1 * 1e3, right], [bottom - 0.6e3 * lift, bottom, bottom], lw=0.0
+    )  # arrows do not extend the axes
+    axes.annotate("", (x0 * 1e3, bottom), (x1 * 1e3, bottom), arrowprops=arrow)
+    axes.text(500.0 * (x0 + x1), bottom, f"{(x1 - x0) * 1e3:.2f} mm", **style, backgroundcolor="white")
+    axes.annotate("", (right, y0 * 1e3), (right, y1 * 1e3), arrowprops=arrow)
+    axes.text(right, 500.0 * (y0 + y1), f"{(y1 - y0) * 1e3:.2f} mm", rotation=90, **style, backgroundcolor="white")
+    flat = unroll(cone)
+    lines = [
+        f"{design.name}, upper conductive layer",
+        f"slant {slant * 1e3:.3f} mm",
+        f"arcs {flat.arc1 * 1e3:.3f} mm (end 1), {flat.arc2 * 1e3:.3f} mm (end 2)",
+    ]
+    if math.isfinite(flat.r1):
+        lines.append(
+            f"r1 {flat.r1 * 1e3:.3f} mm, r2 {flat.r2 * 1e3:.3f} mm, theta0 {math.degrees(flat.theta0):.4f} deg"
+        )
+    lines.append(f"active area {1e4 * layout.active.area(layout.sheet):.1f} cm2 ({layout.active_share:.0%})")
+    axes.text(*at(0.5 * slant, 0.5 * wrap), "\n".join(lines), **style)
+    half = 0.5 * layout.plan.electrode
+    narrow = min(layout.sheet.radius1, layout.sheet.radius2)
+    field = layout.field
+    for name, u, phi in (
+        ("A", field.u2 + half, 0.42 * wrap),
+        ("B", field.u1 - half, 0.42 * wrap),
+        ("C", 0.5 * slant, field.phi2 + half / narrow),
+        ("D", 0.5 * slant, field.phi1 - half / narrow),
+    ):
+        axes.text(*at(u, phi), name, **{**style, "fontweight": "bold"})

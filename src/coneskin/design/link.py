@@ -1,0 +1,136 @@
+"""Loader of the LINK of ``coneskin design``: a mesh file, or a link of a URDF."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import MeshError
+
+if TYPE_CHECKING:
+    from coneskin.geometry.fit.cones import LinkFit
+    from coneskin.geometry.mesh import Mesh
+
+__all__ = ["LinkMesh", "fit_link", "fit_mesh", "load_link"]
+
+_RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkMesh:
+    """The mesh of a link.
+
+    Attributes:
+        name: of the link, for titles.
+        mesh: its surface.
+        frame: frame of its coordinates, in words.
+        notes: notes on the mesh, one sentence each.
+    """
+
+    name: str
+    mesh: Mesh
+    frame: str
+    notes: tuple[str, ...]
+
+
+def load_link(
+    link: str,
+    unit: str | None = None,
+    up_axis: str = "ignore",
+    packages: Mapping[str, str | Path] | None = None,
+) -> Iterator[LinkMesh]:
+    """Load the meshes of a LINK.
+
+    Args:
+        link: a mesh file, or FILE.urdf#LINK.
+        unit: of a mesh file; None to guess.
+        up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
+        packages: folders of the ROS packages in a URDF's package:// paths (``load_urdf_link``).
+
+    Yields:
+        the meshes of the link, the best first: the visual mesh of a URDF is closer to the real surface than its
+        collision mesh, which is often a convex hull.
+
+    Raises:
+        MeshError: the file, the link or its mesh cannot be found or read.
+    """
+    from coneskin.geometry.mesh import load_mesh
+
+    path, hash_sign, name = link.partition("#")
+    if not hash_sign and not path.lower().endswith((".urdf", ".xacro")):
+        mesh = load_mesh(path, unit, up_axis)
+        frame = f"the mesh's coordinates in {Path(path).name}"
+        yield LinkMesh(Path(path).stem, mesh, frame, (*_terms(path), *mesh.notes))
+        return
+    from coneskin.geometry.urdf import load_urdf_link, urdf_links
+
+    if not name:
+        raise MeshError(f"{path}: name a link as {Path(path).name}#LINK; its links are: {', '.join(urdf_links(path))}")
+    errors: list[MeshError] = []
+    for kind in ("visual", "collision"):
+        try:
+            mesh = load_urdf_link(path, name, kind, packages, up_axis)
+        except MeshError as exc:
+            errors.append(exc)
+            continue
+        said = tuple(str(error) for error in errors)
+        notes = (f"{kind} mesh of the URDF", *said, *_terms(path + name), *mesh.notes)
+        yield LinkMesh(name, mesh, f"the URDF link {name}", notes)
+    if len(errors) == 2:
+        raise errors[0]
+
+
+def fit_link(
+    link: str,
+    unit: str | None = None,
+    up_axis: str = "ignore",
+    packages: Mapping[str, str | Path] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+    **search: Any,
+) -> tuple[LinkMesh, LinkFit]:
+    """Return the first mesh of a link in which cones are found, with its fit; else the first mesh.
+
+    Args:
+        link: a mesh file, or FILE.urdf#LINK.
+        unit: of a mesh file; None to guess.
+        up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
+        packages: folders of the ROS packages in a URDF's package:// paths.
+        progress: called with the name of each step.
+        search: keyword arguments of ``find_cones``.
+
+    Raises:
+        MeshError: the file, the link or its mesh cannot be found or read.
+        GeometryError: an argument of the search is out of range.
+    """
+    from coneskin.geometry.fit.cones import find_cones
+
+    tries: list[tuple[LinkMesh, LinkFit]] = []
+    progress(f"reading {link}")
+    for source in load_link(link, unit, up_axis, packages):
+        progress(f"{source.name}: {len(source.mesh.faces)} faces")
+        fit = find_cones(source.mesh, progress=progress, **search)
+        if fit.sheets:
+            return source, fit
+        tries.append((source, fit))
+    return tries[0]
+
+
+def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **search: Any) -> tuple[LinkMesh, LinkFit]:
+    """Return a mesh with its fit, named by its source; arguments as in ``fit_link``."""
+    from coneskin.geometry.fit.cones import find_cones
+
+    name = Path(mesh.source).stem
+    source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", (*_terms(mesh.source), *mesh.notes))
+    return source, find_cones(mesh, progress=progress, **search)
+
+
+def _terms(name: str) -> tuple[str, ...]:
+    if not _RESTRICTED_MODELS.search(name):
+        return ()
+    return (
+        "this looks like a mesh of a UR20 or UR30: Universal Robots' terms for these forbid physical models for "
+        "commercial purposes",
+    )

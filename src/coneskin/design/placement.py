@@ -1,0 +1,90 @@
+"""Place of a sheet on the real link: distances that a ruler and a tape measure, from what the link itself shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from coneskin.geometry.placed_frustum import PlacedFrustum
+
+if TYPE_CHECKING:
+    from coneskin.geometry.mesh import Mesh
+
+__all__ = ["LinkFeature", "SheetPlacement", "find_placement"]
+
+_STANDS_OUT = 3e-3  # m; what stands out less is no feature that a person finds
+_OUTERMOST = 1e-3  # m; points so near to the outermost one are its neighbours
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFeature:
+    """The point of a link that is furthest from the axis of a sheet: a flange, an elbow, a cover.
+
+    Attributes:
+        radius: distance from the axis [m].
+        azimuth: from the seam [rad], in [0, 2 pi).
+        height: along the axis from end 1 of the sheet, positive towards end 2 [m].
+        arc: from the seam to its azimuth, around the sheet at the end nearer to it [m].
+        end: that end, 1 or 2.
+    """
+
+    radius: float
+    azimuth: float
+    height: float
+    arc: float
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class SheetPlacement:
+    """Where a sheet belongs on its link.
+
+    Attributes:
+        around1: way around the bare link at end 1, from edge 0 to edge wrap [m].
+        around2: the same at end 2 [m].
+        before: from the outermost point of the link on the side of end 1 to end 1, along the axis [m]; None where
+            there is no mesh.
+        beyond: from end 2 to the outermost point of the link on its side [m]; None where there is no mesh.
+        seam: direction in which edge 0 faces, in the frame of the link.
+        feature: what stands out, from which the seam is measured; None where nothing does.
+    """
+
+    around1: float
+    around2: float
+    before: float | None
+    beyond: float | None
+    seam: tuple[float, float, float]
+    feature: LinkFeature | None
+
+
+def find_placement(place: PlacedFrustum, mesh: Mesh | None = None) -> SheetPlacement:
+    """Measure where a sheet belongs on its link.
+
+    Args:
+        place: the side of the link that the sheet covers.
+        mesh: of the link; None where it is known by its dimensions only.
+    """
+    side, pose = place.frustum, place.link_frustum
+    around = side.wrap * side.radius1, side.wrap * side.radius2
+    seam = pose.rotate((1.0, 0.0, 0.0))
+    if mesh is None:
+        return SheetPlacement(*around, None, None, seam, None)
+    import numpy as np
+
+    x, y, z = pose.inverse().apply_all(mesh.vertices).T
+    radius = np.hypot(x, y)
+    feature = None
+    furthest = int(radius.argmax())
+    if radius[furthest] > max(side.radius1, side.radius2) + _STANDS_OUT:
+        near = radius > radius[furthest] - _OUTERMOST
+        first = math.atan2(y[furthest], x[furthest])
+        turns = (np.arctan2(y[near], x[near]) - first + math.pi) % (2.0 * math.pi) - math.pi
+        # a collar stands out all around: it has no azimuth
+        if float(np.ptp(turns)) < 0.5 * math.pi:
+            azimuth = (first + 0.5 * float(turns.min() + turns.max())) % (2.0 * math.pi)
+            height = float(np.median(z[near]))
+            end = 1 if height < 0.5 * side.height else 2
+            arc = azimuth * (side.radius1 if end == 1 else side.radius2)
+            feature = LinkFeature(float(radius[furthest]), azimuth, height, arc, end)
+    return SheetPlacement(*around, -float(z.min()), float(z.max()) - side.height, seam, feature)

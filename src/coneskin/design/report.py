@@ -1,0 +1,231 @@
+"""Report of a design (report.md): dimensions, materials, and the guide by which it is built."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from coneskin.geometry.drawing.nesting import MaterialBed
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.sector import unroll
+from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
+
+from .bill_of_materials import bill_of_materials
+from .build_figures import BuildFigures
+from .build_guide import guide_lines
+from .files import sheet_folder
+from .sheets import SheetDesign
+from .summary import design_summary, material_rows
+
+if TYPE_CHECKING:
+    from coneskin.geometry.fit.cones import LinkFit
+
+__all__ = ["report_text"]
+
+_ASSEMBLY = {
+    "loose": "Wrap the layers one after another; each is cut for its own radius.",
+    "pairs": "Glue each conductive sheet to its substrate while both are flat, then wrap the pairs.",
+    "bonded": "Glue all layers together while they are flat, then wrap the sheet; check the strains above.",
+}
+
+
+def report_text(
+    designs: tuple[SheetDesign, ...],
+    figures: Sequence[BuildFigures],
+    link: str,
+    notes: Sequence[str] = (),
+    fit: LinkFit | None = None,
+    pictures: Sequence[tuple[str, str]] = (),
+    beds: Sequence[MaterialBed] = (),
+) -> str:
+    """Return the report as Markdown.
+
+    Args:
+        designs: the sheets.
+        figures: for building each of them.
+        link: name of the link.
+        notes: notes on the link.
+        fit: fit of the sheets to a mesh; None for a link given by its dimensions.
+        pictures: caption and file of each picture.
+        beds: parts of each material, nested.
+    """
+    lines = [f"# Sensor for {link}", ""]
+    lines += [f"* {note}" for note in notes]
+    lines += _coverage(fit) if fit else []
+    for caption, file in pictures:
+        lines += ["", f"![{caption}]({file})", "", caption]
+    for index, design in enumerate(designs):
+        lines += ["", *_sheet_section(design, sheet_folder(designs, index).as_posix())]
+    lines += [
+        "",
+        "## Materials",
+        "",
+        "Areas are net; width and depth are those of the piece of material from which the parts are cut.",
+        "",
+    ]
+    keys = ("sheet", "layer", "material", "area_cm2", "width_mm", "depth_mm", "cut_length_mm")
+    head = ("sheet", "cut sheet", "material", "area [cm2]", "width [mm]", "depth [mm]", "length of cuts [mm]")
+    lines += _table(head, [[_text(row[key]) for key in keys] for row in material_rows(designs)])
+    lines += ["", "### Everything to buy or to cut", ""]
+    lines += _table(("item", "quantity", "for"), bill_of_materials(designs, figures, beds))
+    for index, (design, item) in enumerate(zip(designs, figures, strict=True)):
+        lines += ["", *guide_lines(design, item, sheet_folder(designs, index).as_posix())]
+    return "\n".join(lines) + "\n"
+
+
+def _coverage(fit: LinkFit) -> Iterator[str]:
+    axes = len({sheet.axis for sheet in fit.sheets})
+    count = "1 sheet covers" if len(fit.sheets) == 1 else f"{len(fit.sheets)} sheets cover"
+    yield (
+        f"* {count}, within {fit.tolerance * 1e3:g} mm of the mesh and about {axes} ax{'i' if axes == 1 else 'e'}s, "
+        f"{sum(sheet.area_share for sheet in fit.sheets):.0%} of the hull of the link"
+    )
+    for area in fit.bare_areas:
+        yield f"* No sheet on {area.share:.0%} of the hull: {area.reason}"
+
+
+def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
+    data, stack = design_summary(design), design.options.stack
+    side, active = design.place.frustum, design.active.frustum
+    yield f"## {design.name.capitalize()}"
+    yield ""
+    rows = [
+        ["radius at end 1, end 2", f"{side.radius1 * 1e3:.3f}, {side.radius2 * 1e3:.3f} mm"],
+        ["height, slant", f"{side.height * 1e3:.3f}, {side.slant * 1e3:.3f} mm"],
+        ["half angle", f"{math.degrees(side.half_angle):z.4f} deg"],
+        ["wrap", f"{math.degrees(side.wrap):.3f} deg"],
+        ["flat sector of the bare link", _sector(side)],
+        ["position of end 1 (frame above)", _vector(data["link_cone"]["xyz_mm"], "mm")],
+        ["roll, pitch, yaw of the axis", _vector(data["link_cone"]["rpy_deg"], "deg")],
+    ]
+    if "fit" in data:
+        fit = data["fit"]
+        deviation = f"{fit['max_deviation_mm']:.3f} mm at most, {fit['rms_deviation_mm']:.3f} mm rms"
+        rows.append(["deviation from the mesh", deviation])
+        rows.append(
+            ["share of the link", f"{fit['length_share']:.0%} of its length, {fit['area_share']:.0%} of its hull"]
+        )
+        if fit["bridged_share"] > 0.0:
+            bridged = f"{fit['bridged_share']:.1%} of the sheet, {fit['bridged_depth_mm']:.1f} mm deep"
+            rows.append(["bridged holes and grooves", bridged])
+    if "gap_to_next_mm" in data:
+        gap = data["gap_to_next_mm"]
+        rows.append(["gap to the next sheet", f"{gap['inner']:.2f} mm on the link, {gap['outer']:.2f} mm outside"])
+    yield from _table(("quantity", "value"), rows)
+    yield ""
+    yield "### Layers"
+    yield ""
+    yield f"Assembly: {stack.assembly}. {_ASSEMBLY[stack.assembly]} The patterns differ in radius, but not in theta0."
+    yield ""
+    surfaces = {cut.name: cut.surface for cut in design.cuts}
+    table = []
+    for i, layer in enumerate(stack.layers):
+        surface = surfaces[layer.name]
+        inner, outer = stack.strain(side, i)
+        table.append(
+            [
+                layer.name,
+                f"{layer.thickness * 1e3:.2f}",
+                f"{stack.offset(i) * 1e3:.3f}",
+                f"{surface.radius1 * 1e3:.3f}, {surface.radius2 * 1e3:.3f}",
+                _sector(surface),
+                f"{stack.ignored_gap(side, i) * 1e3:.2f}",
+                f"{inner:+.1%}, {outer:+.1%}",
+            ]
+        )
+    head = (
+        "layer",
+        "thickness [mm]",
+        "neutral surface above the link [mm]",
+        "radii [mm]",
+        "flat sector",
+        "seam gap if cut for the bare link [mm]",
+        "strain of inner, outer face",
+    )
+    yield from _table(head, table)
+    yield ""
+    yield "### Electrodes"
+    yield ""
+    plan, patch = design.layout.plan, data["active_patch"]
+    share = f"{data['active_area_cm2']:.1f} cm2, {data['active_share']:.1%} of the sheet"
+    width = f"{plan.electrode * 1e3:g} mm wide"
+    yield f"* Upper sheet: B on the arc of end 1 (supply), A on the arc of end 2 (ground), {width}."
+    yield (
+        "* Lower sheet: D on the edge phi = 0 (ground), C on the edge phi = wrap (supply), wedges between two rays, "
+        f"{width} at the narrow end."
+    )
+    yield f"* All four wires leave at {plan.wires}."
+    if plan.wires == "end2" and design.next_joint is not None:
+        yield "* The tabs run into the next sheet there: bend them up, or choose another side for the wires."
+    yield (
+        f"* Active area: u {patch['u1_mm']:.2f} to {patch['u2_mm']:.2f} mm, phi {patch['phi1_deg']:.2f} to "
+        f"{patch['phi2_deg']:.2f} deg of the sheet: {share}."
+    )
+    yield (
+        f"* The decoder uses radius {active.radius1 * 1e3:.3f} to {active.radius2 * 1e3:.3f} mm, slant "
+        f"{active.slant * 1e3:.3f} mm, wrap {math.degrees(active.wrap):.3f} deg (`{_join(folder, 'sensor.toml')}`)."
+    )
+    yield ""
+    parts = design.electronics
+    radial, angular = (1e3 * amperes for amperes in design.drive_currents)
+    full_scale = 1e3 * parts.current_full_scale
+    count = full_scale / parts.full_count
+    yield "### Electronics"
+    yield ""
+    upper, lower = design.conductive
+    yield "What was not given was chosen for the shape of this sheet (docs/electronics.md); options change it."
+    yield ""
+    yield from _table(
+        ("quantity", "value"),
+        [
+            ["upper conductive sheet", f"{upper.ohms:g} ohm per square: {upper.name}"],
+            ["lower conductive sheet", f"{lower.ohms:g} ohm per square: {lower.name}"],
+            ["supply", f"{parts.supply_volts:g} V"],
+            ["converter", f"{parts.adc_bits} bits over {parts.adc_volts:g} V"],
+            ["drive current, radial phase", f"{radial:.3f} mA, {radial / count:.0f} counts"],
+            ["drive current, angular phase", f"{angular:.3f} mA, {angular / count:.0f} counts"],
+            ["full scale of the current", f"{full_scale:.3f} mA"],
+            ["shunt", f"{shunt_ohms(parts):.3g} ohm, with an amplifier of {SENSE_GAIN:g} V/V"],
+            ["pull-downs of C and D", f"{parts.pulldown_ohms / 1e3:g} kohm"],
+        ],
+    )
+    yield ""
+    yield "### Accuracy forecast"
+    yield ""
+    yield (
+        f"One count of {parts.adc_bits} bits over {parts.adc_volts:g} V at a supply of "
+        f"{parts.supply_volts:g} V (eq. 25, 26). This is the limit of the A/D converter; noise, the area of the "
+        "contact and uneven material add to it. The paper measured 1.6 mm and 0.5 deg."
+    )
+    yield ""
+    keys = {"u_mm": 1, "along_mm": 4, "around_mm": 4, "azimuth_deg": 4, "theta_deg": 5}
+    steps = [[f"{step[key]:.{digits}f}" for key, digits in keys.items()] for step in data["forecast"]]
+    columns = ("u of the active area [mm]", "along [mm]", "around [mm]", "azimuth [deg]", "theta [deg]")
+    yield from _table(columns, steps)
+
+
+def _sector(cone: Frustum) -> str:
+    flat = unroll(cone)
+    if flat.r1 > 1e4:  # 10 km: within 1 um of a rectangle
+        return f"rectangle {flat.arc1 * 1e3:.3f} x {flat.slant * 1e3:.3f} mm"
+    return f"r1 {flat.r1 * 1e3:.3f} mm, r2 {flat.r2 * 1e3:.3f} mm, theta0 {math.degrees(flat.theta0):.4f} deg"
+
+
+def _vector(values: list[float], unit: str) -> str:
+    return ", ".join(f"{value:z.3f}" for value in values) + f" {unit}"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    yield "| " + " | ".join(head) + " |"
+    yield "|" + "---|" * len(head)
+    for row in rows:
+        yield "| " + " | ".join(row) + " |"
+
+
+def _text(value: object) -> str:
+    return f"{value:.1f}" if isinstance(value, float) else str(value)
+
+
+def _join(folder: str, name: str) -> str:
+    return name if folder == "." else f"{folder}/{name}"

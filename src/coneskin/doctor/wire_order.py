@@ -1,0 +1,159 @@
+"""Order of the four wires: which electrode is on which terminal, found from touches near A, B, C and D.
+
+There are 24 orders. Eight of them join each pair of terminals to one sheet, and read mirrored or exchanged places; the
+others drive the two sheets against each other, and no current flows through them while nothing touches. The firmware
+may also drive the other electrode of a pair than ``radial_positive`` and ``angular_positive`` say. Each hypothesis is
+put into the circuit (ideal resistors for the sheets), and the one whose readings are nearest to what was measured is
+the answer.
+
+Driving A in place of B reads as their wires exchanged do, to less than the noise: in the touch phase both are driven.
+C and D are told apart there, each by its own pull-down; so D in place of C is not the same as their wires exchanged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import permutations
+from typing import TYPE_CHECKING, NamedTuple
+
+from coneskin.skin.virtual.circuit import LayerContact, Matrix, measure
+from coneskin.skin.virtual.ladder import ResistorLadder
+from coneskin.skin.virtual.rewired_sheets import RIGHT_WIRES, reorder, wire_order
+
+if TYPE_CHECKING:
+    from coneskin.skin.sensor import Sensor
+
+__all__ = ["ORDERS", "WIRINGS", "TouchReadings", "WireVerdict", "Wiring", "identify", "touch_places"]
+
+#: electrodes on the terminals A, B, C, D, as in "BACD"; the right order first
+ORDERS = tuple("".join(order) for order in permutations(RIGHT_WIRES))
+_INDICES = {wires: wire_order(wires) for wires in ORDERS}
+_REFINED = 6  # wirings whose place is looked for as well
+_EDGE, _MIDDLE = 0.15, 0.5  # parts of slant and wrap at which the touches are asked for
+_ASIDE = 0.1  # part of slant and wrap by which a person may be off
+_SIEMENS = tuple(10.0 ** (-4.5 + 0.5 * k) for k in range(7))  # conductances that a touch may have, 0.03 to 32 mS
+_VOLTS_ERROR, _CURRENT_ERROR = 0.03, 0.05  # parts of the supply, and of the larger drive current, of the model
+_CLEAR, _LEAST = 2.0, 0.25  # by which factor the second best must be worse, and how bad it must be
+
+
+class TouchReadings(NamedTuple):
+    """Mean readings of one touch: potentials over the supply, and drive currents over the full scale."""
+
+    touch_c: float
+    touch_d: float
+    touch_current: float
+    radial_c: float
+    radial_d: float
+    radial_current: float
+    angular_a: float
+    angular_b: float
+    angular_current: float
+
+
+class Wiring(NamedTuple):
+    """One way in which a sensor may be wired."""
+
+    wires: str  #: electrodes on the terminals A, B, C, D
+    angular_turned: bool  #: the firmware drives the other one of C and D
+
+
+class WireVerdict(NamedTuple):
+    """Answer, and how sure it is."""
+
+    wiring: Wiring | None  #: None where none explains what was read, or two do
+    likely: tuple[Wiring, Wiring]  #: the best and the next best
+    misfit: float  #: root mean square of the differences, in errors of the model
+    second: float  #: that of the next best
+
+
+#: every hypothesis, the right one first
+WIRINGS = tuple(Wiring(wires, turned) for wires in ORDERS for turned in (False, True))
+
+
+def touch_places(sensor: Sensor) -> dict[str, tuple[float, float]]:
+    """Return the places near A, B, C and D: u [m] and phi [rad]."""
+    cone, far = sensor.frustum, 1.0 - _EDGE
+    middle_u, middle_phi = _MIDDLE * cone.slant, _MIDDLE * cone.wrap
+    return {
+        "A": (far * cone.slant, middle_phi),
+        "B": (_EDGE * cone.slant, middle_phi),
+        "C": (middle_u, far * cone.wrap),
+        "D": (middle_u, _EDGE * cone.wrap),
+    }
+
+
+def identify(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> WireVerdict:
+    """Find the order of the wires.
+
+    Args:
+        sensor: as the scene describes it.
+        touched: readings of the touches near A, B, C, D, as of ``touch_places``.
+    """
+    touches = [_Touch(sensor, place, touched[name]) for name, place in touch_places(sensor).items()]
+    rough = {wiring: sum(touch.rough(wiring) for touch in touches) for wiring in WIRINGS}
+    near = sorted(rough, key=rough.__getitem__)[:_REFINED]
+    fine = {wiring: sum(touch.fine(wiring) for touch in touches) for wiring in near}
+    ranked, scale = sorted(near, key=fine.__getitem__), len(TouchReadings._fields) * len(touches)
+    best, second = (math.sqrt(fine[wiring] / scale) for wiring in ranked[:2])
+    clear = second > _CLEAR * best and second > _LEAST
+    return WireVerdict(ranked[0] if clear else None, (ranked[0], ranked[1]), best, second)
+
+
+class _Touch:
+    """One touch, and how well each wiring explains it."""
+
+    def __init__(self, sensor: Sensor, place: tuple[float, float], read: TouchReadings) -> None:
+        self._sensor, self._place, self._read = sensor, place, read
+        polarity = replace(sensor.polarity, angular="D" if sensor.c_positive else "C")
+        self._driven = {False: sensor, True: replace(sensor, polarity=polarity)}
+        self._sheets: dict[tuple[float, float, float], Matrix] = {}
+        self._siemens: dict[Wiring, float] = {}
+
+    def rough(self, wiring: Wiring) -> float:
+        """Return the sum of squares at the best conductance."""
+        self._siemens[wiring] = min(_SIEMENS, key=lambda siemens: self._squares(wiring, 0.0, 0.0, siemens))
+        return self._squares(wiring, 0.0, 0.0, self._siemens[wiring])
+
+    def fine(self, wiring: Wiring) -> float:
+        """Return the same at the best place as well, by a search along its axes; ``rough`` was called before."""
+        at = (0.0, 0.0, self._siemens[wiring])
+        best, step = self._squares(wiring, *at), _ASIDE
+        while step > _ASIDE / 20.0:
+            along, around, siemens = at
+            tries = [
+                *((along + step, around, siemens), (along - step, around, siemens)),
+                *((along, around + step, siemens), (along, around - step, siemens)),
+                *((along, around, siemens * (1.0 + 4.0 * step)), (along, around, siemens / (1.0 + 4.0 * step))),
+            ]
+            inside = [one for one in tries if max(abs(one[0]), abs(one[1])) <= _ASIDE]
+            found = min((self._squares(wiring, *one), one) for one in inside)
+            if found[0] < best:
+                best, at = found
+            else:
+                step *= 0.5
+        return best
+
+    def _squares(self, wiring: Wiring, along: float, around: float, siemens: float) -> float:
+        sensor, parts = self._driven[wiring.angular_turned], self._sensor.electronics
+        sheets = reorder(self._admittance(along, around, siemens), _INDICES[wiring.wires])
+        at = measure(sensor, (sheets, sheets, sheets))
+        current = max(sensor.radial_amperes, sensor.angular_amperes) / parts.current_full_scale
+        total = 0.0
+        for name, value in zip(TouchReadings._fields, self._read, strict=True):
+            expected = getattr(at, name)
+            if name.endswith("current"):
+                off = (min(expected / parts.current_full_scale, 1.0) - value) / (_CURRENT_ERROR * max(current, value))
+            else:
+                off = (expected / parts.supply_volts - value) / _VOLTS_ERROR
+            total += min(off * off, 100.0)
+        return total
+
+    def _admittance(self, along: float, around: float, siemens: float) -> Matrix:
+        key = along, around, siemens
+        if key not in self._sheets:
+            cone, (u, phi) = self._sensor.frustum, self._place
+            contact = LayerContact(u + along * cone.slant, phi + around * cone.wrap, siemens)
+            self._sheets[key] = ResistorLadder().admittance(self._sensor, (contact,))
+        return self._sheets[key]

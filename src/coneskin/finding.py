@@ -1,0 +1,46 @@
+"""Findings of an examination: one line for each thing that was looked at, with what it should be and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+__all__ = ["Finding", "Verdict", "exit_code"]
+
+Verdict = Literal["ok", "warning", "bad", "not tried"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Result of looking at one thing.
+
+    Attributes:
+        item: what was looked at.
+        verdict: "bad": a guard refuses it, or goes wrong with it; "warning": it works, and not as it should.
+        value: what was found; for "not tried", why.
+        rule: what it should be.
+        remedy: what to do; empty where there is nothing.
+    """
+
+    item: str
+    verdict: Verdict
+    value: str
+    rule: str = ""
+    remedy: str = ""
+
+    def as_message(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        return asdict(self)
+
+    @property
+    def text(self) -> str:
+        """Return it for people, in one line or two."""
+        line = f"{self.verdict:>9}  {self.item}: {self.value}"
+        line += f" ({self.rule})" if self.rule else ""
+        return f"{line}\n{'':9}  -> {self.remedy}" if self.remedy else line
+
+
+def exit_code(findings: Iterable[Finding]) -> int:
+    """Return 1 where anything is bad, else 0."""
+    return 1 if any(finding.verdict == "bad" for finding in findings) else 0

@@ -1,0 +1,1 @@
+"""Monitor of a skin's line: what arrives on it, without an arm and without a scene."""

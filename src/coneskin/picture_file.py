@@ -1,0 +1,53 @@
+"""File of a picture: what may go wrong between a figure and the disk, said once for all pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import ConeSkinError, MissingExtra
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["write_picture"]
+
+_SUFFIXES = (".png", ".svg", ".pdf")
+
+
+def write_picture(
+    path: Path, what: str, compose: Callable[[], Figure], refusal: Callable[[str], ConeSkinError], dpi: int = 130
+) -> None:
+    """Draw a figure into a file, in the format of its suffix (png, svg, pdf).
+
+    Args:
+        path: of the file. That it can be written is looked at before anything is drawn.
+        what: is drawn, such as "the picture of a run".
+        compose: makes the figure.
+        refusal: makes the error of a text.
+        dpi: dots per inch of a png.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+        ConeSkinError: as ``refusal`` makes it: the suffix is another, the file cannot be written, or its content has
+            no common scale.
+    """
+    if path.suffix.lower() not in _SUFFIXES:
+        raise refusal(f"{what} is a {', '.join(_SUFFIXES)} file, got {path}")
+    if not path.parent.is_dir():
+        raise refusal(f"{what} cannot be written to {path}: there is no folder {path.parent}; make it first")
+    try:
+        import matplotlib
+    except ImportError as exc:
+        raise MissingExtra("matplotlib", "a picture", "pictures") from exc
+    matplotlib.use("Agg", force=False)
+    with matplotlib.rc_context({"text.parse_math": False, "text.usetex": False}):  # a name may have dollars in it
+        try:
+            compose().savefig(path, dpi=dpi)
+        except ConeSkinError:
+            raise
+        except OSError as exc:
+            raise refusal(f"{what} cannot be written to {path}: {exc.strerror or exc}; name another file") from exc
+        except (ArithmeticError, ValueError) as exc:  # matplotlib's, for times or lengths of any size
+            raise refusal(f"{what} cannot be drawn: its times or values have no common scale: {exc}") from exc

@@ -1,0 +1,155 @@
+"""Scan of one file of a recording: its intact chunks as extents, and what is damaged between them."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from .chunk import CHUNK_HEAD_SIZE, FILE_HEAD_SIZE, MAX_BODY, SYNC, ChunkHead, decode_chunk_head
+
+__all__ = ["Chunk", "Damage", "Extent", "holds_chunk", "scan_extents", "walk"]
+
+_WINDOW = 1 << 18  # bytes that are searched at once
+_SEARCHED = MAX_BODY + CHUNK_HEAD_SIZE + _WINDOW  # bytes within which one of the first two chunks begins
+_EXTENT = 1 << 22  # bytes of an extent: what a seek has to pass over
+
+
+class Chunk(NamedTuple):
+    """Intact chunk: its offset, its head and its stored body."""
+
+    offset: int
+    head: ChunkHead
+    stored: bytes
+
+    @property
+    def end(self) -> int:
+        """Offset of what follows it."""
+        return self.offset + CHUNK_HEAD_SIZE + len(self.stored)
+
+
+class Damage(NamedTuple):
+    """Bytes that are no intact chunk; the head of the one that they were, where it is intact."""
+
+    offset: int
+    end: int
+    head: ChunkHead | None
+
+
+@dataclass(slots=True)
+class Extent:
+    """Intact chunks that follow each other in a file and in the recording; the index of a recording is made of them.
+
+    Attributes:
+        path: the file.
+        offset: of the first chunk [bytes].
+        end: of the last.
+        run: number of the recording.
+        first: number of the first chunk.
+        following: number of the chunk that must come next.
+        blocks: in all of them.
+        kinds: of them, as bits.
+        since: the smallest time [s, host clock].
+        until: the largest.
+        last_kinds: of the last chunk, as bits.
+    """
+
+    path: Path
+    offset: int
+    end: int
+    run: int
+    first: int
+    following: int
+    blocks: int
+    kinds: int
+    since: float
+    until: float
+    last_kinds: int
+
+    def takes(self, chunk: Chunk) -> bool:
+        """Take a chunk that follows; False where it does not, or the extent is long enough."""
+        head = chunk.head
+        if chunk.offset != self.end or head.sequence != self.following or head.run != self.run:
+            return False
+        if chunk.end - self.offset > _EXTENT:
+            return False
+        self.end, self.following, self.last_kinds = chunk.end, head.following, head.kinds
+        self.blocks += head.blocks
+        self.kinds |= head.kinds
+        self.since, self.until = min(self.since, head.since), max(self.until, head.until)
+        return True
+
+
+def walk(file: BinaryIO, at: int, size: int) -> Iterator[Chunk | Damage]:
+    """Yield every intact chunk of a file, and every stretch of bytes between them.
+
+    Args:
+        file: open for reading.
+        at: offset of the first chunk.
+        size: of the file [bytes].
+    """
+    budget = size  # of bytes read twice: heads may be made to name long bodies that are none
+    file.seek(at)
+    while at < size:
+        data = file.read(CHUNK_HEAD_SIZE)
+        head = decode_chunk_head(data)
+        if head is not None:
+            end = at + CHUNK_HEAD_SIZE + head.length
+            stored = file.read(head.length) if end <= size else b""
+            if len(stored) == head.length and end <= size and zlib.crc32(stored) == head.body_crc:
+                yield Chunk(at, head, stored)
+                at = end
+                continue
+            budget -= min(head.length, size - at)
+            end = min(end, size)
+        if head is None or budget > 0:  # bytes may have been cut out of a body, and a chunk begin in it
+            end = _find(file, at + 1, size)
+        yield Damage(at, end, head)
+        at = end
+        file.seek(at)
+
+
+def _find(file: BinaryIO, at: int, size: int) -> int:
+    """Return the offset of the next head of a chunk; the size of the file where there is none."""
+    while at < size:
+        file.seek(at)
+        window = file.read(min(_WINDOW + CHUNK_HEAD_SIZE, size - at))
+        found = window.find(SYNC)
+        while 0 <= found < _WINDOW:
+            if decode_chunk_head(window, found) is not None:
+                return at + found
+            found = window.find(SYNC, found + 1)
+        at += _WINDOW
+    return size
+
+
+def holds_chunk(file: BinaryIO) -> bool:
+    """Tell whether a chunk begins at the start of a file, or where the largest body there would have ended."""
+    return _find(file, 0, _SEARCHED) < _SEARCHED
+
+
+def scan_extents(
+    path: Path, file: BinaryIO, size: int, progress: Callable[[int], None] | None = None
+) -> tuple[list[Extent], list[Damage]]:
+    """Return the extents of a file, in its order, and what is damaged.
+
+    Args:
+        path: of the file.
+        file: open for reading.
+        size: of the file [bytes].
+        progress: called now and then with the bytes that are read.
+    """
+    extents: list[Extent] = []
+    damages: list[Damage] = []
+    for piece in walk(file, FILE_HEAD_SIZE, size):
+        if isinstance(piece, Damage):
+            damages.append(piece)
+        elif not (extents and extents[-1].takes(piece)):
+            head = piece.head
+            content = head.blocks, head.kinds, head.since, head.until, head.kinds
+            extents.append(Extent(path, piece.offset, piece.end, head.run, head.sequence, head.following, *content))
+            if progress is not None:
+                progress(piece.offset)
+    return extents, damages

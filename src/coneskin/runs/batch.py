@@ -1,0 +1,117 @@
+"""Many runs: judged in a pool of processes, or on a Dask cluster; a run that breaks is a row, and the rest goes on."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+from coneskin.errors import RecordingError
+
+from .block_progress import Progress, silent
+from .what_if import broken_rows, judge_run
+
+__all__ = ["judge_runs"]
+
+Rows = list[dict[str, Any]]
+_Judge = Callable[[Path, Sequence[Mapping[str, Any]]], Rows]
+
+
+def judge_runs(
+    paths: Sequence[Path],
+    variants: Sequence[Mapping[str, Any]] = ({},),
+    *,
+    jobs: int | None = None,
+    scheduler: str = "",
+    progress: Progress = silent,
+    judge: _Judge = judge_run,
+) -> Rows:
+    """Judge runs, each with each variant of its settings.
+
+    Args:
+        paths: of the recordings.
+        variants: settings; ``{}`` for those of the run.
+        jobs: processes; by default one for each core. 1: this process.
+        scheduler: address of a Dask scheduler, such as "tcp://10.0.0.5:8786", whose workers see the same paths.
+        progress: called with the fraction that is done.
+        judge: what is done with a run.
+
+    Returns:
+        a row for each run and variant, in the order of the runs; see ``judge_run``.
+
+    Raises:
+        RecordingError: the number of jobs is below 1, or the cluster cannot be reached.
+        MissingExtra: a scheduler is named and distributed is not installed.
+    """
+    count = jobs if jobs is not None else min(len(paths), os.cpu_count() or 1)
+    if count < 1 and paths:
+        raise RecordingError(f"runs need at least 1 job, got {jobs!r}")
+    if scheduler:
+        from .dask_cluster import judge_on_cluster
+
+        done = judge_on_cluster(scheduler, paths, variants, judge)
+    elif count == 1 or len(paths) <= 1:
+        done = _judge_here(paths, variants, judge, progress)
+    else:
+        done = _judge_in_pool(paths, variants, count, judge)
+    rows: dict[Path, Rows] = {}
+    for path, found in done:
+        rows[path] = found
+        progress(len(rows) / len(paths))
+    return [row for path in paths for row in rows[path]]
+
+
+def _judge_here(
+    paths: Sequence[Path], variants: Sequence[Mapping[str, Any]], judge: _Judge, progress: Progress
+) -> Iterator[tuple[Path, Rows]]:
+    for number, path in enumerate(paths):
+        if judge is judge_run:  # which tells how far it is in a long run
+
+            def tell(done: float, before: int = number) -> None:
+                progress((before + done) / len(paths))
+
+            yield path, judge_run(path, variants, tell)
+        else:
+            yield path, judge(path, variants)
+
+
+def _judge_in_pool(
+    paths: Sequence[Path], variants: Sequence[Mapping[str, Any]], jobs: int, judge: _Judge
+) -> Iterator[tuple[Path, Rows]]:
+    left = list(paths)
+    try:
+        with _pool(jobs) as pool:
+            futures = {pool.submit(judge, path, variants): path for path in left}
+            for future in concurrent.futures.as_completed(futures):
+                path = futures[future]
+                rows = _rows_of(future, path, variants)
+                left.remove(path)
+                yield path, rows
+    except BrokenProcessPool:  # one of them has killed its process: find out which, one at a time
+        for path in left:
+            yield path, _judge_alone(path, variants, judge)
+
+
+def _judge_alone(path: Path, variants: Sequence[Mapping[str, Any]], judge: _Judge) -> Rows:
+    try:
+        with _pool(1) as pool:
+            return _rows_of(pool.submit(judge, path, variants), path, variants)
+    except BrokenProcessPool:
+        return broken_rows(path, variants, "its process was killed: out of memory?")
+
+
+def _pool(jobs: int) -> concurrent.futures.ProcessPoolExecutor:
+    return concurrent.futures.ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+
+
+def _rows_of(future: concurrent.futures.Future[Rows], path: Path, variants: Sequence[Mapping[str, Any]]) -> Rows:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        raise
+    except Exception as exc:  # a mistake of ours in one run must not cost the others
+        return broken_rows(path, variants, f"{type(exc).__name__}: {exc}")

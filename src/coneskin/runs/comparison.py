@@ -1,0 +1,256 @@
+"""Comparison of two guards' decisions: contacts moved, reactions earlier or later, new and missing ones.
+
+The inputs of a replay are the recorded ones: the arm moves as the recorded commands made it move. From the first
+command on that the two do not share, what is said of the arm is therefore no longer about the same motion, and is not
+compared. The skin's contacts still are, and so is the first reaction on each side: it is the difference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from coneskin.replay.detail_differences import describe_differences, distance, milliseconds
+from coneskin.replay.quantities import Tolerances
+from coneskin.robot.guard.journal import EventName, GuardEvent
+
+from .arm_command import first_divergence
+from .decisions import Decisions
+from .event_pairs import SKIN_EVENTS, EventPair, pair_events
+from .event_subjects import either_event, event_words, pair_subjects, touched_sensor
+
+__all__ = ["Comparison", "Difference", "compare_decisions", "without_invented"]
+
+_REACTIONS = (EventName.STOPPING, EventName.SPEED_REDUCED, EventName.RETREATING)
+_STARTS = frozenset({EventName.WAITING, EventName.ACTIVATED, EventName.NOT_COMMISSIONED})
+#: from the noise, of which a guard knows more the longer it has watched an untouched skin
+_LEARNED = frozenset({"covariance", "ellipse", "radius_deviation"})
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Difference between two runs that is about one thing.
+
+    Attributes:
+        subject: "contact 1", numbered as in the first run, or the name of an event.
+        words: what is different, each in words with its unit.
+        moved: how far the contact is from where it was [m], or None.
+        delay: how much later its event is [s], the first of them; negative: earlier; None where there is no pair.
+    """
+
+    subject: str
+    words: tuple[str, ...]
+    moved: float | None = None
+    delay: float | None = None
+
+    def __str__(self) -> str:
+        return f"{self.subject}: {'; '.join(self.words)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Result of a comparison.
+
+    Attributes:
+        labels: of the two.
+        differences: in the order of time; empty where nothing counts.
+        paired: events that have a partner.
+        new: events of the second only.
+        missing: events of the first only.
+        diverged: from when on the two command the arm otherwise [s since the start of the first run], or None.
+        not_compared: events about the arm after that, on either side.
+        until: to when the two were compared, where inputs are missing after that [s since the start]; else None.
+        lost: what the recordings lack; empty where nothing.
+        other_code: in what the code of the two differs, as far as it is known, in sentences.
+    """
+
+    labels: tuple[str, str]
+    differences: tuple[Difference, ...]
+    paired: int
+    new: int
+    missing: int
+    diverged: float | None
+    not_compared: int
+    until: float | None
+    lost: str
+    other_code: tuple[str, ...] = ()
+
+    @property
+    def same(self) -> bool:
+        """True where all was compared and nothing differs by more than the tolerances."""
+        return not (self.differences or self.lost) and self.diverged is None and self.paired > 0
+
+    @property
+    def farthest(self) -> float:
+        """How far a contact has moved at most [m]."""
+        return max((d.moved for d in self.differences if d.moved is not None), default=0.0)
+
+
+def compare_decisions(
+    one: Decisions, other: Decisions, tolerances: Tolerances | None = None, shift: float | None = None
+) -> Comparison:
+    """Compare two guards' decisions.
+
+    Args:
+        one: the reference.
+        other: what is compared with it.
+        tolerances: what does not count.
+        shift: what is added to the other's times [s]; None: 0 where the two are about the same recording, by their
+            start, else what makes their first contacts (or their starts) coincide.
+    """
+    tolerances = tolerances or Tolerances()
+    if shift is None:
+        shift = _shift(one, other)
+    until = min(one.until, other.until + shift)
+    window = max(one.window[0], other.window[0] + shift), min(one.window[1], other.window[1] + shift)
+    if until < window[1]:
+        window = window[0], math.nextafter(until, -math.inf)
+    ones, others = _within(one.events, window, 0.0), _within(other.events, window, shift)
+    if one.window != other.window:  # a cut beside the whole run
+        ones, others = _without_beginning(ones, others, shift)
+    diverged = math.inf
+    if shift == 0.0 and one.commands is not None and other.commands is not None:
+        first, second = (
+            [c for c in side if window[0] <= c.time <= window[1]] for side in (one.commands, other.commands)
+        )
+        diverged = first_divergence(first, second, tolerances)
+    kept = _comparable(ones, diverged), _comparable(others, diverged - shift)
+    left_out = len(ones) + len(others) - len(kept[0]) - len(kept[1])
+    pairs = pair_events(*kept, shift)
+    lost = one.missing or other.missing
+    return Comparison(
+        labels=(one.label, other.label),
+        differences=tuple(_differences(pairs, tolerances, shift)),
+        paired=sum(a is not None and b is not None for a, b in pairs),
+        new=sum(a is None for a, _ in pairs),
+        missing=sum(b is None for _, b in pairs),
+        diverged=None if math.isinf(diverged) else diverged - one.start,
+        not_compared=left_out,
+        until=None if math.isinf(until) else until - one.start,
+        lost=lost,
+        other_code=other.other_code if one.other_code != other.other_code else (),
+    )
+
+
+def without_invented(decisions: Decisions, recorded: Decisions) -> Decisions:
+    """Return decisions without what they say of an arm that moved otherwise than they commanded.
+
+    Args:
+        decisions: of a replay.
+        recorded: of the guard that moved the arm; both have commands.
+    """
+    assert decisions.commands is not None
+    assert recorded.commands is not None
+    known = min(decisions.until, recorded.until)
+    then, now = (
+        [command for command in side if command.time < known] for side in (recorded.commands, decisions.commands)
+    )
+    kept = _comparable([e for e in decisions.events if e.time < known], first_divergence(then, now))
+    return replace(decisions, events=tuple(kept))
+
+
+def _shift(one: Decisions, other: Decisions) -> float:
+    if one.start == other.start:
+        return 0.0
+    firsts = [next((e.time for e in side.events if e.name == EventName.CONTACT), None) for side in (one, other)]
+    if firsts[0] is not None and firsts[1] is not None:
+        return firsts[0] - firsts[1]
+    return one.start - other.start
+
+
+def _within(events: Sequence[GuardEvent], window: tuple[float, float], shift: float) -> list[GuardEvent]:
+    return [event for event in events if window[0] <= event.time + shift <= window[1]]
+
+
+def _without_beginning(
+    ones: list[GuardEvent], others: list[GuardEvent], shift: float
+) -> tuple[list[GuardEvent], list[GuardEvent]]:
+    """Leave out how the guard of a cut became active, and what a guard learns before that."""
+    active = [next((e.time for e in side if e.name == EventName.ACTIVATED), -math.inf) for side in (ones, others)]
+    until = max(active[0], active[1] + shift)
+    return (
+        [_unlearned(event) for event in ones if event.name not in _STARTS or event.time > until],
+        [_unlearned(event) for event in others if event.name not in _STARTS or event.time + shift > until],
+    )
+
+
+def _unlearned(event: GuardEvent) -> GuardEvent:
+    return event._replace(details={name: value for name, value in event.details.items() if name not in _LEARNED})
+
+
+def _comparable(events: Sequence[GuardEvent], diverged: float) -> list[GuardEvent]:
+    """Return the events that are about the same motion: the skin's, and the arm's up to its first other reaction."""
+    kept, reacted = [], False
+    for event in events:
+        if event.name in SKIN_EVENTS or event.time < diverged:
+            kept.append(event)
+        elif event.name in _REACTIONS and not reacted and (event.time <= diverged or _of_skin(event)):
+            reacted = True
+            kept.append(event)
+    return kept
+
+
+def _of_skin(reaction: GuardEvent) -> bool:
+    """Tell whether a reaction is made for a touch, and not for what the arm does."""
+    return reaction.name == EventName.SPEED_REDUCED or "contact" in reaction.details
+
+
+def _differences(pairs: Sequence[EventPair], tolerances: Tolerances, shift: float) -> list[Difference]:
+    subjects = pair_subjects([_on_one_clock(pair, shift) for pair in pairs])
+    found: dict[str, Difference] = {}
+    # a stop is told after its contact, whose event follows it
+    for (a, b), subject in sorted(zip(pairs, subjects, strict=True), key=lambda item: _is_stop(item[0])):
+        before = found.get(subject, Difference(subject, ()))
+        words, moved, delay = _words(a, b, tolerances, shift)
+        gone = "touch is missing", "touch is new"
+        if any(word.startswith(gone) for word in before.words):
+            words = [
+                word for word in words if not word.startswith(("located is ", "extent is ", "end is "))
+            ]  # of course
+        if (name := event_words(either_event((a, b)))) == subject.rstrip(
+            " 0123456789"
+        ):  # "retreat: missing", said once
+            words = [word.removeprefix(f"{name} ").removeprefix("is ") for word in words]
+        if words:
+            moved = moved if before.moved is None else before.moved
+            delay = delay if before.delay is None else before.delay
+            found[subject] = Difference(subject, (*before.words, *words), moved, delay)
+    return [found[subject] for subject in dict.fromkeys(subjects) if subject in found]
+
+
+def _on_one_clock(pair: EventPair, shift: float) -> EventPair:
+    a, b = pair
+    return a, None if b is None else b._replace(time=b.time + shift)
+
+
+def _is_stop(pair: EventPair) -> bool:
+    return either_event(pair).name == EventName.STOPPING
+
+
+def _words(
+    a: GuardEvent | None, b: GuardEvent | None, tolerances: Tolerances, shift: float
+) -> tuple[list[str], float | None, float | None]:
+    event = a if a is not None else b
+    assert event is not None
+    name = event_words(event)
+    if a is None or b is None:
+        place = _place(event) if event.name == EventName.CONTACT else ""
+        return [f"{name} is {'missing' if b is None else 'new'}{place}"], None, None
+    delay, words = b.time + shift - a.time, []
+    details = describe_differences(a.details, b.details, tolerances)
+    prefix = "" if event.name == EventName.CONTACT else f"{name} "
+    if event.name == EventName.STOPPING:  # what it says of its contact, the contact's own event says as well
+        details = [line for line in details if not line.startswith("contact ")]
+    words += [f"{prefix}{line}" for line in details]
+    if abs(delay) > tolerances.time:
+        words.append(f"{name} {milliseconds(abs(delay))} {'later' if delay > 0.0 else 'earlier'}")
+    moved = distance(a.details, b.details) if event.name in SKIN_EVENTS and words else None
+    return words, moved, delay if abs(delay) > tolerances.time else None
+
+
+def _place(event: GuardEvent) -> str:
+    u, phi = event.details.get("u"), event.details.get("phi")
+    if not (isinstance(u, float) and isinstance(phi, float)):
+        return ""
+    return f" on {touched_sensor(event)}, u {1e3 * u:.1f} mm, phi {math.degrees(phi):.1f} deg"

@@ -1,0 +1,236 @@
+"""Cut of a run: the part around a contact as a recording of its own, small enough for a repository of tests.
+
+A guard that is started in the middle of a run has heard no process say that it is ready. The cut therefore begins with
+that report, and acknowledges the guard's release at once; the skin's and the controller's bytes are the recorded ones.
+Its events are those that today's guard makes of it, once they have been compared with the whole run's.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coneskin import __version__
+from coneskin.code_version import code_commit
+from coneskin.draft_file import draft_of
+from coneskin.errors import RecordingError
+from coneskin.recording import Block
+from coneskin.recording_file.recorder import Recorder
+from coneskin.replay.quantities import Tolerances
+from coneskin.robot.driver.messages import Release, StatusReport
+from coneskin.robot.guard.journal import INPUTS, BlockKind, EventName, GuardEvent
+from coneskin.robot.guard.outputs import Command, Output
+from coneskin.scene.resolved_settings import resolved_settings
+
+from .arm_command import command_block
+from .block_progress import Progress, silent
+from .comparison import Comparison, compare_decisions
+from .decisions import Decisions, decide_again, recorded_decisions
+from .event_pairs import SKIN_EVENTS
+
+if TYPE_CHECKING:
+    from coneskin.replay.replay import Run
+
+__all__ = ["CUT_TOLERANCES", "CutRun", "cut_run", "first_touch"]
+
+#: s before the settling of the guard that the skin needs: 50 untouched frames at 200 Hz, and as much again
+_SKIN_SETTLE = 0.5
+#: what a start in the middle may change: the zero of the skin is learned from other frames
+CUT_TOLERANCES = Tolerances(place=5e-4, angle=0.02, level=0.02, speed=0.01, time=5e-3, relative=0.01)
+_SURFACES, _TRUTH, _ABSENT = (frozenset({kind}) for kind in (BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.ABSENT))
+_REACTIONS = frozenset(
+    {
+        *(EventName.STOPPING, EventName.RETREATING, EventName.RETREATED, EventName.SPEED_REDUCED, EventName.LATCHED),
+        *(EventName.ESCALATED, EventName.STOP_FAILED),
+    }
+)
+_CONTACTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED})
+
+
+@dataclass(frozen=True, slots=True)
+class CutRun:
+    """Result of a cut.
+
+    Attributes:
+        path: of the new recording.
+        size: of the file [bytes].
+        since: its first input [s since the start of the whole run].
+        until: its last.
+        contacts: in it.
+        comparison: of its contacts with those of the whole run, within 0.5 mm, 1 deg and 5 ms.
+        active: True where the guard is active at the first contact, so that the cut shows the reaction as well.
+        other_reaction: how the arm reacts otherwise than in the whole run, in words; empty where it does not. A guard
+            that starts in the middle knows the controller's clock less well: where states came late, or the frames
+            were old, it may only stop where the other one moved away.
+    """
+
+    path: Path
+    size: int
+    since: float
+    until: float
+    contacts: int
+    comparison: Comparison
+    active: bool
+    other_reaction: str
+
+
+def first_touch(run: Run) -> float:
+    """Return when the first touch of a run was seen [s since the start of the run].
+
+    Raises:
+        RecordingError: none was.
+    """
+    for event in run.events:
+        if event.name == EventName.CONTACT:
+            return event.time - run.start
+    raise RecordingError("no touch was seen in the run: name the moment that is cut out, with --around")
+
+
+def cut_run(
+    run: Run, target: Path, around: float, keep: float = 1.0, name: str = "", progress: Progress = silent
+) -> CutRun:
+    """Write the part of a run around a moment as a recording of its own.
+
+    Args:
+        run: the whole run.
+        target: the file to make.
+        around: the moment [s since the start of the run].
+        keep: how much of it [s]: half before the moment, and as much as a guard needs to become active, half after it.
+        name: of the whole run, for the new one's header.
+        progress: called now and then with the fraction that is done.
+
+    Raises:
+        RecordingError: there is nothing at that moment, no contact, or the contacts would be others than in the whole
+            run; or the file is there already.
+    """
+    if not (math.isfinite(around) and math.isfinite(keep) and keep > 0.0):
+        raise RecordingError(f"a cut needs a moment [s] and a duration above 0 s, got {around!r} s and {keep!r} s")
+    start = run.start
+    lead = max(0.5 * keep, run.scene().monitoring_limits.settle + _SKIN_SETTLE)
+    since, until = start + around - lead, start + around + 0.5 * keep
+    if run.gap <= until:
+        raise RecordingError(f"the part up to {until - start:.3f} s is not whole, so nothing is cut out: {run.missing}")
+    blocks = _written(run, since, until)
+    inputs = [block for block in blocks if block.kind in INPUTS and since < block.time <= until]
+    if not inputs:
+        raise RecordingError(f"the run has nothing from {around - lead:.3f} s to {around + 0.5 * keep:.3f} s")
+    cut = {"from": name, "around_s": around, "keep_s": keep}
+    made_by = {"coneskin": __version__, "commit": code_commit(), "resolved": resolved_settings(run.scene())}
+    header = {**run.header, **made_by, "cut": cut}  # its events are those of today's code
+    part = replace(run, header=header, blocks=tuple(blocks), defects=(), copies=())
+    all_of_it, all_of_part = (
+        decide_again(run, label="the whole run", progress=progress),
+        recorded_decisions(part, "the cut"),
+    )
+    whole, again = _of_window(all_of_it, since, until), _of_window(all_of_part, since, until)
+    comparison = compare_decisions(whole, again, CUT_TOLERANCES)
+    contacts = [event for event in again.events if event.name == EventName.CONTACT]
+    if not contacts:
+        begun = ", ".join(f"{e.time - start:.3f}" for e in run.events if e.name == EventName.CONTACT)
+        where = f"; the run's touches begin at {begun} s" if begun else ""
+        raise RecordingError(
+            f"no touch begins from {around - lead:.3f} s to {around + 0.5 * keep:.3f} s: nothing to cut out{where}"
+        )
+    if comparison.differences:
+        lines = "; ".join(map(str, comparison.differences))
+        raise RecordingError(f"the cut would not show the same contacts: {lines}; keep more than {keep:g} s")
+    active = next((e.time for e in part.events if e.name == EventName.ACTIVATED), math.inf) < contacts[0].time
+    there, here = (_reaction(item.events, contacts[0].time, until) for item in (all_of_it, all_of_part))
+    differs = active and there != here
+    _record(target, Block(BlockKind.HEADER, since, json.dumps(header).encode()), blocks)
+    return CutRun(
+        target,
+        target.stat().st_size,
+        inputs[0].time - start,
+        inputs[-1].time - start,
+        len(contacts),
+        comparison,
+        active,
+        f"{', '.join(here) or 'nothing'}; in the whole run {', '.join(there) or 'nothing'}" if differs else "",
+    )
+
+
+def _reaction(events: Sequence[GuardEvent], since: float, until: float) -> list[str]:
+    """Return what the arm did from a contact on, in a word each [s, host clock]."""
+    window = (event for event in events if since <= event.time <= until)
+    return [
+        str(event.name) + (" incomplete"[: 11 * (event.details.get("complete") is False)])
+        for event in window
+        if event.name in _REACTIONS
+    ]
+
+
+def _record(target: Path, header: Block, blocks: Sequence[Block]) -> None:
+    """Write a recording whole or not at all, in a folder that is made."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with draft_of(target) as draft, Recorder(draft, copied=frozenset({BlockKind.HEADER, BlockKind.SURFACE})) as to:
+            to.write(header, *blocks)
+    except OSError as exc:
+        hint = "; a recording is never overwritten: choose another file" if isinstance(exc, FileExistsError) else ""
+        raise RecordingError(f"cannot make the recording {target}: {exc.strerror or exc}{hint}") from exc
+
+
+def _of_window(decisions: Decisions, since: float, until: float) -> Decisions:
+    """Return the skin's events of the touches that begin in a window [s]; what is said of the arm is left out."""
+    begun: set[str] = set()
+    kept = []
+    for event in decisions.events:
+        if event.name not in SKIN_EVENTS or not since <= event.time <= until:
+            continue
+        sensor = str(event.details.get("sensor", ""))
+        if event.name == EventName.CONTACT:
+            begun.add(sensor)
+        if sensor in begun:
+            kept.append(event)
+    return replace(decisions, events=tuple(kept), commands=None)
+
+
+def _written(run: Run, since: float, until: float) -> list[Block]:
+    """Return the blocks of the cut: its inputs, and what today's guard makes of them."""
+    from coneskin.scene.build import build_core
+
+    scene = run.scene()
+    core, outputs = build_core(scene, run.place_sensors()), list[Output]()
+    external = scene.arm is not None and scene.arm.control == "external"
+    process = "watchdog" if external else "driver"
+    blocks = []
+    for block in _cut_inputs(run, since, until, ready=scene.arm is not None):
+        queue = [block]
+        while queue:
+            taken = queue.pop(0)
+            blocks.append(taken)
+            if taken.kind in INPUTS:
+                core.take(taken, outputs)
+            commands = [output for output in outputs if not isinstance(output, GuardEvent)]
+            blocks += [command_block(command, taken.time, process) for command in commands]
+            blocks += [output.block() for output in outputs if isinstance(output, GuardEvent)]
+            queue += _acknowledgements(commands, taken.time)
+            outputs.clear()
+    return blocks
+
+
+def _acknowledgements(commands: list[Command], time: float) -> list[Block]:
+    return [
+        Block(BlockKind.DRIVER, time, StatusReport("released", str(command.number)).encode())
+        for command in commands
+        if isinstance(command, Release)
+    ]
+
+
+def _cut_inputs(run: Run, since: float, until: float, ready: bool) -> Iterator[Block]:
+    surfaces = {
+        block.payload: block for block in (*run.copies, *run.select(kinds=_SURFACES)) if block.kind in _SURFACES
+    }
+    before = (*surfaces.values(), *run.select(kinds=_TRUTH), *run.select(until=since, kinds=_ABSENT))
+    for block in before:
+        yield block._replace(time=since)
+    if ready:
+        yield Block(BlockKind.DRIVER, since, StatusReport("ready").encode())
+    for slider in list(run.select(until=since, kinds=frozenset({BlockKind.SLIDER})))[-1:]:
+        yield slider._replace(time=since)
+    yield from run.select(since, until, INPUTS)

@@ -1,0 +1,196 @@
+"""Tables of a run: events, skin frames, states of the arm, speed slider, commands; units stand in the columns' names.
+
+Values are in SI and radians. Times count from the start of the run; ``unix_s`` of the events is the wall clock's.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import RobotConnectionError
+from coneskin.recording import is_time
+from coneskin.replay.quantities import QUANTITIES
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.guard.journal import BlockKind
+from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame, FrameDecoder
+
+from .arm_command import recorded_commands
+from .block_progress import Progress, silent, watch
+
+if TYPE_CHECKING:
+    from coneskin.replay.replay import Run
+    from coneskin.robot.driver.state import ControllerState
+
+__all__ = [
+    "Pieces",
+    "Table",
+    "arm_states",
+    "run_tables",
+    "skin_frames",
+    "slider_positions",
+    "table_pieces",
+    "wall_clock",
+]
+
+#: column -> its values, one for each row: all of one type, or None where there is none
+Table = Mapping[str, list[Any]]
+#: begins a table anew and yields its pieces, each with the same columns; nothing where it has no rows
+Pieces = Callable[[], Iterator[Table]]
+_PIECE = 1 << 14  # rows
+_IDENTIFIERS = frozenset({"version", "device", "sensor", "status", "clock_us", "sequence"})  # the rest are counts
+
+
+def run_tables(run: Run, progress: Progress = silent) -> dict[str, Table]:
+    """Return the tables of a run by their names, all in memory; one without rows is left out.
+
+    Args:
+        run: the run.
+        progress: called now and then with the fraction of the skin's frames that is done.
+
+    Raises:
+        SceneError: this version of coneskin cannot read the scene.
+    """
+    tables: dict[str, Table] = {}
+    for name, pieces in table_pieces(run, progress).items():
+        whole: dict[str, list[Any]] = {}
+        for piece in pieces():
+            for column, values in piece.items():
+                whole.setdefault(column, []).extend(values)
+        if whole:
+            tables[name] = whole
+    return tables
+
+
+def table_pieces(run: Run, progress: Progress = silent) -> dict[str, Pieces]:
+    """Return the tables of a run by their names, in pieces that are read one after the other; arguments as above."""
+    start = run.start
+    return {
+        "events": lambda: _events(run, start),
+        "frames": lambda: _frames(run, start, progress),
+        "arm": lambda: _arm(run, start),
+        "slider": lambda: _pieces(("time_s", "fraction"), ((t - start, f) for t, f in slider_positions(run))),
+        "commands": lambda: _commands(run, start),
+    }
+
+
+def _pieces(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[Table]:
+    """Yield rows as tables of some thousand each."""
+    source = iter(rows)
+    while piece := list(islice(source, _PIECE)):
+        yield dict(zip(columns, map(list, zip(*piece, strict=True)), strict=True))
+
+
+def wall_clock(run: Run) -> float:
+    """Return what turns a host time of the run into seconds since 1970; 0 where the recording does not tell."""
+    clocks = run.header["clocks"]
+    unix = clocks.get("unix")
+    return unix - clocks["monotonic"] if is_time(unix) else 0.0
+
+
+def skin_frames(run: Run, progress: Progress = silent) -> Iterator[tuple[float, Frame]]:
+    """Yield the frames of the skin, each with the host time at which its last byte was read [s]."""
+    decoder = FrameDecoder()
+    for block in watch(run, run.select(kinds=frozenset({BlockKind.SKIN})), progress):
+        for frame in decoder.feed(block.payload):
+            yield block.time, frame
+
+
+def arm_states(run: Run, since: float = -math.inf, until: float = math.inf) -> Iterator[ControllerState]:
+    """Yield the states of the arm in a time [s, host clock]; what the guard could not read either is left out."""
+    arm = run.scene().arm
+    if arm is None:
+        return
+    driver = load_driver(arm_model(arm.model).family)
+    for block in run.select(since, until, kinds=frozenset({BlockKind.ARM})):
+        with suppress(RobotConnectionError):
+            yield driver.decode_state(block.time, block.payload)
+
+
+def slider_positions(run: Run) -> Iterator[tuple[float, float]]:
+    """Yield host times [s] and the positions of the speed slider, from 0 to 1; what cannot be read is left out."""
+    arm = run.scene().arm
+    if arm is None:
+        return
+    driver = load_driver(arm_model(arm.model).family)
+    for block in run.select(kinds=frozenset({BlockKind.SLIDER})):
+        with suppress(RobotConnectionError):
+            yield block.time, driver.decode_speed_fraction(block.payload)
+
+
+def _events(run: Run, start: float) -> Iterator[Table]:
+    events = run.events
+    if not events:
+        return
+    names = dict.fromkeys(key for event in events for key in event.details)
+    table: dict[str, list[Any]] = {
+        "time_s": [event.time - start for event in events],
+        "unix_s": [event.time + wall_clock(run) for event in events],
+        "event": [event.name.value for event in events],
+    }
+    for name in names:
+        values = [event.details.get(name) for event in events]
+        table.update(_columns(name, values))
+    table["details_json"] = [json.dumps(event.details) for event in events]
+    yield table
+
+
+def _columns(name: str, values: Sequence[Any]) -> Iterator[tuple[str, list[Any]]]:
+    """Yield the columns of one detail; what is neither number, text nor vector of three is in ``details_json`` only."""
+    quantity = QUANTITIES.get(name)
+    unit = f"_{quantity.si_unit}" if quantity and quantity.si_unit else ""
+    present = [value for value in values if value is not None]
+    if all(isinstance(value, bool) for value in present) or all(isinstance(value, str) for value in present):
+        yield name, list(values)
+    elif all(isinstance(value, int | float) and not isinstance(value, bool) for value in present):
+        kind = int if all(isinstance(value, int) for value in present) else float
+        yield f"{name}{unit}", [None if value is None else kind(value) for value in values]
+    elif all(isinstance(value, list | tuple) and len(value) == 3 and _numeric(value) for value in present):
+        for axis, letter in enumerate("xyz"):
+            yield f"{name}_{letter}{unit}", [None if value is None else float(value[axis]) for value in values]
+
+
+def _numeric(values: Sequence[Any]) -> bool:
+    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+
+
+def _frames(run: Run, start: float, progress: Progress) -> Iterator[Table]:
+    skin = frozenset({BlockKind.SKIN})
+    names = [name if name in _IDENTIFIERS else f"{name}_counts" for name in Frame._fields[:-1]]
+    driven: tuple[None, ...] = ()  # potentials of driven electrodes: only where a frame has them
+    if any(DRIVEN_HEAD in block.payload for block in run.select(kinds=skin)):
+        driven = (None,) * len(DrivenPotentials._fields)
+        names += [f"driven_{name}_counts" for name in DrivenPotentials._fields]
+    rows = (
+        (time - start, *frame[:-1], *(frame.driven or driven if driven else ()))
+        for time, frame in skin_frames(run, progress)
+    )
+    return _pieces(("time_s", *names), rows)
+
+
+def _arm(run: Run, start: float) -> Iterator[Table]:
+    joints = {"q": "rad", "qd": "rad_s", "current": "a", "target_current": "a"}
+    flags = ("powered", "stopped_by_safety", "program_running")
+    names = [f"{name}{joint}_{unit}" for name, unit in joints.items() for joint in range(1, 7)]
+    unknown = (math.nan,) * 6
+    rows = (
+        (
+            *(state.time - start, state.controller_time, *state.q, *state.qd),
+            *(*(state.current or unknown), *(state.target_current or unknown)),
+            *(state.powered, state.stopped_by_safety, state.program_running),
+        )
+        for state in arm_states(run)
+    )
+    return _pieces(("time_s", "controller_time_s", *names, *flags), rows)
+
+
+def _commands(run: Run, start: float) -> Iterator[Table]:
+    rows = (
+        (command.time - start, command.what, json.dumps(command.numbers)) for command in recorded_commands(run.blocks)
+    )
+    return _pieces(("time_s", "command", "numbers_json"), rows)

@@ -1,0 +1,103 @@
+"""Touches that there truly were in a run: as labelled, as a virtual skin was touched, or, without that, as recorded."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from coneskin.bounded_file import read_file
+from coneskin.errors import RecordingError
+from coneskin.recording import is_time
+from coneskin.robot.guard.journal import BlockKind, EventName
+
+from .decisions import Decisions
+
+if TYPE_CHECKING:
+    from coneskin.replay.replay import Run
+
+__all__ = ["TouchLabel", "label_path", "read_labels", "recorded_labels", "true_touches"]
+
+_MAX_SIZE = 1 << 24  # bytes
+_TRUTH = frozenset({BlockKind.TRUTH})
+_EARLY = 0.25  # s before a recorded contact in which a more sensitive guard may see the same touch
+
+
+class TouchLabel(NamedTuple):
+    """One touch that there was.
+
+    Attributes:
+        start: when it begins [s since the start of the run].
+        end: when it is over.
+        sensor: name of the touched sensor; empty for any.
+        early: how long before the start a contact still counts as this touch [s].
+    """
+
+    start: float
+    end: float
+    sensor: str = ""
+    early: float = 0.0
+
+
+def label_path(recording: Path) -> Path:
+    """Return the file of a recording's labels: ``run.touches.toml`` of ``run.rec``."""
+    return recording.with_suffix(".touches.toml")
+
+
+def read_labels(path: Path) -> list[TouchLabel]:
+    """Return the touches in a TOML file: tables ``[[touch]]`` with ``start_s``, ``end_s`` and, if wanted, ``sensor``.
+
+    Raises:
+        RecordingError: the file cannot be read, or a touch has no beginning before its end.
+    """
+    try:
+        tables = tomllib.loads(read_file(path, _MAX_SIZE).decode("utf-8-sig")).get("touch", [])
+        labels = [TouchLabel(item["start_s"], item["end_s"], str(item.get("sensor", ""))) for item in tables]
+    except OSError as exc:
+        raise RecordingError(f"cannot read the labels {path}: {exc.strerror or exc}") from exc
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as exc:
+        raise RecordingError(f"{path} has no [[touch]] with start_s and end_s: {type(exc).__name__}: {exc}") from exc
+    for label in labels:
+        if not (is_time(label.start) and is_time(label.end) and label.start < label.end):
+            raise RecordingError(f"{path}: start_s must be before end_s, got {label.start!r} s and {label.end!r} s")
+    return sorted(labels)
+
+
+def true_touches(run: Run) -> list[TouchLabel] | None:
+    """Return with what the virtual skin of a run was touched; None where nothing tells.
+
+    Raises:
+        RecordingError: what the recording tells is damaged.
+    """
+    told = list(run.select(kinds=_TRUTH))
+    if not told:
+        return None
+    labels: list[TouchLabel] = []
+    for block in told:
+        try:
+            facts = json.loads(block.payload)
+            for touch in facts.get("touches", ()):
+                end = math.inf if touch["end"] is None else touch["end"] - run.start
+                labels.append(TouchLabel(touch["start"] - run.start, end, str(touch["sensor"])))
+            if "released" in facts:  # all that touches at that moment
+                time = facts["released"] - run.start
+                labels = [one._replace(end=time) if one.start < time < one.end else one for one in labels]
+        except (ValueError, TypeError, KeyError, AttributeError) as exc:
+            raise RecordingError(f"a block of {block.time:.6f} s does not say what touched the skin: {exc}") from exc
+    return sorted(labels)
+
+
+def recorded_labels(recorded: Decisions) -> list[TouchLabel]:
+    """Return the contacts that the guard saw when the run was recorded, as if they were all that there was."""
+    labels: list[TouchLabel] = []
+    open_since: dict[str, float] = {}
+    for event in recorded.events:
+        sensor, time = str(event.details.get("sensor", "")), event.time - recorded.start
+        if event.name == EventName.CONTACT:
+            open_since.setdefault(sensor, time)
+        elif event.name == EventName.TOUCH_ENDED and sensor in open_since:
+            labels.append(TouchLabel(open_since.pop(sensor), time, sensor, _EARLY))
+    labels += [TouchLabel(start, math.inf, sensor, _EARLY) for sensor, start in open_since.items()]
+    return sorted(labels)

@@ -1,0 +1,231 @@
+"""Builder of a guard's parts from a scene. Only what the scene names is imported and built."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import KinematicsError, SceneError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from coneskin.geometry.displacement_map import DisplacementMap
+    from coneskin.geometry.placed_frustum import PlacedFrustum
+    from coneskin.geometry.pose import Pose, Vector
+    from coneskin.robot.arm.model import ArmModel
+    from coneskin.robot.guard.arm_supervisor import ArmSupervisor
+    from coneskin.robot.guard.core import GuardCore
+    from coneskin.robot.guard.reaction_motion import ReactionPlanner
+
+    from .scene import Scene
+
+__all__ = ["SensorOnArm", "build_core", "place_on_arm", "withheld_motion"]
+
+_MAX_DEPTH = 0.012  # m that a mesh may lie below the sensor on it: five layers, and the deviation of the fit
+
+
+def build_core(
+    scene: Scene, placed: Sequence[SensorOnArm] | None = None, detector: Mapping[str, Any] | None = None
+) -> GuardCore:
+    """Build the guard's core for a scene; the same for the live guard and for a replay.
+
+    Args:
+        scene: what is guarded.
+        placed: its sensors, as of ``place_on_arm``; None to place them.
+        detector: other values than the default ones for fields of ``DetectorSettings``; in a what-if only.
+
+    Raises:
+        SceneError: the scene has no sensor to guard with.
+    """
+    if not scene.sensors:
+        raise SceneError(["a guard needs a [[link]] with a [[link.sensor]]"], scene.name)
+    from coneskin.robot.guard.contact import GuardedSensor
+    from coneskin.robot.guard.core import GuardCore
+    from coneskin.skin.detection.settings import DetectorSettings
+    from coneskin.skin.detection.stream import TouchStream
+    from coneskin.skin.detection.timing import TimingLimits
+
+    limits = scene.monitoring_limits
+    timing = TimingLimits(late=limits.skin_late, clock_drift=limits.clock_drift)
+    settings = DetectorSettings(stuck_frames=limits.stuck_frames, timing=timing, **(detector or {}))
+    stream = TouchStream([item.sensor for item in scene.sensors], settings)
+    levels = {item.sensor.name: item.sensor.thresholds for item in scene.sensors}
+    tables = {item.sensor.name: item.sensor.force_table for item in scene.sensors}
+    sensors = [
+        GuardedSensor(
+            *(item.name, item.link_name, item.link, item.place, at.touch_level, at.location_level),
+            force=None if (table := tables[item.name]) is None else table.force,
+        )
+        for item in (place_on_arm(scene) if placed is None else placed)
+        for at in (levels[item.name],)
+    ]
+    return GuardCore(stream, sensors, limits, _arm(scene) if scene.arm else None, withheld_motion(scene))
+
+
+def withheld_motion(scene: Scene) -> str:
+    """Return why the arm of a scene only stops where a reaction would move it; empty where it may, or none does."""
+    if not scene.moves_away or (scene.commissioning is not None and scene.commissioning.valid):
+        return ""
+    return scene.commissioning.note if scene.commissioning else "nobody has looked for a commissioning record"
+
+
+def _arm(scene: Scene) -> ArmSupervisor:
+    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.driver.registry import load_driver
+    from coneskin.robot.driver.stop_path import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
+    from coneskin.robot.guard.arm_supervisor import ArmSupervisor
+    from coneskin.robot.reaction.rules import RuleSet
+
+    assert scene.arm is not None
+    arm = arm_model(scene.arm.model)
+    rules = RuleSet(scene.default_reaction, scene.rules)
+    if withheld_motion(scene):
+        rules = rules.without_motion()  # a mirrored or exchanged skin would retreat into the person
+    paths: tuple[StopPath, ...] = INTERNAL_PATHS if scene.arm.control == "internal" else EXTERNAL_PATHS
+    if not scene.arm.slider_stop:
+        paths = tuple(path for path in paths if path is not StopPath.SLIDER)
+    if rules.kinds - {"stop"}:
+        _compile_links(scene, arm)
+    planner = _planner(scene, arm) if rules.move else None
+    heartbeat = None
+    if scene.arm.control == "external":
+        from coneskin.robot.guard.controller_heartbeat import ControllerHeartbeat
+
+        heartbeat = ControllerHeartbeat(scene.arm.controller_heartbeat == "required")
+    return ArmSupervisor(
+        arm, load_driver(arm.family), rules.default, scene.monitoring_limits, paths, rules.rules, planner, heartbeat
+    )
+
+
+def _planner(scene: Scene, arm: ArmModel) -> ReactionPlanner:
+    from coneskin.robot.arm.workspace import TablePlane
+    from coneskin.robot.guard.reaction_motion import ReactionPlanner
+
+    assert scene.arm is not None
+    table = None if scene.arm.table_z is None else TablePlane(scene.arm.table_z)
+    return ReactionPlanner(arm, scene.arm.watchdog_hz if scene.arm.control == "external" else None, table)
+
+
+def _compile_links(scene: Scene, arm: ArmModel) -> None:
+    """Compile the kinematics of the scene's links: 2 ms each, for which the first touch must not wait."""
+    from coneskin.robot.arm.compiled_kinematics import compile_contact
+    from coneskin.robot.arm.link_frames import link_index
+
+    for link in scene.links:
+        if index := link_index(link.name):
+            compile_contact(arm, index)
+
+
+@dataclass(frozen=True, slots=True)
+class SensorOnArm:
+    """Place of a sensor on the arm.
+
+    Attributes:
+        name: of the sensor.
+        link_name: of the link.
+        link: index of the link's DH frame; 0 without an arm.
+        frustum: in that frame; without an arm, in the frame that the scene gives.
+        surface: the link's mesh below the sensor, where the scene names one.
+        model: of the arm, or None.
+    """
+
+    name: str
+    link_name: str
+    link: int
+    frustum: PlacedFrustum
+    surface: DisplacementMap | None = None
+    model: ArmModel | None = None
+
+    def place(self, u: float, phi: float) -> tuple[Vector, Vector]:
+        """Return the point [m] and the outward unit normal at u [m] and phi [rad].
+
+        The point is on the link's mesh where the scene names one, else on the frustum; the normal is the frustum's,
+        which is smooth where that of the facets jumps.
+        """
+        return (self.surface or self.frustum).point(u, phi), self.frustum.normal(phi)
+
+    def place_in_base(self, u: float, phi: float, q: Sequence[float]) -> tuple[Vector, Vector]:
+        """Return point [m] and outward unit normal in the arm's base frame.
+
+        Args:
+            u: slant distance from end 1 [m].
+            phi: azimuth [rad].
+            q: joint positions [rad].
+
+        Raises:
+            KinematicsError: the scene has no arm.
+        """
+        if self.model is None:
+            raise KinematicsError(f"{self.name} is on no arm: the scene has no [arm]")
+        from coneskin.robot.arm.kinematics import link_pose
+
+        point, normal = self.place(u, phi)
+        base_link = link_pose(self.model, q, self.link)
+        return base_link.apply(point), base_link.rotate(normal)
+
+
+def place_on_arm(scene: Scene, surfaces: Mapping[str, NDArray[np.float64]] | None = None) -> list[SensorOnArm]:
+    """Return the places of the scene's sensors on its arm.
+
+    Args:
+        scene: with the sensors.
+        surfaces: heights of the links' meshes below the sensors, by their names, as a recording carries them; None to
+            measure them on the mesh files.
+
+    Raises:
+        SceneError: a sensor lies on a mesh that is not in ``surfaces``.
+        MeshError: a mesh cannot be read.
+        GeometryError: a mesh is not near the sensor on it.
+    """
+    from coneskin.geometry.placed_frustum import PlacedFrustum
+    from coneskin.geometry.pose import Pose
+
+    placed = []
+    for link in scene.links:
+        index, dh_mesh_frame, dh_frame, arm = 0, Pose(), Pose(), None
+        if scene.arm is not None:
+            from coneskin.robot.arm.link_frames import dh_link, dh_mesh, link_index
+            from coneskin.robot.arm.ur_models import arm_model
+
+            index, arm = link_index(link.name), arm_model(scene.arm.model)
+            dh_mesh_frame = dh_mesh(arm, link.name)
+            frames = {"mesh": dh_mesh_frame, "urdf": dh_link(arm, link.name), "dh": Pose()}
+            dh_frame = frames[link.frame]
+        frusta = [PlacedFrustum(item.placed.frustum, dh_frame @ item.placed.link_frustum) for item in link.sensors]
+        on_mesh: Sequence[DisplacementMap | None] = [None] * len(frusta)
+        if link.mesh and surfaces is None:
+            on_mesh = _measured(link.mesh, dh_mesh_frame, frusta)
+        elif link.mesh and surfaces is not None:
+            on_mesh = [
+                _carried(scene, item.sensor.name, at, surfaces) for item, at in zip(link.sensors, frusta, strict=True)
+            ]
+        for item, frustum, surface in zip(link.sensors, frusta, on_mesh, strict=True):
+            placed.append(SensorOnArm(item.sensor.name, link.name, index, frustum, surface, arm))
+    return placed
+
+
+def _carried(
+    scene: Scene, name: str, frustum: PlacedFrustum, surfaces: Mapping[str, NDArray[np.float64]]
+) -> DisplacementMap:
+    from coneskin.geometry.displacement_map import DisplacementMap
+
+    if name not in surfaces:
+        why = f"the recording does not carry the mesh below {name}, and no file that it names is opened; name --scene"
+        raise SceneError([why], scene.name)
+    return DisplacementMap(frustum, surfaces[name])
+
+
+def _measured(path: Path, dh_mesh_frame: Pose, frusta: list[PlacedFrustum]) -> list[DisplacementMap]:
+    """Measure the mesh below each sensor. A sensor has a thickness, so the mesh may be that much below it."""
+    from coneskin.geometry.displacement_map import measure_displacement
+    from coneskin.geometry.mesh import load_mesh
+    from coneskin.geometry.ray_casting import RayCaster
+
+    mesh = load_mesh(path).moved(dh_mesh_frame)
+    rays = RayCaster(mesh)
+    return [measure_displacement(mesh, frustum, 64, 128, limit=_MAX_DEPTH, rays=rays) for frustum in frusta]

@@ -1,0 +1,210 @@
+"""Commissioning record of a scene: what a person has touched, what the skin read, and whether a retreat is earned.
+
+It lies beside the scene, as ``scene.commissioning.json`` beside ``scene.toml``. It shows that a procedure was carried
+out on this skin, on this link; it is no lock, and a record that was edited by hand cannot be recognized.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import SceneError
+
+from .scene import Commissioning
+from .sensor_facts import round_facts, sensor_facts
+from .whole_file import write_whole
+
+if TYPE_CHECKING:
+    from .scene import PlacedSensor, Scene
+
+__all__ = [
+    "CommissioningRecord",
+    "MarkResult",
+    "fingerprint",
+    "read_record",
+    "record_path",
+    "with_commissioning",
+    "write_record",
+]
+
+_CHAIN = 1  # to be raised where the way from a frame to a place on the arm changes, so that old records are void
+_MAX_BYTES = 1 << 20  # of a record
+_DAY = 86400.0  # s
+_CLOCK_ERROR = 1.0  # days that a record may be ahead of this computer's date
+HOW_TO = "see `coneskin commission`"
+
+
+@dataclass(frozen=True, slots=True)
+class MarkResult:
+    """Result of one touched mark.
+
+    Attributes:
+        sensor: its name.
+        where: the place in the words that the person was given.
+        u_mm: slant distance from end 1 that was expected [mm].
+        phi_deg: azimuth that was expected [deg].
+        read_u_mm: as the skin read it [mm].
+        read_phi_deg: as the skin read it [deg].
+        distance_mm: of the two along the surface [mm].
+        level: of the touch.
+        attempts: how often it was touched.
+        passed: it was read where it is, within the tolerance.
+    """
+
+    sensor: str
+    where: str
+    u_mm: float
+    phi_deg: float
+    read_u_mm: float
+    read_phi_deg: float
+    distance_mm: float
+    level: float
+    attempts: int
+    passed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CommissioningRecord:
+    """Record of one commissioning.
+
+    Attributes:
+        date: when it ended, UTC, as ISO 8601 has it.
+        coneskin: the version.
+        fingerprint: of all that the result depends on; see ``fingerprint``.
+        passed: every mark of every sensor was read where it is.
+        cause: why it did not pass, for people.
+        by: who touched it; empty where nobody said so.
+        marks: in the order in which they were touched.
+    """
+
+    date: str
+    coneskin: str
+    fingerprint: str
+    passed: bool
+    cause: str
+    by: str
+    marks: tuple[MarkResult, ...]
+
+
+def fingerprint(scene: Scene) -> str:
+    """Return a hash of everything that places of touches on the arm depend on.
+
+    It changes with the arm's model, and with link, frame, pose, geometry, polarity, sheets, electronics, calibration
+    and numbers of each sensor, and between a virtual skin and a real one. It does not with names, thresholds, reactions
+    and ports.
+    """
+    from coneskin.skin.sources.kinds import is_simulated
+
+    simulated = scene.source is not None and is_simulated(scene.source.kind)
+    facts = {
+        "chain": _CHAIN,
+        "arm": scene.arm.model if scene.arm else None,
+        "simulated": simulated,
+        "sensors": [[_link_name(link.name), link.frame, _facts(item)] for link in scene.links for item in link.sensors],
+    }
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def _link_name(name: str) -> str:
+    return "".join(ch for ch in name.lower().removesuffix("_link") if ch.isalnum())
+
+
+def _facts(item: PlacedSensor) -> Any:
+    sensor, pose = item.sensor, item.placed.link_frustum
+    facts = {**sensor_facts(sensor), "pose": [pose.rotation, pose.translation]}
+    if sensor.place_map is not None:
+        facts["map"] = [sensor.place_map.along, sensor.place_map.around]
+    return round_facts(facts)
+
+
+def record_path(scene: Scene) -> Path:
+    """Return the path of a scene's record, which lies beside its file."""
+    return scene.folder / f"{Path(scene.name).stem}.commissioning.json"
+
+
+def write_record(scene: Scene, record: CommissioningRecord) -> Path:
+    """Write a scene's record, whole or not at all, in place of an older one; return its path.
+
+    Raises:
+        SceneError: it cannot be written.
+    """
+    path = record_path(scene)
+    try:
+        write_whole(path, json.dumps(asdict(record), indent=2) + "\n")
+    except OSError as exc:
+        raise SceneError([f"the record {path} cannot be written: {exc.strerror or exc}"], scene.name) from exc
+    return path
+
+
+def read_record(path: Path) -> CommissioningRecord:
+    """Read a record.
+
+    Raises:
+        FileNotFoundError: there is none.
+        ValueError: it cannot be read, or is no record; the message says why.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(_MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise
+    except OSError as exc:
+        raise ValueError(f"it cannot be read: {exc.strerror or exc}") from exc
+    if len(data) > _MAX_BYTES:
+        raise ValueError(f"it has more than {_MAX_BYTES} bytes")
+    try:
+        table = json.loads(data)
+        marks = tuple(MarkResult(**mark) for mark in table.pop("marks"))
+        record = CommissioningRecord(**table, marks=marks)
+        datetime.fromisoformat(record.date)
+    except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as exc:
+        raise ValueError(f"it is no commissioning record: {exc}") from exc
+    return record
+
+
+def with_commissioning(scene: Scene, now: float) -> Scene:
+    """Return a scene with what its record says, where a reaction of it would move the arm away.
+
+    Args:
+        scene: what it says of its commissioning already is kept.
+        now: computer's date, seconds since 1970.
+    """
+    if scene.commissioning is not None or not scene.moves_away:
+        return scene
+    return replace(scene, commissioning=_check(scene, now))
+
+
+def _check(scene: Scene, now: float) -> Commissioning:
+    path = record_path(scene)
+    try:
+        record = read_record(path)
+    except FileNotFoundError:
+        return Commissioning(False, f"there is no commissioning record {path.name}: {HOW_TO}")
+    except ValueError as exc:
+        return Commissioning(False, f"the commissioning record {path.name} is of no use, {exc}: {HOW_TO}")
+    then = datetime.fromisoformat(record.date)
+    then = then if then.tzinfo else then.replace(tzinfo=UTC)
+    day = f"{then:%Y-%m-%d}"
+    age = (now - then.timestamp()) / _DAY
+    if record.passed is not True or not record.marks or not all(mark.passed is True for mark in record.marks):
+        why = f"the commissioning of {day} has failed{f', {record.cause}' if record.cause else ''}: {HOW_TO}"
+        return Commissioning(False, why)
+    if record.fingerprint != fingerprint(scene):
+        changed = (
+            "arm, link, pose, geometry, wiring, electronics or calibration of a sensor, or the kind of source, is "
+            "another now"
+        )
+        return Commissioning(False, f"the commissioning of {day} was of another scene, {changed}: {HOW_TO}")
+    limit = scene.commissioning_max_age
+    if limit is not None and age * _DAY > limit:
+        allowed = f"{limit / _DAY:g} days are allowed (commissioning.max_age_days)"
+        return Commissioning(False, f"the commissioning of {day} is {age:.1f} days old, {allowed}: {HOW_TO}")
+    if limit is not None and age < -_CLOCK_ERROR:
+        return Commissioning(False, f"the commissioning is dated {day}, which is still to come: set the date; {HOW_TO}")
+    by = f" by {record.by}" if record.by else ""
+    return Commissioning(True, f"passed on {day}{by}, {len(record.marks)} marks")

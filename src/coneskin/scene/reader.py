@@ -1,0 +1,329 @@
+"""Reader of scene files, which reports every mistake at once. The keys are described in docs/scene.md."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from coneskin.bounded_file import read_file
+from coneskin.errors import ConeSkinError, SceneError
+
+from . import scene as s
+from .link_tables import count_sensors, inline_sensor_files, read_links
+from .reaction_table import read_reaction
+from .schema import MAX_SIZE, Key, check
+from .source_table import read_sources
+
+if TYPE_CHECKING:
+    from coneskin.robot.stop.limits import MonitoringLimits
+    from coneskin.skin.sensor import Sensor
+    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+
+__all__ = ["TABLES", "load_scene", "parse_scene"]
+
+#: that a scene may have
+TABLES = ("arm", "link", "source", "reaction", "monitoring", "recording", "motion", "commissioning", "body", "padding")
+_ARM = (
+    Key("model", str),
+    Key("host", str),
+    Key("watchdog_hz", float, 4.0, low=1.0, high=100.0),
+    Key("control", str, "internal", choices=("internal", "external")),
+    Key("table_z_mm", float, None, low=-5000.0, high=5000.0),
+    Key("slider_stop", bool, True),
+    Key("controller_heartbeat", str, "optional", choices=("required", "optional")),
+)
+_TOUCH = (
+    Key("sensor", int, None, low=0, high=255),
+    Key("start_s", low=0.0),
+    Key("end_s", low=0.0),
+    Key("u_mm", low=0.0, high=10_000.0),
+    Key("phi_deg", low=0.0, high=360.0),
+    Key("force_n", float, 5.0, low=0.0, high=1000.0),
+    Key("radius_mm", float, 0.0, low=0.0, high=500.0),
+    Key("grown_force_n", float, 0.0, low=0.0, high=1000.0),
+    Key("growth_time_s", float, 0.0, low=0.0),
+)
+_MONITORING = (
+    Key("skin_silence_ms", low=2.0, high=1000.0),
+    Key("skin_late_ms", low=2.0, high=1000.0),
+    Key("clock_drift_ppm", low=1.0, high=50_000.0),
+    Key("stuck_frames", int, low=0, high=1_000_000),
+    Key("arm_silence_ms", low=4.0, high=1000.0),
+    Key("escalate_ms", low=4.0, high=500.0),
+    Key("standstill_rad_s", low=1e-4, high=0.1),
+    Key("settle_ms", low=10.0, high=10_000.0),
+    Key("program_silence_ms", low=60.0, high=5000.0),
+)
+_RECORDING = (
+    Key("folder", str),
+    Key("max_mb", float, None, low=1.0, high=60_000.0),
+    Key("keep", int, None, low=1, high=100_000),
+)
+_MOTION = (
+    Key("waypoints_deg", dict, ...),
+    Key("speed_deg_s", float, low=0.1, high=360.0),
+    Key("acceleration_deg_s2", float, low=1.0, high=2000.0),
+    Key("rounds", int, 0, low=0),
+)
+_COMMISSIONING = (Key("max_age_days", float, None, low=0.0, high=10_000.0, above=True),)
+#: tomllib's time for a dotted key grows with the cube of its parts: a key of 20 kB takes minutes
+_MAX_PARTS = 64
+_DOTTED = re.compile(r"[\w\"'-][ \t]*\.")
+_PIECES = re.compile(r"[=,{\n]")
+_WAYPOINT = (Key("q_deg", list, low=-363.0, high=363.0, length=6),)
+
+
+def load_scene(path: Path | str, *, calibrated: bool = True) -> s.Scene:
+    """Read a scene from a TOML file (docs/scene.md).
+
+    Args:
+        path: of the file.
+        calibrated: False to leave the calibrations of its sensors out.
+
+    Raises:
+        SceneError: the file cannot be read, or has mistakes; all of them are listed.
+    """
+    path = Path(path)
+    try:
+        text = read_file(path, MAX_SIZE).decode("utf-8-sig")  # some editors put a byte-order mark in front
+    except UnicodeDecodeError as exc:
+        raise SceneError(
+            [f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8; save the scene as UTF-8 text"],
+            str(path),
+        ) from exc
+    except OSError as exc:
+        raise SceneError([f"the file cannot be read: {exc.strerror or exc}"], str(path)) from exc
+    return parse_scene(text, path.name, path.parent, calibrated=calibrated)
+
+
+def parse_scene(
+    text: str,
+    name: str = "scene",
+    folder: Path = Path(),
+    *,
+    recorded: bool = False,
+    calibrated: bool = True,
+    commissioning: s.Commissioning | None = None,
+) -> s.Scene:
+    """Read a scene from its text.
+
+    Args:
+        text: TOML.
+        name: for the messages.
+        folder: where relative paths start.
+        recorded: the text comes from a recording: no file that it names is looked for or opened.
+        calibrated: False to leave the calibrations of its sensors out.
+        commissioning: what is known of it already; None: the record beside the file says so when a guard starts.
+
+    Raises:
+        SceneError: with every mistake.
+    """
+    if len(text) > MAX_SIZE:
+        raise SceneError([f"a scene has at most {MAX_SIZE} characters, got {len(text)}: is it the right file?"], name)
+    if any(len(_DOTTED.findall(piece)) > _MAX_PARTS for piece in _PIECES.split(text)):
+        raise SceneError([f"not TOML: a key must have at most {_MAX_PARTS} parts with dots between them"], name)
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as exc:  # a whole number of 5000 digits is a plain ValueError
+        raise SceneError([f"not TOML: {exc}"], name) from exc
+    named = frozenset(tables)
+    problems = [f"unknown table [{t}]; known: {', '.join(TABLES)}" for t in tables if t not in TABLES]
+    for table in (name for name in TABLES if name not in ("link", "body")):
+        several = table == "source" and _is_array_of_tables(tables.get(table))
+        if table in tables and not isinstance(tables[table], dict) and not several:
+            problems.append(f"{table} must be one table: write [{table}], once, got {type(tables[table]).__name__}")
+            del tables[table]
+    text = inline_sensor_files(tables, None if recorded else folder, problems, calibrated) or text
+    reaction, rules = read_reaction(tables["reaction"], problems) if "reaction" in tables else (None, ())
+    scene = s.Scene(
+        name=name,
+        text=text,
+        folder=folder,
+        arm=_arm(tables, problems),
+        links=read_links(tables, None if recorded else folder, problems),
+        source=None,
+        reaction=reaction,
+        rules=rules,
+        monitoring=_monitoring(tables, problems),
+        recording=_recording(tables, folder, problems),
+        motion=_motion(tables, problems),
+        commissioning_max_age=_max_age(tables, problems),
+        commissioning=commissioning,
+        **_physics(tables, problems),
+    )
+    scene = replace(scene, source=_source(scene, tables, problems))
+    _check_together(scene, named, tables, problems)
+    if problems:
+        raise SceneError(problems, name)
+    return scene
+
+
+def _settings(keys: tuple[Key, ...], tables: Mapping[str, Any], name: str, problems: list[str]) -> dict[str, Any]:
+    """Return the values that a table sets; missing keys have the defaults of the dataclass that takes them."""
+    required = {key.name for key in keys if key.kind is str}
+    optional = tuple(key if key.name in required else replace(key, default=None) for key in keys)
+    values = check(tables[name], optional, name, problems)
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _monitoring(tables: Mapping[str, Any], problems: list[str]) -> MonitoringLimits | None:
+    if "monitoring" not in tables:
+        return None
+    from coneskin.robot.stop.limits import MonitoringLimits
+
+    return MonitoringLimits(**_settings(_MONITORING, tables, "monitoring", problems))
+
+
+def _arm(tables: Mapping[str, Any], problems: list[str]) -> s.ArmScene | None:
+    if "arm" not in tables:
+        return None
+    values = check(tables["arm"], _ARM, "arm", problems)
+    if "model" in values:
+        from coneskin.robot.arm.ur_models import arm_model
+
+        try:
+            values["model"] = arm_model(values["model"]).name
+        except ConeSkinError as exc:
+            problems.append(f"arm.model: {exc}")
+            del values["model"]
+    if not values.get("host", "?").strip():
+        problems.append("arm.host must name the controller, got an empty text")
+    if len(values) < len(_ARM):
+        return None
+    return s.ArmScene(watchdog_hz=values.pop("watchdog"), **values)
+
+
+def _is_array_of_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
+
+
+def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s.SourceScene | None:
+    if "source" not in tables:
+        return None
+    values = read_sources(tables["source"], problems)
+    built = [item.sensor for item in scene.sensors]
+    sensors = [*built, *[None] * (count_sensors(tables) - len(built))]
+    touches = [
+        touch
+        for number, table in enumerate(values.pop("touch", ()), 1)
+        if (touch := _touch(sensors, table, f"source.touch {number}", problems)) is not None
+    ]
+    kind = values.pop("kind", None)
+    return None if kind is None else s.SourceScene(kind, MappingProxyType(values), tuple(touches))
+
+
+def _touch(
+    sensors: Sequence[Sensor | None], table: Mapping[str, Any], where: str, problems: list[str]
+) -> ScriptedTouch | None:
+    """Read a scripted touch; among the sensors, None stands for each that has a mistake."""
+    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+
+    before = len(problems)
+    values = check(table, _TOUCH, where, problems)
+    start, end = values.get("start", -math.inf), values.get("end", math.inf)
+    if not start < end:
+        problems.append(f"{where}: start_s must be before end_s, got {start:g} s and {end:g} s")
+    wanted = values.pop("sensor")
+    known = () if wanted is None and None in sensors else sensors  # the first of them may be one with a mistake
+    sensor = next((one for one in known if one is not None and wanted in (None, one.sensor_id)), None)
+    if sensor is None:
+        if None not in sensors:  # otherwise it may be that one
+            problems.append(f"{where}: there is no sensor {'to touch' if wanted is None else f'with the id {wanted}'}")
+        return None
+    cone = sensor.frustum
+    u, phi = values.get("u", 0.0), values.get("phi", 0.0)
+    if u > cone.slant or phi > cone.wrap:
+        problems.append(
+            f"{where} is off {sensor.name}, whose u_mm ends at {1e3 * cone.slant:g} and phi_deg at "
+            f"{math.degrees(cone.wrap):g}: got {1e3 * u:g} mm and {math.degrees(phi):g} deg"
+        )
+    if values.get("grown_force") and not values.get("growth_time"):
+        problems.append(f"{where}: grown_force_n needs a growth_time_s above 0 s")
+    return ScriptedTouch(**values, sensor=sensor.name) if len(problems) == before else None
+
+
+def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> s.RecordingScene | None:
+    if "recording" not in tables:
+        return None
+    values = check(tables["recording"], _RECORDING, "recording", problems)
+    size, keep = values["max"], values["keep"]
+    if keep is not None and size is None:
+        problems.append("recording.keep counts files, and without recording.max_mb there is only one: set both")
+    if "folder" not in values:
+        return None
+    return s.RecordingScene(folder / values["folder"], None if size is None else round(size), keep)
+
+
+def _motion(tables: Mapping[str, Any], problems: list[str]) -> s.MotionScene | None:
+    if "motion" not in tables:
+        return None
+    rows = tables["motion"].get("waypoints_deg")
+    points = []
+    if isinstance(rows, list):
+        for number, row in enumerate(rows, 1):
+            where = f"motion.waypoints_deg[{number}]"
+            lines: list[str] = []
+            points.append(check({"q_deg": row}, _WAYPOINT, where, lines).get("q", ()))
+            problems += [line.replace(f"{where}.q_deg", where) for line in lines]
+        if len(rows) < 2:
+            problems.append(f"motion.waypoints_deg needs at least 2 waypoints, got {len(rows)}")
+    table = {key: value for key, value in tables["motion"].items() if key != "waypoints_deg"}
+    values = check(table, _MOTION[1:], "motion", problems)
+    if not isinstance(rows, list):
+        problems.append("motion.waypoints_deg must be a list of lists of 6 joint positions [deg]")
+    return s.MotionScene(tuple(points), **values) if len(values) == len(_MOTION) - 1 else None
+
+
+def _physics(tables: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
+    """Return what only the physics engine asks for."""
+    if "body" not in tables and "padding" not in tables:
+        return {}
+    from .body_table import read_bodies, read_padding
+
+    return {"bodies": read_bodies(tables, problems), "padding": read_padding(tables, problems)}
+
+
+def _max_age(tables: Mapping[str, Any], problems: list[str]) -> float | None:
+    values = check(tables.get("commissioning", {}), _COMMISSIONING, "commissioning", problems)
+    age: float | None = values.get("max_age")
+    return age
+
+
+def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, Any], problems: list[str]) -> None:
+    """Add the mistakes that only the tables together show."""
+    seen: dict[tuple[int, int] | str, str] = {}
+    for link in scene.links:
+        for item in link.sensors:
+            sensor = item.sensor
+            ident = (sensor.device_id, sensor.sensor_id)
+            if ident in seen:
+                problems.append(
+                    f"link {link.name}: sensor {ident[1]} of device {ident[0]} is already on link {seen[ident]}; give "
+                    "each sensor its own id"
+                )
+            elif sensor.name in seen:
+                problems.append(f"link {link.name}: the name {sensor.name} is already on link {seen[sensor.name]}")
+            seen[ident] = seen[sensor.name] = link.name
+    if "reaction" in named and "arm" not in named:
+        problems.append("[reaction] needs an [arm] that can react")
+    if "body" in named and "arm" not in named:
+        problems.append("[[body]] needs an [arm] that can run into it")
+    if "motion" in named and "arm" not in named:
+        problems.append("[motion] needs an [arm] that can move")
+    external = scene.arm is not None and scene.arm.control == "external"
+    if external and "motion" in named:
+        problems.append(
+            "[motion] needs control = internal in [arm]: with control = external another program makes the motion"
+        )
+    if "source" in named and isinstance(tables.get("link", []), list) and not count_sensors(tables):
+        problems.append("[source] needs a [[link]] with a [[link.sensor]] that its bytes come from")
+    if "arm" in named:
+        from .checks import check_links
+
+        check_links(scene, problems)

@@ -1,0 +1,226 @@
+"""Values of a scene, in SI and radians.
+
+What a scene does not name is neither imported, started nor computed. ``reader`` reads one from a TOML file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from coneskin.geometry.placed_frustum import PlacedFrustum
+    from coneskin.robot.reaction.rules import Rule
+    from coneskin.robot.reaction.types import Reaction
+    from coneskin.robot.stop.limits import MonitoringLimits
+    from coneskin.skin.padding import Padding
+    from coneskin.skin.sensor import Sensor
+    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+
+    from .body import BodyScene
+
+__all__ = [
+    "ArmScene",
+    "Commissioning",
+    "LinkScene",
+    "MotionScene",
+    "PlacedSensor",
+    "RecordingScene",
+    "Scene",
+    "SourceScene",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class ArmScene:
+    """Arm of a scene.
+
+    Attributes:
+        model: such as "UR10e".
+        host: the controller's name or address.
+        watchdog_hz: the controller ends the program through which coneskin moves the arm when it receives nothing for
+            1 / watchdog_hz.
+        control: "internal": a program moves the arm through the driver process; "external": another program moves it.
+        slider_stop: the guard takes the controller's speed slider, as one more way to stop the arm.
+        controller_heartbeat: "required": a program that the controller does not end without the guard's heartbeat is
+            stopped; "optional": it is reported.
+        table_z: height in the base frame that the arm does not go below while it retreats [m], or None.
+    """
+
+    model: str
+    host: str
+    watchdog_hz: float = 4.0
+    control: str = "internal"
+    table_z: float | None = None
+    slider_stop: bool = True
+    controller_heartbeat: str = "optional"
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedSensor:
+    """Sensor and its place.
+
+    Attributes:
+        sensor: the sensor.
+        placed: its frustum in the frame of the link's mesh, or of its DH frame.
+    """
+
+    sensor: Sensor
+    placed: PlacedFrustum
+
+
+@dataclass(frozen=True, slots=True)
+class LinkScene:
+    """Link of the arm that carries sensors.
+
+    Attributes:
+        name: its name in the arm's URDF, such as "forearm".
+        frame: "mesh", "urdf" or "dh": what the poses of its sensors refer to.
+        mesh: the file of its mesh, or None.
+        sensors: on the link.
+    """
+
+    name: str
+    frame: str
+    mesh: Path | None
+    sensors: tuple[PlacedSensor, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SourceScene:
+    """Source of the skin's bytes.
+
+    Attributes:
+        kind: one of `coneskin.skin.sources.kinds.SOURCE_KINDS`, such as "serial" or "virtual"; ``GROUP`` for several.
+        settings: values of the keys of that kind, in SI, under their names without the unit.
+        touches: script of a simulated source.
+    """
+
+    kind: str
+    settings: Mapping[str, Any]
+    touches: tuple[ScriptedTouch, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingScene:
+    """Place where runs are recorded.
+
+    Attributes:
+        folder: each run makes a folder in it.
+        max_size: of a file, from which on a run goes on in a new one [bytes]; None for one file.
+        keep: newest files of a run that stay whole; in older ones only events stay, and what was recorded around
+            touches, stops and faults. None for all.
+    """
+
+    folder: Path
+    max_size: int | None = None
+    keep: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MotionScene:
+    """Motion that the guard itself makes, over and over: for tests and demonstrations.
+
+    Attributes:
+        waypoints: joint positions [rad].
+        speed: of the leading joint [rad/s].
+        acceleration: of the leading joint [rad/s2].
+        rounds: their number; 0 for no end.
+    """
+
+    waypoints: tuple[tuple[float, ...], ...]
+    speed: float
+    acceleration: float
+    rounds: int
+
+
+@dataclass(frozen=True, slots=True)
+class Commissioning:
+    """Whether the reactions of a scene may move its arm away from a touch. Without it they only stop the arm.
+
+    Attributes:
+        valid: the places that the skin reads were compared with places that were touched.
+        note: for people: how that is known, or why not.
+    """
+
+    valid: bool
+    note: str
+
+    def as_message(self) -> dict[str, Any]:
+        """Return it as JSON has it, for another process or a recording."""
+        return {"valid": self.valid, "note": self.note}
+
+    @classmethod
+    def from_message(cls, message: Any) -> Commissioning | None:
+        """Return what ``as_message`` made of it; None for None.
+
+        Raises:
+            ValueError: the message is nothing of the kind.
+        """
+        if message is None:
+            return None
+        if not (isinstance(message, dict) and message.get("valid") in (True, False) and "note" in message):
+            raise ValueError(f"a commissioning needs valid and note, got {message!r}")
+        return cls(bool(message["valid"]), str(message["note"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Content of a scene file; None or empty for what it does not name.
+
+    Attributes:
+        name: of the file, for messages.
+        text: the file itself, with the sensor files that it names written out, so that a recording is whole.
+        folder: where relative paths start.
+        commissioning_max_age: age from which on a commissioning record is void [s]; None: never.
+        commissioning: None where nobody has looked yet: ``with_commissioning`` then reads the record beside the file. A
+            program that knows better says so with ``dataclasses.replace``.
+        bodies: that the arm may run into, in the physics engine.
+        padding: of the skins, for the physics engine; None where the file names none.
+    """
+
+    name: str
+    text: str
+    folder: Path
+    arm: ArmScene | None = None
+    links: tuple[LinkScene, ...] = ()
+    source: SourceScene | None = None
+    reaction: Reaction | None = None
+    rules: tuple[Rule, ...] = ()
+    monitoring: MonitoringLimits | None = None
+    recording: RecordingScene | None = None
+    motion: MotionScene | None = None
+    commissioning_max_age: float | None = None
+    commissioning: Commissioning | None = None
+    bodies: tuple[BodyScene, ...] = ()
+    padding: Padding | None = None
+
+    @property
+    def sensors(self) -> tuple[PlacedSensor, ...]:
+        """All sensors, in the order of the file."""
+        return tuple(sensor for link in self.links for sensor in link.sensors)
+
+    @property
+    def default_reaction(self) -> Reaction:
+        """Reaction to a touch that no rule fits; a stop where the file names none."""
+        from coneskin.robot.reaction.types import Reaction
+
+        return self.reaction or Reaction(kind="stop")
+
+    @property
+    def moves_away(self) -> bool:
+        """True where a reaction of the scene moves the arm away from a touch, or gives way to it."""
+        if self.arm is None:
+            return False
+        from coneskin.robot.reaction.rules import RuleSet
+
+        return RuleSet(self.default_reaction, self.rules).move
+
+    @property
+    def monitoring_limits(self) -> MonitoringLimits:
+        """Limits of the monitoring; the defaults where the file names none."""
+        from coneskin.robot.stop.limits import MonitoringLimits
+
+        return self.monitoring or MonitoringLimits()

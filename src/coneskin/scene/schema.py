@@ -1,0 +1,202 @@
+"""Keys of a TOML table: their units, ranges and defaults, checked all at once.
+
+In a file the unit is part of the name of the key (``height_mm``); checked values are in SI and radians under the plain
+name.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["MAX_SIZE", "Key", "check"]
+
+MAX_SIZE = 256_000  #: bytes of a scene file or a sensor file; a scene of 100 sensors has 50 kB
+
+_DEGREE = math.pi / 180.0  # rad
+_UNITS: Mapping[str, tuple[float, str]] = {
+    "_n_per_mm": (1e3, "N/mm"),
+    "_kg": (1.0, "kg"),
+    "_mm_s": (1e-3, "mm/s"),
+    "_deg_s2": (_DEGREE, "deg/s2"),
+    "_deg_s": (_DEGREE, "deg/s"),
+    "_rad_s2": (1.0, "rad/s2"),
+    "_rad_s": (1.0, "rad/s"),
+    "_mm": (1e-3, "mm"),
+    "_deg": (_DEGREE, "deg"),
+    "_ppm": (1e-6, "ppm"),
+    "_days": (86400.0, "days"),
+    "_per_s": (1.0, "1/s"),
+    "_siemens": (1.0, "S"),
+    "_ms": (1e-3, "ms"),
+    "_hz": (1.0, "Hz"),
+    "_ma": (1e-3, "mA"),
+    "_ohm": (1.0, "ohm"),
+    "_v": (1.0, "V"),
+    "_mb": (1e6, "MB"),
+    "_n": (1.0, "N"),
+    "_s": (1.0, "s"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One key of a table: its type, unit, range and default.
+
+    Attributes:
+        name: in the file, with its unit.
+        kind: float, int, str or bool; list for a list of numbers, dict for a list of tables.
+        default: value of a missing key, in SI; ``...`` for a mandatory key.
+        low: smallest value allowed, in the unit of the file.
+        high: largest value allowed, in the unit of the file.
+        choices: words allowed.
+        length: number of numbers in a list.
+        above: True if low itself is not allowed.
+        or_zero: True if 0 is allowed below low.
+        one_for_all: True if one number may stand for a list of equal ones.
+        meaning: short description, for help texts.
+    """
+
+    name: str
+    kind: type = float
+    default: Any = ...
+    low: float = -math.inf
+    high: float = math.inf
+    choices: Sequence[str] = ()
+    length: int | None = None
+    above: bool = False
+    or_zero: bool = False
+    one_for_all: bool = False
+    meaning: str = ""
+
+    @property
+    def suffix(self) -> str:
+        """Unit at the end of the name, with its underscore; empty without a unit."""
+        return next((s for s in _UNITS if self.name.endswith(s)), "") if self.kind in (float, list) else ""
+
+    @property
+    def plain(self) -> str:
+        """Name without the unit."""
+        return self.name.removesuffix(self.suffix)
+
+    def in_file_unit(self, value: float) -> float:
+        """Convert a value from SI to the unit of the key."""
+        factor = _UNITS.get(self.suffix, (1.0, ""))[0]
+        return value * (1.0 / factor) if factor != _DEGREE else math.degrees(value)  # 1 / 1e-3 is 1000 exactly
+
+
+def check(table: Mapping[str, Any], keys: Sequence[Key], where: str, problems: list[str]) -> dict[str, Any]:
+    """Check a table and convert its values to SI.
+
+    Args:
+        table: from the file.
+        keys: keys that it may have.
+        where: name of the table, for messages.
+        problems: every mistake is added here.
+
+    Returns:
+        the values in SI under their plain names; a key with a mistake has its default, or is missing.
+    """
+    known = {key.name: key for key in keys}
+    for name in table:
+        if name not in known:
+            near = _nearest(name, known)
+            problems.append(f"{where}: unknown key {name}; " + (f"did you mean {near}?" if near else _list(known)))
+    values: dict[str, Any] = {}
+    for key in keys:
+        if key.default is not ...:
+            values[key.plain] = key.default
+        if key.name not in table:
+            if key.default is ...:
+                problems.append(f"{where}: the key {key.name} is missing")
+            continue
+        found = _convert(key, table[key.name], f"{where}.{key.name}", problems.append)
+        if found is not None:
+            values[key.plain] = found
+    return values
+
+
+def _nearest(name: str, known: Mapping[str, Key]) -> str | None:
+    stem = name.rsplit("_", 1)[0]
+    same = [other for other, key in known.items() if key.plain == stem or key.plain == name]
+    return next(iter(same or difflib.get_close_matches(name, known, 1, 0.6)), None)
+
+
+def _list(known: Mapping[str, Key]) -> str:
+    return "known here: " + ", ".join(known)
+
+
+def _convert(key: Key, value: Any, where: str, report: Callable[[str], None]) -> Any:
+    """Return the value in SI; report a mistake and return None."""
+    if key.kind is list:
+        if key.one_for_all and not isinstance(value, list):
+            number = _number(key, value, where, report)
+            return None if number is None else (number,) * (key.length or 1)
+        if not isinstance(value, list) or (key.length is not None and len(value) != key.length):
+            report(f"{where} must be a list of {key.length or 'some'} numbers, got {_show(value)}")
+            return None
+        numbers = [_number(key, item, f"{where}[{i}]", report) for i, item in enumerate(value)]
+        return None if None in numbers else tuple(numbers)
+    if key.kind is float:
+        return _number(key, value, where, report)
+    if key.kind is int:
+        if isinstance(value, bool) or not isinstance(value, int) or not key.low <= value <= key.high:
+            report(f"{where} must be a whole number {_range(key, '')}, got {_show(value)}")
+            return None
+        return value
+    if key.kind is dict:
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            report(f"{where} must be a list of tables, in double brackets, got {_show(value)}")
+            return None
+        return value
+    if not isinstance(value, key.kind):
+        report(f"{where} must be {'text' if key.kind is str else 'true or false'}, got {_show(value)}")
+        return None
+    if key.choices and value not in key.choices:
+        report(f"{where} must be one of {', '.join(key.choices)}, got {_show(value)}")
+        return None
+    return value
+
+
+def _number(key: Key, value: Any, where: str, report: Callable[[str], None]) -> float | None:
+    factor, unit = _UNITS.get(key.suffix, (1.0, ""))
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        report(f"{where} must be a number{f' [{unit}]' if unit else ''}, got {_show(value)}")
+        return None
+    try:
+        value = float(value)
+    except OverflowError:  # integers of TOML have no upper limit
+        report(f"{where} must be {_range(key, unit)}, got {_show(value)}")
+        return None
+    inside = math.isfinite(value) and key.low <= value <= key.high and not (key.above and value == key.low)
+    inside = inside or (key.or_zero and value == 0.0)
+    if not inside:
+        hint = ""
+        if unit in ("mm", "mm/s") and math.isfinite(value) and key.low <= 1e3 * value <= key.high:
+            hint = f": is that in metres? Then write {1e3 * value:g}"
+        report(f"{where} must be {_range(key, unit)}, got {_show(value)}{f' {unit}' if unit else ''}{hint}")
+        return None
+    return value * factor if factor != _DEGREE else math.radians(value)
+
+
+def _show(value: Any) -> str:
+    """Return the text of a value for a message, shortened if it is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # Python does not print integers of more than 4300 digits
+        return "something too large to print"
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _range(key: Key, unit: str) -> str:
+    unit = f" {unit}" if unit else ""
+    low, high = math.isfinite(key.low), math.isfinite(key.high)
+    if low and high:
+        start = "above" if key.above else "0 or from" if key.or_zero else "from"
+        return f"{start} {key.low:g} to {key.high:g}{unit}"
+    if low:
+        return f"{'above' if key.above else 'at least'} {key.low:g}{unit}"
+    return f"at most {key.high:g}{unit}" if high else f"finite{unit and f' [{unit.strip()}]'}"

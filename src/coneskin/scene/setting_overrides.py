@@ -1,0 +1,180 @@
+"""Overrides of a scene's settings, by the names of its keys: what if this value had been another one."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from coneskin.errors import SceneError
+
+from .detector_keys import DETECTOR, detector_settings
+from .link_tables import sensor_tables
+from .reader import TABLES
+
+__all__ = ["override_detector", "override_settings", "parse_choices", "parse_settings"]
+
+_EXAMPLE = (
+    "write reaction.kind=stop, monitoring.settle_ms=100, reaction.rule.0.kind=slow, sensor.0.touch_level=0.08, "
+    "detection.touch_level=0.08 for all sensors, or detector.release_frames=5"
+)
+_ALL_SENSORS = "detection"  # keys of every [[link.sensor]]
+_SENSOR = "sensor"  # the sensors of all links in the order of the file
+_BARE_POINT = re.compile(r"(?<![\w.\"'])([+-]?)\.(?=\d)")  # of a number such as .08, which is none in TOML
+#: tables of which a replay uses nothing, and why
+_NO_EFFECT = {
+    "source": "the skin's bytes are the recorded ones",
+    "motion": "the arm moved as it was recorded",
+    "recording": "nothing is recorded",
+}
+_PART = re.compile(r'"([^"]*)"|([^."]+)')
+
+
+def parse_settings(words: Iterable[str]) -> dict[str, Any]:
+    """Return the settings in words such as "reaction.kind=stop": name -> value, as TOML reads it, or a text.
+
+    Raises:
+        SceneError: a word has no name or no value.
+    """
+    settings = {}
+    for word in words:
+        name, text = _split(word)
+        settings[name] = _value(text)
+    return settings
+
+
+def parse_choices(word: str) -> tuple[str, list[Any]]:
+    """Return the name and the values in a word such as "detection.touch_level=0.06,0.08"; errors as above."""
+    name, text = _split(word)
+    values = _value(f"[{text}]")
+    return name, values if isinstance(values, list) else [_value(part.strip()) for part in text.split(",")]
+
+
+def _split(word: str) -> tuple[str, str]:
+    name, equals, text = word.partition("=")
+    if not equals or not name.strip() or not text.strip():
+        raise SceneError([f"a setting is TABLE.KEY=VALUE, got {word!r}; {_EXAMPLE}"], "settings")
+    return name.strip(), text.strip()
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads("value = " + _BARE_POINT.sub(r"\g<1>0.", text))["value"]
+    except (ValueError, RecursionError, KeyError):
+        return text  # a word without quotation marks
+
+
+def override_detector(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those settings that are the detector's own, by the names of their fields, in SI.
+
+    Raises:
+        SceneError: one of them is unknown, or its value not possible.
+    """
+    own = {name.partition(".")[2]: value for name, value in settings.items() if name.partition(".")[0] == DETECTOR}
+    return detector_settings(own)
+
+
+def override_settings(text: str, settings: Mapping[str, Any]) -> str:
+    """Return the text of a scene with other values.
+
+    Args:
+        text: of the scene, with the keys of its sensor files in it, as a recording carries it.
+        settings: name -> value, in the unit of the key's name. A name is the way to a key, with dots between its parts:
+            tables by their names, lists by the number of the item from 0, or by its name: "reaction.rule.0.kind",
+            "link.forearm.frame". "sensor" stands for the sensors of all links, "detection" for every one of them. What
+            is the detector's own is left out: see ``override_detector``.
+
+    Raises:
+        SceneError: the text is not TOML, or there is no such place. Whether the last key is known and its value
+            possible is checked where the scene is read.
+    """
+    import tomli_w
+
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as exc:
+        raise SceneError([f"not TOML: {exc}"], "settings") from exc
+    problems: list[str] = []
+    for name, value in settings.items():
+        parts = [quoted or plain for quoted, plain in _PART.findall(name)]
+        if parts[:1] == [DETECTOR]:
+            continue
+        try:
+            _override(tables, parts, value)
+        except _NoPlace as exc:
+            problems.append(f"{name}: {exc}")
+    if problems:
+        raise SceneError(problems, "settings")
+    return tomli_w.dumps(tables)
+
+
+class _NoPlace(Exception):
+    """A name leads nowhere."""
+
+
+def _override(tables: dict[str, Any], parts: list[str], value: Any) -> None:
+    if len(parts) < 2:
+        raise _NoPlace(f"a setting is named TABLE.KEY; {_EXAMPLE}")
+    if parts[0] in _NO_EFFECT:
+        raise _NoPlace(f"it would have no effect in a replay: {_NO_EFFECT[parts[0]]}; leave it out")
+    sensors = sensor_tables(tables)
+    if parts[0] in (_ALL_SENSORS, _SENSOR) and not sensors:
+        raise _NoPlace("the scene has no sensor")
+    if parts[0] == _ALL_SENSORS:
+        for sensor in sensors:
+            _put(sensor, parts[1:], value, parts[0])
+    elif parts[0] == _SENSOR:
+        place = _step(sensors, parts[1], _SENSOR)
+        _put(place, [part for part in parts[2:3] if part != _ALL_SENSORS] + parts[3:], value, ".".join(parts[:2]))
+    elif parts[0] in TABLES:
+        _put(tables.setdefault(parts[0], {}), parts[1:], value, parts[0])
+    else:
+        raise _NoPlace(_unknown("table", parts[0], [*TABLES, _SENSOR, _ALL_SENSORS, DETECTOR]))
+
+
+def _put(place: Any, parts: list[str], value: Any, where: str) -> None:
+    """Set the value at the end of the way through tables and lists."""
+    if not parts:
+        raise _NoPlace(f"{where} is no value but a table: name one of its keys")
+    for part in parts[:-1]:
+        place = _step(place, part, where)
+        where = f"{where}.{part}"
+    last = parts[-1]
+    if isinstance(place, dict):
+        place[last] = value
+    elif isinstance(place, list):
+        number = _index(place, last, where, room=isinstance(value, dict))
+        place[number : number + 1] = [value]
+    else:
+        raise _NoPlace(f"{where} is {place!r}, which has no parts")
+
+
+def _step(place: Any, part: str, where: str) -> Any:
+    if isinstance(place, list):
+        return place[_index(place, part, where)]
+    if not isinstance(place, dict):
+        raise _NoPlace(f"{where} is {place!r}, which has no parts")
+    if part not in place:
+        inner = [name for name, value in place.items() if isinstance(value, dict | list)]
+        raise _NoPlace(f"in {where} " + _unknown("table or list", part, inner))
+    return place[part]
+
+
+def _index(items: list[Any], part: str, where: str, room: bool = False) -> int:
+    """Return the number of an item that a part of a name stands for; with room, it may be the next one."""
+    if part.isdecimal() and int(part) < len(items) + room:
+        return int(part)
+    names = [str(item["name"]) for item in items if isinstance(item, dict) and "name" in item]
+    for number, item in enumerate(items):
+        if isinstance(item, dict) and item.get("name") == part:
+            return number
+    numbers = f"{where} has {len(items)} item{'s'[: len(items) != 1]}, counted from 0"
+    raise _NoPlace(f"{numbers}; " + (_unknown("item", part, names) if names else f"got {part!r}"))
+
+
+def _unknown(what: str, part: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(part, known, 1, 0.5)
+    said = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}" if known else "there is none at all"
+    return f"there is no {what} {part}; {said}"

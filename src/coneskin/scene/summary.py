@@ -1,0 +1,152 @@
+"""Summary of a scene for people and programs, and what it lacks for a guard."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from .source_table import source_label
+
+if TYPE_CHECKING:
+    from coneskin.robot.reaction.rules import Rule
+    from coneskin.robot.reaction.types import Reaction
+    from coneskin.robot.stop.limits import MonitoringLimits
+    from coneskin.skin.sensor import Sensor
+
+    from .scene import PlacedSensor, Scene
+
+__all__ = ["missing_parts", "summarize"]
+
+#: arm.controller_heartbeat -> what it means
+_HEARTBEAT = {
+    "required": "a program on the controller must depend on the guard's heartbeat (coneskin heartbeat)",
+    "optional": "NOT REQUIRED: a program without the lines of coneskin heartbeat goes on if the network is cut",
+}
+
+#: reaction.on_resistance -> what it means
+_ANSWER = {"stop": "stay", "back": "go back the way of the retreat", "comply": "give way to all touches"}
+#: reaction.on_clamp -> what it means, beside what is the default
+_CLAMP = {
+    "stop": "",
+    "path": "; where touches hold the arm between them: go back along its path if that leads into none of them",
+    "comply": "; where touches hold the arm between them: give way to them",
+}
+
+
+def missing_parts(scene: Scene) -> list[str]:
+    """Return what has to be added before the scene can be guarded, one line each."""
+    needed = {"[source]": scene.source, "[[link]] with a [[link.sensor]]": scene.sensors}
+    return [f"a guard needs a {name}" for name, part in needed.items() if not part]
+
+
+def summarize(scene: Scene) -> dict[str, Any]:
+    """Return what the scene has, a name and a sentence each; limits that have their defaults are included."""
+    found: dict[str, Any] = {"scene": scene.name}
+    if scene.arm:
+        table = "" if scene.arm.table_z is None else f", table at z = {1e3 * scene.arm.table_z:g} mm"
+        found["arm"] = f"{scene.arm.model} at {scene.arm.host}, control {scene.arm.control}{table}"
+        if scene.arm.control == "external":
+            found["heartbeat"] = _HEARTBEAT[scene.arm.controller_heartbeat]
+    for link in scene.links:
+        for item in link.sensors:
+            found[f"sensor {item.sensor.name}"] = _sensor(item, link.name, link.frame)
+            if item.sensor.place_map:
+                note = item.sensor.place_map.note or "numbers of the scene"
+                found[f"calibration of {item.sensor.name}"] = note
+            found[f"place on {item.sensor.name}"] = _certainty(item.sensor, scene.arm is not None)
+    if scene.source:
+        found["source"] = source_label(scene.source)
+    if scene.arm:
+        found["reaction"] = _reaction(scene.default_reaction)
+        if scene.commissioning:
+            valid, note = scene.commissioning.valid, scene.commissioning.note
+            found["commissioning"] = note if valid else f"NOT VALID: the arm only stops; {note}"
+    for number, rule in enumerate(scene.rules, 1):
+        found[f"rule {number}"] = f"{_reaction(rule.reaction)}, {_conditions(rule)}"
+    if scene.source:
+        found["monitoring"] = _monitoring(scene.monitoring_limits, scene.arm is not None)
+    if scene.source and scene.source.touches:
+        found["touches"] = str(len(scene.source.touches))
+    if scene.motion:
+        found["motion"] = f"{len(scene.motion.waypoints)} waypoints, rounds: {scene.motion.rounds or 'no end'}"
+    if scene.recording:
+        found["recording"] = str(scene.recording.folder)
+    return found
+
+
+def _sensor(item: PlacedSensor, link: str, frame: str) -> str:
+    sensor, cone, pose = item.sensor, item.sensor.frustum, item.placed.link_frustum
+    place = ", ".join(f"{1e3 * x:g}" for x in pose.translation)
+    turn = ", ".join(f"{math.degrees(x):g}" for x in pose.rpy)
+    return (
+        f"id {sensor.device_id}/{sensor.sensor_id} on the {link}: radius {1e3 * cone.radius1:g} to "
+        f"{1e3 * cone.radius2:g} mm, height {1e3 * cone.height:g} mm, wrap {math.degrees(cone.wrap):g} deg, "
+        f"at ({place}) mm, rpy ({turn}) deg, in the {frame} frame"
+    )
+
+
+def _certainty(sensor: Sensor, arm: bool) -> str:
+    """Return when a touch's place is certain, and what that excludes."""
+    from coneskin.skin.detection.settings import DetectorSettings
+    from coneskin.skin.detection.single_contact import DANGEROUS_ANGLE, frames_until_certain, weakest_pair_excluded
+
+    settings = DetectorSettings()
+    frames = frames_until_certain(sensor, settings)
+    wanted, reached = 1e3 * settings.second_contact, 1e3 * weakest_pair_excluded(sensor, 512)
+    if frames is None:
+        return (
+            f"this sensor's place never becomes certain{': the arm only stops' if arm else ''}; its readings are too "
+            f"coarse to exclude a second contact of {wanted:g} mS (about 2 N), only one of {reached:.2g} mS"
+        )
+    return (
+        f"certain after about {frames} frame{'s' if frames > 1 else ''} of a firm touch: then a second contact of "
+        f"{wanted:g} mS (about 2 N), {math.degrees(DANGEROUS_ANGLE):.0f} deg off, is excluded; after 512 frames one of "
+        f"{reached:.2g} mS"
+    )
+
+
+def _reaction(reaction: Reaction) -> str:
+    """Return what the arm does, with the settings that matter to it."""
+    stop = f"braking at {reaction.deceleration:g} rad/s2"
+    if reaction.kind == "stop":
+        return f"stop, {stop}"
+    if reaction.kind == "slow":
+        return (
+            f"slow to {100.0 * reaction.slow_to:g} % for at most {reaction.time_budget:g} s, and no more than "
+            f"{1e3 * reaction.press:g} mm farther into the touch than a stop; then stop, {stop}"
+        )
+    text = (
+        f"{reaction.kind}: stop, {stop}, then at most {1e3 * reaction.distance:g} mm at up to "
+        f"{1e3 * reaction.speed:g} mm/s within {reaction.time_budget:g} s, no point of the arm farther than "
+        f"{1e3 * reaction.arm_distance:g} mm or faster than {1e3 * reaction.arm_speed:g} mm/s"
+    )
+    if reaction.kind == "comply":
+        return f"{text}, with full speed at level {reaction.full_level:g}"
+    text += "; else back along its path" if reaction.fallback == "path" else ""
+    return f"{text}; where the touch resists: {_ANSWER[reaction.on_resistance]}{_CLAMP[reaction.on_clamp]}"
+
+
+def _conditions(rule: Rule) -> str:
+    from coneskin.robot.arm.link_frames import LINK_INDEX
+
+    said = []
+    if rule.link is not None:
+        said.append(f"touched on the {next(name for name, index in LINK_INDEX.items() if index == rule.link)}")
+    if rule.level_above is not None:
+        said.append(f"level above {rule.level_above:g}")
+    if rule.speed_above is not None:
+        said.append(f"arm faster than {rule.speed_above:g} rad/s")
+    return "where " + " and ".join(said) if said else "always"
+
+
+def _monitoring(limits: MonitoringLimits, arm: bool) -> str:
+    text = f"skin silent for {1e3 * limits.skin_silence:g} ms or late by {1e3 * limits.skin_late:g} ms"
+    if limits.stuck_frames:
+        text += f" or without noise for {limits.stuck_frames} frames"
+    if not arm:
+        return f"{text}: a fault"
+    return (
+        f"{text}, controller silent for {1e3 * limits.arm_silence:g} ms, program silent for "
+        f"{1e3 * limits.program_silence:g} ms: stop; next stop path after "
+        f"{1e3 * limits.escalate:g} ms without slowdown; standing below {limits.standstill:g} rad/s"
+    )

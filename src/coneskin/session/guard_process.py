@@ -1,0 +1,63 @@
+"""Guard process: it runs the guard's loop alone. Started by ``coneskin.session.session``."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coneskin.channel import decode_json, wait_readable, wait_writable
+from coneskin.child_process import inherit
+from coneskin.errors import ConeSkinError
+from coneskin.recording import encode_block
+
+if TYPE_CHECKING:  # imported once the line to the program is there, which may have ended already
+    pass
+
+__all__ = ["main"]
+
+_PRECEDENCE = -15  # nice value; more would be in the way of the kernel's own threads
+_AUTOGROUP = Path("/proc/self/autogroup")  # of sched(7): nice values only count among the processes of one session
+
+
+def main(arguments: list[str]) -> int:
+    """Take the channels and the scene, open what it names, and run until the guard is to end."""
+    lifeline, (session, *rest) = inherit(arguments)
+    # while the other processes start; not above, because the program may be gone before all of it is loaded
+    from coneskin.robot.guard.journal import EventName, GuardEvent
+    from coneskin.robot.guard.overflow import RecordingOverflowFilter
+    from coneskin.scene.reader import parse_scene
+    from coneskin.scene.scene import Commissioning
+
+    from .guard_run import run_guard
+
+    session.overflow = RecordingOverflowFilter()
+    other = rest[0] if rest else None
+    while not (hello := session.receive()) and not session.closed:
+        wait_readable([session], 1.0)
+    if not hello or hello[0] == b"quit":
+        return 1
+    start = decode_json(hello[0])
+    with contextlib.suppress(OSError):
+        os.nice(_PRECEDENCE)  # allowed for root, and where the user's limits say so
+        if os.getsid(0) == os.getpid():  # Linux may first divide its time among sessions; this one is the guard's own
+            _AUTOGROUP.write_text(str(_PRECEDENCE))
+    try:
+        known = Commissioning.from_message(start["commissioning"])
+        scene = parse_scene(start["scene"], start["name"], Path(start["folder"]), commissioning=known)
+        with contextlib.ExitStack() as stack:
+            run_guard(scene, start, session, other, lifeline, stack)
+    except ConeSkinError as exc:
+        event = GuardEvent(EventName.GUARD_EXITED, time.monotonic(), {"what": str(exc), "error": type(exc).__name__})
+        session.send(encode_block(event.block()))
+        wait_writable(session, 1.0)
+        session.flush()
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,89 @@
+"""Run of a guard in its process: it opens what the scene names, and serves until it is told to end."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import time
+from typing import Any
+
+from coneskin.channel import Channel
+from coneskin.child_process import Lifeline
+from coneskin.errors import RobotRefused
+from coneskin.recording import encode_block
+from coneskin.robot.guard.loop import GuardLoop
+from coneskin.robot.guard.ports import GuardPorts
+from coneskin.scene.build import build_core, place_on_arm
+from coneskin.scene.scene import Scene
+from coneskin.scene.surface_record import encode_surfaces
+from coneskin.skin.sources.kinds import is_simulated, open_source
+from coneskin.skin.sources.source_reopening import SourceReopening
+
+__all__ = ["run_guard"]
+
+
+def run_guard(
+    scene: Scene,
+    start: dict[str, Any],
+    session: Channel,
+    other: Channel | None,
+    lifeline: Lifeline,
+    stack: contextlib.ExitStack,
+) -> None:
+    """Open what a scene names, and guard it until the guard is to end.
+
+    Args:
+        scene: with a source, and perhaps an arm.
+        start: what the program has said; it names the port.
+        session: channel to the program.
+        other: that to the driver process, or to the guard watchdog; None without an arm.
+        lifeline: to the program.
+        stack: takes what is open.
+
+    Raises:
+        ConeSkinError: something cannot be opened, or is not what the scene says.
+    """
+    placed = place_on_arm(scene)
+    core = build_core(scene, placed)
+    for block in encode_surfaces(placed, time.monotonic()):
+        session.send(encode_block(block))
+    assert scene.source is not None
+    source = stack.enter_context(open_source(scene.source.kind, scene.source.settings, start["port"]))
+    ports = GuardPorts(session, source, reopen=None if is_simulated(scene.source.kind) else SourceReopening)
+    if scene.arm is not None:
+        from coneskin.robot.arm.ur_models import arm_model
+        from coneskin.robot.driver.registry import load_driver
+
+        from .arm_lock import ArmLock
+
+        if scene.arm.control == "internal":
+            ports.driver = other
+        else:
+            ports.watchdog = other
+        arm = arm_model(scene.arm.model)
+        driver, host = load_driver(arm.family), scene.arm.host
+        stack.enter_context(ArmLock(host))
+        driver.check_model(arm, host)
+        if core.needs_setpoints:
+            ports.reader = ports.setpoints = stack.enter_context(driver.setpoint_writer(host))
+        else:
+            ports.reader = stack.enter_context(driver.state_reader(host))
+        ports.stops = stack.enter_context(driver.stop_connections(host))
+        if core.needs_slider:
+            ports.slider = stack.enter_context(driver.speed_slider(host))
+        elif core.stops_by_slider:
+            try:
+                ports.slider = stack.enter_context(driver.speed_slider(host))
+            except RobotRefused as exc:  # a program has it
+                ports.absent = {"slider": str(exc)}
+        if core.heartbeat_required is not None:
+            try:
+                ports.heartbeat = stack.enter_context(driver.heartbeat_writer(host))
+            except RobotRefused as exc:  # a program has the register
+                if core.heartbeat_required:
+                    raise
+                ports.absent = {**ports.absent, "heartbeat": str(exc)}
+    lifeline.hold()
+    loop = GuardLoop(core, ports)
+    signal.signal(signal.SIGTERM, lambda *_: loop.stop())
+    loop.run()

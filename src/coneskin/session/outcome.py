@@ -1,0 +1,158 @@
+"""Outcome of a guarded run: its events as the error, the sentence and the exit code that a program gets."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+from coneskin import errors
+from coneskin.errors import Collision, ConeSkinError, MissingExtra, RobotConnectionError, RobotRefused, SceneError
+from coneskin.robot.guard.journal import EventName
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from coneskin.robot.guard.journal import GuardEvent
+    from coneskin.scene.scene import Scene
+
+    from .event_log import EventLog
+
+__all__ = [
+    "NOT_CONFIRMED",
+    "STANDS",
+    "STILL_RETREATING",
+    "activation_error",
+    "await_outcome",
+    "braking_time",
+    "exit_code",
+    "exit_error",
+    "reasons",
+    "stands",
+    "stop_error",
+]
+
+STANDS = "the arm stands"
+STILL_RETREATING = "the arm has stood and still moves away from the touch"
+NOT_CONFIRMED = "standstill of the arm NOT confirmed"
+_MOVING = (EventName.ACTIVATED, EventName.SPEED_REDUCED, EventName.RESUMED, EventName.STOPPING, EventName.RETREATING)
+_REACTION_TIMEOUT = 6.0  # s beyond the braking time in which a reaction ends
+_MARGIN = 0.5  # s for the events to come, on a busy machine
+
+
+def braking_time(scene: Scene) -> float:
+    """Return the longest time in which the arm of a scene comes to a confirmed standstill after a stop [s]."""
+    from coneskin.robot.arm.ur_models import arm_model
+
+    assert scene.arm is not None
+    reactions = [scene.default_reaction, *(rule.reaction for rule in scene.rules)]
+    slowest = min(reaction.deceleration for reaction in reactions)
+    fastest = max(arm_model(scene.arm.model).joint_speed)
+    return scene.monitoring_limits.stop_budget(fastest, slowest) + _MARGIN
+
+
+def await_outcome(log: EventLog, since: int, patience: float) -> str:
+    """Return the outcome of the newest stop, as far as it is known in time.
+
+    Args:
+        log: of the run, with a stop in it.
+        since: position of the first event that counts.
+        patience: time in which the arm comes to a confirmed standstill [s].
+    """
+    end = time.monotonic() + patience + _REACTION_TIMEOUT
+    while True:
+        newest = max(i for i, event in enumerate(log.events) if i >= since and event.name == EventName.STOPPING)
+        if log.wait_for((EventName.STANDSTILL, EventName.LATCHED), patience, newest) is None:
+            return NOT_CONFIRMED
+        latched = log.wait_for((EventName.LATCHED,), max(end - time.monotonic(), 0.0), newest)
+        if not any(event.name == EventName.STOPPING for event in log.events[newest + 1 :]):
+            return STANDS if latched else STILL_RETREATING
+        if time.monotonic() >= end:
+            return NOT_CONFIRMED
+
+
+def stop_error(
+    stop: GuardEvent, contact: GuardEvent | None, outcome: str, reaction: str = ""
+) -> Collision | RobotRefused:
+    """Return the error for a stop.
+
+    Args:
+        stop: the event of the stop.
+        contact: the event that says where the touch is, if there is one.
+        outcome: STANDS, STILL_RETREATING or NOT_CONFIRMED.
+        reaction: what the reaction did, as the event "latched" says it; empty where that is not known.
+    """
+    if contact is None or stop.details["why"] != "touch":
+        return RobotRefused(f"the guard has stopped the arm: {stop.details['why']}; {outcome}")
+    where = contact.details
+    return Collision(
+        f"{where['sensor']} on the {where['link']} was touched at u = {1e3 * where['u']:.1f} mm, "
+        f"phi = {math.degrees(where['phi']):.1f} deg; {outcome}, until a person resets the guard"
+        + (f" ({reaction})" if reaction else ""),
+        contact,
+        outcome == STANDS,
+        reaction,
+        int(stop.details.get("stop", 0)),
+    )
+
+
+def activation_error(
+    events: Sequence[GuardEvent], describe_line: Callable[[Sequence[str]], str] = lambda _: ""
+) -> RobotRefused:
+    """Return the error of a guard that has not become active, with all that stood against it.
+
+    Args:
+        events: of the run.
+        describe_line: says what is wrong with the skin's line, given the reasons.
+    """
+    waiting = next((event for event in reversed(events) if event.name == EventName.WAITING), None)
+    faults = [str(event.details["what"]) for event in events if event.name in (EventName.FAULT, EventName.GUARD_EXITED)]
+    waited_for = reasons(waiting) if waiting else []
+    line = describe_line(waited_for)
+    listed = list(dict.fromkeys([*faults, *([line] if line else []), *waited_for])) or ["its process sent nothing"]
+    return RobotRefused("the guard did not become active:\n" + "\n".join(f"  {line}" for line in listed))
+
+
+def exit_error(event: GuardEvent) -> ConeSkinError:
+    """Return the error that ended a guard, of the type that it had there."""
+    kind = getattr(errors, str(event.details.get("error")), RobotConnectionError)
+    if kind in (SceneError, MissingExtra):  # they are made of parts, of which only the message has come
+        kind = RobotRefused
+    error: ConeSkinError = kind(event.details["what"])
+    return error
+
+
+def reasons(event: GuardEvent) -> list[str]:
+    """Return why a guard waits or refuses, one line each."""
+    details = event.details
+    return [str(reason) for reason in details.get("reasons", [details.get("what", event.name)])]
+
+
+def stands(events: Sequence[GuardEvent]) -> bool:
+    """Tell whether the arm was last seen standing, for as long as it takes, and nothing has let it move since."""
+    for event in reversed(events):
+        if event.name == EventName.LATCHED:  # a standstill may be one between two starts of a program
+            return True
+        if event.name == EventName.FALLBACK_STOP:
+            return bool(event.details["stands"])
+        if event.name in _MOVING:
+            return False
+    return False
+
+
+def exit_code(events: Sequence[GuardEvent], arm: bool) -> int:
+    """Return the exit code of a guarded run: 0 nothing has happened, 1 a fault, 3 a collision.
+
+    Args:
+        events: of the run.
+        arm: whether the scene has one; without one a touch counts as a collision.
+    """
+    on_purpose = {event.details["what"] for event in events if event.name == EventName.ENDING}
+    stops = [event.details["why"] for event in events if event.name == EventName.STOPPING]
+    names = {event.name for event in events}
+    if "touch" in stops or (not arm and EventName.CONTACT in names):
+        return 3
+    if not arm and EventName.FAULT in names:
+        return 1
+    lost = [event.name for event in events if event.name in (EventName.GUARD_EXITED, EventName.GUARD_UNRESPONSIVE)]
+    return 1 if lost or not on_purpose.issuperset(stops) else 0

@@ -1,0 +1,87 @@
+"""Retention of a run: its events stay for ever, all that was recorded around them for a while, the rest is dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+from coneskin.errors import RecordingError
+from coneskin.recording import Block
+from coneskin.recording_file.defect import DefectKind
+from coneskin.recording_file.reader import MAX_SIZE, parts_of, read_recording
+from coneskin.recording_file.recording_lock import hold_against_recorder
+from coneskin.recording_file.retention import prune_file
+from coneskin.robot.guard.journal import BlockKind, EventName, decode_event
+
+__all__ = ["AROUND", "prune_part", "prune_run"]
+
+AROUND = 5.0  #: s before and after an event in which all stays
+_KEPT = frozenset({BlockKind.HEADER, BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.EVENT, BlockKind.OVERRUN})
+_EVENTS = frozenset({BlockKind.EVENT})
+#: events that are no reason to keep what led to them
+_ORDINARY = frozenset(
+    {
+        EventName.WAITING,
+        EventName.ACTIVATED,
+        EventName.NOT_COMMISSIONED,
+        EventName.MESSAGE,
+        EventName.REFUSED,
+        EventName.RESET,
+        EventName.ENDING,
+        EventName.RECORDING_GAP,
+    }
+)
+
+
+def prune_run(path: Path, around: float = AROUND, progress: Callable[[float], None] | None = None) -> tuple[int, int]:
+    """Drop what is far from any touch, stop or fault; a run that was pruned says so, and cannot be replayed as a whole.
+
+    Args:
+        path: a recording, or the folder of a run with one in it.
+        around: time before and after such an event in which all stays [s].
+        progress: called now and then with the fraction of the files that is scanned.
+
+    Returns:
+        bytes before and after.
+
+    Raises:
+        RecordingError: it cannot be read, is being recorded now, or is of version 1.
+    """
+    path = path / "run.rec" if path.is_dir() else path
+    recording = read_recording(path, progress)
+    if recording.version == 1:
+        raise RecordingError(f"{path} is of version 1, and only recordings of version 2 are pruned")
+    parts = parts_of(path)
+    with hold_against_recorder(parts[-1], MAX_SIZE):
+        windows = list(_windows(recording.select(kinds=_EVENTS), around))
+        # a touch may be in what is lost
+        lost = [defect for defect in recording.defects if defect.kind is not DefectKind.DROPPED]
+        windows += [(defect.since - around, defect.until + around) for defect in lost]
+        for part in parts:
+            for _ in prune_file(part, windows, _KEPT):
+                pass
+    return recording.size, sum(part.stat().st_size for part in parts)
+
+
+def prune_part(path: Path, around: float = AROUND) -> Iterator[None]:
+    """Drop the same from one file of a recording that goes on, step by step.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    yield from prune_file(path, list(_windows(read_recording(path).select(kinds=_EVENTS), around)), _KEPT)
+
+
+def _windows(blocks: Iterable[Block], around: float) -> Iterator[tuple[float, float]]:
+    """Yield the times around what is no ordinary event; those that overlap are one."""
+    since = until = None
+    for block in blocks:
+        if decode_event(block).name in _ORDINARY:
+            continue
+        if since is None or until is None or block.time - around > until:
+            if since is not None and until is not None:
+                yield since, until
+            since = block.time - around
+        until = block.time + around
+    if since is not None and until is not None:
+        yield since, until

@@ -1,0 +1,323 @@
+"""Guarded session: it starts the processes of a scene, records what they do, and gives the arm to a program.
+
+    with guard("scene.toml") as g:
+        g.arm.move_j(q, speed=1.0, acceleration=2.0)     # raises Collision when the skin is touched
+
+Processes: this one records and waits; the guard's loop, the arm's driver and a virtual skin are children, each on a
+channel. The death of a child shows as the end of its channel, and ends in a stopped arm.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from coneskin.errors import RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.guard.journal import EventName, GuardEvent, stopping_contact
+from coneskin.scene.commissioning_record import with_commissioning
+from coneskin.scene.reader import load_scene
+from coneskin.scene.resolved_settings import resolved_settings
+from coneskin.scene.scene import Scene
+from coneskin.scene.summary import missing_parts
+
+from .arm_client import ArmClient
+from .child_processes import ChildProcesses
+from .deferred_interrupt import defer_interrupts
+from .event_log import EventLog, discard_recording, new_recording
+from .fallback_stop import FallbackStop
+from .guard_monitor import GuardMonitor
+from .outcome import (
+    activation_error,
+    await_outcome,
+    braking_time,
+    exit_error,
+    reasons,
+    stands,
+    stop_error,
+)
+from .program_heartbeat import ProgramHeartbeat
+
+__all__ = ["Session", "guard"]
+
+_START_TIMEOUT = 20.0  # s for the children to start and the guard to become active
+_REASON_TIMEOUT = 5.0  # s for the guard to report why the driver process ended
+
+
+def guard(
+    scene: Scene | Path | str,
+    *,
+    recording: Path | str | None = None,
+    on_event: Callable[[GuardEvent], None] | None = None,
+    start_timeout: float = _START_TIMEOUT,
+) -> Session:
+    """Guard an arm, or watch a skin, while a ``with`` lasts.
+
+    Args:
+        scene: a scene, or the path of its file.
+        recording: file to record to; by default a new one in the folder that the scene names, if it names one.
+        on_event: called for each event, from the thread that records.
+        start_timeout: how long the guard may take to become active [s].
+
+    Raises:
+        SceneError: the scene has mistakes, or nothing to guard with.
+        RobotRefused: on entering, where the guard does not become active in time; the reasons are listed.
+        RobotConnectionError: on entering, where the controller cannot be reached.
+        SkinConnectionError: on entering, where the port cannot be opened.
+    """
+    return Session(
+        scene if isinstance(scene, Scene) else load_scene(scene),
+        None if recording is None else Path(recording),
+        on_event,
+        start_timeout,
+    )
+
+
+class Session:
+    """Guarded run, made by ``guard`` and entered in a ``with``, or begun with ``open``.
+
+    Attributes:
+        scene: of the run.
+        recording: the file that is recorded to, or None.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        recording: Path | None,
+        on_event: Callable[[GuardEvent], None] | None,
+        start_timeout: float,
+    ) -> None:
+        if missing := missing_parts(scene):
+            raise SceneError(missing, scene.name)
+        self.scene = with_commissioning(scene, time.time())
+        self.recording = recording
+        self._made = False  # the recording's folder
+        self._on_event = on_event
+        self._start_timeout = start_timeout
+        self._log = EventLog()
+        self._monitor: GuardMonitor | None = None
+        self._heartbeat: ProgramHeartbeat | None = None
+        self._processes = ChildProcesses()
+        self._arm: ArmClient | None = None
+        self._requests = 0  # resets, each of which has a number
+
+    @property
+    def events(self) -> list[GuardEvent]:
+        """Events so far, in order; a copy."""
+        return list(self._log.events)
+
+    @property
+    def began(self) -> float:
+        """When the run began, on the clock of the events [s]: the zero of the times that commands print."""
+        return self._log.began
+
+    @property
+    def arm(self) -> ArmClient:
+        """Arm for the program.
+
+        Raises:
+            RobotRefused: the scene has none.
+        """
+        if self._arm is None and self._processes.guard is None:
+            raise RobotRefused("nothing is guarded yet: enter the guard with a `with`")
+        if self._arm is None and self.scene.arm is not None:
+            raise RobotRefused(f"{self.scene.name} says control = external in [arm]: another program moves the arm")
+        if self._arm is None:
+            raise RobotRefused(f"{self.scene.name} has no [arm]")
+        return self._arm
+
+    def open(self) -> Session:
+        """Begin the run, as entering a ``with`` does, for a program that ends with ``close``.
+
+        A program that ends without it ends the run as well: the other processes stop the arm.
+
+        Raises:
+            RobotRefused, RobotConnectionError, SkinConnectionError: as ``guard``.
+        """
+        return self.__enter__()
+
+    def __enter__(self) -> Session:
+        try:
+            self._open()
+            self._await_activation()
+            self._processes.note_script()
+        except BaseException:
+            self.close()
+            if self._made and self.recording is not None and not self._log.activated:
+                discard_recording(self.recording)
+            raise
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop the arm, end the children and close the recording; may be called again.
+
+        Raises:
+            KeyboardInterrupt: a person has interrupted meanwhile; all of it is done nevertheless.
+        """
+        defer_interrupts(self._close)
+
+    def _close(self) -> None:
+        self._processes.end(lambda: stands(self._log.events))
+        if self._arm is not None:
+            self._arm.close()
+        if self._monitor is not None:
+            self._monitor.close()
+        self._log.close()
+        if self._heartbeat is not None:
+            self._heartbeat.stop()
+        self._processes.close()
+
+    def reset(self, timeout: float = 5.0, stop: int | None = None) -> None:
+        """Let the arm move again after a collision or a fault: call it because a person has looked.
+
+        Args:
+            timeout: for the guard to become active [s].
+            stop: number of the stop that the person has looked at (``Collision.number``); by default the newest one
+                that latched the arm and was reported to this program. A newer one is not forgiven.
+
+        Raises:
+            RobotRefused: something is still wrong; the reasons are listed.
+            RobotConnectionError: the guard hangs, or is gone.
+        """
+        self.check_guard()
+        if stop is None:
+            stop = self.latched_stop
+        if stop == 0:
+            raise RobotRefused("reset refused: no stop that has latched the arm was reported to this program")
+        self._requests += 1
+        request, seen = self._requests, len(self._log.events)
+        assert self._processes.guard is not None
+        self._processes.guard.send(b"reset %d %d" % (stop, request))
+        answers = (EventName.ACTIVATED, EventName.REFUSED)
+        event = self._log.wait_for(answers, timeout, seen, lambda event: event.details.get("request") == request)
+        if event is None or event.name != EventName.ACTIVATED:
+            listed = ["the guard did not become active in time"] if event is None else reasons(event)
+            line = self._log.line.describe(self.scene, listed)
+            why = "; ".join([*([line] if line else []), *listed])
+            raise RobotRefused(f"reset refused: {why}")
+
+    @property
+    def latched_stop(self) -> int:
+        """Number of the newest stop that has latched the arm and was reported to this program; 0 before the first."""
+        latched = (event for event in reversed(self._log.events) if event.name == EventName.LATCHED)
+        return next((int(event.details["stop"]) for event in latched), 0)
+
+    def touch(self, u: float, phi: float, force: float = 5.0, duration: float = 0.3, sensor: str | int = "") -> float:
+        """Touch the scene's virtual skin now.
+
+        Args:
+            u: slant distance from end 1 [m].
+            phi: azimuth [rad].
+            force: [N].
+            duration: [s]; less where the arm moves away from the touch.
+            sensor: its name or its id; by default the first.
+
+        Returns:
+            when the touch begins, on the clock of the events [s].
+
+        Raises:
+            SensorError: there is no such sensor, the place is off it, or a value cannot be.
+            SkinConnectionError: the scene's skin is not virtual, or is gone.
+        """
+        if self._processes.skin is None:
+            raise SkinConnectionError("only a virtual skin can be touched by a program")
+        return self._processes.skin.touch(u, phi, force, duration, sensor)
+
+    def check_guard(self) -> None:
+        """Raise where the guard hangs, or is gone. What it has stopped does not matter here.
+
+        Raises:
+            RobotConnectionError: a process is gone, or sends nothing.
+            ConeSkinError: what ended the guard.
+        """
+        for event in self._log.events[self._since_activation() :]:
+            if event.name == EventName.GUARD_EXITED:
+                raise exit_error(event)
+        if self._monitor is not None and self._monitor.lost:
+            raise RobotConnectionError(self._monitor.lost)
+        if self._log.ended and not any(event.name == EventName.ENDING for event in self._log.events[-20:]):
+            raise RobotConnectionError("the guard's process has ended; the arm is stopped by the other processes")
+
+    def wait_for(self, names: tuple[str, ...], timeout: float, after: int = 0) -> GuardEvent | None:
+        """Return the first event of one of these names from position ``after`` on; None after the timeout [s]."""
+        return self._log.wait_for(names, timeout, after)
+
+    def check(self, stopped: bool = False) -> None:
+        """Raise what has happened: a collision, a fault, or the end of a process.
+
+        Args:
+            stopped: the driver process has said that the guard stopped the arm; the guard's own report may be late.
+
+        Raises:
+            Collision: the skin was touched and the arm has reacted.
+            RobotRefused: a fault has stopped the arm.
+            RobotConnectionError: a process is gone, or the guard hangs.
+        """
+        since = self._since_activation()
+        stop = self.wait_for((EventName.STOPPING,), 1.0 if stopped else 0.0, after=since)
+        self.check_guard()
+        if stop is None:
+            return
+        outcome = await_outcome(self._log, since, braking_time(self.scene))
+        contact = stopping_contact(stop, self._log.events)
+        latched = [event for event in self._log.events[since:] if event.name == EventName.LATCHED]
+        raise stop_error(stop, contact, outcome, str(latched[-1].details["why"]) if latched else "")
+
+    def _since_activation(self) -> int:
+        """Return the position after the newest activation, searched from the end: it is asked at each command."""
+        events = self._log.events
+        return next((at + 1 for at in range(len(events) - 1, -1, -1) if events[at].name == EventName.ACTIVATED), 0)
+
+    def _take_event(self, event: GuardEvent) -> None:
+        """Take what touches a virtual skin off it as soon as the arm moves away; a push is what an arm gives way to."""
+        away = event.name == EventName.RETREATING and event.details.get("how") != "push"
+        if away and self._processes.skin is not None:
+            self._processes.skin.release()
+        if self._on_event is not None:
+            self._on_event(event)
+
+    # ---- how it starts
+
+    def _open(self) -> None:
+        scene = self.scene
+        start: dict[str, Any] = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve())}
+        start["commissioning"] = scene.commissioning.as_message() if scene.commissioning else None
+        if self.recording is None and scene.recording is not None:
+            self.recording, self._made = new_recording(scene.recording.folder), True
+        virtual = scene.source is not None and scene.source.kind == "virtual"
+        self._log = EventLog(self.recording, self._take_event if virtual else self._on_event, scene.recording)
+        self._log.open({**start, "resolved": resolved_settings(scene)})
+        channel = self._processes.start(scene, start, self._log.note_truth)
+        program = self._processes.program
+        fallback = None
+        if scene.arm is not None and program is not None:
+            from .ur_rtde_names import UrRtdeArm
+
+            self._arm = UrRtdeArm(program, self.check, arm_model(scene.arm.model), scene.arm.host)
+        elif scene.arm is not None:
+            fallback = FallbackStop(scene)
+        self._monitor = GuardMonitor(self._log, channel, fallback, lambda why: self._log.line.describe(scene, why))
+        self._monitor.start()
+        self._heartbeat = ProgramHeartbeat(channel)
+        self._heartbeat.start()
+
+    def _await_activation(self) -> None:
+        end = time.monotonic() + self._start_timeout
+        while time.monotonic() < end:
+            event = self.wait_for((EventName.ACTIVATED, EventName.GUARD_EXITED), 0.2)
+            if event is not None and event.name == EventName.ACTIVATED:
+                return
+            driver = self._processes.children.get("driver")
+            if event is not None or self._log.ended or (driver is not None and driver.poll() is not None):
+                # waiting longer for the activation would not help, but the guard may still report why
+                self.wait_for((EventName.FAULT, EventName.GUARD_EXITED), _REASON_TIMEOUT)
+                break
+        self.check_guard()
+        raise activation_error(self._log.events, lambda why: self._log.line.describe(self.scene, why))

@@ -1,0 +1,101 @@
+"""Skin client: a program's requests to the process of the scene's virtual skin."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from coneskin.channel import Channel, decode_json, encode_json, pair, wait_readable
+from coneskin.child_process import spawn
+from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+
+if TYPE_CHECKING:
+    from coneskin.skin.sensor import Sensor
+
+__all__ = ["SkinClient"]
+
+_ANSWER_TIMEOUT = 10.0  # s that the process may take to start, or to answer
+
+
+class SkinClient:
+    """Client of the process of ``skin_process``, which it starts.
+
+    Args:
+        start: the scene's text, name and folder.
+        sensors: of the scene, in its order.
+        note_truth: is told each touch: ``touches``, a list of their ``sensor``, ``start``, ``end`` [s, host clock; None
+            for one without an end], ``u`` [m], ``phi`` [rad], ``force`` [N] and ``radius`` [m]; or ``released``, when
+            all that touches was taken away [s].
+
+    Attributes:
+        process: the skin's; it ends when the channel does.
+        channel: to the process.
+    """
+
+    def __init__(
+        self,
+        start: dict[str, Any],
+        sensors: Sequence[Sensor],
+        note_truth: Callable[[dict[str, Any]], None] = lambda _: None,
+    ) -> None:
+        ours, theirs = pair()
+        self.process = spawn("coneskin.session.skin_process", theirs)
+        self.channel = Channel(ours)
+        self.channel.send(encode_json(start))
+        self._sensors = sensors
+        self._note_truth = note_truth
+
+    def port(self) -> str:
+        """Return the port at which the skin can be read, once its process has started."""
+        return str(self._ask("port"))
+
+    def touch(self, u: float, phi: float, force: float, duration: float, sensor: str | int) -> float:
+        """Touch the skin now; arguments, result and errors as of ``Session.touch``."""
+        touch = ScriptedTouch(0.0, duration, u, phi, force=force, sensor=self._name(sensor))
+        request = {"u": u, "phi": phi, "force": force, "duration": duration, "sensor": touch.sensor}
+        self.channel.send(encode_json(request))
+        told = self._ask("touched")
+        self._note_truth({"touches": [told]})
+        return float(told["start"])
+
+    def note_script(self) -> None:
+        """Note the touches of the scene's script, once the skin plays; errors as of ``touch``."""
+        self._note_truth({"touches": self._ask("script")})
+
+    def release(self) -> None:
+        """End the touches that there are now."""
+        self.channel.send(encode_json({"release": True}))
+        self._note_truth({"released": time.monotonic()})
+
+    def _name(self, wanted: str | int) -> str:
+        if wanted == "":
+            return self._sensors[0].name
+        ids = () if isinstance(wanted, bool) else tuple(sensor.sensor_id for sensor in self._sensors)
+        found = [sensor.name for sensor in self._sensors if wanted == sensor.name]
+        found += [sensor.name for sensor, number in zip(self._sensors, ids, strict=False) if wanted == number]
+        if len(found) != 1:  # sensors of two devices may have one id
+            known = ", ".join(f"{sensor.name} (id {sensor.sensor_id})" for sensor in self._sensors)
+            raise SensorError(f"touch.sensor must be one of {known}, got {wanted!r}")
+        return found[0]
+
+    def _ask(self, key: str) -> Any:
+        end = time.monotonic() + _ANSWER_TIMEOUT
+        while time.monotonic() < end and not self.channel.closed:
+            wait_readable([self.channel], 0.1)
+            for message in self.channel.receive():
+                answer = decode_json(message)
+                if "refused" in answer:
+                    raise SensorError(answer["refused"])
+                if key in answer:
+                    return answer[key]
+        if self.process.poll() is not None:
+            raise SkinConnectionError(
+                f"the process of the virtual skin has ended with exit code {self.process.returncode}; why is on "
+                "standard error"
+            )
+        raise SkinConnectionError(
+            f"the process of the virtual skin has not answered for {_ANSWER_TIMEOUT:g} s: end what else keeps this "
+            'computer busy, or choose model = "ladder" in [source], which takes less, and start the session again'
+        )

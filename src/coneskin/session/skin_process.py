@@ -1,0 +1,109 @@
+"""Skin process: the virtual skin of a scene on a pseudo-terminal. Started by ``coneskin.session.skin_client``.
+
+It plays the scene's script and takes further touches while it runs, so that a program can touch a moving arm.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.channel import Channel, decode_json, encode_json, wait_readable
+from coneskin.child_process import inherit
+from coneskin.errors import ConeSkinError
+
+if TYPE_CHECKING:  # imported once the line to the program is there, which may have ended already
+    from coneskin.scene.scene import Scene
+    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+    from coneskin.skin.virtual.skin import VirtualSkin
+
+__all__ = ["main", "virtual_skin"]
+
+_TOUCH_DELAY = 0.002  # s from a request to its touch, so that it begins on a frame that is not measured yet
+
+
+def virtual_skin(scene: Scene, script: bool = True) -> VirtualSkin:
+    """Return the virtual skin that a scene's source describes, with its script of touches or without."""
+    from coneskin.skin.virtual.skin import VirtualSkin
+
+    assert scene.source is not None
+    return VirtualSkin(
+        [item.sensor for item in scene.sensors],
+        scene.source.touches if script else (),
+        rate_hz=scene.source.settings["rate"],
+        seed=scene.source.settings["seed"],
+        model=scene.source.settings["model"],
+        wire_version=scene.source.settings["wire_version"],
+        wires=scene.source.settings["wires"],
+    )
+
+
+def main(arguments: list[str]) -> int:
+    """Take the channel and the scene, report the port, and play until the channel ends."""
+    _, (channel,) = inherit(arguments)  # it ends with the program at once: nothing depends on it then
+    from coneskin.scene.reader import parse_scene
+    from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, play, wait_for_reader, write_all
+
+    while not (hello := channel.receive()) and not channel.closed:
+        wait_readable([channel], 1.0)
+    if not hello:
+        return 1
+    start = decode_json(hello[0])
+    scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
+    master, slave, path = open_raw_terminal()
+    channel.send(encode_json({"port": path}))  # the guard opens it, and the arm, while the field is loaded here
+    skin = virtual_skin(scene, start.get("script", True))
+
+    began = time.monotonic()
+
+    def wait(duration: float) -> bool:
+        end = time.monotonic() + duration
+        while wait_readable([channel], max(end - time.monotonic(), 0.0)):
+            _serve(channel, skin, began)
+            if channel.closed:
+                return True
+        return False
+
+    os.close(slave)
+    wait_for_reader(master, path, wait)
+    began = time.monotonic()
+    assert scene.source is not None
+    script = scene.source.touches if start.get("script", True) else ()
+    channel.send(encode_json({"script": [_told(touch, began, skin.sensors[0].name) for touch in script]}))
+    play(skin, lambda data: write_all(master, data), wait=wait)
+    return 0
+
+
+def _serve(channel: Channel, skin: VirtualSkin, began: float) -> None:
+    """Make the requested touches; an impossible one is refused, and the skin goes on."""
+    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+
+    for message in channel.receive():
+        start = time.monotonic() - began + _TOUCH_DELAY
+        try:
+            request = decode_json(message)
+            if "release" in request:
+                skin.release(start)
+                continue
+            end, place = start + request["duration"], (request["u"], request["phi"])
+            touch = ScriptedTouch(start, end, *place, force=request["force"], sensor=request["sensor"])
+            skin.touch(touch)
+        except (ConeSkinError, ValueError, TypeError, KeyError) as exc:
+            channel.send(encode_json({"refused": str(exc)}))
+        else:
+            channel.send(encode_json({"touched": _told(touch, began)}))
+
+
+def _told(touch: ScriptedTouch, began: float, first: str = "") -> dict[str, Any]:
+    """Return a touch as it is recorded; times on the host's clock."""
+    end = began + touch.end if math.isfinite(touch.end) else None
+    place = {name: getattr(touch, name) for name in ("u", "phi", "force", "radius")}
+    return {"sensor": touch.sensor or first, "start": began + touch.start, "end": end, **place}
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,205 @@
+"""Studio's page: the link with its cones in 3D, handles beside it, and the layers flat."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from coneskin.design.link import LinkMesh, load_link
+from coneskin.design.sheets import SheetDesign
+from coneskin.errors import ConeSkinError
+from coneskin.geometry.ray_casting import RayCaster
+from coneskin.view.page_server import PageServer
+
+from .design_text import design_facts, flat_drawing, warning_list
+from .deviation_bands import deviation_bands
+from .workbench import Handles, Workbench
+
+__all__ = ["StudioPage"]
+
+_LINK = (205, 208, 214)
+_ELECTRODES = {"A": (220, 38, 38), "B": (217, 119, 6), "C": (37, 99, 235), "D": (13, 148, 136)}
+_SUFFIXES = {".stl", ".obj", ".dae", ".ply"}
+_LEGEND = "Green: the sheet lies on the link. Red: the link stands out. Blue: it is below. Grey: a hole is spanned."
+_STEP = 0.5  # mm and deg of the handles
+
+
+class StudioPage:
+    """Page of the studio, for one person.
+
+    Args:
+        server: of the page.
+        bench: with the link and its cones.
+        folder: where the design is written.
+        overwrite: an earlier design there may be replaced.
+        load: makes the workbench of a mesh file that was put onto the page.
+    """
+
+    def __init__(
+        self,
+        server: PageServer,
+        bench: Workbench,
+        folder: Path,
+        overwrite: bool,
+        load: Callable[[LinkMesh], Workbench],
+    ) -> None:
+        self._server, self._bench, self._folder, self._overwrite, self._load = server, bench, folder, overwrite, load
+        self._lock = threading.Lock()  # the page's callbacks come from several threads
+        self._handles: list[Any] = []
+        gui = server.gui
+        gui.add_html(f'<div style="font-size:12px;margin:4px 10px">{_LEGEND}</div>')
+        self._said = gui.add_html("")
+        self._upload = gui.add_upload_button("another link (STL, OBJ, DAE, PLY)", mime_type="*/*")
+        self._upload.on_upload(lambda _event: self._take_upload())
+        self._layer = gui.add_dropdown("layer", ["none"], initial_value="none")
+        self._layer.on_update(lambda _event: self._draw_flat())
+        self._flat = gui.add_html("")
+        self._folder_of_handles = gui.add_folder("handles")
+        self._warnings = gui.add_html("")
+        self._facts = gui.add_html("")
+        self._write = gui.add_button(f"write {folder}")
+        self._write.on_click(lambda _event: self._written())
+        self._stand()
+
+    def _stand(self) -> None:
+        """Draw the link of the workbench, and make a set of handles for each of its sheets."""
+        bench, scene, gui = self._bench, self._server.scene, self._server.gui
+        scene.reset()
+        scene.set_up_direction("+z")
+        vertices = bench.link.mesh.vertices
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        middle, size = 0.5 * (low + high), float((high - low).max())
+        self._server.look_from(
+            (float(middle[0] + 0.7 * size), float(middle[1] - 0.6 * size), float(middle[2] + 0.35 * size)),
+            (float(middle[0]), float(middle[1]), float(middle[2])),
+        )
+        scene.add_mesh_simple(
+            "/link", vertices.astype("float32"), bench.link.mesh.faces, color=_LINK, side="double", flat_shading=True
+        )
+        for handle in self._handles:
+            handle.remove()
+        self._handles = []
+        with self._folder_of_handles:
+            for number, sheet in enumerate(bench.fit.sheets):
+                self._handles += self._handles_of(gui, number, sheet.frustum.height, sheet.frustum.wrap)
+        self._rays = RayCaster(bench.link.mesh)
+        self._draw()
+
+    def _handles_of(self, gui: Any, number: int, height: float, wrap: float) -> list[Any]:
+        name = f"sheet {number + 1}: "
+        room, widest = math.floor(1e3 * height - 10.0), round(math.degrees(wrap), 1)
+        turn = 360.0 if wrap >= 2.0 * math.pi else widest
+        sliders = [
+            gui.add_slider(name + "end 1 [mm off]", 0.0, float(max(room, 1)), _STEP, 0.0),
+            gui.add_slider(name + "end 2 [mm off]", 0.0, float(max(room, 1)), _STEP, 0.0),
+            gui.add_slider(name + "wrap [deg]", 30.0, widest, 0.1, widest),
+            gui.add_slider(name + "seam [deg]", 0.0, turn, _STEP, 0.0),
+        ]
+
+        def changed(_event: Any) -> None:
+            end1, end2, covered, seam = (float(slider.value) for slider in sliders)
+            full = None if covered >= widest else math.radians(covered)
+            with self._lock:
+                self._bench.handle(number, Handles(1e-3 * end1, 1e-3 * end2, full, math.radians(seam)))
+                self._draw()
+
+        for slider in sliders:
+            slider.on_update(changed)
+        return sliders
+
+    def _draw(self) -> None:
+        """Draw the sheets as they are now, on the link and in the panel."""
+        bench, scene = self._bench, self._server.scene
+        with self._server.together():
+            scene.add_frame("/sheets", show_axes=False)  # replaces the one before, and all that was below it
+            for design in bench.designs:
+                name = f"/sheets/{design.name}"
+                for number, band in enumerate(deviation_bands(self._rays, design.place, bench.fit.tolerance)):
+                    scene.add_mesh_simple(
+                        f"{name}/band {number}",
+                        band.vertices.astype("float32"),
+                        band.faces,
+                        color=band.colour,
+                        side="double",
+                        cast_shadow=False,
+                    )
+                for letter, points in electrode_lines(design).items():
+                    scene.add_line_segments(f"{name}/{letter}", points, colors=_ELECTRODES[letter], thickness=0.002)
+        self._facts.content = design_facts(bench.designs)
+        self._warnings.content = warning_list(bench.warnings() or ([bench.fit.reason] if bench.fit.reason else []))
+        layers = [f"{design.name}: {cut.name}" for design in bench.designs for cut in design.cuts] or ["none"]
+        if list(self._layer.options) != layers:
+            self._layer.options = layers
+        self._draw_flat()
+
+    def _draw_flat(self) -> None:
+        chosen = str(self._layer.value)
+        for design in self._bench.designs:
+            for cut in design.cuts:
+                if f"{design.name}: {cut.name}" == chosen:
+                    self._flat.content = flat_drawing(cut)
+                    return
+        self._flat.content = ""
+
+    def _take_upload(self) -> None:
+        """Find the cones of a mesh file that was put onto the page."""
+        file = self._upload.value
+        suffix = Path(file.name).suffix.lower()
+        if suffix not in _SUFFIXES:
+            self._say(f"{file.name} is no {', '.join(sorted(_SUFFIXES))} file")
+            return
+        self._say(f"looking for cones in {file.name} ...")
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / f"link{suffix}"  # the name that a page sends is no path of ours
+                path.write_bytes(file.content)
+                found = next(iter(load_link(str(path))))
+            stem = "".join(letter for letter in Path(file.name).stem if letter.isalnum() or letter in "-_ ")[:40]
+            bench = self._load(LinkMesh(stem or "link", found.mesh, found.frame, found.notes))
+        except ConeSkinError as exc:
+            self._say(f"{file.name}: {exc}")
+            return
+        with self._lock:
+            self._bench = bench
+            self._stand()
+        self._say(f"{file.name}: {len(bench.fit.sheets)} sheets")
+
+    def _written(self) -> None:
+        try:
+            with self._lock:
+                files = self._bench.write(self._folder, self._overwrite)
+        except ConeSkinError as exc:
+            self._say(str(exc))
+        else:
+            self._say(f"written: {len(files)} files in {self._folder}; next: coneskin init {self._folder} --simulated")
+
+    def _say(self, text: str) -> None:
+        from html import escape
+
+        self._said.content = (
+            f'<div id="coneskin-said" style="font-size:13px;margin:4px 10px"><b>{escape(text)}</b></div>'
+        )
+
+
+def electrode_lines(design: SheetDesign) -> dict[str, Any]:
+    """Return the middle lines of the electrodes on the side of a sheet, as line segments [m], by their letters."""
+    import numpy as np
+
+    side, box, half = design.place.frustum, design.layout.field, 0.5 * design.layout.plan.electrode
+    turn = half / min(side.radius1, side.radius2)
+    along, around = np.linspace(box.u1, box.u2, 20), np.linspace(box.phi1, box.phi2, 90)
+    found = {}
+    for letter, u, phi in (
+        ("B", np.full(90, box.u1 - half), around),
+        ("A", np.full(90, box.u2 + half), around),
+        ("D", along, np.full(20, box.phi1 - turn)),
+        ("C", along, np.full(20, box.phi2 + turn)),
+    ):
+        points, normals = design.place.place(u, phi)
+        points = (points + 0.001 * normals).astype("float32")
+        found[letter] = np.stack([points[:-1], points[1:]], axis=1)
+    return found

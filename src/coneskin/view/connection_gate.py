@@ -1,0 +1,126 @@
+"""Gate in front of a page's server: who may connect, which file may be asked for, and which messages get in.
+
+The library that serves the page hands out any file that a path with ``..`` leads to, opens a tunnel to the internet
+when a message asks for it, and lets pages of other origins connect. A page here only shows: what comes from a browser
+is its camera, and the controls of its own panel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+__all__ = ["ALLOWED", "UPLOADS", "ConnectionGate", "refusal_of"]
+
+#: types of message that a page may send
+ALLOWED = frozenset({"ViewerCameraMessage", "GuiUpdateMessage"})
+#: and those with which a file is dropped onto it
+UPLOADS = frozenset({"FileTransferStartUpload", "FileTransferPart"})
+_LARGEST = 1 << 16  # bytes of a message that is no part of a file
+_VIEWERS = 32  # that are served at once
+
+
+def refusal_of(path: str, host: str, origin: str | None, hosts: frozenset[str] | None) -> str:
+    """Return why a request is refused; empty where it is not.
+
+    Args:
+        path: that it asks for, as sent.
+        host: its header Host: what the browser believes to talk to.
+        origin: its header Origin, which a browser sends with a web socket; None without.
+        hosts: names of this server; None for any. A name that somebody else's page has led here is none of them.
+    """
+    plain = unquote(path.partition("?")[0])
+    if not plain.startswith("/") or ".." in plain.split("/") or "//" in plain or "\\" in plain or "\0" in plain:
+        return "no such page"
+    try:
+        name = urlsplit(f"//{host}").hostname or ""
+        if hosts is not None and name not in hosts:
+            return f"this server is not {name}"
+        if origin is not None and urlsplit(origin).netloc != host:
+            return "a page of another origin may not look in"
+    except ValueError:  # half a bracket
+        return "that is no address"
+    return ""
+
+
+class ConnectionGate:
+    """Gate of one server.
+
+    Args:
+        decode: bytes of a message -> the message as a dict; raises ValueError for what is none.
+        hosts: names of this server; None for any.
+        allowed: types of message that get in.
+        largest: bytes of a message.
+
+    Attributes:
+        refused: messages and requests that were not let in.
+        viewers: connections that are open.
+    """
+
+    def __init__(
+        self,
+        decode: Callable[[bytes], Any],
+        hosts: frozenset[str] | None,
+        allowed: frozenset[str] = ALLOWED,
+        largest: int = _LARGEST,
+    ) -> None:
+        self.refused = self.viewers = 0
+        self._decode, self._hosts, self._allowed, self._largest = decode, hosts, allowed, largest
+
+    def serve_arguments(self, handler: Callable[[Any], Awaitable[None]], **given: Any) -> dict[str, Any]:
+        """Return the arguments of the server's ``serve`` with this gate in them.
+
+        Args:
+            handler: of a connection.
+            **given: the arguments without the gate.
+        """
+        answer = given.get("process_request")
+
+        def process_request(connection: Any, request: Any) -> Any:
+            headers = request.headers
+            why = refusal_of(request.path, headers.get("Host", ""), headers.get("Origin"), self._hosts)
+            if not why and headers.get("Upgrade") and self.viewers >= _VIEWERS:
+                why = f"{_VIEWERS} viewers are served already"
+            if why:
+                self.refused += 1
+                return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
+            return answer(connection, request) if answer is not None else None
+
+        async def handle(connection: Any) -> None:
+            self.viewers += 1
+            try:
+                await handler(_Sieve(connection, self))
+            finally:
+                self.viewers -= 1
+
+        return {**given, "handler": handle, "process_request": process_request, "max_size": self._largest}
+
+    def lets_in(self, data: Any) -> bool:
+        """Tell whether a message gets in; one that does not is counted."""
+        try:
+            message = self._decode(data) if isinstance(data, bytes) else None
+            kind = message.get("type") if isinstance(message, dict) else None
+        except ValueError:
+            kind = None
+        if isinstance(kind, str) and kind in self._allowed:
+            return True
+        self.refused += 1
+        return False
+
+
+class _Sieve:
+    """Connection of which only the messages that the gate lets in are received."""
+
+    def __init__(self, connection: Any, gate: ConnectionGate) -> None:
+        self._connection, self._gate = connection, gate
+
+    async def recv(self) -> bytes:
+        while True:
+            data = await self._connection.recv()
+            if self._gate.lets_in(data):
+                return bytes(data)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._connection, name)

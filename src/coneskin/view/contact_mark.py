@@ -1,0 +1,126 @@
+"""Mark of a contact: where it is drawn on its link, how large its uncertainty is, and how far it has faded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from coneskin.geometry.pose import Vector
+from coneskin.robot.guard.journal import EventName, GuardEvent
+
+__all__ = ["FADING", "ContactLog", "ContactMark"]
+
+FADING = 4.0  #: s that the mark of a touch that is over is still seen
+_KEPT = 400  # touches that are remembered, in a page that stays open
+_PLACES = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})
+_FARTHEST = 100.0  # m; a place farther off is no place
+
+
+class ContactMark(NamedTuple):
+    """Mark of a contact at one moment.
+
+    Attributes:
+        number: of the touch.
+        sensor: its name.
+        point: in the frame of the link [m].
+        normal: outward unit normal there.
+        ellipse: the two half axes within which the place is with 95 % [m], or None.
+        line: half of the line on which contacts lie about the place [m], or None.
+        located: the place is certain.
+        level: 0..1.
+        strength: 1 while it lasts, then falling to 0.
+    """
+
+    number: int
+    sensor: str
+    point: Vector
+    normal: Vector
+    ellipse: tuple[Vector, Vector] | None
+    line: Vector | None
+    located: bool
+    level: float
+    strength: float
+
+
+class _Place(NamedTuple):
+    time: float
+    mark: ContactMark
+
+
+class _Touch:
+    """Touch: the places that were told of it, and when it ended."""
+
+    def __init__(self) -> None:
+        self.places: list[_Place] = []
+        self.ended = math.inf
+
+
+class ContactLog:
+    """Touches of a run, taken event by event.
+
+    An event whose place is nonsense has no mark; it stands among the events all the same.
+    """
+
+    def __init__(self) -> None:
+        self._touches: dict[int, _Touch] = {}
+
+    def take(self, event: GuardEvent) -> None:
+        """Take an event; those that tell of no touch are passed over."""
+        number = event.details.get("number")
+        if not isinstance(number, int):
+            return
+        if event.name in _PLACES and (mark := _mark(number, event.details)) is not None:
+            self._touches.setdefault(number, _Touch()).places.append(_Place(event.time, mark))
+            while len(self._touches) > _KEPT:
+                del self._touches[next(iter(self._touches))]
+        elif event.name == EventName.TOUCH_ENDED and number in self._touches:
+            self._touches[number].ended = event.time
+
+    def take_all(self, events: Iterable[GuardEvent]) -> ContactLog:
+        """Take events in their order, and return itself."""
+        for event in events:
+            self.take(event)
+        return self
+
+    def marks(self, time: float) -> list[ContactMark]:
+        """Return the marks that are seen at a time [s, host clock], the strongest first."""
+        found = []
+        for touch in self._touches.values():
+            told = [place.mark for place in touch.places if place.time <= time]
+            age = time - touch.ended
+            if told and age < FADING:
+                found.append(told[-1]._replace(strength=min(1.0, 1.0 - age / FADING)))
+        return sorted(found, key=lambda mark: (-mark.strength, -mark.number))
+
+
+def _mark(number: int, details: Mapping[str, Any]) -> ContactMark | None:
+    """Return the mark of an event's details; None where they have no place."""
+    point, normal = _vector(details.get("point")), _vector(details.get("normal"))
+    if point is None or normal is None:
+        return None
+    axes = details.get("ellipse")
+    ellipse = None
+    if isinstance(axes, list | tuple) and len(axes) == 2:
+        first, second = _vector(axes[0]), _vector(axes[1])
+        ellipse = None if first is None or second is None else (first, second)
+    level = details.get("level")
+    return ContactMark(
+        number,
+        str(details.get("sensor")),
+        point,
+        normal,
+        ellipse,
+        _vector(details.get("line")),
+        details.get("location_valid") is True,
+        float(level) if isinstance(level, int | float) and math.isfinite(level) else 0.0,
+        1.0,
+    )
+
+
+def _vector(value: Any) -> Vector | None:
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        return None
+    if not all(isinstance(x, int | float) and abs(x) < _FARTHEST for x in value):
+        return None
+    return float(value[0]), float(value[1]), float(value[2])

@@ -1,0 +1,241 @@
+"""History of a run as it is shown: joint positions, levels, channels, events, phases; taken block by block.
+
+A page that follows a guard forgets what is older than it shows, so that it does not grow.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from coneskin.errors import RecordingError, RobotConnectionError
+from coneskin.recording import Block
+from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, decode_event
+
+from .contact_mark import ContactLog, ContactMark
+from .phase_words import UNKNOWN, PhaseWords, phase_after
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from coneskin.robot.arm.model import Joints
+    from coneskin.robot.driver.state import ControllerState
+    from coneskin.scene.scene import Scene
+    from coneskin.skin.sensor import Sensor
+
+__all__ = ["CHANNELS", "History", "PhaseChange", "Series", "history_of"]
+
+#: channels of a frame that are drawn, as fractions of the supply
+CHANNELS = ("touch_c", "touch_d", "radial_c", "radial_d", "angular_a", "angular_b")
+_LONGEST_FRAME = 64  # bytes
+_BATCH = 1 << 21  # bytes of a skin's stream that are looked at together
+_EVENTS = 2000  # that a page keeps
+_SPARE = 1.5  # times what is kept, before the older part is dropped
+_HEALTH = frozenset(
+    {EventName.FAULT, EventName.GUARD_EXITED, EventName.GUARD_UNRESPONSIVE, EventName.STOP_FAILED}
+    | {EventName.RECORDING_GAP, EventName.SKIN_LINE, EventName.FALLBACK_STOP}
+)
+
+
+class PhaseChange(NamedTuple):
+    """Time [s, host clock] from which on a guard is in a phase."""
+
+    time: float
+    phase: PhaseWords
+
+
+@dataclass(slots=True)
+class Series:
+    """Values over time, in the order of their times.
+
+    Attributes:
+        times: [s, host clock].
+        values: one for each time.
+    """
+
+    times: list[float] = field(default_factory=list)
+    values: list[tuple[float, ...]] = field(default_factory=list)
+
+    def at(self, time: float) -> tuple[float, ...] | None:
+        """Return the last values up to a time; None before the first."""
+        index = bisect_right(self.times, time) - 1
+        return self.values[index] if index >= 0 else None
+
+    def drop_before(self, time: float) -> None:
+        """Forget what is older than a time."""
+        index = bisect_right(self.times, time)
+        del self.times[:index]
+        del self.values[:index]
+
+
+class History:
+    """What has happened in a run so far.
+
+    Args:
+        scene: of the run.
+        keep: time that is kept [s]; infinite for a recording that is over.
+
+    Attributes:
+        joints: measured joint positions [rad].
+        speeds: measured joint speeds [rad/s].
+        levels: by the names of the sensors: touch level.
+        channels: by the names of the sensors: fractions of the supply, in the order of ``CHANNELS``.
+        events: the newest.
+        phases: when each began.
+        since: time of the first block [s, host clock].
+        until: time of the last one.
+    """
+
+    def __init__(self, scene: Scene, keep: float = math.inf) -> None:
+        self.joints, self.speeds = Series(), Series()
+        self.sensors = [item.sensor for item in scene.sensors]
+        self.levels = {sensor.name: Series() for sensor in self.sensors}
+        self.channels = {sensor.name: Series() for sensor in self.sensors}
+        self.events: list[GuardEvent] = []
+        self.phases = [PhaseChange(-math.inf, UNKNOWN)]
+        self.since, self.until = math.inf, -math.inf
+        self.contacts = ContactLog()
+        self._keep = keep
+        self._pending: list[tuple[float, bytes]] = []
+        self._pending_size = 0
+        self._rest = b""
+        self._decode = _state_decoder(scene)
+
+    def take(self, block: Block) -> None:
+        """Take a block; one that cannot be read, which the guard has reported, is passed over."""
+        if block.time > self.until:
+            self.until = block.time
+        if block.time < self.since:
+            self.since = block.time
+        if block.kind == BlockKind.SKIN:
+            self._pending.append((block.time, block.payload))
+            self._pending_size += len(block.payload)
+            if self._pending_size >= _BATCH:
+                self.settle()
+        elif block.kind == BlockKind.ARM:
+            with suppress(RobotConnectionError):
+                state = self._decode(block.time, block.payload)
+                self.joints.times.append(block.time)
+                self.joints.values.append(state.q)
+                self.speeds.times.append(block.time)
+                self.speeds.values.append(state.qd)
+        elif block.kind == BlockKind.EVENT:
+            with suppress(RecordingError):
+                self._take_event(decode_event(block))
+
+    def take_all(self, blocks: Iterable[Block]) -> None:
+        """Take blocks, and read the skin's bytes among them."""
+        for block in blocks:
+            self.take(block)
+        self.settle()
+
+    def settle(self) -> None:
+        """Read the skin's bytes that were taken, and forget what is too old."""
+        if self._pending:
+            times = [time for time, _ in self._pending]
+            parts = [part for _, part in self._pending]
+            self._pending, self._pending_size = [], 0
+            self._read_skin(times, parts)
+        if math.isfinite(self._keep) and self.until - self.since > _SPARE * self._keep:
+            self.since = self.until - self._keep
+            for series in (self.joints, self.speeds, *self.levels.values(), *self.channels.values()):
+                series.drop_before(self.since)
+
+    def q(self, time: float) -> Joints | None:
+        """Return the joint positions at a time [rad]; the first ones before they were measured, None without any."""
+        return self.joints.at(time) or (self.joints.values[0] if self.joints.values else None)  # type: ignore[return-value]
+
+    def level(self, sensor: str, time: float) -> float:
+        """Return the touch level of a sensor at a time; 0 before it was read."""
+        found = self.levels[sensor].at(time)
+        return 0.0 if found is None else found[0]
+
+    def phase(self, time: float) -> PhaseWords:
+        """Return the guard's phase at a time."""
+        at = bisect_right(self.phases, time, key=lambda change: change.time) - 1
+        return self.phases[max(at, 0)].phase
+
+    def marks(self, time: float) -> list[ContactMark]:
+        """Return the contacts that are seen at a time."""
+        return self.contacts.marks(time)
+
+    def health(self, time: float) -> str:
+        """Return the last thing that was wrong up to a time, since the guard last became active; empty for none."""
+        for event in reversed(self.events):
+            if event.time > time:
+                continue
+            if event.name == EventName.ACTIVATED:
+                return ""
+            if event.name in _HEALTH:
+                return str(event.details.get("what", event.name))
+        return ""
+
+    def _take_event(self, event: GuardEvent) -> None:
+        self.events.append(event)
+        if len(self.events) > _SPARE * _EVENTS and math.isfinite(self._keep):
+            del self.events[:-_EVENTS]
+            del self.phases[:-_EVENTS]
+        self.contacts.take(event)
+        before = self.phases[-1].phase
+        if (phase := phase_after(before, event.name)) != before:
+            self.phases.append(PhaseChange(event.time, phase))
+
+    def _read_skin(self, times: list[float], parts: list[bytes]) -> None:
+        import numpy as np
+
+        from coneskin.skin.frame_batch import find_frames
+
+        data = self._rest + b"".join(parts)
+        batch = find_frames(data)
+        ends = len(self._rest) + np.cumsum([len(part) for part in parts])
+        arrived = np.array(times)[np.minimum(np.searchsorted(ends, batch.ends, side="left"), len(times) - 1)]
+        for sensor in self.sensors:
+            own = batch.of(sensor.device_id, sensor.sensor_id)
+            if own.any():
+                frames = batch.pick(own)
+                self._take_frames(sensor, arrived[own].tolist(), {n: frames.field(n).astype(float) for n in _FIELDS})
+        read = int(batch.ends[-1]) if len(batch.ends) else 0
+        self._rest = data[max(read, len(data) - _LONGEST_FRAME) :]
+
+    def _take_frames(self, sensor: Sensor, times: list[float], fields: dict[str, NDArray[np.float64]]) -> None:
+        import numpy as np
+
+        supply = np.maximum(fields["touch_supply"], 1.0)
+        level = np.clip((fields["touch_c"] + fields["touch_d"]) / (2.0 * supply), 0.0, 1.0)
+        series, channels = self.levels[sensor.name], self.channels[sensor.name]
+        series.times += times
+        series.values += [(value,) for value in level.tolist()]
+        columns = [
+            np.clip(fields[name] / np.maximum(fields[f"{name.split('_')[0]}_supply"], 1.0), 0.0, 1.1).tolist()
+            for name in CHANNELS
+        ]
+        channels.times += times
+        channels.values += list(zip(*columns, strict=True))
+
+
+_FIELDS = (*CHANNELS, "touch_supply", "radial_supply", "angular_supply")
+
+
+def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState]:
+    if scene.arm is None:
+
+        def refuse(_time: float, _payload: bytes) -> ControllerState:
+            raise RobotConnectionError("the scene has no arm")
+
+        return refuse
+    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.driver.registry import load_driver
+
+    return load_driver(arm_model(scene.arm.model).family).decode_state
+
+
+def history_of(scene: Scene, blocks: Iterable[Block]) -> History:
+    """Return the history of a recording that is over."""
+    found = History(scene)
+    found.take_all(blocks)
+    return found

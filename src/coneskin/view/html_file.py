@@ -1,0 +1,203 @@
+"""File of a page that opens in a browser without Python: scene, playback and events in one HTML file.
+
+viser's client plays the scene; its panel is not in such a file, so what it says (phase, events, the notice) is added
+here, and follows the time that the client shows.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from coneskin.draft_file import draft_of
+from coneskin.errors import RecordingError
+from coneskin.replay.event_text import describe
+
+from .page_server import PageServer, page_client
+from .panel_text import NOTICE
+from .stage_nodes import StageNodes, look_at_stages
+from .strand import Strand
+
+__all__ = ["write_html"]
+
+_RATE = 30.0  # pictures a second ...
+_PICTURES = 6000  # ... but not more than these in a file
+_EVENTS = 3000  # in a file
+_FIRST = b"<!doctype html"  # of every page
+
+_STYLE = """
+#coneskin{position:fixed;top:12px;right:12px;width:360px;max-height:calc(100% - 24px);overflow:auto;z-index:9;
+background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px 8px rgba(0,0,0,.25);padding:10px}
+#coneskin b{word-break:break-all}
+#coneskin-notice{border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px;margin:6px 0}
+.coneskin-phase{color:#fff;padding:6px 10px;font-size:15px;margin:4px 0}
+.coneskin-health{color:#b91c1c;font-size:12px}
+#coneskin-timeline{width:100%;display:block;cursor:pointer}
+#coneskin-events{font:11px/1.5 monospace;margin-top:6px}
+#coneskin-events div{cursor:pointer;white-space:nowrap;overflow:hidden;text-overflow:ellipsis}
+"""
+
+#: moves the client's own playback by its field for the time, and follows what its slider shows
+_SCRIPT = """
+(function () {
+  const data = JSON.parse(document.getElementById('coneskin-data').textContent);
+  const panel = document.getElementById('coneskin');
+  const phases = [...panel.querySelectorAll('.coneskin-phase')];
+  const healths = [...panel.querySelectorAll('.coneskin-health')];
+  const clock = document.getElementById('coneskin-clock');
+  const list = document.getElementById('coneskin-events');
+  const cursor = document.getElementById('coneskin-cursor');
+  const rows = data.events.map((event) => {
+    const row = document.createElement('div');
+    row.textContent = row.title = event[1];
+    row.onclick = () => jump(event[0]);
+    list.appendChild(row);
+    return row;
+  });
+  function field() { return document.querySelector('#root input:not([role=slider])'); }
+  function shown() {
+    const thumb = document.querySelector('#root [role=slider]');
+    return thumb === null ? null : parseFloat(thumb.getAttribute('aria-valuenow'));
+  }
+  function jump(time) {
+    const input = field();
+    if (input === null) return;
+    const setter = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
+    setter.call(input, String(Math.max(time, 0.0001).toFixed(4)));
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+    input.dispatchEvent(new Event('blur', { bubbles: true }));
+  }
+  const timeline = document.getElementById('coneskin-timeline');
+  timeline.onclick = (event) => {
+    const box = timeline.getBoundingClientRect();
+    jump(data.duration * (event.clientX - box.left) / box.width);
+  };
+  function last(changes, time) {
+    let found = changes[0];
+    for (const change of changes) { if (change[0] <= time + 1e-4) found = change; else break; }
+    return found;
+  }
+  let before = null;
+  function follow() {
+    const time = shown();
+    if (time !== null && time !== before) {
+      before = time;
+      clock.textContent = (time + data.since).toFixed(3) + ' s';
+      cursor.style.left = (100 * time / data.duration) + '%';
+      data.runs.forEach((run, k) => {
+        const phase = last(run.phases, time);
+        phases[k].textContent = (data.runs.length > 1 ? run.title + ': ' : '') + phase[1];
+        phases[k].style.background = phase[2];
+        healths[k].textContent = last(run.health, time)[1];
+      });
+      rows.forEach((row, k) => { row.style.opacity = data.events[k][0] <= time + 1e-4 ? 1 : 0.4; });
+    }
+    requestAnimationFrame(follow);
+  }
+  follow();
+})();
+"""
+
+
+def write_html(path: Path, strands: Sequence[Strand]) -> float:
+    """Write runs into one HTML file.
+
+    Args:
+        path: of the file; a page that is there is replaced, and nothing else.
+        strands: the runs.
+
+    Returns:
+        pictures a second that the file has.
+
+    Raises:
+        MissingExtra: viser is not installed.
+        RecordingError: the file cannot be written, or is something else than a page.
+    """
+    _check_target(path)
+    since, until = min(item.span[0] for item in strands), max(item.span[1] for item in strands)
+    duration = max(until - since, 1e-3)
+    count = min(max(2, int(duration * _RATE)), _PICTURES)
+    scene = _serialized(strands, since, duration, count)
+    embedded = base64.b64encode(scene).decode("ascii")
+    head = (
+        f"<title>coneskin: {escape(strands[0].stage.title)}</title><style>{_STYLE}</style>"
+        f'<script>window.__VISER_EMBED_DATA__="{embedded}";window.__VISER_EMBED_CONFIG__={{darkMode:false}};</script>'
+    )
+    page = page_client()
+    page = page.replace("</head>", f"{head}</head>", 1)
+    at = page.rindex("</body>")
+    page = page[:at] + _panel(strands, since, until) + page[at:]
+    try:
+        with draft_of(path, overwrite=True) as draft:
+            draft.write_text(page, encoding="utf-8")
+    except OSError as exc:
+        raise RecordingError(f"cannot write {path}: {exc.strerror or exc}") from exc
+    return count / duration
+
+
+def _check_target(path: Path) -> None:
+    """Refuse a file that is no page: a recording, perhaps, that was named by mistake."""
+    if not path.is_file():
+        return  # the writing says whether that is possible
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(_FIRST))
+    except OSError as exc:
+        raise RecordingError(f"cannot write {path}: {exc.strerror or exc}") from exc
+    if start and start.lower() != _FIRST:
+        raise RecordingError(f"{path} exists already and is no page, so it is not replaced: name another file")
+
+
+def _serialized(strands: Sequence[Strand], since: float, duration: float, count: int) -> bytes:
+    """Return the scene and its pictures as viser's client reads them."""
+    with PageServer("coneskin", port=0x2F00) as server:
+        taken = server.serializer()
+        reach = max(strand.stage.reach for strand in strands)
+        look_at_stages(server, reach, len(strands))
+        server.scene.set_up_direction("+z")
+        nodes = [
+            StageNodes(server.scene, strand.stage, f"/run {number}", strand.offset)
+            for number, strand in enumerate(strands, 1)
+        ]
+        for picture in range(count):
+            at = since + duration * picture / (count - 1)
+            for strand, drawn in zip(strands, nodes, strict=True):
+                drawn.show(strand.moment(at))
+            if picture < count - 1:
+                taken.insert_sleep(duration / (count - 1))
+        return bytes(taken.serialize())
+
+
+def _panel(strands: Sequence[Strand], since: float, until: float) -> str:
+    from .timeline import timeline
+
+    several = len(strands) > 1
+    runs, parts = [], []
+    events: list[tuple[float, str]] = []
+    for strand in strands:
+        phases = [[max(c.time - strand.zero - since, 0.0), c.phase.text, c.phase.colour] for c in strand.history.phases]
+        health = [[0.0, ""]]
+        for event in strand.history.events:
+            if (wrong := strand.history.health(event.time)) != health[-1][1]:
+                health.append([event.time - strand.zero - since, wrong])
+        runs.append({"title": strand.stage.title, "phases": phases, "health": health})
+        title = "" if several else f"<b>{escape(strand.stage.title)}</b>"  # of several, each phase says whose it is
+        parts.append(f'{title}<div class="coneskin-phase"></div>')
+        parts.append('<div class="coneskin-health"></div>')
+        for event in strand.history.events[:_EVENTS]:
+            words = " ".join(describe(event, strand.start).split())
+            events.append((event.time - strand.zero - since, words))
+    events.sort(key=lambda item: item[0])
+    data = {"since": since, "duration": max(until - since, 1e-3), "several": several, "runs": runs, "events": events}
+    text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element
+    drawn = timeline(strands, since, until)
+    return (
+        f'<div id="coneskin"><div id="coneskin-notice">{escape(NOTICE)}</div>{"".join(parts)}'
+        f'<div id="coneskin-clock"></div><div style="position:relative">{drawn}<div id="coneskin-cursor" '
+        'style="position:absolute;top:0;bottom:0;width:2px;background:#111827;pointer-events:none"></div></div>'
+        f'<div id="coneskin-events"></div></div><script type="application/json" id="coneskin-data">{text}</script>'
+        f"<script>{_SCRIPT}</script>"
+    )

@@ -1,0 +1,181 @@
+"""Page that follows a guard: one scene and one panel for all viewers, who can change nothing in either."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from coneskin.errors import ConeSkinError
+from coneskin.replay.event_text import describe
+
+from .live_run import LiveRun
+from .moment import Moment
+from .page_server import PageServer
+from .panel_text import event_list, notice, status
+from .phase_words import UNKNOWN, PhaseWords
+from .stage import Stage
+from .stage_nodes import StageNodes, look_at_stages
+from .strand import Strand
+from .timeline import timeline
+from .trace_plot import TracePlot
+
+__all__ = ["LivePage"]
+
+_PERIOD = 1.0 / 30.0  # s between two pictures
+_POLL = 0.008  # s between two looks at the recording
+_TEXT_PERIOD = 0.1  # s between two changes of the text
+_PLOT_PERIOD = 0.5  # s between two changes of timeline and traces
+_SEARCH_PERIOD = 0.3  # s between two looks for a guard
+_STALE = 0.7  # s without news after which the page says so
+_WINDOW = 20.0  # s of the timeline
+_LISTED = 60  # events that are put into words
+
+
+class LivePage:
+    """Page that shows a stage, and the run of a guard whenever there is one.
+
+    Args:
+        server: of the page.
+        stage: what is shown while there is no run.
+        find: returns the run to follow, or None while there is none.
+    """
+
+    def __init__(self, server: PageServer, stage: Stage, find: Callable[[], LiveRun | None]) -> None:
+        self._server, self._stage, self._find = server, stage, find
+        self._run: LiveRun | None = None
+        self._plot: TracePlot | None = None
+        self._drawn = stage
+        self._nodes: StageNodes | None = None
+        self._texted = self._plotted = self._searched = -1e9
+        self._lines_of = -1
+        self._clock = ""
+        gui = server.gui
+        gui.add_html(notice())
+        self._timeline = gui.add_html("")
+        self._status = gui.add_html("")
+        self._events = gui.add_html("")
+        self._stand(stage)
+
+    def serve(self, over: threading.Event, ended: Callable[[], bool] = lambda: False) -> None:
+        """Show what happens until an event is set, or ``ended`` says so.
+
+        Args:
+            over: ends the page.
+            ended: asked with each picture.
+        """
+        drawn = 0.0
+        while not over.is_set() and not ended():
+            now = time.monotonic()
+            news = self.look(now)
+            if now - drawn >= _PERIOD or news:
+                self.draw(now)
+                drawn = now
+            over.wait(_POLL)
+
+    def look(self, now: float) -> bool:
+        """Take what is new; return whether an event is among it.
+
+        Args:
+            now: the clock [s].
+        """
+        if self._run is None:
+            if now - self._searched < _SEARCH_PERIOD:
+                return False
+            self._searched = now
+            try:
+                self._run = self._find()
+            except ConeSkinError:  # its header is not there yet
+                return False
+            if self._run is not None:
+                self._stand(self._run.strand.stage)
+            return False
+        events = len(self._run.strand.history.events)
+        try:
+            self._run.follow()
+        except ConeSkinError:
+            self._leave()
+            return True
+        news = len(self._run.strand.history.events) != events
+        if self._run.ended or self._run.silence > 30.0:
+            self._searched = now
+            if (following := self._find()) is not None:
+                self._leave()
+                self._run = following
+                self._stand(following.strand.stage)
+                return True
+        return news
+
+    def draw(self, now: float) -> None:
+        """Show the newest moment.
+
+        Args:
+            now: the clock [s].
+        """
+        strand = None if self._run is None else self._run.strand
+        if strand is None:
+            self._text(now, [(self._stage.title, UNKNOWN, "")], "", "no guard records a run: what is drawn is at rest")
+            return
+        at = strand.history.until - strand.zero
+        moment = strand.moment(at)
+        assert self._nodes is not None
+        with self._server.together():
+            self._nodes.show(moment)
+        self._text(now, [(strand.stage.title, moment.phase, moment.health)], f"{at:9.3f} s", self._stale())
+        self._draw_past(now, strand, at)
+
+    def _stale(self) -> str:
+        assert self._run is not None
+        if self._run.ended:
+            return "the run is over: this is its last moment"
+        silence = self._run.silence
+        return f"NOTHING NEW for {silence:.1f} s: what is drawn is old" if silence > _STALE else ""
+
+    def _text(self, now: float, runs: list[tuple[str, PhaseWords, str]], clock: str, stale: str) -> None:
+        content = status(runs, clock if now - self._texted >= _TEXT_PERIOD else self._clock, stale)
+        if content != self._status.content:
+            self._clock = clock
+            self._texted = now
+            self._status.content = content
+
+    def _draw_past(self, now: float, strand: Strand, at: float) -> None:
+        events = strand.history.events
+        newest = len(events) and id(events[-1])
+        if newest != self._lines_of:
+            self._lines_of = newest
+            lines = [(event, describe(event, strand.start)) for event in events[-_LISTED:]]
+            self._events.content = event_list(lines, len(lines) - 1)
+        if now - self._plotted >= _PLOT_PERIOD and not (self._run is not None and self._run.ended):
+            self._plotted = now
+            self._timeline.content = timeline([strand], at - _WINDOW, at)
+            if self._plot is None:
+                self._plot = TracePlot(self._server.gui, [strand], at - _WINDOW, at, fixed=True)
+            else:
+                self._plot.move(at - _WINDOW, at)
+
+    def _stand(self, stage: Stage) -> None:
+        """Draw a stage in the place of the one before, unless it looks the same."""
+        if self._plot is not None:
+            self._plot.remove()
+            self._plot = None
+        self._clock = ""
+        if self._nodes is not None and self._drawn.same_shape(stage):
+            self._drawn = stage
+            return
+        self._drawn = stage
+        scene, reach = self._server.scene, stage.reach
+        scene.reset()
+        scene.set_up_direction("+z")
+        look_at_stages(self._server, reach)
+        self._nodes = StageNodes(scene, stage)
+        levels = {sheet.name: 0.0 for sheet in stage.sheets}
+        self._nodes.show(Moment(0.0, stage.poses(None), levels, [], UNKNOWN, ""))
+
+    def _leave(self) -> None:
+        if self._run is not None:
+            self._run.close()
+            self._run = None
+
+    def close(self) -> None:
+        """Close the recording that is followed; may be called again."""
+        self._leave()

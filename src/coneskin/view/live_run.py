@@ -1,0 +1,111 @@
+"""Live run: the recording of a guard that runs, found and followed from another process."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from coneskin.errors import RecordingError
+from coneskin.recording import Block
+from coneskin.replay.replay import Run
+from coneskin.robot.guard.journal import BlockKind
+
+from .history import History
+from .recording_tail import RecordingTail
+from .stage import set_stage
+from .strand import Strand
+
+__all__ = ["KEPT", "LiveRun", "find_live_run", "is_live"]
+
+KEPT = 60.0  #: s of a live run that its page keeps
+_FRESH = 3.0  # s since the last write, within which a recording counts as growing: a guard records ticks all the time
+_ALWAYS = frozenset({BlockKind.HEADER, BlockKind.SURFACE, BlockKind.EVENT})
+
+
+class LiveRun:
+    """Run that is followed.
+
+    Args:
+        path: the first file of its recording.
+
+    Attributes:
+        strand: what is shown; its history grows.
+        ended: the recording was closed.
+
+    Raises:
+        RecordingError: there is no recording, or its header has not been written yet.
+        SceneError: this version of coneskin cannot read its scene.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._tail = RecordingTail(path, KEPT, _ALWAYS)
+        try:
+            blocks = self._tail.read()
+            run = Run(_header(blocks, path), blocks)
+            scene = run.scene()
+            history = History(scene, KEPT)
+            history.take_all(blocks)
+            stage = set_stage(scene, run.place_sensors(), f"live: {path}")
+        except BaseException:
+            self._tail.close()
+            raise
+        self.strand = Strand(stage, history, run.start, run.start)
+        self._grown = time.monotonic()
+
+    @property
+    def ended(self) -> bool:
+        """True once the recording was closed."""
+        return self._tail.ended
+
+    def follow(self) -> int:
+        """Take what has come, and return how many blocks that were.
+
+        Raises:
+            RecordingError: the recording is gone, or damaged.
+        """
+        blocks = self._tail.read()
+        if blocks:
+            self.strand.history.take_all(blocks)
+            self._grown = time.monotonic()
+        return len(blocks)
+
+    @property
+    def silence(self) -> float:
+        """Time since anything came [s]."""
+        return time.monotonic() - self._grown
+
+    def close(self) -> None:
+        """Close the recording; may be called again."""
+        self._tail.close()
+
+
+def is_live(path: Path) -> bool:
+    """Tell whether a recording grows: its newest file was written a moment ago."""
+    from coneskin.recording_file.reader import parts_of
+
+    try:
+        newest = max(part.stat().st_mtime for part in parts_of(path))
+    except OSError:
+        return False
+    return time.time() - newest < _FRESH
+
+
+def find_live_run(folder: Path) -> Path | None:
+    """Return the recording in a folder of runs that grows now, the newest of several; None without any."""
+    found = [path for path in folder.glob("*/run.rec") if is_live(path)]
+    return max(found, key=lambda path: path.stat().st_mtime, default=None)
+
+
+def _header(blocks: Iterable[Block], path: Path) -> dict[str, Any]:
+    for block in blocks:
+        if block.kind == BlockKind.HEADER:
+            try:
+                header = json.loads(block.payload)
+            except ValueError as exc:
+                raise RecordingError(f"the header of {path} is damaged: {exc}") from exc
+            if isinstance(header, dict) and isinstance(header.get("scene"), str):
+                return header
+    raise RecordingError(f"{path} has no header yet: nothing of it can be shown")

@@ -1,0 +1,44 @@
+"""Moment of a run: all that moves or changes on the page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from coneskin.geometry.pose import Pose
+
+    from .contact_mark import ContactMark
+    from .history import History
+    from .phase_words import PhaseWords
+    from .stage import Stage
+
+__all__ = ["Moment", "moment_at"]
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What is seen at one time.
+
+    Attributes:
+        time: [s, host clock].
+        poses: of the links' frames in the base frame, by their indices.
+        levels: of the sensors, by their names.
+        marks: of contacts.
+        phase: of the guard.
+        health: what is wrong; empty where nothing is.
+    """
+
+    time: float
+    poses: dict[int, Pose]
+    levels: dict[str, float]
+    marks: list[ContactMark]
+    phase: PhaseWords
+    health: str
+
+
+def moment_at(stage: Stage, history: History, time: float) -> Moment:
+    """Return what is seen at a time [s, host clock]."""
+    levels = {sheet.name: history.level(sheet.name, time) for sheet in stage.sheets}
+    poses = stage.poses(history.q(time))
+    return Moment(time, poses, levels, history.marks(time), history.phase(time), history.health(time))

@@ -1,0 +1,83 @@
+"""Text of a page's panel as HTML. What a recording says is foreign: every word of it is escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from coneskin.robot.guard.journal import GuardEvent
+
+from .phase_words import PhaseWords
+
+__all__ = ["NOTICE", "event_list", "notice", "status"]
+
+NOTICE = "No safety display. What is drawn may be late, old or wrong; nobody may rely on it near an arm."
+_SHOWN = 9  # events of the list
+_HOT = {"contact", "contact_located", "contact_extended", "stopping", "stop_failed", "fault", "guard_exited"}
+
+
+def notice() -> str:
+    """Return the words that stand on every page."""
+    style = "border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px;margin:4px 10px"
+    return f'<div id="coneskin-notice" style="{style}">{escape(NOTICE)}</div>'
+
+
+def status(runs: Sequence[tuple[str, PhaseWords, str]], clock: str, stale: str = "", share: float | None = None) -> str:
+    """Return the phases of the guards, what is wrong, and the time.
+
+    Args:
+        runs: title, phase and what is wrong, of each run on the page.
+        clock: the time in words.
+        stale: why what is shown is old; empty where it is not.
+        share: where on the timeline the time is, 0 to 1; None without a timeline.
+    """
+    parts = []
+    if share is not None:
+        left = f"left:calc({100.0 * min(max(share, 0.0), 1.0):.2f}% - 1px)"
+        parts.append(
+            '<div style="position:relative;height:9px;margin:-4px 10px 0 10px">'
+            f'<div style="position:absolute;{left};width:2px;height:9px;background:#111827"></div></div>'
+        )
+    for title, phase, wrong in runs:
+        name = f'<span style="opacity:.8">{escape(title)}</span><br>' if len(runs) > 1 else ""
+        parts.append(
+            f'<div class="coneskin-phase" style="background:{phase.colour};color:white;padding:6px 10px;'
+            f'font-size:15px;margin:4px 10px">{name}{escape(phase.text)}</div>'
+        )
+        if wrong:
+            parts.append(
+                f'<div class="coneskin-health" style="color:#b91c1c;font-size:12px;margin:2px 10px">'
+                f"{escape(wrong[:400])}</div>"
+            )
+    if stale:
+        parts.append(
+            f'<div id="coneskin-stale" style="background:#111827;color:#fbbf24;padding:6px 10px;margin:4px 10px">'
+            f"{escape(stale)}</div>"
+        )
+    parts.append(
+        f'<div id="coneskin-clock" style="font-family:monospace;font-size:13px;margin:2px 10px">{escape(clock)}</div>'
+    )
+    return "".join(parts)
+
+
+def event_list(lines: Sequence[tuple[GuardEvent, str]], now: int) -> str:
+    """Return the events around the present one.
+
+    Args:
+        lines: events and their lines for people.
+        now: index of the newest that has happened; -1 for none.
+    """
+    begin = max(0, min(now - _SHOWN + 3, len(lines) - _SHOWN))
+    rows = []
+    for index in range(begin, min(begin + _SHOWN, len(lines))):
+        event, line = lines[index]
+        style = "font-weight:700;" if index == now else "opacity:.45;" if index > now else ""
+        colour = "#b91c1c" if event.name in _HOT else "inherit"
+        rows.append(
+            f'<div style="{style}color:{colour};white-space:nowrap;overflow:hidden;text-overflow:ellipsis" '
+            f'title="{escape(line.strip()[:600])}">{escape(line.strip()[:200])}</div>'
+        )
+    return (
+        '<div id="coneskin-events" style="font-family:monospace;font-size:11px;line-height:1.5;margin:2px 10px">'
+        f"{''.join(rows) or 'no events'}</div>"
+    )

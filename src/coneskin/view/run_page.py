@@ -1,0 +1,178 @@
+"""Page of recordings: each viewer has a player of its own, so that nobody moves what another looks at."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from html import escape
+from typing import Any
+
+from coneskin.replay.event_text import describe
+from coneskin.robot.guard.journal import EventName
+
+from .page_server import PageServer
+from .panel_text import event_list, notice, status
+from .playback import SPEEDS, Playback
+from .stage_nodes import StageNodes, look_at_stages
+from .strand import Strand
+from .timeline import timeline
+from .trace_plot import TracePlot
+
+__all__ = ["show_runs"]
+
+_PERIOD = 1.0 / 30.0  # s between two pictures
+_TEXT_PERIOD = 0.1  # s between two changes of the text
+_IMPORTANT = frozenset(
+    {EventName.CONTACT, EventName.STOPPING, EventName.STANDSTILL, EventName.RETREATING, EventName.RETREATED}
+    | {EventName.LATCHED, EventName.FAULT, EventName.ACTIVATED, EventName.SPEED_REDUCED, EventName.STOP_FAILED}
+    | {EventName.CONTACT_LOCATED, EventName.TOUCH_ENDED, EventName.GUARD_EXITED, EventName.RESET}
+)
+
+
+def show_runs(server: PageServer, strands: Sequence[Strand]) -> None:
+    """Show recordings on a page, to every viewer that connects from now on."""
+    reach = max(strand.stage.reach for strand in strands)
+    look_at_stages(server, reach, len(strands))
+    server.on_viewer(lambda client: _Player(client, strands).end)
+
+
+class _Player:
+    """Player of one viewer: a thread of its own that moves the scene; its panel only sets what the thread reads.
+
+    Args:
+        client: viser's ``ClientHandle``.
+        strands: the runs.
+    """
+
+    def __init__(self, client: Any, strands: Sequence[Strand]) -> None:
+        self._client, self._strands = client, strands
+        spans = [strand.span for strand in strands]
+        self._playback = Playback(_down(min(since for since, _ in spans)), -_down(-max(until for _, until in spans)))
+        self._changed = threading.Condition()
+        self._over = False
+        self._nodes = [
+            StageNodes(client.scene, strand.stage, f"/run {number}", strand.offset)
+            for number, strand in enumerate(strands, 1)
+        ]
+        events = [
+            (event.time - strand.zero, event, strand.start) for strand in strands for event in strand.history.events
+        ]
+        events.sort(key=lambda item: item[0])
+        self._times = [at for at, _, _ in events]
+        self._lines = [(event, describe(event, start)) for _, event, start in events]
+        self._jumps = [index for index, (_, event, _) in enumerate(events) if event.name in _IMPORTANT]
+        self._make_panel(client.gui)
+        self._shown = -2
+        self._texted = -1.0
+        threading.Thread(target=self._run, daemon=True, name="coneskin player").start()
+
+    def end(self) -> None:
+        """End the thread."""
+        with self._changed:
+            self._over = True
+            self._changed.notify()
+
+    def _make_panel(self, gui: Any) -> None:
+        playback = self._playback
+        gui.add_html(notice())
+        for strand in self._strands:
+            gui.add_html(_title(strand.stage.title))
+        gui.add_html(timeline(self._strands, playback.since, playback.until))
+        self._status = gui.add_html("")
+        step = max(1e-3, round((playback.until - playback.since) / 2e5, 3))
+        self._slider = gui.add_slider(
+            "time [s]", min=playback.since, max=playback.until, step=step, initial_value=playback.since
+        )
+        self._buttons = gui.add_button_group("", ("play", "pause", "|<", "<", ">"))
+        self._speed = gui.add_dropdown("speed", [f"{speed:g}x" for speed in SPEEDS], initial_value="1x")
+        choices = ["jump to an event", *(self._choice(index) for index in self._jumps[:500])]
+        self._jump = gui.add_dropdown("event", choices, initial_value=choices[0])
+        self._events = gui.add_html("")
+        self._plot = TracePlot(gui, self._strands, playback.since, playback.until)
+        self._slider.on_update(self._sought)
+        self._buttons.on_click(self._pressed)
+        self._speed.on_update(self._speeded)
+        self._jump.on_update(self._jumped)
+
+    def _choice(self, index: int) -> str:
+        return f"{index}: {' '.join(self._lines[index][1].split())[:70]}"
+
+    def _sought(self, event: Any) -> None:
+        if event.client is not None:  # not our own change
+            self._do(lambda playback: playback.show(float(self._slider.value)))
+
+    def _pressed(self, _event: Any) -> None:
+        what, now = self._buttons.value, time.monotonic()
+        actions: dict[str, Callable[[Playback], object]] = {
+            "play": lambda playback: playback.play(now),
+            "pause": lambda playback: playback.pause(),
+            "|<": lambda playback: playback.show(playback.since),
+            "<": lambda playback: self._step(playback, -1),
+            ">": lambda playback: self._step(playback, 1),
+        }
+        if what in actions:
+            self._do(actions[what])
+
+    def _speeded(self, _event: Any) -> None:
+        speed = float(str(self._speed.value).removesuffix("x"))
+        self._do(lambda playback: setattr(playback, "speed", speed))
+
+    def _jumped(self, event: Any) -> None:
+        head = str(self._jump.value).partition(":")[0]
+        if event.client is not None and head.isdecimal() and int(head) < len(self._times):
+            self._do(lambda playback: playback.show(self._times[int(head)]))
+
+    def _step(self, playback: Playback, way: int) -> None:
+        """Go to the next event that matters, or to the one before."""
+        times = [self._times[index] for index in self._jumps]
+        ahead = [at for at in times if (at - playback.time) * way > 1e-4]
+        if ahead:
+            playback.show(min(ahead) if way > 0 else max(ahead))
+
+    def _do(self, action: Callable[[Playback], object]) -> None:
+        with self._changed:
+            action(self._playback)
+            self._changed.notify()
+
+    def _run(self) -> None:
+        with self._changed:
+            while not self._over:
+                began = time.monotonic()
+                at, playing = self._playback.advance(began), self._playback.playing
+                self._show(at, began, playing)
+                wait = max(0.0, _PERIOD - (time.monotonic() - began)) if self._playback.playing else None
+                self._changed.wait(wait)
+
+    def _show(self, at: float, now: float, playing: bool) -> None:
+        moments = [strand.moment(at) for strand in self._strands]
+        with self._client.atomic():
+            for nodes, moment in zip(self._nodes, moments, strict=True):
+                nodes.show(moment)
+        if playing and now - self._texted < _TEXT_PERIOD:
+            return
+        self._texted = now
+        playback = self._playback
+        share = (at - playback.since) / max(playback.until - playback.since, 1e-9)
+        runs = [
+            (strand.stage.title, moment.phase, moment.health)
+            for strand, moment in zip(self._strands, moments, strict=True)
+        ]
+        self._status.content = status(runs, f"{at:9.3f} s of {playback.until:.3f} s", share=share)
+        if abs(float(self._slider.value) - at) > 1e-9:
+            self._slider.value = at
+        newest = bisect_right(self._times, at + 1e-6) - 1
+        if newest != self._shown:
+            self._shown = newest
+            self._events.content = event_list(self._lines, newest)
+
+
+def _title(text: str) -> str:
+    return f'<div style="font-size:13px;margin:2px 10px;word-break:break-all"><b>{escape(text)}</b></div>'
+
+
+def _down(time: float) -> float:
+    """Return a time rounded down to a millisecond, which a slider has room for [s]."""
+    return math.floor(1e3 * time) / 1e3

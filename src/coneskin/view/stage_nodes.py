@@ -1,0 +1,212 @@
+"""Nodes of a stage in a page's scene: made once, then moved and coloured for each moment."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from coneskin.geometry.pose import Pose, Vector
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from .contact_mark import ContactMark
+    from .moment import Moment
+    from .page_server import PageServer
+    from .stage import Stage
+
+__all__ = ["StageNodes", "level_colour", "look_at_stages"]
+
+_MARKS = 6  # nodes for contacts on each link with a sheet, used again and again
+_STEPS = 24  # colours of a sheet: a change below one is not worth a message
+_QUIET, _TOUCHED, _FIRM = (46, 125, 107), (245, 158, 11), (220, 38, 38)
+_LOCATED, _UNCERTAIN, _PAST = (192, 38, 211), (249, 115, 22), (120, 113, 108)
+_NORMAL = 0.14  # m; length of the arrow along the normal
+_LEAST = 0.004  # m; half axes of an ellipse that can still be seen
+_FADES = 8  # steps in which a mark fades
+_SEGMENTS = 32
+
+
+def level_colour(level: float, touch_level: float) -> tuple[int, int, int]:
+    """Return the colour of a sheet: quiet below its touch level, then from touched to firm."""
+    if level < touch_level:
+        low, high, share = _QUIET, _TOUCHED, 0.5 * max(level, 0.0) / touch_level
+    else:
+        low, high, share = _TOUCHED, _FIRM, min(1.0, (level - touch_level) / max(0.6 - touch_level, 1e-3))
+    share = round(share * _STEPS) / _STEPS
+    red, green, blue = (round(a + share * (b - a)) for a, b in zip(low, high, strict=True))
+    return red, green, blue
+
+
+def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
+    """Draw the floor, and set from where a new viewer looks.
+
+    Args:
+        server: of the page.
+        reach: how far anything can be from its base [m].
+        count: stages side by side.
+    """
+    away = 0.5 * reach * (1.0 + 0.5 * (count - 1))
+    server.look_from((away, -away, 0.55 * reach), (0.0, 0.0, 0.28 * reach))
+    server.scene.configure_default_lights(cast_shadow=False)  # shadows cost half of the pictures without a GPU
+    server.scene.add_grid("/floor", width=4.0 * reach, height=4.0 * reach, cell_size=0.1, section_size=0.5)
+
+
+class StageNodes:
+    """Nodes of one stage.
+
+    Args:
+        scene: viser's ``SceneApi``, of a server or of one viewer.
+        stage: what is drawn.
+        root: name of the node above them, such as "/run".
+        offset: where the base stands on the floor [m].
+    """
+
+    def __init__(self, scene: Any, stage: Stage, root: str = "/run", offset: Vector = (0.0, 0.0, 0.0)) -> None:
+        self._stage = stage
+        scene.add_frame(root, show_axes=False, position=offset)
+        self._frames = {link: scene.add_frame(f"{root}/link {link}", show_axes=False) for link in stage.links}
+        for solid in stage.solids:
+            scene.add_mesh_simple(
+                f"{root}/link {solid.link}/{_node(solid.name)}",
+                _single(solid.vertices),
+                solid.faces,
+                color=solid.colour,
+                side="double",
+            )
+        self._sheets = {}
+        self._colours: dict[str, tuple[int, int, int]] = {}
+        for number, sheet in enumerate(stage.sheets):
+            name = f"{root}/link {sheet.link}/sheet {number} {_node(sheet.name)}"
+            colour = self._colours[sheet.name] = level_colour(0.0, sheet.touch_level)
+            self._sheets[sheet.name] = scene.add_mesh_simple(
+                name, _single(sheet.vertices), sheet.faces, color=colour, side="double", cast_shadow=False
+            )
+            scene.add_line_segments(f"{name}/active area", _single(sheet.rim), colors=(20, 40, 35), thickness=0.0015)
+        links = sorted({sheet.link for sheet in stage.sheets})
+        self._marks = {
+            link: [_MarkNodes(scene, f"{root}/link {link}/contact {k}") for k in range(_MARKS)] for link in links
+        }
+        self._link_of = {sheet.name: sheet.link for sheet in stage.sheets}
+
+    def show(self, moment: Moment) -> None:
+        """Move and colour the nodes; what has not changed is not sent."""
+        for link, frame in self._frames.items():
+            pose = moment.poses[link]
+            frame.wxyz, frame.position = _quaternion(pose), pose.translation
+        for sheet in self._stage.sheets:
+            colour = level_colour(moment.levels[sheet.name], sheet.touch_level)
+            if colour != self._colours[sheet.name]:
+                self._colours[sheet.name] = self._sheets[sheet.name].color = colour
+        left = {link: list(nodes) for link, nodes in self._marks.items()}
+        for mark in moment.marks:
+            nodes = left.get(self._link_of.get(mark.sensor, -1))
+            if nodes:
+                nodes.pop(0).show(mark)
+        for nodes in left.values():
+            for node in nodes:
+                node.hide()
+
+
+class _MarkNodes:
+    """Nodes of one contact: its ball, the arrow along its normal, and the ellipse of its uncertainty."""
+
+    def __init__(self, scene: Any, name: str) -> None:
+        self._scene, self._name = scene, name
+        self._frame = scene.add_frame(name, show_axes=False, visible=False)
+        self._drawn: tuple[Any, ...] | None = None
+        self._parts: list[Any] = []
+
+    def show(self, mark: ContactMark) -> None:
+        fading = math.ceil(mark.strength * _FADES)
+        drawn = (mark._replace(strength=fading, level=0.0),)
+        if drawn != self._drawn:
+            self._drawn = drawn
+            self._draw(mark, fading / _FADES)
+        self._frame.visible = True
+
+    def hide(self) -> None:
+        self._frame.visible = False
+
+    def _draw(self, mark: ContactMark, strength: float) -> None:
+        colour = _PAST if strength < 1.0 else _LOCATED if mark.located else _UNCERTAIN
+        shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
+        self._frame.position, self._frame.wxyz = mark.point, _quaternion(_along(mark.normal))
+        arrow, faces = _arrow()
+        self._scene.add_mesh_simple(f"{self._name}/normal", arrow, faces, color=colour, opacity=shade, side="double")
+        patch, fan = _ellipse(mark)
+        self._scene.add_mesh_simple(
+            f"{self._name}/uncertainty", patch, fan, color=colour, opacity=0.55 * (shade or 1.0), side="double"
+        )
+
+
+def _arrow() -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    from .solid import revolve
+
+    head, shaft, width = 0.035, 0.0035, 0.010
+    profile = [(0.0, 0.0), (shaft, 0.0), (shaft, _NORMAL - head), (width, _NORMAL - head), (0.0, _NORMAL)]
+    vertices, faces = revolve(profile, 16)
+    return _single(vertices), faces
+
+
+def _ellipse(mark: ContactMark) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return the ellipse of a mark in its own frame; a small disc where nothing is known of its size."""
+    import numpy as np
+
+    back = _along(mark.normal).inverse()
+    axes = mark.ellipse or ((_LEAST, 0.0, 0.0), (0.0, _LEAST, 0.0))
+    first, second = (np.array(back.rotate(axis) if mark.ellipse else axis) for axis in axes)
+    first, second = _visible(first), _visible(second)
+    turn = np.linspace(0.0, 2.0 * math.pi, _SEGMENTS, endpoint=False)[:, None]
+    rim = np.cos(turn) * first + np.sin(turn) * second + (0.0, 0.0, 0.004)
+    vertices = np.concatenate([[[0.0, 0.0, 0.004]], rim])
+    k = np.arange(_SEGMENTS)
+    return _single(vertices), np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % _SEGMENTS])
+
+
+def _visible(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    import numpy as np
+
+    length = float(np.linalg.norm(axis))
+    return axis * max(1.0, _LEAST / length) if length > 0.0 else np.array((_LEAST, 0.0, 0.0))
+
+
+def _along(normal: Vector) -> Pose:
+    """Return a pose whose z axis is along a direction."""
+    x, y, z = normal
+    length = math.sqrt(x * x + y * y + z * z) or 1.0
+    x, y, z = x / length, y / length, z / length
+    ax, ay, az = (1.0, 0.0, 0.0) if abs(x) < 0.7 else (0.0, 1.0, 0.0)
+    ux, uy, uz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+    length = math.sqrt(ux * ux + uy * uy + uz * uz)
+    ux, uy, uz = ux / length, uy / length, uz / length
+    vx, vy, vz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
+    return Pose.trusted(((ux, vx, x), (uy, vy, y), (uz, vz, z)), (0.0, 0.0, 0.0))
+
+
+def _quaternion(pose: Pose) -> tuple[float, float, float, float]:
+    """Return the rotation of a pose as w, x, y, z (Shepperd's method)."""
+    (a, b, c), (d, e, f), (g, h, i) = pose.rotation
+    trace = a + e + i
+    parts = (trace, a, e, i)
+    largest = parts.index(max(parts))
+    if largest == 0:
+        w, x, y, z = 1.0 + trace, h - f, c - g, d - b
+    elif largest == 1:
+        w, x, y, z = h - f, 1.0 + a - e - i, b + d, c + g
+    elif largest == 2:
+        w, x, y, z = c - g, b + d, 1.0 - a + e - i, f + h
+    else:
+        w, x, y, z = d - b, c + g, f + h, 1.0 - a - e + i
+    size = math.sqrt(w * w + x * x + y * y + z * z)
+    return w / size, x / size, y / size, z / size
+
+
+def _single(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    return values.astype("float32")
+
+
+def _node(name: str) -> str:
+    """Return a name as a node of the page's tree has it: a slash would begin a child."""
+    return "".join("-" if letter in "/\\" else letter for letter in name)[:60]

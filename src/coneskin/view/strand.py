@@ -1,0 +1,76 @@
+"""Strand: one run on a page, with its own place on the floor and its own zero of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from coneskin.errors import RecordingError
+from coneskin.geometry.pose import Vector
+from coneskin.replay.replay import Run, read_run
+from coneskin.robot.guard.journal import EventName
+
+from .history import History, history_of
+from .moment import Moment, moment_at
+from .stage import Stage, set_stage
+
+__all__ = ["Strand", "read_strands"]
+
+_APART = 0.75  # of the arms' reach, between two bases
+_ZEROS = (EventName.CONTACT, EventName.STOPPING)  # by which two runs are laid side by side
+
+
+@dataclass(frozen=True, slots=True)
+class Strand:
+    """One run on a page.
+
+    Attributes:
+        stage: what is drawn.
+        history: what happened.
+        zero: host time that is 0 on the page's clock [s].
+        start: host time at which the run was started, from which its events count [s].
+        offset: where the base stands [m].
+    """
+
+    stage: Stage
+    history: History
+    zero: float
+    start: float
+    offset: Vector = (0.0, 0.0, 0.0)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """From when to when it is, on the page's clock [s]."""
+        return self.history.since - self.zero, self.history.until - self.zero
+
+    def moment(self, time: float) -> Moment:
+        """Return what is seen at a time on the page's clock [s]."""
+        return moment_at(self.stage, self.history, self.zero + time)
+
+
+def read_strands(paths: Sequence[Path]) -> list[Strand]:
+    """Read runs: one as it is, several side by side, each with its first touch at the time 0.
+
+    Raises:
+        RecordingError: a run cannot be read, or nothing was recorded in it.
+        SceneError: this version of coneskin cannot read its scene.
+    """
+    runs = [read_run(path) for path in paths]
+    found = [_strand(run, str(path), len(runs) > 1) for run, path in zip(runs, paths, strict=True)]
+    apart = _APART * max(strand.stage.reach for strand in found)
+    middle = 0.5 * (len(found) - 1)
+    return [
+        Strand(item.stage, item.history, item.zero, item.start, (0.0, apart * (middle - number), 0.0))
+        for number, item in enumerate(found)
+    ]
+
+
+def _strand(run: Run, title: str, aligned: bool) -> Strand:
+    scene = run.scene()
+    history = history_of(scene, run.blocks)
+    if not history.since <= history.until:
+        raise RecordingError(f"nothing was recorded in {title}: there is nothing to be shown")
+    stage = set_stage(scene, run.place_sensors(), title)
+    first = next((event.time for event in history.events if event.name in _ZEROS), run.start) if aligned else run.start
+    return Strand(stage, history, first, run.start)

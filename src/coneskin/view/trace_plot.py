@@ -1,0 +1,70 @@
+"""Plot of traces in a page's panel, with the choice of what is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from .strand import Strand
+from .traces import Traces, trace_names, traces
+
+__all__ = ["TracePlot"]
+
+_COLOURS = ("#2563eb", "#ea580c", "#16a34a", "#7c3aed", "#854d0e", "#0891b2", "#db2777", "#4b5563")
+_MOST = 12  # lines of one plot
+
+
+class TracePlot:
+    """Plot of runs.
+
+    Args:
+        gui: viser's ``GuiApi``.
+        strands: the runs.
+        since: from when on, on the page's clock [s].
+        until: until when.
+        fixed: touch levels alone are drawn, and nobody can choose: on a page that all viewers share.
+    """
+
+    def __init__(self, gui: Any, strands: Sequence[Strand], since: float, until: float, fixed: bool = False) -> None:
+        self._gui, self._strands, self._since, self._until = gui, strands, since, until
+        names = trace_names(strands)
+        self._folder = gui.add_folder("traces")
+        self._shown = names[0]
+        with self._folder:
+            choice = None if fixed else gui.add_dropdown("show", names, initial_value=names[0])
+            self._plot = self._make()
+        if choice is not None:
+            choice.on_update(lambda _event: self._change(str(choice.value)))
+
+    def move(self, since: float, until: float) -> None:
+        """Draw another stretch of time."""
+        self._since, self._until = since, until
+        found = self._traces()
+        self._plot.data = (found.times, *found.values)
+
+    def remove(self) -> None:
+        """Take the plot off the page."""
+        self._folder.remove()
+
+    def _change(self, what: str) -> None:
+        old, self._shown = self._plot, what
+        with self._folder:
+            self._plot = self._make()
+        old.remove()
+
+    def _traces(self) -> Traces:
+        found = traces(self._strands, self._shown, self._since, self._until)
+        return Traces(found.names[:_MOST], found.times, found.values[:_MOST])
+
+    def _make(self) -> Any:
+        found = self._traces()
+        series = [{"label": "time [s]"}]
+        for number, name in enumerate(found.names):
+            series.append({"label": name, "stroke": _COLOURS[number % len(_COLOURS)], "width": 1.5})  # type: ignore[dict-item]
+        return self._gui.add_uplot(
+            (found.times, *found.values),
+            tuple(series),
+            scales={"x": {"time": False, "auto": True}, "y": {"auto": True}},
+            legend={"show": True},
+            aspect=1.7,
+        )
