@@ -1,17 +1,94 @@
-"""What every test leaves behind: no thread of ours, no child process."""
+"""Hypothesis profiles, the short run, tests with processes, and the check that a test leaves none of them behind."""
 
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from _pytest.runner import runtestprotocol
+from hypothesis import HealthCheck, settings
+
+from .hold_ups import HoldUpWatch
 
 _TASKS = Path("/proc/self/task")  # Linux; elsewhere only threads are looked at
+_HERE = Path(__file__).parent
+_WITH_PROCESSES = (  # tests that run one at a time; below this folder
+    *("guarded", "commands/test_guard.py", "robot/sim/test_command.py", "robot/sim/test_wheel.py", "robot/ur"),
+    *("test_demos.py", "test_measure_controller.py"),
+)
+_TRIES = 5  # of a test with processes, as long as the computer holds it up
+_SHORT = "not long"  # the marker expression of the short run, as in pyproject.toml
+
+_WATCH = pytest.StashKey[HoldUpWatch]()
+_REPEATED = pytest.StashKey[list[str]]()
+
+# A slow machine is no failure, so nothing here depends on time; the same examples every time, so nothing on luck.
+_STEADY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow], "database": None}
+settings.register_profile("steady", derandomize=True, **_STEADY)
+settings.register_profile("fuzz", derandomize=False, max_examples=100, print_blob=True, **_STEADY)
+settings.load_profile("steady")  # --hypothesis-profile=fuzz takes its place: see scripts/fuzz
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Run a test that is named on the command line, long or not."""
+    arguments = config.invocation_params.args
+    if config.option.markexpr == _SHORT and "-m" not in arguments and any("::" in word for word in config.args):
+        config.option.markexpr = ""
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m selects
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests with real processes: their peers have to be punctual, so they do not run beside others."""
+    for item in items:
+        if any(item.path.is_relative_to(_HERE / place) for place in _WITH_PROCESSES):
+            item.add_marker(pytest.mark.processes)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """Run a test with real processes again where it failed while something else held up this computer.
+
+    What it tests acts within tens of milliseconds, or stops the arm because it could not. A failure without a hold-up,
+    and one in each try, is a failure.
+    """
+    if "processes" not in item.keywords:
+        return None
+    if (watch := item.config.stash.get(_WATCH, None)) is None:
+        watch = item.config.stash[_WATCH] = HoldUpWatch()
+        item.config.add_cleanup(watch.close)
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    assert isinstance(item, pytest.Function)
+    for tries_left in reversed(range(_TRIES)):
+        item._initrequest()  # as new: its fixtures are made again
+        began = time.monotonic()
+        reports = runtestprotocol(item, log=False, nextitem=nextitem)
+        if tries_left and any(report.failed for report in reports) and (late := watch.longest_since(began)):
+            item.config.stash.setdefault(_REPEATED, []).append(f"{item.nodeid} ({1e3 * late:.0f} ms)")
+            continue
+        break
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Name the tests that were run again, and how long the computer had held them up."""
+    for line in config.stash.get(_REPEATED, []):
+        terminalreporter.write_line(f"held up, so run again: {line}")
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """Say in the first lines what the short run leaves out."""
+    if config.option.markexpr == _SHORT:
+        return "short run: tests marked long are deselected; `make check` or `pytest -m ''` runs them too"
+    return None
 
 
 def _children() -> frozenset[str]:
-    """Processes that any thread of this one has started and nobody has waited for."""
+    """Return the processes that any thread of this one has started and that have not been waited for."""
     found: set[str] = set()
     for task in _TASKS.glob("*/children"):
         with suppress(OSError):  # that thread has just ended

@@ -12,7 +12,7 @@ ARGUMENTS = {"04_guard_a_program.py": ["127.0.0.44" if sys.platform.startswith("
 
 
 def play(name: str) -> str:
-    """What a demo prints; it must end well and complain of nothing."""
+    """Run a demo and return what it prints; it must end well and complain of nothing."""
     done = subprocess.run(
         [sys.executable, "-W", "error", str(DEMOS / name), *ARGUMENTS.get(name, [])],
         capture_output=True,
@@ -39,7 +39,7 @@ def test_unroll() -> None:
 
 def test_bytes_to_contact() -> None:
     out = play("02_bytes_to_contact.py")
-    match = re.search(r"u = ([\d.]+) mm, phi = ([\d.]+) deg, fault: None", out)
+    match = re.search(r"u = ([\d.]+) mm, phi = ([\d.]+) deg, certain: True", out)
     assert match
     assert float(match[1]) == pytest.approx(250.0, abs=0.5)  # one count of 12 bits is 0.13 mm, its noise 0.7 counts
     assert float(match[2]) == pytest.approx(60.0, abs=0.5)
@@ -52,7 +52,7 @@ def test_virtual_skin() -> None:
     kinds = re.findall(r" s  (\w+)", out)
     assert [kind for kind in kinds if kind != "SkinFault"] == ["TouchBegan", "TouchEnded"]  # a stall adds a fault
     assert "at u = 200 mm" in out
-    assert "the end: SkinConnectionError" in out
+    assert "stream ended: SkinConnectionError" in out
     frames, missing = map(int, re.findall(r"(\d+) (?:frames|missing)", out))
     assert frames + missing <= 600  # 0.6 s at 1000 Hz
     assert missing >= 600 // 97
@@ -69,12 +69,38 @@ def test_guard_a_program() -> None:
     events = re.search(r"events: (.*)", out)
     assert events
     names = events[1].split(", ")
-    milestones = ("armed", "stopping", "contact", "slower", "standstill", "retreating", "retreated", "latched")
-    assert [name for name in dict.fromkeys(names) if name in milestones] == list(milestones)
-    assert out.endswith("reset, and back home\n")
+    milestones = [
+        "activated",
+        "stopping",
+        "contact",
+        "decelerating",
+        "standstill",
+        "retreating",
+        "retreated",
+        "latched",
+    ]
+    assert [name for name in dict.fromkeys(names) if name in milestones] == milestones
+    assert out.endswith("after the reset: back home\n")
 
 
 def test_replay_as_test() -> None:
     out = play("05_replay_as_test.py")
-    assert "touch on sensor 0/0 (tube): u = 199.9 mm" in out
+    assert "touch on sensor 0/0 (tube) at u = 199.9 mm" in out
     assert out.endswith("the same events, bit by bit\n")
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
+def test_runs_as_tests() -> None:
+    out = play("06_runs_as_tests.py")
+    assert re.search(r"collision\.rec: \d+ kB, from", out)
+    assert out.count("1 passed") == 3
+    assert re.search(r"contact 1: u 198\.\d+ -> 199\.\d+ mm", out)
+    assert out.index("1 failed") < out.index("golden events written")
+
+
+def test_own_source() -> None:
+    out = play("07_own_source.py").splitlines()
+    assert out[0].startswith("TouchBegan: u = 250 mm, phi = 60 deg")
+    assert "TouchMoved: u = 250 mm, phi = 60 deg, certain: True" in out
+    assert out[-1].startswith("TouchEnded: ")

@@ -11,15 +11,27 @@ from .scene.scenes import DOUBLE_CONE, SERIAL_RETREAT, SKIN_ONLY, record
 NUMERIC = {"numpy", "scipy"}
 DEVICES = {"serial", "rtde_control", "rtde_receive", "rtde_io", "dashboard_client"}
 DRAWING = {"trimesh", "matplotlib", "ezdxf", "collada", "embreex", "tomli_w"}
-HEAVY = NUMERIC | DEVICES | DRAWING
-VIRTUAL = {"coneskin.skin.virtual", "coneskin.skin.circuit", "coneskin.skin.ladder", "coneskin.skin.pseudo_terminal"}
-FIELD = {f"coneskin.skin.field_{name}" for name in ("model", "sheet", "contact", "places")}
-KINEMATICS = {"coneskin.robot.link_frames", "coneskin.robot.compiled"}
-SIMULATOR = {"coneskin.robot.sim_controller", "coneskin.robot.sim_process", "coneskin.robot.sim_server"}
+PAGE = {"viser", "websockets", "msgspec", "coneskin.view"}
+ENGINE = {"mujoco", "coneskin.physics"}
+HEAVY = NUMERIC | DEVICES | DRAWING | PAGE | ENGINE
+VIRTUAL = {
+    "coneskin.skin.virtual.skin",
+    "coneskin.skin.virtual.circuit",
+    "coneskin.skin.virtual.ladder",
+    "coneskin.skin.virtual.pseudo_terminal",
+}
+FIELD = {"coneskin.skin.field", "coneskin.skin.virtual.field_contacts"}
+KINEMATICS = {"coneskin.robot.arm.link_frames", "coneskin.robot.arm.compiled_kinematics"}
+SIMULATOR = {"coneskin.robot.sim.controller", "coneskin.robot.sim.process", "coneskin.robot.sim.server"}
+CALIBRATION = {"coneskin.calibration", "coneskin.scene.calibration_file", "coneskin.skin.place_map"}
 LOADED = "coneskin.geometry.frustum", "coneskin.skin.sensor"
 
-_LOAD = "from coneskin.scene import load; scene = load({scene!r})"
-_BUILD = _LOAD + "; from coneskin.build import build_core; build_core(scene)"
+_LOAD = "from coneskin.scene.reader import load_scene; scene = load_scene({scene!r})"
+_BUILD = _LOAD + "; from coneskin.scene.build import build_core; build_core(scene)"
+_BUILD_COMMISSIONED = (
+    _LOAD + "; from coneskin.testing.commissioned import commissioned"
+    "; from coneskin.scene.build import build_core; build_core(commissioned(scene))"
+)
 _SERIAL_FREE = SKIN_ONLY[: SKIN_ONLY.index("[source]")]
 _NO_TOUCH = SKIN_ONLY[: SKIN_ONLY.index("[[source.touch]]")]
 _NO_MESH_FRAME = SERIAL_RETREAT.replace('name = "upper_arm"', 'name = "upper_arm"\nframe = "dh"')
@@ -30,89 +42,117 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "the package alone": ("", "import coneskin", {"coneskin"}, HEAVY | {"coneskin.geometry", "coneskin.skin"}),
     "errors and scene values": (
         "",
-        "import coneskin.errors, coneskin.scene",
-        {"coneskin.scene"},
-        HEAVY | {"coneskin.geometry", "coneskin.skin", "coneskin.robot", "coneskin.scene_reader"},
+        "import coneskin.errors, coneskin.scene.scene",
+        {"coneskin.scene.scene"},
+        HEAVY | {"coneskin.geometry", "coneskin.skin", "coneskin.robot", "coneskin.scene.reader"},
     ),
     "design only: unroll": (
         "",
         "from coneskin.cli import main; main(['unroll', '--radius1-mm', '54', '--height-mm', '434'])",
         {"coneskin.geometry.sector"},
-        HEAVY | {"coneskin.skin", "coneskin.robot", "coneskin.scene_reader", "coneskin.design"},
+        HEAVY | {"coneskin.skin", "coneskin.robot", "coneskin.scene.reader", "coneskin.design.sheets"},
     ),
     "one cylinder, read": (
         _SERIAL_FREE,
         _LOAD,
         {*LOADED},
-        HEAVY | VIRTUAL | FIELD | {"coneskin.robot", "coneskin.skin.wire", "coneskin.skin.serial_port"},
+        HEAVY
+        | VIRTUAL
+        | FIELD
+        | CALIBRATION
+        | {"coneskin.robot", "coneskin.skin.wire", "coneskin.skin.sources.serial_port"},
     ),
     "one cylinder, guarded without an arm": (
         _NO_TOUCH,
         _BUILD,
-        {*LOADED, "coneskin.skin.stream"},
+        {*LOADED, "coneskin.skin.detection.stream"},
         HEAVY
         | VIRTUAL
         | FIELD
         | SIMULATOR
-        | {"coneskin.session", "coneskin.robot.ur_rtde", "coneskin.robot.link_frames"},
+        | {"coneskin.session.session", "coneskin.robot.ur.ur_rtde", "coneskin.robot.arm.link_frames"},
     ),
     "double cone, its touches scripted": (
         DOUBLE_CONE,
         _BUILD,
-        {*LOADED, "coneskin.robot.link_frames", "coneskin.skin.scripted_touch"},
+        {*LOADED, "coneskin.robot.arm.link_frames", "coneskin.skin.virtual.scripted_touch"},
         HEAVY
         | VIRTUAL
         | FIELD
         | SIMULATOR
-        | {"coneskin.session", "coneskin.skin.serial_port", "coneskin.robot.ur_rtde"},
+        | {"coneskin.session.session", "coneskin.skin.sources.serial_port", "coneskin.robot.ur.ur_rtde"},
+    ),
+    "no body": (_STOP, _LOAD, {*LOADED}, HEAVY | {"coneskin.scene.body", "coneskin.skin.padding"}),
+    "bodies, which no guard knows of": (
+        _STOP + '[[body]]\nkind = "post"\nxyz_mm = [0, 0, 0]\ndirection = [0, 0, 1]\n[padding]\n',
+        _BUILD,
+        {*LOADED, "coneskin.scene.body", "coneskin.skin.padding"},
+        HEAVY | VIRTUAL | FIELD | SIMULATOR,
     ),
     "no mesh": (
         _NO_MESH_FRAME,
-        _BUILD,
+        _BUILD_COMMISSIONED,
         {*LOADED, *KINEMATICS},
-        HEAVY | VIRTUAL | FIELD | SIMULATOR | {"coneskin.geometry.mesh", "coneskin.geometry.rays"},
+        HEAVY | VIRTUAL | FIELD | SIMULATOR | {"coneskin.geometry.mesh", "coneskin.geometry.ray_casting"},
     ),
     "stop": (
         _STOP,
         _BUILD,
-        {*LOADED, "coneskin.robot.link_frames", "coneskin.robot.commands"},
-        {"coneskin.robot.compiled"}
+        {*LOADED, "coneskin.robot.arm.link_frames", "coneskin.robot.reaction.types"},
+        {"coneskin.robot.arm.compiled_kinematics"}
         | HEAVY
         | VIRTUAL
         | FIELD
         | SIMULATOR
-        | {"coneskin.robot.inverse", "coneskin.robot.ur_rtde"},
+        | {"coneskin.robot.arm.inverse_kinematics", "coneskin.robot.ur.ur_rtde"},
     ),
     "a scene is only looked at": (
         SERIAL_RETREAT,
         "from coneskin.cli import main; main(['guard', {scene!r}, '--check'])",
         {*LOADED},
-        HEAVY | VIRTUAL | FIELD | SIMULATOR | {"coneskin.session", "coneskin.skin.stream", "coneskin.robot.guard_core"},
+        HEAVY
+        | VIRTUAL
+        | FIELD
+        | CALIBRATION
+        | SIMULATOR
+        | {"coneskin.session.session", "coneskin.skin.detection.stream", "coneskin.robot.guard.core"},
     ),
     "replay": (
         "",
         "from coneskin.cli import main; assert main(['replay', {run!r}]) == 0",
-        {*LOADED, "coneskin.replay", "coneskin.robot.guard_core"},
-        HEAVY
+        {*LOADED, "coneskin.replay.replay", "coneskin.robot.guard.core"},
+        (HEAVY - {"numpy"})  # which replays what is quiet many inputs at once
         | FIELD
         | SIMULATOR
-        | {"coneskin.session", "coneskin.skin.serial_port", "coneskin.run_picture", "coneskin.robot.ur_rtde"},
+        | {
+            "coneskin.session.session",
+            "coneskin.skin.sources.serial_port",
+            "coneskin.replay.run_picture",
+            "coneskin.robot.ur.ur_rtde",
+        },
     ),
-    "the owner of ur_rtde": (
+    "the driver of ur_rtde": (
         "",
-        "import coneskin.robot.owner",
-        {"coneskin.robot.owner"},
-        HEAVY | {"coneskin.skin", "coneskin.geometry.mesh", "coneskin.robot.guard_core"},
+        "import coneskin.robot.ur.driver_process",
+        {"coneskin.robot.ur.driver_process"},
+        HEAVY | {"coneskin.skin", "coneskin.geometry.mesh", "coneskin.robot.guard.core"},
     ),
     "the process of the guard": (
         "",
-        "import coneskin.guard_process",
-        {"coneskin.guard_process"},
+        "import coneskin.session.guard_process",
+        {"coneskin.session.guard_process"},
         HEAVY
         | VIRTUAL
         | FIELD
+        | CALIBRATION
         | SIMULATOR
-        | {f"coneskin.robot.{name}" for name in ("foreign", "mover", "rtde_codec", "speed_slider", "state_reader")},
+        | {
+            "coneskin.robot.ur.stop_sockets",
+            "coneskin.robot.guard.reaction_motion",
+            "coneskin.robot.ur.rtde_codec",
+            "coneskin.robot.ur.speed_slider",
+            "coneskin.robot.ur.state_reader",
+        },
     ),
 }
 
@@ -133,13 +173,17 @@ def test_what_is_not_named_is_not_loaded(case: str, tmp_path: Path, a_run: str) 
 
 
 def test_a_scene_without_an_arm_loads_no_kinematics_and_no_reaction(tmp_path: Path) -> None:
-    unneeded = {"ur_models", "retreat", "arm_reaction", "state_reader", "compiled", "rtde_codec"}
+    unneeded = {"arm.ur_models", "reaction.retreat", "guard.arm_supervisor", "ur.state_reader"}
+    unneeded |= {"arm.compiled_kinematics", "ur.rtde_codec"}
     assert not {f"coneskin.robot.{name}" for name in unneeded} & modules(_NO_TOUCH, _BUILD, tmp_path / "scene.toml", "")
 
 
-def test_a_reaction_that_only_stops_loads_no_retreat(tmp_path: Path) -> None:
-    unneeded = {"mover", "leaving", "movement", "retreat", "comply", "trail", "table", "follower", "steering"}
-    loaded = modules(_STOP, _BUILD, tmp_path / "scene.toml", "")
+@pytest.mark.parametrize("scene", [_STOP, _NO_MESH_FRAME], ids=["a stop", "a retreat without a commissioning"])
+def test_a_reaction_that_only_stops_loads_no_retreat(scene: str, tmp_path: Path) -> None:
+    unneeded = {"guard.reaction_motion", "reaction.motion", "reaction.retreat"}
+    unneeded |= {"reaction.admittance", "reaction.backtrack", "arm.workspace", "ur.setpoint_program"}
+    unneeded |= {"ur.setpoint_writer"}
+    loaded = modules(scene, _BUILD, tmp_path / "scene.toml", "")
     assert not {f"coneskin.robot.{name}" for name in unneeded} & loaded
 
 

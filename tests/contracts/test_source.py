@@ -1,126 +1,138 @@
-"""One contract for all sources: the serial port over three kinds of line, the skin in memory, the pty twin."""
+"""Contract of every source, held by each of ours over each kind of line, and what ours promise beyond it."""
 
 import os
 import socket
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from coneskin.errors import SkinConnectionError, SkinTimeout
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.faults import Faults
-from coneskin.skin.memory_source import MemorySource
-from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.serial_port import SerialPort
-from coneskin.skin.source import Source
-from coneskin.skin.virtual import VirtualSkin
-from coneskin.skin.wire import FRAME_LENGTH, Decoder
+from coneskin.skin.sources.serial_port import SerialPort
+from coneskin.skin.sources.source_group import SourceGroup
+from coneskin.skin.virtual.memory_source import MemorySource
+from coneskin.skin.virtual.skin import VirtualSkin
+from coneskin.testing.source_contract import SOURCE_CHECKS, OpenLine, OpenLineFactory, contract_bytes
 
 SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))
-PATIENCE = 2.0  # far beyond what a line in this machine needs; reached only where the contract is broken
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
 
 
-def a_skin(faults: Faults | None = None, duration: float = 1.0) -> VirtualSkin:
-    touch = ScriptedTouch(0.01, 0.03, 0.2, 1.0)
-    return VirtualSkin(SENSOR, [touch], faults=faults or Faults(), duration=duration, seed=3)
+class SentSkin(VirtualSkin):
+    """A device that sends given bytes, is silent, and goes when the plug is pulled."""
 
+    def __init__(self, sent: bytes) -> None:
+        super().__init__(SENSOR, model="ladder")
+        self.sent = sent
+        self.pulled = False
 
-def what_arrives(skin: VirtualSkin) -> bytes:
-    data = b""
-    with suppress(SkinConnectionError):  # unplugged, where the faults say so
-        for _, packet in skin.packets():
-            data += packet
-    return data
+    def packets(self) -> Iterator[tuple[float, bytes]]:
+        """Send the bytes, 500 of them a millisecond."""
+        number = 0
+        while not self.pulled:
+            number += 1
+            yield 1e-3 * number, self.sent[500 * (number - 1) : 500 * number]
+        raise SkinConnectionError("unplugged")
 
-
-class Line:
-    """An open source, and the hand that pulls the plug."""
-
-    def __init__(self, source: Source, pull: Callable[[], None] | None) -> None:
-        self.source = source
-        self.pull = pull
-
-    def read(self, count: int) -> bytes:
-        """So many bytes."""
-        data = b""
-        while len(data) < count:
-            data += self.source.read(PATIENCE)
-        return data
-
-    def read_to_the_end(self, count: int) -> bytes:
-        """Everything until the line is gone; where it does not go by itself, the plug is pulled after so many bytes."""
-        data = b""
-        with suppress(SkinConnectionError):
-            while True:
-                if self.pull and len(data) == count:
-                    self.pull()
-                data += self.source.read(PATIENCE)
-        return data
+    def pull(self) -> None:
+        """Pull the plug."""
+        self.pulled = True
 
 
 @contextmanager
-def over_memory(skin: VirtualSkin) -> Iterator[Line]:
+def over_memory(sent: bytes) -> Iterator[OpenLine]:
+    skin = SentSkin(sent)
     with MemorySource(skin) as source:
-        yield Line(source, None)
+        yield OpenLine(source, skin.pull)
 
 
 @contextmanager
-def over_twin(skin: VirtualSkin) -> Iterator[Line]:
-    from coneskin.skin.pseudo_terminal import PseudoTerminal
+def over_twin(sent: bytes) -> Iterator[OpenLine]:
+    from coneskin.skin.virtual.pseudo_terminal import PseudoTerminal
 
+    skin = SentSkin(sent)
     with PseudoTerminal(skin, hold=True) as twin, SerialPort(twin.path) as port:
         twin.begin()
-        yield Line(port, None)
+        yield OpenLine(port, skin.pull)
 
 
 @contextmanager
-def over_pty(skin: VirtualSkin) -> Iterator[Line]:
-    from coneskin.skin.pseudo_terminal import open_raw_terminal
-
-    master, slave, path = open_raw_terminal()
-    open_ends = [slave, master]
-
-    def pull() -> None:
-        while open_ends:
-            os.close(open_ends.pop())
-
-    try:
-        with SerialPort(path) as port:
-            assert os.write(master, what_arrives(skin))
-            yield Line(port, pull)
-    finally:
-        pull()
+def over_pty(sent: bytes) -> Iterator[OpenLine]:
+    with pseudo_terminal() as (master, path, pull), SerialPort(path) as port:
+        assert os.write(master, sent) == len(sent)
+        yield OpenLine(port, pull)
 
 
 @contextmanager
-def over_loop(skin: VirtualSkin) -> Iterator[Line]:
+def over_loop(sent: bytes) -> Iterator[OpenLine]:
     with SerialPort("loop://") as port:
         inner = port._port  # loop:// has no other end that could send
-        inner.write(what_arrives(skin))
-        yield Line(port, inner.close)
+        inner.write(sent)
+        yield OpenLine(port, inner.close)
 
 
 @contextmanager
-def over_socket(skin: VirtualSkin) -> Iterator[Line]:
+def over_socket(sent: bytes) -> Iterator[OpenLine]:
     with socket.create_server(("127.0.0.1", 0)) as server:
         host, number = server.getsockname()
         with SerialPort(f"socket://{host}:{number}") as port:
             other, _ = server.accept()
             with other:
-                other.sendall(what_arrives(skin))
-                yield Line(port, other.close)
+                other.sendall(sent)
+                yield OpenLine(port, other.close)
 
 
-LINES = {
+@contextmanager
+def over_group(sent: bytes) -> Iterator[OpenLine]:
+    """Beside a second port, on which nothing comes."""
+    with (
+        pseudo_terminal() as (_, silent, _),
+        pseudo_terminal() as (master, path, pull),
+        SourceGroup([SerialPort(silent), SerialPort(path)]) as group,
+    ):
+        assert os.write(master, sent) == len(sent)
+        yield OpenLine(group, pull)
+
+
+@contextmanager
+def over_asked_group(sent: bytes) -> Iterator[OpenLine]:
+    """Two sources that can only be asked in turn; on the other one nothing comes."""
+    port = SerialPort("loop://")
+    with SourceGroup([MemorySource(SentSkin(b"")), port]) as group:
+        inner = port._port
+        inner.write(sent)
+        yield OpenLine(group, inner.close)
+
+
+@contextmanager
+def pseudo_terminal() -> Iterator[tuple[int, str, Callable[[], None]]]:
+    """Our end, the path of the other, and what hangs it up."""
+    from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal
+
+    master, slave, path = open_raw_terminal()
+    ends = [slave, master]
+
+    def pull() -> None:
+        while ends:
+            os.close(ends.pop())
+
+    try:
+        yield master, path, pull
+    finally:
+        pull()
+
+
+LINES: dict[str, OpenLineFactory] = {
     "memory": over_memory,
     "pty twin": over_twin,
     "serial over pty": over_pty,
+    "two ports as one, over pty": over_group,
+    "two sources as one, asked in turn": over_asked_group,
     "serial over loop": over_loop,
     "serial over socket": over_socket,
 }
@@ -153,70 +165,29 @@ def open_descriptors() -> set[str]:
 
 
 @every_line
-def test_it_is_a_source_and_the_bytes_are_the_same(line):
-    skin = a_skin(Faults(stall_after=50))
-    expected = what_arrives(skin)
-    assert len(expected) == 50 * FRAME_LENGTH
-    with line(skin) as opened:
-        assert isinstance(opened.source, Source)
-        assert opened.read(len(expected)) == expected
+@pytest.mark.parametrize("check", SOURCE_CHECKS, ids=lambda check: check.__name__)
+def test_it_keeps_the_contract(check: Callable[[OpenLineFactory], None], line: OpenLineFactory) -> None:
+    check(line)
 
 
 @every_line
-def test_silence_is_a_timeout_that_leaves_it_open(line):
-    with line(a_skin(Faults(stall_after=10))) as opened:
-        opened.read(10 * FRAME_LENGTH)
-        for _ in range(2):
-            with pytest.raises(SkinTimeout, match=r"no bytes for 10 ms"):
-                opened.source.read(0.01)
-
-
-@every_line
-def test_a_cut_frame_costs_that_frame_only(line):
-    skin = a_skin(Faults(cut_after=5, stall_after=50))
-    with line(skin) as opened:
-        decoder = Decoder()
-        numbers = [frame.sequence for frame in decoder.feed(opened.read(len(what_arrives(skin))))]
-    assert numbers == [n for n in range(50) if n != 5]
-    assert 0 < decoder.bytes_skipped < FRAME_LENGTH
-
-
-@every_line
-def test_unplugged_is_a_connection_error_not_an_end_of_bytes(line):
-    skin = a_skin(Faults(unplug_after=20))
-    with line(skin) as opened:
-        expected = what_arrives(skin)
-        received = opened.read_to_the_end(len(expected))
-        # a pseudo-terminal that is hung up, like a plug that is pulled, may take the last bytes with it
-        assert expected.startswith(received) if line is over_twin else received == expected
-        for _ in range(2):
-            with pytest.raises(SkinConnectionError, match="gone"):
-                opened.source.read(0.05)
-
-
-@every_line
-def test_closing_twice_is_fine_and_reading_then_is_not(line):
-    with line(a_skin(Faults(stall_after=20))) as opened:
+def test_its_errors_say_what_happened(line: OpenLineFactory) -> None:
+    sent = contract_bytes()[:720]
+    with line(sent) as opened:
+        assert opened.pull is not None
+        assert (opened.source.fileno() is None) == (line in (over_memory, over_loop, over_asked_group))
+        opened.read(len(sent))
+        with pytest.raises(SkinTimeout, match="no bytes for 10 ms"):
+            opened.source.read(0.01)
+        opened.pull()
+        with pytest.raises(SkinConnectionError, match="gone"):
+            opened.source.read(2.0)
         opened.source.close()
-        opened.source.close()
-        assert opened.source.fileno() is None
         with pytest.raises(SkinConnectionError, match="not open"):
             opened.source.read(0.0)
 
 
-@every_line
-def test_the_descriptor_becomes_readable_where_there_is_one(line):
-    import select
-
-    with line(a_skin(Faults(stall_after=20))) as opened:
-        descriptor = opened.source.fileno()
-        if descriptor is None:
-            assert line in (over_memory, over_loop)
-            return
-        assert select.select([descriptor], [], [], PATIENCE)[0] == [descriptor]
-
-
-@pytest.mark.parametrize("make", [lambda: SerialPort("/dev/there-is-none"), lambda: MemorySource(a_skin())])
+@pytest.mark.parametrize("make", [lambda: SerialPort("/dev/there-is-none"), lambda: MemorySource(SentSkin(b""))])
 def test_nothing_happens_before_open(make):
     source = make()
     source.close()
@@ -226,13 +197,13 @@ def test_nothing_happens_before_open(make):
 
 @posix
 def test_a_twin_that_is_closed_early_leaves_nothing():
-    from coneskin.skin.pseudo_terminal import PseudoTerminal
+    from coneskin.skin.virtual.pseudo_terminal import PseudoTerminal
 
-    twin = PseudoTerminal(a_skin(duration=60.0))
+    twin = PseudoTerminal(SentSkin(b""))
     twin.open()
     twin.open()
     twin.close()
     twin.close()
-    held = PseudoTerminal(a_skin(), hold=True)
+    held = PseudoTerminal(SentSkin(b""), hold=True)
     held.open()
     held.close()

@@ -6,25 +6,26 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from coneskin.build import build_core
-from coneskin.robot import rtde_codec as rtde
-from coneskin.robot.arm_reaction import Output
-from coneskin.robot.journal import GuardEvent, Kind
-from coneskin.robot.owner_messages import Note
-from coneskin.scene import Scene
-from coneskin.scene_reader import parse_scene
-from coneskin.skin.recording import Block, Recorder
-from coneskin.skin.scripted_touch import ScriptedTouch
-from coneskin.skin.virtual import VirtualSkin
+from coneskin.recording import Block
+from coneskin.recording_file.recorder import Recorder
+from coneskin.robot.driver.messages import StatusReport
+from coneskin.robot.guard.journal import BlockKind, GuardEvent
+from coneskin.robot.guard.outputs import Output
+from coneskin.robot.ur import rtde_codec as rtde
+from coneskin.scene.build import build_core
+from coneskin.scene.reader import parse_scene
+from coneskin.scene.scene import Scene
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "scene.md"
-SKIN_ONLY, SERIAL_RETREAT, DOUBLE_CONE = re.findall(
-    r"```toml\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL
+SKIN_ONLY, SERIAL_RETREAT, DOUBLE_CONE, TWO_PORTS = re.findall(
+    r"```toml.*?\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL
 )
 FULL = (
     DOUBLE_CONE
     + """
-[watch]
+[monitoring]
 settle_ms = 50
 
 [recording]
@@ -35,27 +36,31 @@ Q = (-0.7, -1.6, 1.6, -1.6, -1.6, 0.0)
 
 
 def arm_payload(time: float, speed: float = 0.0) -> bytes:
-    """What a controller sends while joint 1 turns at this speed [rad/s]."""
+    """Return what a controller sends while joint 1 turns at this speed [rad/s]."""
     names = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
     still = (0.0,) * 5
     return rtde.Recipe(names).pack([time, Q, (speed, *still), 7, 1, 2])
 
 
 def inputs(scene: Scene, touch: ScriptedTouch, end: float = 1.5) -> Iterator[Block]:
-    """Everything that goes into a guard in a run: skin, arm and owner; the arm stops 50 ms after the touch."""
+    """Return the inputs of a guard in a run: skin, arm and driver; the arm stops 50 ms after the touch."""
     assert scene.source is not None
-    skin = VirtualSkin([item.sensor for item in scene.sensors], [touch], rate_hz=scene.source.rate_hz, seed=7)
+    skin = VirtualSkin([item.sensor for item in scene.sensors], [touch], rate_hz=scene.source.settings["rate"], seed=7)
     start = 1000.0
-    yield Block(Kind.OWNER, start, Note("ready").encode())
-    due = 0.0
+    yield Block(BlockKind.DRIVER, start, StatusReport("ready").encode())
+    due = heard = 0.0
     for time, data in skin.packets():
         if time > end:
             return
+        if time >= heard:
+            heard += 0.02
+            yield Block(BlockKind.PROGRAM, start + time, b"")
+            yield Block(BlockKind.DRIVER, start + time, StatusReport("released", "1").encode())
         while scene.arm is not None and due <= time:
             since = max(0.0, due - touch.start - 0.005)
-            yield Block(Kind.ARM, start + due, arm_payload(due, max(0.0, 0.5 - 10.0 * since)))
+            yield Block(BlockKind.ARM, start + due, arm_payload(due, max(0.0, 0.5 - 10.0 * since)))
             due += 0.002
-        yield Block(Kind.SKIN, start + time, data)
+        yield Block(BlockKind.SKIN, start + time, data)
 
 
 def record(path: Path, text: str = FULL, touch: ScriptedTouch | None = None) -> list[GuardEvent]:
@@ -65,7 +70,7 @@ def record(path: Path, text: str = FULL, touch: ScriptedTouch | None = None) -> 
     core, events = build_core(scene), []
     header = {"scene": scene.text, "name": scene.name, "folder": str(path.parent), "clocks": {"monotonic": 1000.0}}
     with Recorder(path) as recorder:
-        recorder.write(Block(Kind.HEADER, 1000.0, json.dumps(header).encode()))
+        recorder.write(Block(BlockKind.HEADER, 1000.0, json.dumps(header).encode()))
         for block in inputs(scene, touch):
             outputs: list[Output] = []
             core.take(block, outputs)

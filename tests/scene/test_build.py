@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coneskin.build import build_core, place_on_arm
 from coneskin.errors import SceneError
-from coneskin.robot.arm_reaction import Phase
-from coneskin.scene_reader import parse_scene
+from coneskin.robot.guard.phase import Phase
+from coneskin.scene.build import build_core, place_on_arm
+from coneskin.scene.reader import parse_scene
 
 from .scenes import DOUBLE_CONE, SERIAL_RETREAT, SKIN_ONLY
 
@@ -90,8 +90,8 @@ def test_without_an_arm_the_frame_of_the_scene_is_kept() -> None:
 def test_the_core_knows_every_sensor() -> None:
     core = build_core(parse_scene(DOUBLE_CONE))
     assert core.phase is Phase.STARTING
-    wrong = core.unsound(0.0)
-    for name in ("towards the elbow", "towards the wrist", "ur_rtde is not ready", "the controller is silent"):
+    wrong = core.blockers(0.0)
+    for name in ("towards the elbow", "towards the wrist", "the arm's driver is not ready", "the controller is silent"):
         assert any(name in line for line in wrong)
 
 

@@ -9,32 +9,40 @@ from typing import Any
 
 import pytest
 
-from coneskin import link_tables, reaction_table, scene_reader, schema, sensor_table
-from coneskin.robot.commands import Reaction
-from coneskin.robot.watch import Watch
-from coneskin.scene_reader import parse_scene
-from coneskin.schema import Key
-from coneskin.skin.electronics import Electronics, Polarity, Thresholds
+from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.scene import body_table, link_tables, reaction_table, schema, sensor_table, source_table
+from coneskin.scene import reader as scene_reader
+from coneskin.scene.reader import parse_scene
+from coneskin.scene.schema import Key
+from coneskin.skin.electronics import Polarity, Thresholds
+from coneskin.skin.matched_electronics import match_electronics
 from coneskin.skin.sensor import Sensor
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"```toml\n(.*?)```", DOCUMENT, re.DOTALL)
+EXAMPLES = re.findall(r"```toml.*?\n(.*?)```", DOCUMENT, re.DOTALL)
 SECTIONS: dict[str, tuple[Key, ...]] = {
     "[arm]": scene_reader._ARM,
     "[[link]]": link_tables.LINK_KEYS,
-    "[[link.sensor]]": (Key("file", str, None), *sensor_table.SENSOR_KEYS),
-    "[source]": scene_reader._SOURCE,
+    "[[link.sensor]]": (Key("file", str, None), Key("calibration", str, None), *sensor_table.SENSOR_KEYS),
+    "[source]": source_table.source_keys(),
     "[[source.touch]]": scene_reader._TOUCH,
     "[reaction]": reaction_table.REACTION_KEYS,
     "[[reaction.rule]]": reaction_table.RULE_KEYS,
-    "[watch]": scene_reader._WATCH,
+    "[monitoring]": scene_reader._MONITORING,
     "[recording]": scene_reader._RECORDING,
     "[motion]": scene_reader._MOTION,
+    "[commissioning]": scene_reader._COMMISSIONING,
+    "[[body]]": body_table.BODY_KEYS,
+    "[padding]": body_table.PADDING_KEYS,
 }
 #: what the document says in words, because the code says None, nothing, or works it out
 IN_WORDS = {
+    ("[recording]", "max_mb"): "none",
+    ("[recording]", "keep"): "all",
     ("[arm]", "table_z_mm"): "none",
     ("[reaction]", "rule"): "none",
+    ("[commissioning]", "max_age_days"): "none",
     **{
         ("[[reaction.rule]]", key.name): "any" if number < 3 else "as above"
         for number, key in enumerate(reaction_table.RULE_KEYS)
@@ -43,7 +51,17 @@ IN_WORDS = {
     ("[[link]]", "mesh"): "none",
     ("[[link]]", "sensor"): "none",
     ("[[link.sensor]]", "file"): "none",
+    ("[[link.sensor]]", "calibration"): "none",
     ("[[link.sensor]]", "name"): "from its numbers",
+    **{
+        ("[[link.sensor]]", name): "matches the sheets"
+        for name in ("supply_v", "adc_bits", "pulldown_ohm", "current_full_scale_ma")
+    },
+    ("[[link.sensor]]", "map_along"): "none",
+    ("[[link.sensor]]", "map_around"): "none",
+    ("[[link.sensor]]", "map_note"): "none",
+    **{("[[link.sensor]]", name): "none" for name in ("touch_force_n", "forces_n", "force_levels")},
+    **{("[[body]]", name): "none" for name in ("direction", "mass_kg", "stiffness_n_per_mm", "force_n")},
     ("[source]", "port"): "- with serial",
     ("[source]", "touch"): "none",
     ("[[source.touch]]", "sensor"): "the first",
@@ -62,8 +80,8 @@ def rows(section: str) -> dict[str, list[str]]:
 
 
 def default_in_si(section: str, key: Key) -> Any:
-    """The default that counts: the key's own, or that of the value that the table is for."""
-    settings = {"[reaction]": Reaction, "[watch]": Watch}.get(section)
+    """Return the default that counts: the key's own, or that of the value that the table is for."""
+    settings = {"[reaction]": Reaction, "[monitoring]": MonitoringLimits}.get(section)
     if settings is not None and key.kind in (float, int):
         return next(field.default for field in fields(settings) if field.name == key.plain)
     return key.default
@@ -76,8 +94,12 @@ def default_text(section: str, key: Key) -> str:
     if value is ...:
         return "-"
     factor = schema._UNITS.get(key.suffix, (1.0, ""))[0]
+    if key.kind is list and key.one_for_all and len(set(value)) == 1:
+        return f"{value[0] / factor:g}"
     if key.kind is list:
         return "[" + ", ".join(f"{number / factor:g}" for number in value) + "]"
+    if key.kind is bool:
+        return str(value).lower()
     return f"{value / factor:g}" if key.kind is float else str(value)
 
 
@@ -89,7 +111,7 @@ def all_keys() -> Iterator[tuple[str, Key]]:
 
 def test_the_document_has_a_section_for_each_table() -> None:
     assert re.findall(r"^## `(.*)`$", DOCUMENT, re.MULTILINE) == list(SECTIONS)
-    assert {name.strip("[]").split(".")[0] for name in SECTIONS} == set(scene_reader._TOP)
+    assert {name.strip("[]").split(".")[0] for name in SECTIONS} == set(scene_reader.TABLES)
 
 
 @pytest.mark.parametrize("section", SECTIONS)
@@ -125,25 +147,23 @@ def test_the_defaults_of_a_sensor_are_those_of_its_parts() -> None:
     text = '[[link]]\nname = "a"\n[[link.sensor]]\nradius1_mm = 54\nradius2_mm = 54\nheight_mm = 434\n'
     (item,) = parse_scene(text).sensors
     assert item.sensor == Sensor(item.sensor.frustum)
-    assert (item.sensor.electronics, item.sensor.polarity, item.sensor.thresholds) == (
-        Electronics(),
-        Polarity(),
-        Thresholds(),
-    )
+    assert (item.sensor.polarity, item.sensor.thresholds) == (Polarity(), Thresholds())
+    assert item.sensor.electronics == match_electronics(item.sensor.radial_ohms, item.sensor.angular_ohms)
 
 
-def test_there_are_three_examples() -> None:
-    assert len(EXAMPLES) == 3
+def test_there_are_four_examples() -> None:
+    assert len(EXAMPLES) == 4
 
 
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("number", range(4))
 def test_the_examples_load(number: int) -> None:
     scene = parse_scene(EXAMPLES[number], f"example {number}")
-    assert [len(link.sensors) for link in scene.links] == [[1], [1], [2]][number]
+    assert [len(link.sensors) for link in scene.links] == [[1], [1], [2], [2]][number]
     assert [scene.arm.model if scene.arm else None, scene.reaction.kind if scene.reaction else None] == [
         [None, None],
         ["UR10e", "retreat"],
         ["UR5e", "stop"],
+        [None, None],
     ][number]
 
 

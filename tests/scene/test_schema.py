@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.schema import Key, check
+from coneskin.scene.schema import Key, check
 
 KEYS = (
     Key("length_mm", low=1.0, high=500.0),
@@ -135,7 +135,8 @@ anything = st.recursive(
 )
 
 
-@settings(deadline=None, derandomize=True, max_examples=300)
+@pytest.mark.long
+@settings(max_examples=300)
 @given(st.dictionaries(st.sampled_from([key.name for key in KEYS]) | st.text(), anything, max_size=8))
 def test_whatever_a_table_holds_mistakes_are_collected_not_raised(table: dict[str, Any]) -> None:
     problems: list[str] = []
@@ -153,7 +154,6 @@ def test_whatever_a_table_holds_mistakes_are_collected_not_raised(table: dict[st
             assert key.plain in values
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.floats(1.0, 500.0))
 def test_conversion_costs_no_more_than_one_rounding(value: float) -> None:
     (si,) = check({"length_mm": value}, KEYS[:1], "thing", []).values()

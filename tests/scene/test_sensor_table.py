@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.scene_reader import parse_scene
-from coneskin.sensor_table import build_sensor, with_file
-from coneskin.skin.electronics import Electronics, Polarity, Thresholds
+from coneskin.scene.reader import parse_scene
+from coneskin.scene.sensor_table import build_sensor, merge_sensor_file
+from coneskin.skin.electronics import Electronics, LeadOhms, Polarity, Thresholds
 
 SHAPE = {"radius1_mm": 40, "radius2_mm": 70, "height_mm": 150}
 
@@ -49,7 +49,7 @@ def test_every_key_reaches_its_place() -> None:
     assert sensor.frustum.wrap == math.radians(270)
     assert (sensor.sensor_id, sensor.device_id, sensor.name) == (4, 5, "six")
     assert sensor.polarity == Polarity("A", "D")
-    assert sensor.electronics == Electronics(3.0, 5.0, 16, 2000.0, 3e6, 2.0, 0.1)
+    assert sensor.electronics == Electronics(3.0, 5.0, 16, 2000.0, 3e6, LeadOhms.equal(2.0), 0.1)
     assert (sensor.upper_sheet_ohms, sensor.lower_sheet_ohms) == (700.0, 800.0)
     assert sensor.thresholds == Thresholds(0.2, 0.1, 0.3)
     # end 1 at (1, 2, 3) mm, x turned to y: phi = 0 of end 1 lies 40 mm along y
@@ -59,7 +59,7 @@ def test_every_key_reaches_its_place() -> None:
 def test_a_sensor_that_cannot_be_is_a_problem_not_an_exception() -> None:
     problems: list[str] = []
     assert build_sensor({**SHAPE, "height_mm": 0, "radius2_mm": 40}, "s", problems) is None
-    assert problems == ["s: height must be above 0 m where both radii are equal: the side has no length"]
+    assert problems == ["s: height must be above 0 where both radii are equal: the side has no length"]
 
 
 def test_a_height_in_metres_is_said_to_be_one() -> None:
@@ -73,18 +73,21 @@ def test_a_height_in_metres_is_said_to_be_one() -> None:
 def test_a_file_gives_keys_and_the_table_wins(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("radius1_mm = 1\nheight_mm = 2\n")
     problems: list[str] = []
-    assert with_file({"file": "a.toml", "height_mm": 3}, "s", tmp_path, problems) == {"radius1_mm": 1, "height_mm": 3}
-    assert with_file({"height_mm": 3}, "s", tmp_path, problems) == {"height_mm": 3}
+    assert merge_sensor_file({"file": "a.toml", "height_mm": 3}, "s", tmp_path, problems) == {
+        "radius1_mm": 1,
+        "height_mm": 3,
+    }
+    assert merge_sensor_file({"height_mm": 3}, "s", tmp_path, problems) == {"height_mm": 3}
     assert problems == []
-    assert with_file({"file": "b.toml"}, "s", tmp_path, problems) == {}
-    assert with_file({"file": ""}, "s", tmp_path, problems) == {}
+    assert merge_sensor_file({"file": "b.toml"}, "s", tmp_path, problems) == {}
+    assert merge_sensor_file({"file": ""}, "s", tmp_path, problems) == {}
     assert len(problems) == 2
 
 
 def test_unknown_keys_of_a_file_are_reported(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("radius_mm = 1\n")
     problems: list[str] = []
-    build_sensor(with_file({"file": "a.toml", **SHAPE}, "s", tmp_path, problems), "s", problems)
+    build_sensor(merge_sensor_file({"file": "a.toml", **SHAPE}, "s", tmp_path, problems), "s", problems)
     assert problems == ["s: unknown key radius_mm; did you mean radius2_mm?"]
 
 

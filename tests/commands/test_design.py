@@ -1,0 +1,416 @@
+"""``coneskin design``, end to end: a folder that is whole or absent, a sensor file that loads, clear refusals."""
+
+import csv
+import json
+import math
+import struct
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from coneskin.cli import main
+from coneskin.commands.design_arguments import EXAMPLES
+from coneskin.design import files as design_files
+from coneskin.scene.sensor_table import build_sensor, merge_sensor_file
+
+DATA = Path(__file__).parents[2].parent / "shared" / "data"
+CYLINDER = ["--radius1-mm", "54", "--height-mm", "200"]
+BALL = ["--radius1-mm", "40", "--radius2-mm", "70", "--height-mm", "150", "--radius3-mm", "40", "--height2-mm", "150"]
+LAYERS = (
+    "1-lower-substrate",
+    "2-lower-electrodes",
+    "3-lower-conductive",
+    "4-isolation",
+    "5-upper-conductive",
+    "6-upper-electrodes",
+    "7-upper-substrate",
+    "all",
+)
+
+
+def design(*words):
+    return main(["design", *words, "--no-pictures"])
+
+
+def sensor_of(folder):
+    problems = []
+    table = merge_sensor_file({"file": "sensor.toml"}, "sensor", folder, problems)
+    built = build_sensor(table, "sensor", problems)
+    assert problems == []
+    return built
+
+
+def test_a_cylinder_from_numbers_to_files(tmp_path, capsys):
+    out = tmp_path / "new" / "skin"
+    assert design(*CYLINDER, "-o", str(out)) == 0
+    assert sorted(path.name for path in (out / "cut").iterdir()) == sorted(
+        f"{layer}.{kind}" for layer in LAYERS for kind in ("dxf", "svg", "pdf")
+    )
+    assert sorted(path.name for path in out.iterdir()) == [
+        "cut",
+        "design.json",
+        "materials.csv",
+        "nested",
+        "report.md",
+        "sensor.toml",
+    ]
+    assert sorted(path.name for path in out.parent.iterdir()) == ["skin"], "nothing is left beside it"
+    text = capsys.readouterr()
+    assert "sheet 1: radius 54.000 to 54.000 mm" in text.out
+    assert "writing drawings" in text.err
+    rows = list(csv.DictReader((out / "materials.csv").read_text().splitlines()))
+    assert [row["layer"] for row in rows] == list(LAYERS[:-1])
+    around = 2 * math.pi * 55.25  # the middle of the lower foam lies 1.25 mm above the link
+    holes = 3 * math.pi * 1.25**2
+    assert float(rows[0]["area_cm2"]) == pytest.approx((around * 200 - holes) / 100, abs=1e-4)
+
+
+def test_sensor_file_loads_and_its_corners_are_the_inner_corners_of_the_electrodes(tmp_path):
+    """phi = 0, end 1 of the loaded frustum is where B meets D, at the height of the upper conductive layer."""
+    assert design(*BALL, "--wrap-deg", "300", "-o", str(tmp_path / "out")) == 0
+    data = json.loads((tmp_path / "out" / "design.json").read_text())
+    for index, sheet in enumerate(data["sheets"]):
+        sensor, placed = sensor_of(tmp_path / "out" / f"sheet-{index + 1}")
+        assert sensor.sensor_id == index
+        assert sensor.b_positive
+        assert sensor.c_positive
+        cone, patch = sheet["link_cone"], sheet["field_patch"]
+        half_angle = math.radians(cone["half_angle_deg"])
+        height = 3.45  # 2.5 + 0.1 + 0.8 mm and the middle of 0.1
+        for u_mm, u in ((patch["u1_mm"], 0.0), (patch["u2_mm"], placed.frustum.slant)):
+            for phi_deg, phi in ((patch["phi1_deg"], 0.0), (patch["phi2_deg"], placed.frustum.wrap)):
+                rho = cone["radius1_mm"] + u_mm * math.sin(half_angle) + height * math.cos(half_angle)
+                z = cone["xyz_mm"][2] + u_mm * math.cos(half_angle) - height * math.sin(half_angle)
+                turn = math.radians(phi_deg)
+                want = (rho * math.cos(turn), rho * math.sin(turn), z)
+                assert [1e3 * x for x in placed.point(u, phi)] == pytest.approx(want, abs=1e-3)  # json has 4 digits
+
+
+def test_two_sheets_of_a_rugby_ball_keep_the_gap_and_lead_their_wires_away(tmp_path, capsys):
+    assert design(*BALL, "--sheet-gap-mm", "2", "--json", "-o", str(tmp_path / "out")) == 0
+    data = json.loads(capsys.readouterr().out)
+    first, second = data["sheets"]
+    end = first["link_cone"]["xyz_mm"][2] + first["link_cone"]["height_mm"]
+    assert second["link_cone"]["xyz_mm"][2] - end == pytest.approx(2.0, abs=1e-3)
+    alpha = math.atan2(30, 150)  # outside the faces part by 2 t sin(alpha)
+    assert first["gap_to_next_mm"] == {"inner": 2.0, "outer": pytest.approx(2.0 + 12.0 * math.sin(alpha), abs=1e-3)}
+    report = (tmp_path / "out" / "report.md").read_text()
+    assert "All four wires leave at end1" in report
+    assert "All four wires leave at end2" in report
+
+
+def test_two_sheets_of_a_waist_are_trimmed_until_their_outer_faces_clear(tmp_path):
+    waist = [
+        "--radius1-mm",
+        "70",
+        "--radius2-mm",
+        "50",
+        "--height-mm",
+        "150",
+        "--radius3-mm",
+        "70",
+        "--height2-mm",
+        "150",
+    ]
+    assert design(*waist, "--sheet-gap-mm", "1", "-o", str(tmp_path / "out")) == 0
+    data = json.loads((tmp_path / "out" / "design.json").read_text())
+    assert data["sheets"][0]["gap_to_next_mm"]["outer"] == pytest.approx(1.0, abs=1e-3)
+    assert data["sheets"][0]["gap_to_next_mm"]["inner"] == pytest.approx(
+        1.0 + 12.0 * math.sin(math.atan2(20, 150)), abs=1e-3
+    )
+
+
+def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
+    assert design(*CYLINDER, "--seam-gap-mm", "1.5", "-o", str(tmp_path / "out")) == 0
+    cone = json.loads((tmp_path / "out" / "design.json").read_text())["sheets"][0]["link_cone"]
+    assert math.radians(360.0 - cone["wrap_deg"]) * 54.0 == pytest.approx(1.5, abs=1e-4)
+    assert cone["rpy_deg"][2] == pytest.approx((360.0 - cone["wrap_deg"]) / 2, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["--height-mm", "100"], "name a mesh file, or give --radius1-mm and --height-mm"),
+        ([*CYLINDER, "--wrap-deg", "361"], "--wrap-deg must be above 0 to 360 deg, got 361.0"),
+        ([*CYLINDER, "--wrap-deg", "nan"], "--wrap-deg must be above 0 to 360 deg, got nan"),
+        ([*CYLINDER, "--margin-mm", "150"], "the sheet measures 200 mm from end to end; margins of 150 mm"),
+        ([*CYLINDER, "--margin-mm", "94"], "of 94 mm and electrodes of 6 mm on both sides leave less than 1 mm active"),
+        ([*CYLINDER, "--radius1-mm", "-5"], "--radius1-mm must be 0 or from 1 to 5000 mm, got -5.0 mm"),
+        ([*CYLINDER, "--radius1-mm", "nan"], "--radius1-mm must be 0 or from 1 to 5000 mm, got nan mm"),
+        ([*CYLINDER, "--radius1-mm", "1e300"], "--radius1-mm must be 0 or from 1 to 5000 mm, got 1e+300 mm"),
+        ([*CYLINDER, "--radius1-mm", "0.054"], "got 0.054 mm: is that in metres? Then write 54"),
+        ([*CYLINDER, "--height-mm", "0.2"], "got 0.2 mm: is that in metres? Then write 200"),
+        ([*CYLINDER, "--radius2-mm", "0"], "sheet 1: a sheet cannot reach an apex"),
+        ([*CYLINDER, "--height-mm", "0"], "height must be above 0 where both radii are equal"),
+        ([*CYLINDER, "--radius3-mm", "30"], "a second cone needs both --radius3-mm and --height2-mm"),
+        ([*CYLINDER, "--thickness-mm", "1", "1", "0", "1", "1"], "thickness of isolation must be above 0 and at most"),
+        ([*CYLINDER, "--neutral", "0", "0", "2", "0", "0"], "neutral factor of isolation must be in [0, 1], got 2.0"),
+        ([*CYLINDER, "--kerf-mm", "-1"], "kerf must be finite and not negative, got -1 mm"),
+        ([*CYLINDER, "--kerf-mm", "20"], "is larger than a detail"),
+        ([*CYLINDER, "--seam-gap-mm", "-1"], "seam gap must be finite and not negative, got -1 mm; for a flap use"),
+        ([*CYLINDER, "--seam-gap-mm", "400"], "seam gap of 400 mm takes the whole narrow end, 339.3 mm"),
+        ([*CYLINDER, "--sheet-gap-mm", "inf"], "sheet gap must be finite and not negative, got inf mm"),
+        ([*BALL, "--sheet-gap-mm", "400"], "sheet 1: the gap to its neighbours takes"),
+        ([*CYLINDER, "--cut-tolerance-mm", "0"], "the tolerance of the cut must be from 0.0001 to 1 mm, got 0 mm"),
+        ([*CYLINDER, "--arcs", "flattened", "--cut-tolerance-mm", "1e-9"], "from 0.0001 to 1 mm, got 1e-09 mm"),
+        ([*CYLINDER, "--cut-tolerance-mm", "nan"], "from 0.0001 to 1 mm, got nan mm"),
+        ([*CYLINDER, "--overlap-mm", "400"], "an overlap must be at most 25% of the narrow end, 84.82 mm, got 400 mm"),
+        ([*CYLINDER, "--wrap-deg", "300", "--overlap-mm", "5"], "an overlap closes the seam of a full wrap"),
+        ([*CYLINDER, "--thickness-mm", "100", "1", "1", "1", "1"], "lower substrate must be above 0 and at most 20 mm"),
+        ([*CYLINDER, "--radius1-mm", "10", "--thickness-mm", "20", "1", "1", "1", "1"], "is strained by -50% at the"),
+        ([*CYLINDER, "--adc-bits", "0"], "sheet 1: adc_bits must be a whole number from 8 to 16, got 0"),
+        ([*CYLINDER, "--adc-bits", "20"], "sheet 1: adc_bits must be a whole number from 8 to 16, got 20"),
+        (
+            [*CYLINDER, "--upper-sheet-ohm", "1", "--current-full-scale-ma", "20"],
+            "current_full_scale_ma must suit the normal drive current",
+        ),
+        ([*CYLINDER, "--supply-v", "3.3"], "supply_v must be at most 95 % of adc_v"),
+        ([*CYLINDER, "--overlap-mm", "5", "--wires", "edge1"], "an overlap at edge1 would cover the tabs"),
+        (["nowhere.stl"], "nowhere.stl"),
+        ([*CYLINDER, "--tab-mm", "nan"], "tab must be finite and not negative mm, got nan mm"),
+        (["nowhere.stl", "--radius1-mm", "5"], "a mesh and --radius1-mm cannot go together"),
+    ],
+)
+def test_a_mistake_is_one_clear_line_and_leaves_nothing(words, line, tmp_path, capsys):
+    assert design(*words, "-o", str(tmp_path / "out")) == 1
+    errors = [row for row in capsys.readouterr().err.splitlines() if row.startswith("coneskin design:")]
+    assert len(errors) == 1
+    assert line in errors[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failure_halfway_leaves_nothing(tmp_path, monkeypatch, capsys):
+    """Power, disk, a bug: after the first files are written."""
+    written = []
+
+    def breaks(sheets, *_):
+        written.append(len(list(tmp_path.rglob("*.dxf"))))
+        if len(written) == 3:
+            raise OSError(28, "No space left on device")
+        return "drawing"
+
+    monkeypatch.setattr(design_files, "to_dxf", breaks)
+    assert design(*CYLINDER, "-o", str(tmp_path / "out")) == 1
+    assert "coneskin design: No space left on device" in capsys.readouterr().err
+    assert written == [0, 1, 2], "files were there when it failed"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_is_replaced_only_by_force_and_only_if_it_is_a_design(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert design(*CYLINDER, "-o", str(out)) == 0
+    before = (out / "sensor.toml").read_text()
+    assert design(*CYLINDER, "--margin-mm", "8", "-o", str(out)) == 1
+    assert "exists already: choose another folder, or replace the design there (--force" in capsys.readouterr().err
+    assert (out / "sensor.toml").read_text() == before
+    (out / "old.txt").write_text("old")
+    assert design(*CYLINDER, "--margin-mm", "8", "--force", "-o", str(out)) == 0
+    assert (out / "sensor.toml").read_text() != before
+    assert (out / "old.txt").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    precious = tmp_path / "precious"
+    precious.mkdir()
+    (precious / "thesis.tex").write_text("years of work")
+    assert design(*CYLINDER, "--force", "-o", str(precious)) == 1
+    assert "is not a design (no design.json in it), so it is not replaced" in capsys.readouterr().err
+    assert (precious / "thesis.tex").read_text() == "years of work"
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert design(*CYLINDER, "-o", str(empty)) == 0
+
+
+def test_a_folder_that_is_there_is_refused_before_any_work(tmp_path, monkeypatch, capsys):
+    """Reading and fitting a mesh takes seconds; the folder is known before."""
+    (tmp_path / "thesis.tex").write_text("years of work")
+    assert design("nowhere.stl", "-o", str(tmp_path)) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "exists already" in line
+    assert design("nowhere.stl", "--force", "-o", str(tmp_path)) == 1
+    assert "is not a design" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("height", ["60", "40", "4000"])
+def test_no_geometry_is_refused_for_its_electronics(height, tmp_path):
+    words = ["--radius1-mm", "54", "--height-mm", height, "--no-pictures", "-o", str(tmp_path / "out")]
+    assert design(*words) == 0
+    sensor, _ = sensor_of(tmp_path / "out")
+    report = (tmp_path / "out" / "report.md").read_text()
+    assert f"| full scale of the current | {1e3 * sensor.electronics.current_full_scale:.3f} mA |" in report
+    assert f"| pull-downs of C and D | {sensor.electronics.pulldown_ohms / 1e3:g} kohm |" in report
+
+
+def test_missing_packages_are_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
+    assert design(*CYLINDER, "-o", str(tmp_path / "out")) == 1
+    assert "writing DXF files needs the package ezdxf: pip install 'coneskin[design]'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_numbers_of_the_report_are_those_of_the_drawings(tmp_path):
+    words = [*CYLINDER, "--assembly", "bonded", "--adc-bits", "10", "--supply-v", "3.0", "--material", *"abcde"]
+    words += ["--upper-sheet-ohm", "500", "--lower-sheet-ohm", "2000", "--current-full-scale-ma", "30"]
+    assert design(*words, "-o", str(tmp_path / "out")) == 0
+    report = (tmp_path / "out" / "report.md").read_text()
+    assert "Assembly: bonded" in report
+    assert "rectangle 358.142 x 200.000 mm" in report  # 2 pi (54 + 3)
+    assert "One count of 10 bits over 3.3 V at a supply of 3 V" in report
+    assert "| full scale of the current | 30.000 mA |" in report
+    assert "| sheet 1 | 4-isolation | c 0.80 mm |" in report
+    sensor, _ = sensor_of(tmp_path / "out")
+    assert (sensor.upper_sheet_ohms, sensor.lower_sheet_ohms) == (500.0, 2000.0)
+    assert sensor.electronics.current_full_scale == pytest.approx(0.03)
+    assert sensor.electronics.adc_bits == 10
+    assert sensor.electronics.supply_volts == 3.0
+
+
+def test_sensor_file_holds_every_digit_of_the_shape_and_a_pose_to_read(tmp_path):
+    assert design(*CYLINDER, "-o", str(tmp_path / "out")) == 0
+    table = tomllib.loads((tmp_path / "out" / "sensor.toml").read_text())
+    assert table["radius1_mm"] == table["radius2_mm"] == pytest.approx(54 + 3.45, rel=1e-14)
+    assert table["height_mm"] == pytest.approx(200 - 24, rel=1e-13)
+    assert table["wrap_deg"] == pytest.approx(360 - 2 * math.degrees(12 / 54), rel=1e-13)
+    assert table["xyz_mm"] == [0.0, 0.0, 12.0]
+    assert table["rpy_deg"] == [0.0, 0.0, round(math.degrees(12 / 54), 4)]
+
+
+def stl(path, triangles):
+    body = b"".join(struct.pack("<12fH", 0, 0, 0, *(x for p in t for x in p), 0) for t in triangles)
+    path.write_bytes(bytes(80) + struct.pack("<I", len(triangles)) + body)
+
+
+def tube(radius1, radius2, height, sides=96):
+    """Open tube about the y axis, off the origin, in metres."""
+    ring = [(math.cos(2 * math.pi * i / sides), math.sin(2 * math.pi * i / sides)) for i in range(sides + 1)]
+    low = [(0.3 + radius1 * c, -0.1, 0.05 - radius1 * s) for c, s in ring]
+    high = [(0.3 + radius2 * c, -0.1 + height, 0.05 - radius2 * s) for c, s in ring]
+    for i in range(sides):
+        yield low[i], low[i + 1], high[i + 1]
+        yield low[i], high[i + 1], high[i]
+
+
+def test_a_mesh_from_file_to_sensor_in_the_meshs_frame(tmp_path):
+    stl(tmp_path / "cone.stl", list(tube(0.040, 0.050, 0.160)))
+    assert design(str(tmp_path / "cone.stl"), "-o", str(tmp_path / "out")) == 0
+    _, placed = sensor_of(tmp_path / "out")
+    table = tomllib.loads((tmp_path / "out" / "sensor.toml").read_text())
+    assert all(value == round(value, 4) for value in (*table["xyz_mm"], *table["rpy_deg"]))  # a fit has more digits
+    for u in (0.0, placed.frustum.slant):
+        for phi in (0.0, 1.0, 4.0):
+            x, y, z = placed.point(u, phi)
+            # on the upper conductive layer, 3.45 mm along the normal of the cone about the axis x = 0.3, z = 0.05
+            slope = 0.010 / 0.160
+            off = (math.hypot(x - 0.3, z - 0.05) - 0.040 - slope * (y + 0.1)) / math.hypot(1.0, slope)
+            assert off == pytest.approx(3.45e-3, abs=0.1e-3)  # 96 flats of a 50 mm tube lie 0.03 mm inside
+    data = json.loads((tmp_path / "out" / "design.json").read_text())
+    assert data["frame"] == "the mesh's coordinates in cone.stl"
+    assert data["sheets"][0]["fit"]["max_deviation_mm"] < 0.2
+    assert "pictures" not in (tmp_path / "out" / "report.md").read_text()
+
+
+def test_a_link_of_a_urdf(tmp_path, capsys):
+    stl(tmp_path / "cone.stl", list(tube(40.0e-3, 50.0e-3, 160.0e-3)))
+    mesh = '<geometry><mesh filename="cone.stl" scale="2 2 2"/></geometry><origin xyz="0 0 1"/>'
+    (tmp_path / "arm.urdf").write_text(f'<robot name="r"><link name="arm"><visual>{mesh}</visual></link></robot>')
+    assert design(f"{tmp_path / 'arm.urdf'}#arm", "-o", str(tmp_path / "out")) == 0
+    data = json.loads((tmp_path / "out" / "design.json").read_text())
+    cone = data["sheets"][0]["link_cone"]
+    assert sorted([cone["radius1_mm"], cone["radius2_mm"]]) == pytest.approx([80.0, 100.0], abs=0.5)
+    assert cone["xyz_mm"][0] == pytest.approx(600.0, abs=0.2)
+    assert cone["xyz_mm"][2] == pytest.approx(1100.0, abs=0.2)
+    assert data["frame"] == "the URDF link arm"
+    capsys.readouterr()
+    assert design(str(tmp_path / "arm.urdf"), "-o", str(tmp_path / "none")) == 1
+    assert "name a link as arm.urdf#LINK; its links are: arm" in capsys.readouterr().err
+    assert design(f"{tmp_path / 'arm.urdf'}#leg", "-o", str(tmp_path / "none")) == 1
+    assert "no link 'leg'; there are: arm" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_the_seam_looks_where_it_is_asked_to(tmp_path):
+    stl(tmp_path / "cone.stl", list(tube(0.040, 0.050, 0.160)))
+    for name, seam in (("x", (1, 0, 0)), ("z", (0, 0, 1)), ("oblique", (-1, 5, 1))):
+        words = [str(tmp_path / "cone.stl"), "--seam", *map(str, seam), "-o", str(tmp_path / name)]
+        assert design(*words) == 0
+        _, placed = sensor_of(tmp_path / name)
+        middle = placed.point(0.05, 0.5 * placed.frustum.wrap)  # opposite to the seam
+        want = math.atan2(-seam[2], -seam[0])
+        turn = math.atan2(middle[2] - 0.05, middle[0] - 0.3) - want
+        assert math.remainder(turn, 2.0 * math.pi) == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_cube_has_no_sheet_and_says_so(tmp_path, capsys):
+    corners = [(x, y, z) for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)]
+    faces = [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 7, 5),
+        (4, 6, 7),
+        (0, 5, 1),
+        (0, 4, 5),
+        (2, 3, 7),
+        (2, 7, 6),
+        (0, 2, 6),
+        (0, 6, 4),
+    ]
+    faces += [(1, 5, 7), (1, 7, 3)]
+    stl(tmp_path / "cube.stl", [[corners[i] for i in face] for face in faces])
+    assert design(str(tmp_path / "cube.stl"), "-o", str(tmp_path / "out")) == 3
+    assert "cube.stl" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not DATA.exists(), reason="the shared link meshes are not beside the repository")
+def test_a_real_link_with_pictures(tmp_path):
+    mesh = DATA / "xarm" / "uf850_link4.stl"
+    assert main(["design", str(mesh), "-o", str(tmp_path / "out"), "--max-sheets", "1"]) == 0
+    pictures = sorted(path.name for path in (tmp_path / "out" / "pictures").iterdir())
+    kinds = ("deviation", "layout", "parts", "seam", "stack")
+    assert pictures == ["link.png", *(f"sheet-1-{kind}.png" for kind in kinds)]
+    report = (tmp_path / "out" / "report.md").read_text()
+    for name in pictures:
+        assert f"(pictures/{name})" in report
+        assert (tmp_path / "out" / "pictures" / name).read_bytes().startswith(b"\x89PNG")
+    cone = json.loads((tmp_path / "out" / "design.json").read_text())["sheets"][0]["link_cone"]
+    assert abs(cone["half_angle_deg"]) == pytest.approx(0.65, abs=0.1)  # geometry study: 0.65 deg
+    assert sorted([cone["radius1_mm"], cone["radius2_mm"]]) == pytest.approx([43.9, 45.0], abs=0.2)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--radius1-mm", "60", "--radius2-mm", "160", "--height-mm", "0", "--current-full-scale-ma", "50"],
+        ["--radius1-mm", "50", "--radius2-mm", "150", "--height-mm", "85", "--wires", "end2"],
+        [*BALL, "--wrap-deg", "200", "--wires", "edge1"],
+    ],
+)
+def test_pictures_of_discs_wide_sectors_and_partial_wraps(words, tmp_path):
+    assert main(["design", *words, "-o", str(tmp_path / "out")]) == 0
+    for path in (tmp_path / "out" / "pictures").iterdir():
+        assert path.stat().st_size > 10_000
+    assert (tmp_path / "out" / "pictures" / "link.png").is_file()
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not DATA.exists(), reason="the shared link meshes are not beside the repository")
+def test_a_hull_is_refused_with_the_reason_and_the_nearest_thing(tmp_path, capsys):
+    assert design(str(DATA / "ur" / "ur5e" / "collision" / "forearm.stl"), "-o", str(tmp_path / "out")) == 3
+    errors = capsys.readouterr().err
+    assert "convex hull" in errors
+    assert "there is one: radius" in errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_shows_examples_that_run(tmp_path, monkeypatch):
+    """Every example of --help that needs no mesh."""
+    monkeypatch.chdir(tmp_path)
+    lines = [row.strip().split("    ")[0] for row in EXAMPLES.splitlines() if "--radius1-mm" in row]
+    assert len(lines) == 3
+    for i, row in enumerate(lines):
+        words = row.split()[2:]
+        words[words.index("skin")] = f"skin{i}"
+        assert design(*words) == 0
+        assert (tmp_path / f"skin{i}" / "report.md").is_file()

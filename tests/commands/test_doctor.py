@@ -1,0 +1,80 @@
+"""``coneskin doctor``: from a design to a guarded arm without editing a file; exit codes, JSON, a patched scene."""
+
+import io
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from coneskin.cli import main
+from coneskin.doctor.doctor import Doctor
+from coneskin.doctor.wire_examination import WirePatch
+from coneskin.finding import Finding
+from coneskin.robot.sim.process import free_host
+from coneskin.scene.reader import load_scene
+from coneskin.testing.forearm import forearm_scene
+
+Output = pytest.CaptureFixture[str]
+MESH = Path(os.environ.get("CONESKIN_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "ur/ur5e/visual"
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not MESH.is_dir(), reason=f"there are no meshes in {MESH}")
+def test_from_a_mesh_to_a_guarded_arm_in_five_commands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+) -> None:
+    """Each command but the first is the one that the one before has named."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "stdin", io.StringIO())  # the guard listens to a person
+    began, host = time.monotonic(), free_host()
+    assert main(["design", str(MESH / "forearm.dae"), "-o", "skin", "--no-pictures"]) == 0
+    said = [capsys.readouterr().out.splitlines()[-1]]
+    for words in (
+        ["init", "skin", "--simulated", "--host", host],
+        ["doctor", "scene.toml", "--simulated"],
+        ["guard", "scene.toml", "--simulated", "--once"],
+    ):
+        assert main(words) == (3 if words[0] == "guard" else 0)
+        said.append(capsys.readouterr().out.splitlines()[-1])
+    assert said[0].startswith("next: coneskin init skin --simulated")
+    assert said[1:3] == ["next: coneskin doctor scene.toml --simulated", "next: coneskin guard scene.toml --simulated"]
+    assert time.monotonic() - began < 300.0, "under five minutes, as the issue wants it"
+
+
+@pytest.mark.parametrize(("words", "typed", "changed"), [(["--yes"], "", True), ([], "y\n", True), ([], "\n", False)])
+def test_a_scene_is_changed_where_a_person_agrees(
+    words: list[str], typed: str, changed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+) -> None:
+    def examine(doctor: Doctor) -> None:
+        doctor.findings.append(Finding("wires", "bad", "mirrored"))
+        doctor.patches.append(WirePatch("sensor 0/0", {"radial_positive": "A"}))
+
+    monkeypatch.setattr(Doctor, "examine", examine)
+    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
+    path = tmp_path / "scene.toml"
+    path.write_text(forearm_scene())
+    assert main(["doctor", str(path), *words]) == 1
+    assert '+radial_positive = "A"' in capsys.readouterr().err
+    assert load_scene(path).sensors[0].sensor.polarity.radial == ("A" if changed else "B")
+
+
+def test_a_scene_with_nothing_to_examine_is_bad(tmp_path: Path, capsys: Output) -> None:
+    (tmp_path / "scene.toml").write_text("")
+    assert main(["doctor", str(tmp_path / "scene.toml")]) == 1
+    out = capsys.readouterr().out
+    assert "bad  scene: a guard needs a [source]" in out
+    assert "bad  scene: a guard needs a [[link]]" in out
+
+
+def test_a_port_that_is_not_there_is_one_bad_finding(tmp_path: Path, capsys: Output) -> None:
+    path = tmp_path / "scene.toml"
+    text = forearm_scene(port="/dev/nothing-there")
+    path.write_text(text[text.index("[[link]]") : text.index("[reaction]")])
+    assert main(["doctor", str(path)]) == 1
+    out = capsys.readouterr().out
+    assert "bad  skin, permission: there is no /dev/nothing-there; present: " in out
+    assert "not tried  skin, wires: no port" in out
+    assert "not tried  arm: the scene has no [arm]" in out
+    assert out.splitlines()[-1].startswith("next: mend what is bad, then coneskin doctor")

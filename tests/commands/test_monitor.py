@@ -1,0 +1,107 @@
+"""The command on files and on a pseudo-terminal that a C program plays into."""
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from coneskin.cli import main
+from coneskin.errors import SkinTimeout
+from coneskin.monitor.line_monitor import LineMonitor
+from coneskin.skin.sources.serial_port import SerialPort
+
+from ..scene.scenes import SKIN_ONLY, record
+from ..skin.diagnosis.corpus import BAUD, MISTAKES, NOT_TO_BE_NAMED, WITH_A_SCENE, build, bytes_of
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
+HEARING = 2.0  # s until the first line must name the mistake
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("mistakes"))
+
+
+def test_a_file_of_bytes_is_diagnosed(program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "bytes.bin"
+    path.write_bytes(b"".join(data for _, data in bytes_of(program, "crc low byte first", 0.3)))
+    assert main(["monitor", str(path)]) == 1
+    assert capsys.readouterr().out.startswith("the checksum is another CRC: its low byte goes first: append")
+
+
+def test_bytes_of_a_file_have_no_rate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, data, said in (
+        ("same.bin", b"x" * 3000, "nothing but the byte 0x78 comes, 3000 times: "),
+        ("other.bin", bytes(n * n % 251 for n in range(3000)), "3000 bytes come, but no frame: "),
+    ):
+        (tmp_path / name).write_bytes(data)
+        assert main(["monitor", str(tmp_path / name)]) == 1
+        assert capsys.readouterr().out.startswith(said)
+
+
+def test_a_recording_is_diagnosed_with_the_times_that_it_has(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run.rec"
+    record(path)
+    assert main(["monitor", str(path), "--json"]) in (0, 1)
+    heard = capsys.readouterr().out
+    assert main(["monitor", str(tmp_path), "--json"]) in (0, 1)
+    assert capsys.readouterr().out == heard  # the folder of a run is as good
+    last = json.loads(heard.splitlines()[-1])
+    assert last["sensors"][0]["clock_ratio"] == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_scene_is_heard_beside_what_it_expects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SKIN_ONLY)
+    main(["monitor", str(path), "--duration-s", "0.2", "--json"])
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last["sensors"][0]["expected"]["touch_supply"] > 0
+
+
+@posix
+@pytest.mark.long
+@pytest.mark.processes
+def test_every_mistake_is_named_within_two_seconds_on_a_port(program: Path) -> None:
+    """The corpus in three parts, each mistake on a pseudo-terminal of its own, in real time.
+
+    A computer that is busy with something else holds bytes back, which is then what is named: those are heard again.
+    """
+    names = [name for name in (*MISTAKES, *NOT_TO_BE_NAMED) if name not in WITH_A_SCENE]
+    wrong: dict[str, str] = {}
+
+    def hear(name: str) -> None:
+        sender = subprocess.Popen([program, name, "20", "--port"], stdout=subprocess.PIPE, text=True)
+        assert sender.stdout is not None
+        try:
+            with SerialPort(sender.stdout.readline().strip(), BAUD) as port:
+                monitor = LineMonitor(start := time.monotonic(), (), BAUD)
+                while (left := start + HEARING - time.monotonic()) > 0.0:
+                    try:
+                        monitor.feed(port.read(left), time.monotonic())
+                    except SkinTimeout:
+                        break
+                named = monitor.report(time.monotonic()).diagnosis
+        finally:
+            sender.kill()
+            sender.communicate()
+        if named.cause is not {**MISTAKES, **NOT_TO_BE_NAMED}[name]:
+            wrong[name] = named.line
+
+    for at in range(0, len(names), 32):
+        threads = [threading.Thread(target=hear, args=(name,)) for name in names[at : at + 32]]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    again = list(wrong)
+    assert len(again) <= 8, wrong
+    wrong.clear()
+    for name in again:
+        hear(name)
+    assert wrong == {}

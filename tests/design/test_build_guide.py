@@ -1,0 +1,164 @@
+"""Build guide: each sheet has its own steps, and its figures are those of the drawings and of the sensor."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from coneskin.design.bill_of_materials import bill_of_materials
+from coneskin.design.build_figures import BuildFigures, measure_build
+from coneskin.design.build_guide import guide_lines
+from coneskin.design.placement import find_placement
+from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.wiring import LOOP, cable_exit
+from coneskin.errors import GeometryError
+from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
+from coneskin.geometry.drawing.surface_shape import SheetSide
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
+from coneskin.geometry.pose import Pose
+from coneskin.skin.sensor import sheet_resistances
+
+CONE = Frustum(0.045, 0.060, 0.15)
+SIDES: tuple[SheetSide, ...] = ("end1", "end2", "edge0", "edge1")
+
+
+def built(frustum: Frustum, **options: object) -> tuple[SheetDesign, BuildFigures]:
+    (design,) = design_sheets([PlacedFrustum(frustum)], DesignOptions(**options))  # type: ignore[arg-type]
+    return design, measure_build(design, 0)
+
+
+def guide(design: SheetDesign, figures: BuildFigures, folder: str = ".") -> str:
+    return "\n".join(guide_lines(design, figures, folder))
+
+
+def test_every_sheet_is_built_by_steps_of_its_own() -> None:
+    """The wires of the second sheet leave at the other end, and its tabs are folded there."""
+    designs = design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15))
+    for number, (design, end) in enumerate(zip(designs, (1, 2), strict=True), 1):
+        text = guide(design, measure_build(design, number - 1), f"sheet-{number}")
+        assert f"## Building sheet {number}\n" in text
+        assert f"Fold the tabs over end {end} outwards" in text
+        assert f"The tabs stand out over end {end}" in text
+        assert f"`sheet-{number}/cut/`" in text
+        steps = [int(word) for word in re.findall(r"^(\d+)\. ", text, re.MULTILINE)]
+        assert steps == list(range(1, len(steps) + 1))
+
+
+@pytest.mark.parametrize("assembly", ["loose", "pairs", "bonded"])
+@pytest.mark.parametrize("side", SIDES)
+def test_every_part_has_its_step_and_its_face(assembly: str, side: SheetSide) -> None:
+    from dataclasses import replace
+
+    from coneskin.geometry.drawing.layer_stack import PAPER_STACK
+
+    stack = replace(PAPER_STACK, assembly=assembly)  # type: ignore[arg-type]
+    design, figures = built(Frustum(0.054, 0.054, 0.2), stack=stack, wires=side)
+    text = guide(design, figures)
+    steps = text.split("### Place")[0]
+    for part in (1, 3, 4, 5, 7):
+        assert re.search(rf"\b[Pp]arts? {part}\b|\b1 and 3\b|\b5 and 7\b", steps)
+    assert f"part 3 on the bench, {design.cuts[2].face} up" in steps
+    assert ("lead them out between the edges" in steps) == side.startswith("edge")
+
+
+@pytest.mark.parametrize("side", ["end1", "end2"])
+def test_a_sheet_reads_what_its_conductive_layers_measure_between_their_electrodes(side: SheetSide) -> None:
+    """Summed over thin rings, resp. wires: the sheets reach beyond the electrodes of the other one."""
+    design, figures = built(CONE, wires=side, upper_sheet_ohms=500.0, lower_sheet_ohms=2000.0)
+    radial, angular = figures.pairs
+    field, plan = design.layout.field, design.layout.plan
+    sine = math.sin(math.atan2(0.015, 0.15))
+    cosine = math.cos(math.atan2(0.015, 0.15))
+    u = np.linspace(field.u1, field.u2, 20001)
+    radius = 0.045 + 3.45e-3 * cosine + u * sine
+    spread = 2 * math.pi - (plan.setback + 2 * (plan.lead + plan.clearance) + 0.0) / 0.045 - plan.setback / 0.045
+    assert radial.ohms == pytest.approx(500 * np.trapezoid(1 / radius, u) / spread, rel=0.03)  # lead beside the wedge
+    u = np.linspace(plan.setback, CONE.slant - plan.setback, 20001)
+    radius = 0.045 + 2.55e-3 * cosine + u * sine
+    assert angular.ohms == pytest.approx(2000 * (field.phi2 - field.phi1) / np.trapezoid(1 / radius, u), rel=1e-6)
+    for pair, nominal in ((radial, 500.0), (angular, 2000.0)):
+        assert 0.7 < pair.ohms / (pair.squares * nominal) < 1.0
+    fitted = sheet_resistances(design.active.frustum, radial.ohms / radial.squares, angular.ohms / angular.squares)
+    assert fitted == pytest.approx((radial.ohms, angular.ohms))
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("tab", [0.0, 0.012])
+def test_wires_reach_one_connector_by_the_shorter_way(side: SheetSide, tab: float) -> None:
+    layout = lay_out_sheet(Frustum(0.054, 0.054, 0.2), ElectrodePlan(wires=side, tab=tab))
+    cable = cable_exit(layout, 0.06)
+    assert [wire.electrode for wire in cable.wires] == ["A", "B", "C", "D"]
+    assert [wire.pin for wire in cable.wires] == [1, 2, 3, 4]
+    for wire in cable.wires:
+        if side.startswith("end"):
+            across = abs(math.remainder(wire.phi - cable.phi, 2 * math.pi)) * 0.054
+            assert across < 0.03, "the tabs are beside each other, some across the seam"
+        else:
+            across = abs(wire.u - cable.u)
+        assert 0.0 < wire.length - (across + 0.06 + LOOP) < 0.02
+    with pytest.raises(GeometryError, match="the connector must be 30 to 2000 mm from the rim, got 1 mm"):
+        cable_exit(layout, 1e-3)
+
+
+def bumped(azimuth: float | None) -> Mesh:
+    """A tube of 50 mm about z from -0.03 to 0.25, with a cone that stands out at an azimuth and z = 0.24."""
+    phi = np.linspace(0, 2 * math.pi, 73)[:-1]
+    ring = np.stack([0.05 * np.cos(phi), 0.05 * np.sin(phi)], axis=1)
+    low, high = (np.column_stack([ring, np.full(72, z)]) for z in (-0.03, 0.25))
+    faces = [f for i in range(72) for f in ((i, (i + 1) % 72, 72 + i), ((i + 1) % 72, 72 + (i + 1) % 72, 72 + i))]
+    corners = [*low, *high]
+    if azimuth is not None:
+        corners.append(np.array([0.08 * math.cos(azimuth), 0.08 * math.sin(azimuth), 0.24]))
+        faces.append((72, 73, 144))
+    return Mesh(np.array(corners), np.array(faces))
+
+
+@pytest.mark.parametrize("azimuth", [0.3, 3.0, 6.0])
+def test_a_sheet_is_placed_from_what_the_link_shows(azimuth: float) -> None:
+    pose = Pose.from_xyz_rpy((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
+    place = find_placement(PlacedFrustum(Frustum(0.05, 0.05, 0.2), pose), bumped(azimuth).moved(pose))
+    assert place.before == pytest.approx(0.03)
+    assert place.beyond == pytest.approx(0.05)
+    assert place.around1 == pytest.approx(2 * math.pi * 0.05)
+    assert place.seam == pytest.approx(pose.rotate((1.0, 0.0, 0.0)))
+    assert place.feature is not None
+    assert place.feature.azimuth == pytest.approx(azimuth)
+    assert place.feature.arc == pytest.approx(azimuth * 0.05)
+    assert place.feature.end == 2
+
+
+def test_a_round_link_has_nothing_to_measure_the_seam_from() -> None:
+    place = find_placement(PlacedFrustum(Frustum(0.05, 0.05, 0.2)), bumped(None))
+    assert place.feature is None
+    assert place.before == pytest.approx(0.03)
+    collar = bumped(None)
+    wide = collar.vertices * np.where(collar.vertices[:, 2:] > 0.2, (1.5, 1.5, 1.0), (1.0, 1.0, 1.0))
+    assert find_placement(PlacedFrustum(Frustum(0.05, 0.05, 0.2)), Mesh(wide, collar.faces)).feature is None
+
+
+def test_coordinates_of_the_file_are_those_of_the_drawing() -> None:
+    design, figures = built(CONE, link="forearm")
+    data = figures.as_data(design)
+    assert len(data["holes"]) == 3
+    surface = design.cuts[5].surface
+    for corner in data["electrodes"]["A"]:
+        x, y = surface.flat_point(1e-3 * corner["u_mm"], math.radians(corner["phi_deg"]) - 0.5 * surface.wrap)
+        assert (corner["x_mm"], corner["y_mm"]) == pytest.approx((1e3 * x, 1e3 * y), abs=2e-3)
+    assert any("tab_width_mm" in corner for corner in data["electrodes"]["C"])
+    assert data["untouched_frame"]["radial_current"] > 100
+    for cut in design.cuts:
+        texts = [label.text for part in cut.parts for label in part.labels]
+        assert any("forearm: sheet 1" in text for text in texts), f"the link is named on part {cut.number}"
+
+
+def test_the_bill_counts_every_sheet() -> None:
+    designs = design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15))
+    figures = [measure_build(design, index) for index, design in enumerate(designs)]
+    bill = {item.item: item.quantity for item in bill_of_materials(designs, figures)}
+    assert bill["4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts"] == "2"
+    assert bill["plastic pin with flat head, 2.4 x 8 mm"] == "6"
+    net = sum(part.area for design in designs for k in (0, 6) for part in design.cuts[k].parts)
+    assert bill["silicone foam sheet 2.50 mm"].startswith(f"{1e4 * net:.0f} cm2 net")

@@ -1,0 +1,65 @@
+"""One call from a mesh, or from dimensions, to the sheets and to the folder for the workshop."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import coneskin as cs
+from coneskin.geometry.mesh import Mesh
+
+
+def tube() -> Mesh:
+    phi = np.linspace(0, 2 * np.pi, 97)[:-1]
+    ring = np.stack([0.05 * np.cos(phi), 0.05 * np.sin(phi)], axis=1)
+    corners = np.concatenate([np.column_stack([ring, np.full(96, z)]) for z in (0.0, 0.2)])
+    faces = [f for i in range(96) for f in ((i, (i + 1) % 96, 96 + i), ((i + 1) % 96, 96 + (i + 1) % 96, 96 + i))]
+    return Mesh(corners, np.array(faces), "tube.stl")
+
+
+def test_dimensions_are_designed_and_written_in_one_call(tmp_path: Path) -> None:
+    steps: list[str] = []
+    design = cs.design_link(cs.Frustum(0.04, 0.07, 0.15), tmp_path / "skin", pictures=False, progress=steps.append)
+    assert [sheet.name for sheet in design.sheets] == ["sheet 1"]
+    assert design.folder == tmp_path / "skin"
+    assert (tmp_path / "skin" / "report.md").is_file()
+    assert {path.relative_to(tmp_path / "skin").as_posix() for path in (tmp_path / "skin").rglob("*.*")} == set(
+        design.data["files"]
+    )
+    assert {bed["file"] for bed in design.data["beds"]} == {
+        f"nested/{path.name[:-4]}" for path in (tmp_path / "skin" / "nested").glob("*.dxf")
+    }
+    assert steps
+    with pytest.raises(cs.GeometryError, match="exists already"):
+        cs.design_link(cs.Frustum(0.04, 0.07, 0.15), tmp_path / "skin")
+
+
+def test_a_mesh_is_designed_without_a_folder() -> None:
+    design = cs.design_link(tube(), max_sheets=1)
+    (sheet,) = design.sheets
+    assert sheet.place.frustum.radius1 == pytest.approx(0.05, abs=1e-4)
+    assert design.fit is not None
+    assert design.name == "tube"
+    assert sheet.options.link == "tube"
+    assert design.folder is None
+    points, normals = sheet.place.place([0.0, 0.05], [0.0, 1.0])
+    assert points.shape == normals.shape == (2, 3)
+
+
+def test_what_cannot_be_covered_says_why() -> None:
+    with pytest.raises(cs.GeometryError, match="there is no sheet to design: "):
+        cs.design_link(tube(), min_length=0.3)
+
+
+def test_drawings_name_their_extents(tmp_path: Path) -> None:
+    """Some cutters compare them with their bed, and a viewer shows them first."""
+    ezdxf = pytest.importorskip("ezdxf")
+    cs.design_link(cs.Frustum(0.04, 0.07, 0.15), tmp_path / "skin", pictures=False)
+    from ezdxf import bbox
+
+    for path in [tmp_path / "skin" / "cut" / "3-lower-conductive.dxf", *(tmp_path / "skin" / "nested").glob("*.dxf")]:
+        document = ezdxf.readfile(path)
+        lines = [item for item in document.modelspace() if item.dxftype() == "LWPOLYLINE"]
+        box = bbox.extents(lines, fast=False)
+        assert tuple(document.header["$EXTMIN"])[:2] == pytest.approx(tuple(box.extmin)[:2], abs=0.02)
+        assert tuple(document.header["$EXTMAX"])[:2] == pytest.approx(tuple(box.extmax)[:2], abs=0.02)

@@ -1,0 +1,226 @@
+"""What a program can do with the arm, with real processes: every kind of motion and its end by a touch."""
+
+import math
+import threading
+import time
+
+import pytest
+
+from coneskin.errors import Collision, RobotRefused
+from coneskin.robot.arm.kinematics import forward
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.waypoint import Waypoint
+from coneskin.robot.sim.urscript.values import values_of
+from coneskin.session.session import guard
+from coneskin.testing.forearm import START
+
+from .guarded_session import scene_for, until
+
+pytestmark = pytest.mark.long
+pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
+
+from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
+
+TOOL = list(values_of(forward(arm_model("UR5e"), START)))
+
+
+@pytest.fixture(scope="module")
+def controller():
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+        yield simulated
+
+
+@pytest.fixture(scope="module")
+def guarded(controller):
+    """One session for all tests. Its silences are longer still: what is tested here is the program's arm."""
+    changes = {
+        'kind = "retreat"\ndistance_mm = 30': 'kind = "stop"\ndeceleration_rad_s2 = 8',
+        "arm_silence_ms = 300": "arm_silence_ms = 1000",
+        "program_silence_ms = 500": "program_silence_ms = 1000",
+    }
+    with guard(scene_for(controller, changes)) as session:
+        for number in (19, 20):  # the thread that reads them is one of the session, not of a test
+            session.arm.states.value(f"input_{'int' if number == 19 else 'double'}_register_{number}")
+        yield session
+
+
+@pytest.fixture
+def session(guarded):
+    """The session with its arm at the start, and allowed to move."""
+    let_move(guarded)
+    return guarded
+
+
+def let_move(session):
+    names = [event.name for event in session.events]
+    if names[::-1].index("activated") > names[::-1].index("latched") if "latched" in names else False:
+        until(lambda: is_let_go(session))
+        session.reset()
+    session.arm.move_j(START, 2.0, 8.0)
+
+
+def ahead(metres):
+    """The tool's pose at the start, this much further along x."""
+    return [TOOL[0] + metres, *TOOL[1:]]
+
+
+def stream(send):
+    """Send a command again and again, until it raises."""
+
+    def run(arm):
+        for step in range(600):
+            send(arm, step * 0.01)
+            time.sleep(0.01)
+
+    return run
+
+
+FAR = [START[0] + 1.8, *START[1:]]
+HALF = [START[0] + 0.9, *START[1:]]
+MOTIONS = {
+    "move_j": lambda arm: arm.move_j(FAR, 0.8, 8.0),
+    "move_j_ik": lambda arm: arm.move_j_ik(values_of(forward(arm_model("UR5e"), FAR)), 0.8, 8.0),
+    "move_l": lambda arm: arm.move_l(ahead(-0.25), 0.1, 3.0),
+    "joint path": lambda arm: arm.move_path([Waypoint.move_j(HALF, 0.8, 8.0, 0.05), Waypoint.move_j(FAR, 0.8, 8.0)]),
+    "straight path": lambda arm: arm.move_path(
+        [Waypoint.move_l(ahead(-0.1), 0.1, 3.0, 0.02), Waypoint.move_l(ahead(-0.25), 0.1, 3.0)]
+    ),
+    "speed_j": stream(lambda arm, _: arm.speed_j([0.4, 0, 0, 0, 0, 0], 4.0, 0.3)),
+    "speed_l": stream(lambda arm, _: arm.speed_l([-0.05, 0, 0, 0, 0, 0], 1.0, 0.3)),
+    "servo_j": stream(lambda arm, t: arm.servo_j([START[0] + 0.3 * t, *START[1:]], 0.3)),
+    "servo_l": stream(lambda arm, t: arm.servo_l(ahead(-0.04 * t), 0.3)),
+}
+
+
+def drive(motion, arm):
+    """Run a motion in a thread; what it raised is in the list that is returned."""
+    raised = []
+
+    def run():
+        try:
+            motion(arm)
+        except Exception as exc:
+            raised.append(exc)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread, raised
+
+
+def has_moved(controller, before):
+    return lambda: math.dist(controller.state()["q"], before) > 0.02
+
+
+def is_let_go(session):
+    names = [event.name for event in session.events if event.name in ("contact", "touch_ended")]
+    return names[-1] == "touch_ended"
+
+
+def test_a_touch_in_the_middle_of_each_kind_of_motion_ends_in_a_measured_standstill(controller, session):
+    for name, motion in MOTIONS.items():
+        before = controller.state()["q"]
+        thread, raised = drive(motion, session.arm)
+        until(has_moved(controller, before))
+        session.touch(0.13, 1.55, duration=0.1)
+        thread.join(20)
+        assert [type(exc) for exc in raised] == [Collision], (name, raised)
+        assert raised[0].standstill_confirmed, name
+        stood = controller.state()
+        assert max(map(abs, stood["qd"])) == 0.0, name
+        with pytest.raises(Collision):
+            session.arm.outputs.set_digital(0, True)
+        until(lambda: is_let_go(session))
+        assert controller.state()["q"] == stood["q"], f"{name} went on by itself"
+        let_move(session)
+
+
+def test_moves_go_on_beside_the_program_which_follows_them_waits_for_them_and_stops_them(controller, session):
+    arm = session.arm
+    points = [Waypoint.move_j([START[0] + 0.1 * n, *START[1:]], 1.5, 8.0, 0.02) for n in (1, 2, 3)]
+    began = time.monotonic()
+    arm.move_path([*points, Waypoint.move_l(TOOL, 0.5, 3.0)], wait=False)
+    seen = [arm.progress()]
+    while (waypoint := arm.progress()) is not None:
+        seen.append(waypoint)
+        time.sleep(0.002)
+    assert time.monotonic() - began > 0.3, "it cannot have been driven"
+    assert seen == sorted(seen)
+    assert set(seen) == {0, 1, 2, 3}
+    assert controller.wait_for_standstill()["q"] == pytest.approx(START, abs=1e-4)  # the wheel writes 6 digits
+    assert arm.progress() is None
+    arm.wait()  # nothing to wait for
+
+    arm.move_j(FAR, 0.5, 4.0, wait=False)
+    thread, raised = drive(lambda it: it.wait(), arm)
+    until(fast_enough(controller))
+    arm.stop(8.0)
+    thread.join(5)
+    assert "wait: the program itself has stopped the arm" in str(raised[0])
+    assert controller.wait_for_standstill()["q"][0] < FAR[0] - 0.5
+    arm.moveL_FK(START, 0.5, 3.0)
+    assert controller.state()["q"] == pytest.approx(START, abs=1e-3)
+
+
+def fast_enough(controller):
+    return lambda: max(map(abs, controller.state()["qd"])) > 0.2
+
+
+STREAMS = {
+    "servo_j": lambda arm: arm.servo_j([START[0] + 1.0, *START[1:]], 0.2),
+    "servo_l": lambda arm: arm.servo_l(ahead(-0.1), 0.1, gain=100),
+    "speedL of ur_rtde": lambda arm: arm.speedL([-0.2, 0, 0, 0, 0, 0], 3.0),
+}
+
+
+def test_a_program_that_falls_silent_does_not_move_its_arm_on(controller, session):
+    began = len(session.events)
+    for name, command in STREAMS.items():
+        command(session.arm)
+        until(has_moved(controller, controller.state()["q"]))
+        state = controller.wait_for_standstill()
+        assert max(map(abs, state["qd"])) == 0.0, name
+        session.arm.move_j(START, 2.0, 8.0)  # no stop of the guard: the program may go on
+    said = [event.details["what"] for event in session.events[began:] if event.name == "message"]
+    assert sum("no new speed or servo command" in what for what in said) == len(STREAMS)
+
+
+def test_a_touch_while_a_path_is_taken_stops_it_as_soon_as_it_moves(controller, session):
+    before = controller.state()["q"]
+    thread, raised = drive(MOTIONS["joint path"], session.arm)
+    until(lambda: not session.arm.states.reading().program_running)  # the program is sent, which takes 0.1 s
+    session.touch(0.13, 1.55, duration=0.4)
+    thread.join(20)
+    assert isinstance(raised[0], Collision)
+    assert raised[0].standstill_confirmed
+    assert math.dist(controller.wait_for_standstill()["q"], before) < 0.02
+
+
+def test_outputs_are_set_states_are_read_and_questions_are_answered(controller, session):
+    arm = session.arm
+    arm.outputs.set_digital(3, True)
+    arm.outputs.set_digital(1, True, "configurable")
+    arm.outputs.set_digital(0, True, "tool")
+    arm.outputs.set_analog(1, 0.25)
+    arm.outputs.set_register(19, 7)
+    arm.setInputDoubleRegister(20, 2.5)
+    until(lambda: arm.states.reading().digital_outputs == 1 << 3 | 1 << 9 | 1 << 16)
+    arm.setStandardDigitalOut(3, False)
+    until(lambda: not arm.getDigitalOutState(3))
+    reading = arm.states.reading()
+    assert [reading.digital_output(n, group) for n, group in ((3, "standard"), (1, "configurable"), (0, "tool"))] == [
+        *(False, True, True)
+    ]
+    assert reading.analog_outputs == (0.0, 2.5)  # V
+    assert reading.q == pytest.approx(arm.getActualQ())
+    assert (reading.mode, reading.safety_mode, reading.speed_fraction) == ("RUNNING", "NORMAL", 1.0)
+    assert (reading.program_running, arm.isProtectiveStopped(), arm.isSteady()) == (True, False, True)
+    assert (arm.states.value("input_int_register_19"), arm.states.value("input_double_register_20")) == (7, 2.5)
+    pose = arm.getActualTCPPose()
+    assert arm.getForwardKinematics(arm.getActualQ()) == pytest.approx(pose, abs=1e-6)
+    assert arm.ask("getInverseKinematics", pose) == pytest.approx(list(reading.q), abs=1e-6)
+    with pytest.raises(RobotRefused, match="forceMode is refused: in it the arm moves with what pushes it"):
+        arm.forceMode([0.0] * 6, [0] * 6, [0.0] * 6, 2, [0.1] * 6)
+    for wrong in (lambda: arm.setToolDigitalOut(2, True), lambda: arm.outputs.set_analog(0, 1.5)):
+        with pytest.raises(ValueError, match="number"):
+            wrong()
+    assert controller.state()["q"] == list(reading.q)

@@ -1,0 +1,100 @@
+"""A network that is cut while an external program moves the arm: the controller ends the program by itself."""
+
+import subprocess
+import sys
+
+import pytest
+
+from coneskin.errors import RobotRefused
+from coneskin.robot.ur.heartbeat_registers import program_lines
+from coneskin.session.session import guard
+from coneskin.testing.forearm import GOAL, START
+
+from .guarded_session import fast, scene_for, until
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
+
+from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
+
+from .test_external_control import PATIENT, send  # noqa: E402
+
+MOVES = f"while True:\n    movej({GOAL}, a=4, v=1)\n    movej({START}, a=4, v=1)\n  end\nend\n"
+WITHOUT = f"def users():\n  {MOVES}"
+WITH = f"def users():\n  {program_lines(4.0).replace(chr(10), chr(10) + '  ')}{MOVES}"
+REQUIRED = {**PATIENT, "[arm]": '[arm]\ncontroller_heartbeat = "required"'}
+
+
+@pytest.fixture
+def controller():
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+        yield simulated
+
+
+@pytest.mark.long
+def test_a_program_with_the_lines_ends_when_the_network_is_cut(controller):
+    with guard(scene_for(controller, REQUIRED, "external")) as session:
+        send(controller.host, 30002, WITH)
+        until(lambda: fast(controller))
+        before = controller.state()["cycle"]
+        controller.call("cut network")
+        until(lambda: controller.state()["runtime"] == "STOPPED")
+        # the controller's own clock: 1 / 4 Hz, and what was on its way
+        assert (controller.state()["cycle"] - before) * 0.002 < 0.5
+        controller.wait_for_standstill()
+        controller.call("restore network")
+        assert session.wait_for(("latched",), 20.0) is not None
+
+
+@pytest.mark.long
+def test_a_motion_that_ur_rtde_sends_with_the_lines_ends_when_the_network_is_cut(controller):
+    """The way of docs/guard/external.md: it needs no file of the control script, which the wheel does not hold."""
+    pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
+    code = (
+        "import sys, rtde_control\n"
+        "control = rtde_control.RTDEControlInterface(sys.argv[1])\n"
+        "print('connected', flush=True)\n"
+        "sys.stdin.readline()\n"
+        "control.sendCustomScriptFunction('guarded_move', sys.argv[2])\n"
+    )
+    command = [sys.executable, "-c", code, controller.host, f"{program_lines(4.0)}movej({GOAL}, a=4, v=1)\n"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as user:
+        try:
+            assert user.stdout.readline() == "connected\n"
+            with guard(scene_for(controller, PATIENT, "external")):
+                user.stdin.write("\n")
+                user.stdin.flush()
+                until(lambda: fast(controller))
+                assert controller.state()["program"] == "guarded_move"
+                before = controller.state()["cycle"]
+                controller.call("cut network")
+                until(lambda: controller.state()["runtime"] == "STOPPED")
+                assert (controller.state()["cycle"] - before) * 0.002 < 0.5
+                assert controller.wait_for_standstill()["q"][0] < GOAL[0] - 0.1
+                controller.call("restore network")
+        finally:
+            user.kill()
+
+
+@pytest.mark.long
+def test_a_program_without_the_lines_is_stopped_where_they_are_required(controller):
+    with guard(scene_for(controller, REQUIRED, "external")) as session:
+        send(controller.host, 30002, WITHOUT)
+        latched = session.wait_for(("latched",), 10.0)
+        assert "goes on if the network is cut" in latched.details["why"]
+        controller.wait_for_standstill()
+
+
+@pytest.mark.long
+def test_beside_a_program_without_the_lines_the_guard_does_not_become_active(controller):
+    send(controller.host, 30002, WITHOUT)
+    until(lambda: fast(controller))
+    with pytest.raises(RobotRefused, match="goes on if the network is cut"):
+        guard(scene_for(controller, REQUIRED, "external"), start_timeout=8.0).__enter__()
+
+
+@pytest.mark.long
+def test_without_the_lines_it_is_said_where_they_are_not_required(controller):
+    with guard(scene_for(controller, PATIENT, "external")) as session:
+        send(controller.host, 30002, WITHOUT)
+        said = session.wait_for(("message",), 10.0)
+        assert "goes on if the network is cut" in said.details["what"]

@@ -1,0 +1,82 @@
+"""An arm guarded by the board's own firmware: emulated as compiled, its port a pseudo-terminal, its skin touched.
+
+Whatever ends the frames, the arm stands and a line names it.
+"""
+
+import sys
+
+import pytest
+
+from coneskin.errors import Collision, RobotRefused
+from coneskin.replay.replay import read_run, replay
+from coneskin.session.session import guard
+from coneskin.testing.firmware.emulated_board import BoardPrograms, EmulatedBoard
+from coneskin.testing.firmware.firmware_build import build_emulator, build_sketch, missing_tools
+from coneskin.testing.firmware.guarded_board import board_scene
+from coneskin.testing.forearm import START
+
+from .guarded_session import assert_stopped_on_the_way, run_until_moving
+
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(sys.platform == "win32", reason="the emulated board needs a pseudo-terminal"),
+    pytest.mark.skipif(bool(missing_tools()), reason=missing_tools()),
+]
+pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
+
+from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("firmware")
+    return BoardPrograms(build_emulator(folder), build_sketch(folder))
+
+
+@pytest.fixture
+def controller():
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+        yield simulated
+
+
+@pytest.fixture
+def board(programs, controller):
+    with EmulatedBoard(programs, board_scene(controller.host, "none").sensors[0].sensor) as emulated:
+        yield emulated
+
+
+def test_a_touch_stops_the_arm_where_it_is_and_replays_bit_by_bit(controller, board, tmp_path):
+    with guard(board_scene(controller.host, board.path), recording=tmp_path / "run.rec") as session:
+        thread, raised = run_until_moving(controller, session)
+        board.touch(0.13, 1.55, duration=0.4)
+        thread.join(20)
+        assert isinstance(raised[0], Collision)
+        assert raised[0].u == pytest.approx(0.13, abs=1e-3)
+        assert_stopped_on_the_way(controller)
+    assert replay(read_run(tmp_path / "run.rec")).same
+
+
+@pytest.mark.parametrize(
+    ("lines", "named"),
+    [
+        (("0 power off",), "no valid frame has come for too long: check power, cable"),
+        (("0 power off", "0.1 power on"), "the device has started anew: check its power"),  # the supply dips for 0.1 s
+        (("0 hang",), "the device has started anew: check its power and its firmware's watchdog"),
+        (("0 supply 2.0",), "the device reports"),
+        ((), "is gone: the other end closed it"),
+    ],
+    ids=["killed", "browned out", "watchdog fired", "supply sags", "unplugged"],
+)
+def test_whatever_happens_to_the_board_the_arm_stops_and_a_line_names_it(controller, board, lines, named):
+    with guard(board_scene(controller.host, board.path)) as session:
+        thread, raised = run_until_moving(controller, session)
+        if lines:
+            board.tell(*lines)
+        else:
+            board.unplug()
+        fault = session.wait_for(("fault",), 5.0)
+        assert_stopped_on_the_way(controller)
+        thread.join(20)
+        assert named in fault.details["what"]
+        assert isinstance(raised[0], RobotRefused)
+        assert named in str(raised[0])

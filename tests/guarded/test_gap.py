@@ -1,0 +1,59 @@
+"""A recording in the middle of which blocks are missing: it says so, and is compared up to there."""
+
+import pytest
+
+from coneskin.cli import main
+from coneskin.recording import Block, decode_blocks, encode_block
+from coneskin.recording_file.reader import read_recording
+from coneskin.recording_file.recorder import Recorder
+from coneskin.replay.replay import Verdict, read_run, replay
+from coneskin.robot.guard.journal import BlockKind
+from coneskin.robot.guard.overflow import RecordingOverflowFilter
+
+from ..scene.scenes import record
+
+
+def with_a_gap(whole, cut, since, until):
+    """The recording as a guard makes it whose program takes nothing for a while."""
+    spill, blocks = RecordingOverflowFilter(), []
+    for block in read_recording(whole).blocks:
+        if block.kind == BlockKind.HEADER or not since <= block.time < until:
+            blocks += [found for _, found in decode_blocks(spill.notice())]
+            blocks.append(block)
+        else:
+            blocks += [found for _, found in decode_blocks(spill.shorten(encode_block(block)))]
+    with Recorder(cut) as recorder:
+        recorder.write(*blocks)
+
+
+@pytest.mark.parametrize("since", [1000.3, 1000.7])  # before and within the touch at 0.6 s
+def test_it_is_compared_up_to_the_gap_and_says_where_that_is(tmp_path, capsys, since):
+    happened = record(tmp_path / "whole.rec")
+    with_a_gap(tmp_path / "whole.rec", tmp_path / "cut.rec", since, 1001.0)
+    run = read_run(tmp_path / "cut.rec")
+    assert [event.name for event in run.events if event.name != "recording_gap"] == [event.name for event in happened]
+    assert f"are not recorded: the program did not read them, from {since - 1000.0:.2f}" in run.missing
+    assert "to 0.99" in run.missing or "to 1.00" in run.missing
+    result = replay(run)
+    assert result.verdict == Verdict.INCOMPLETE, result.differences
+    assert result.compared == sum(event.time < since for event in happened)
+    assert main(["replay", str(tmp_path / "cut.rec")]) == 4
+    assert f"missing: {run.missing}" in capsys.readouterr().out
+
+
+def test_a_difference_before_the_gap_is_found(tmp_path):
+    record(tmp_path / "whole.rec")
+    with_a_gap(tmp_path / "whole.rec", tmp_path / "cut.rec", 1001.2, 1001.4)
+    blocks = list(read_recording(tmp_path / "cut.rec").blocks)
+    with Recorder(tmp_path / "other.rec") as recorder:
+        recorder.write(*(block for block in blocks if not (block.kind == BlockKind.ARM and block.time < 1000.4)))
+    assert replay(read_run(tmp_path / "other.rec")).differences
+    assert replay(read_run(tmp_path / "cut.rec")).agrees
+
+
+def test_a_whole_recording_lacks_nothing(tmp_path):
+    record(tmp_path / "whole.rec")
+    with_a_gap(tmp_path / "whole.rec", tmp_path / "same.rec", 0.0, 0.0)
+    assert read_run(tmp_path / "same.rec").missing == ""
+    assert RecordingOverflowFilter().notice() == b""
+    assert RecordingOverflowFilter().shorten(encode_block(Block(BlockKind.SKIN, 1.0, b"x"))) == b""

@@ -1,0 +1,259 @@
+"""A guarding program that dies, freezes, forks or blocks, and processes that hang: the arm stands, nothing is left."""
+
+import contextlib
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from coneskin.errors import RobotRefused
+from coneskin.session.session import guard
+from coneskin.testing.forearm import GOAL, START
+
+from .guarded_session import (
+    assert_stopped_on_the_way,
+    fast,
+    kill,
+    run_until_moving,
+    scene_for,
+    scene_text,
+    until,
+)
+
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal"),
+]
+pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
+
+from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
+
+from .test_external_control import PATIENT, RAW, send  # noqa: E402
+
+STREAM = "while True: g.arm.speed_j([0.4, 0, 0, 0, 0, 0], 4.0); time.sleep(0.02)"
+MOVE = f"g.arm.move_j({GOAL}, 1.0, 4.0)"
+FORK_BELOW_PYTHON = "import ctypes\n    if ctypes.CDLL(None).fork() == 0: time.sleep(600)\n    "
+FORK = "import multiprocessing as m; m.get_context('fork').Process(target=time.sleep, args=(600,)).start()\n    "
+
+
+@pytest.fixture
+def controller():
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+        yield simulated
+
+
+class Program:
+    """A program that guards, in a process group of its own; it prints the numbers of its children."""
+
+    def __init__(self, folder: Path, text: str, body: str, before: str = "") -> None:
+        (folder / "scene.toml").write_text(text)
+        code = (
+            f"import sys, time\nfrom coneskin.session.session import guard\n{before}\n"
+            "with guard(sys.argv[1]) as g:\n"
+            "    print(*(child.pid for child in g._processes.children.values()), flush=True)\n"
+            f"    {body}\n"
+        )
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", code, str(folder / "scene.toml")],
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        assert self.process.stdout is not None
+        self.children = [int(number) for number in self.process.stdout.readline().split()]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+        self.process.stdout.close()
+
+
+def lives(number):
+    """Tell whether a process lives; one that nobody has waited for does not."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize("fork", [FORK, FORK_BELOW_PYTHON])
+def test_a_program_that_has_forked_and_is_killed_stops_its_arm(controller, tmp_path, fork):
+    """A worker of multiprocessing lives on with copies of all that was open; below Python nothing closes them."""
+    with Program(tmp_path, scene_text(controller.host), fork + STREAM) as program:
+        until(lambda: controller.state()["qd"][0] > 0.35, 30.0)
+        program.process.kill()
+        assert program.process.wait(10.0) == -signal.SIGKILL
+        controller.wait_for_standstill()
+        until(lambda: not any(map(lives, program.children)), 10.0)
+
+
+@pytest.mark.parametrize("control", ["internal", "external"])
+def test_a_program_that_is_frozen_stops_its_arm_and_hears_why(controller, tmp_path, control):
+    changes = PATIENT if control == "external" else None
+    body = f"try: {MOVE}" if control == "internal" else "try:\n        while True: g.check(); time.sleep(0.01)"
+    body += "\n    except Exception as exc: print(exc, flush=True); g.wait_for(('never',), 60.0)"
+    with Program(tmp_path, scene_text(controller.host, changes, control), body) as program:
+        if control == "external":
+            send(controller.host, 30002, RAW)
+        until(lambda: fast(controller), 30.0)
+        program.process.send_signal(signal.SIGSTOP)
+        assert_stopped_on_the_way(controller)
+        program.process.send_signal(signal.SIGCONT)
+        assert "the program that guards: no heartbeat for 500 ms" in program.process.stdout.readline()
+
+
+def test_a_program_whose_main_thread_hangs_moves_its_arm_no_longer_than_it_said(controller):
+    with guard(scene_for(controller)) as session:
+        session.arm.speed_j([0.4, 0, 0, 0, 0, 0], 4.0, duration=0.4)
+        until(lambda: controller.state()["qd"][0] > 0.2)
+        controller.wait_for_standstill()  # while this thread does nothing else; its heartbeat goes on
+        said = session.wait_for(("message",), 5.0)
+        assert "no new speed or servo command" in said.details["what"]
+        session.check()  # nothing is wrong
+        session.arm.speed_j([-0.4, 0, 0, 0, 0, 0], 4.0, duration=5.0)
+        until(lambda: controller.state()["qd"][0] < -0.2)
+
+
+def test_a_frozen_driver_is_not_armed_and_does_not_do_later_what_was_asked(controller):
+    with guard(scene_for(controller)) as session:
+        thread, raised = run_until_moving(controller, session)
+        session.touch(0.13, 1.55, duration=0.2)
+        thread.join(20)
+        assert session.wait_for(("latched",), 10.0) is not None
+        assert session.wait_for(("touch_ended",), 10.0) is not None
+        kill(session, "driver", signal.SIGSTOP)
+        with pytest.raises(RobotRefused, match="the driver process: no heartbeat"):
+            session.reset(timeout=20.0)
+        stood = controller.wait_for_standstill()["q"]
+        thread, raised = run(session, stood)
+        thread.join(20)
+        assert raised
+        kill(session, "driver", signal.SIGCONT)
+        assert session.wait_for(("never",), 1.0) is None
+        assert controller.state()["q"] == pytest.approx(stood, abs=1e-3)
+        session.reset()
+        session.arm.move_j([stood[0] + 0.1, *stood[1:]], 1.0, 4.0)
+        assert controller.state()["q"][0] == pytest.approx(stood[0] + 0.1, abs=1e-3)
+
+
+def run(session, stood):
+    """Ask for a move from a thread; what it raised is in the list that is returned."""
+    raised = []
+
+    def move():
+        try:
+            session.arm.move_j([stood[0] + 1.0, *stood[1:]], 1.0, 4.0)
+        except Exception as exc:
+            raised.append(exc)
+
+    thread = threading.Thread(target=move)
+    thread.start()
+    return thread, raised
+
+
+def test_a_frozen_driver_that_nobody_needs_now_is_a_fault(controller):
+    with guard(scene_for(controller)) as session:
+        kill(session, "driver", signal.SIGSTOP)
+        assert session.wait_for(("latched",), 10.0) is not None
+        until(lambda: any("the driver process: no heartbeat" in str(e.details.get("what")) for e in session.events))
+        kill(session, "driver", signal.SIGCONT)
+
+
+def test_a_frozen_watchdog_is_a_fault_and_the_arm_is_not_armed_without_it(controller):
+    with guard(scene_for(controller, PATIENT, "external")) as session:
+        send(controller.host, 30002, RAW)
+        until(lambda: fast(controller))
+        kill(session, "watchdog", signal.SIGSTOP)
+        controller.wait_for_standstill()
+        latched = session.wait_for(("latched",), 10.0)
+        assert "the guard watchdog: no heartbeat" in latched.details["why"]
+        with pytest.raises(RobotRefused, match="the guard watchdog: no heartbeat"):
+            session.reset()
+        kill(session, "watchdog", signal.SIGCONT)
+
+
+def test_no_process_outlives_a_killed_program_whose_controller_cannot_be_reached(controller, tmp_path):
+    """``ur_rtde`` would wait for the answer to its stop: for a minute, or for five."""
+    with Program(tmp_path, scene_text(controller.host), MOVE) as program:
+        until(lambda: fast(controller), 30.0)
+        controller.call("cut network")
+        program.process.kill()
+        until(lambda: not any(map(lives, program.children)), 12.0)
+    controller.call("restore network")
+    controller.wait_for_standstill()  # the controller's own watchdog
+
+
+def test_lines_typed_before_a_collision_reset_nothing(controller, tmp_path):
+    """Each would have let the arm go on one millisecond after a collision."""
+    touches = "".join(
+        f"[[source.touch]]\nstart_s = {at}\nend_s = {at}.2\nu_mm = 130\nphi_deg = 89\n" for at in range(3, 60, 3)
+    )
+    points = [[round(57.29577951308232 * q, 3) for q in place] for place in (GOAL, START)]
+    text = scene_text(controller.host, {'kind = "retreat"\ndistance_mm = 30': 'kind = "stop"'})
+    text += f"{touches}[motion]\nwaypoints_deg = {points}\nspeed_deg_s = 20\nacceleration_deg_s2 = 100\n"
+    (tmp_path / "scene.toml").write_text(text)
+    command = [sys.executable, "-m", "coneskin", "guard", str(tmp_path / "scene.toml")]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    process = subprocess.Popen(command, text=True, bufsize=1, **pipes)
+    try:
+        process.stdin.write("reset\nreset\nreset\n")
+        lines = []
+        while 'type "reset"' not in "".join(lines[-1:]):
+            lines.append(process.stdout.readline())
+            assert lines[-1], lines
+        assert any("3 line(s) typed before the arm was latched are ignored" in line for line in lines)
+        until(lambda: controller.wait_for_standstill() is not None)
+        process.send_signal(signal.SIGTERM)
+        lines += process.stdout.readlines()
+        assert sum("  activated" in line for line in lines) == 1, lines
+        assert process.wait(20.0) == 3
+    finally:
+        process.kill()
+        process.wait()
+        process.stdin.close()
+        process.stdout.close()
+
+
+def test_a_program_with_more_than_1024_descriptors_guards_as_well(controller, tmp_path):
+    before = "import os; many = [os.open(os.devnull, 0) for _ in range(1100)]"
+    body = f"print('guarded', flush=True); {MOVE}; print('there', flush=True)"
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(2048, hard), hard))
+    try:
+        with Program(tmp_path, scene_text(controller.host), body, before) as program:
+            assert program.process.stdout.read() == "guarded\nthere\n"
+            assert program.process.wait(20.0) == 0
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_a_blocking_on_event_delays_neither_the_fallback_stop_nor_the_recording(controller, tmp_path):
+    free = threading.Event()
+    seen = []
+
+    def block(event):
+        free.wait(60.0)
+        seen.append(event)
+
+    scene = scene_for(controller, PATIENT, "external")
+    with guard(scene, on_event=block, recording=tmp_path / "run.rec") as session:
+        send(controller.host, 30002, RAW)
+        until(lambda: fast(controller))
+        for name in ("watchdog", "guard"):
+            kill(session, name, signal.SIGSTOP)
+        controller.wait_for_standstill()
+        until(lambda: any(event.name == "fallback_stop" for event in session.events))
+        assert seen == []
+        free.set()
+        for name in ("watchdog", "guard"):
+            kill(session, name, signal.SIGCONT)
+    assert [event.name for event in seen] == [event.name for event in session.events][: len(seen)]

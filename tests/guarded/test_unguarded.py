@@ -1,0 +1,171 @@
+"""An arm that another program moves, and whose guard hangs or is gone: it stands, and it is held at standstill."""
+
+import signal
+import socket
+import sys
+import threading
+from contextlib import suppress
+
+import pytest
+
+from coneskin.errors import RobotConnectionError, RobotRefused, SensorError
+from coneskin.session.fallback_stop import FallbackStop
+from coneskin.session.session import guard
+from coneskin.testing.forearm import START
+
+from .guarded_session import fast, kill, scene_for, until
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
+
+from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
+
+from .test_external_control import PATIENT, RAW, send  # noqa: E402
+
+
+@pytest.fixture
+def controller():
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+        yield simulated
+
+
+def external(simulated):
+    return scene_for(simulated, PATIENT, "external")
+
+
+def start_again(controller):
+    """A user's program that heals itself; it must not get far."""
+    before = controller.wait_for_standstill()["q"][0]
+    if controller.state()["safety"] == "PROTECTIVE_STOP":  # on a busy machine the first stop may have needed it
+        return
+    send(controller.host, 30002, RAW)
+    until(lambda: controller.state()["q"][0] != before)
+    until(lambda: controller.state()["runtime"] != "PLAYING")  # the protective stop pauses it
+    # found moving within 5 states, 1 rad/s at most, and braked at 10 rad/s2: 0.05 rad; a busy machine takes longer
+    assert abs(controller.wait_for_standstill()["q"][0] - before) < 0.5
+
+
+def reset(session):
+    """Whether a person's reset is taken; at first the frames that have waited are too old."""
+    try:
+        session.reset()
+    except (RobotRefused, RobotConnectionError):
+        return False
+    return True
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("gone", [("guard",), ("watchdog", "guard")])
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_program_that_starts_again_without_a_guard_is_stopped_again(controller, gone, number):
+    with guard(external(controller)) as session:
+        send(controller.host, 30002, RAW)
+        until(lambda: fast(controller))
+        for name in gone:
+            kill(session, name, number)
+        controller.wait_for_standstill()
+        lost = ("guard_exited",) if number is signal.SIGKILL else ("guard_unresponsive",)
+        until(lambda: any(event.name in lost for event in session.events))
+        start_again(controller)
+        assert controller.state()["safety"] == "PROTECTIVE_STOP"  # from the first restart on
+        with pytest.raises(RobotConnectionError, match="ended unannounced" if number is signal.SIGKILL else "hangs"):
+            session.check()
+        with pytest.raises(RobotConnectionError):
+            session.reset()
+        # after its watch of 0.7 s
+        until(lambda: any(event.name == "fallback_stop" and event.details["stands"] for event in session.events))
+        for name in gone:
+            kill(session, name, signal.SIGCONT)
+
+
+@pytest.mark.long
+def test_a_guard_that_has_hung_guards_again_and_is_missed_again(controller):
+    with guard(external(controller)) as session:
+        kill(session, "guard", signal.SIGSTOP)
+        assert session.wait_for(("guard_unresponsive",), 10.0) is not None
+        kill(session, "guard", signal.SIGCONT)
+        assert session.wait_for(("latched",), 10.0) is not None
+        until(lambda: reset(session))
+        send(controller.host, 30002, RAW)
+        until(lambda: fast(controller))
+        for name in ("watchdog", "guard"):
+            kill(session, name, signal.SIGSTOP)
+        controller.wait_for_standstill()  # the fallback stop was not used up
+        for name in ("watchdog", "guard"):
+            kill(session, name, signal.SIGCONT)
+
+
+def test_a_touch_that_cannot_be_is_refused_and_nothing_else_happens(controller):
+    with guard(external(controller)) as session:
+        send(controller.host, 30002, RAW)
+        until(lambda: fast(controller))
+        for wrong, message in (
+            ({"sensor": "nope"}, r"must be one of sensor 0/0 \(id 0\), got 'nope'"),
+            ({"sensor": 1}, r"must be one of sensor 0/0 \(id 0\), got 1"),
+            ({"u": 130.0}, "a touch must lie on sensor 0/0: u up to 0.26 m"),
+            ({"phi": 90.0}, "a touch must lie on sensor 0/0"),
+            ({"force": -3.0}, r"touch.force must be finite and not negative \[N\], got -3.0"),
+            ({"duration": -3.0}, "must end after it starts"),
+        ):
+            with pytest.raises(SensorError, match=message):
+                session.touch(**{"u": 0.13, "phi": 1.55, **wrong})
+        assert fast(controller)
+        session.check()
+        session.touch(0.13, 1.55, duration=0.2, sensor=0)
+        assert session.wait_for(("latched",), 20.0) is not None
+
+
+# ---- the last resort, by whatever port opens
+
+
+class Ports:
+    """A controller of which only some ports answer, and none says a word."""
+
+    def __init__(self, host, numbers):
+        self.got = dict.fromkeys(numbers, b"")
+        self._socks = []
+        self._threads = []
+        for number in numbers:
+            sock = socket.create_server((host, number))
+            self._socks.append(sock)
+            self._run(self._accept, sock, number)
+
+    def _run(self, target, *arguments):
+        self._threads.append(threading.Thread(target=target, args=arguments, daemon=True))
+        self._threads[-1].start()
+
+    def _accept(self, sock, number):
+        while True:
+            try:
+                other, _ = sock.accept()
+            except OSError:
+                return
+            self._socks.append(other)
+            self._run(self._read, other, number)
+
+    def _read(self, sock, number):
+        with suppress(OSError):
+            while data := sock.recv(4096):
+                self.got[number] += data
+
+    def close(self):
+        for sock in self._socks:
+            with suppress(OSError):
+                sock.shutdown(socket.SHUT_RDWR)
+            sock.close()
+
+
+@pytest.mark.parametrize("numbers", [(30003, 29999), (30003, 29999, 30004), (30003,), (29999,)])
+def test_a_stop_goes_out_by_whatever_port_opens(numbers):
+    host = free_host()
+    ports = Ports(host, numbers)
+    resort = FallbackStop(scene_for(type("Host", (), {"host": host}), PATIENT, "external"))
+    try:
+        port, word = (30003, b"stopj(10.000)") if 30003 in numbers else (29999, b"stop\n")
+        resort.look(lambda: word in ports.got[port])
+        until(lambda: word in ports.got[port])
+        assert resort.stands is False  # nobody has seen it
+        seen = len(ports.got[port])
+        until(lambda: resort.look(lambda: False) or len(ports.got[port]) > seen)  # and again, now and then
+    finally:
+        resort.end()
+        ports.close()

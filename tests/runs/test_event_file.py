@@ -1,0 +1,25 @@
+"""Files of events: what is there stays where its successor cannot be written."""
+
+import resource
+from pathlib import Path
+
+import pytest
+
+from coneskin.errors import RecordingError
+from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.runs.event_file import read_events, write_events
+
+
+def test_reviewed_events_survive_a_full_disk(tmp_path: Path) -> None:
+    path = tmp_path / "run.events.json"
+    reviewed = [GuardEvent(EventName.CONTACT, 1.5, {"sensor": "forearm"})]
+    write_events(path, reviewed, 1.0)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        with pytest.raises(RecordingError, match="cannot write the events"):
+            write_events(path, reviewed * 10, 1.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert read_events(path, 1.0) == reviewed
+    assert list(tmp_path.iterdir()) == [path]

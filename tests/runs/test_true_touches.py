@@ -1,0 +1,81 @@
+"""With what a virtual skin was touched: the truth of a run that no person has to label."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coneskin.errors import RecordingError
+from coneskin.recording import Block
+from coneskin.recording_file.recorder import Recorder
+from coneskin.replay.replay import Run, read_run
+from coneskin.robot.guard.journal import BlockKind
+from coneskin.runs.cut import cut_run
+from coneskin.runs.touch_labels import true_touches
+from coneskin.runs.what_if import judge_run
+
+SKIN = "forearm skin"
+TOUCHED = 2.94  # s since the start of the recorded collision; it is seen 9 ms later
+
+
+def told(run: Run, *facts: Any) -> Run:
+    """Return the run with blocks that tell these facts."""
+    blocks = [Block(BlockKind.TRUTH, run.start + 1.0, json.dumps(one).encode()) for one in facts]
+    return replace(run, blocks=(*blocks, *run.blocks))
+
+
+def touch(run: Run, start: float, end: float | None, sensor: str = SKIN) -> dict[str, Any]:
+    return {"sensor": sensor, "start": run.start + start, "end": None if end is None else run.start + end}
+
+
+def write(path: Path, run: Run) -> Path:
+    with Recorder(path) as recorder:
+        recorder.write(Block(BlockKind.HEADER, run.start, json.dumps(run.header).encode()), *run.blocks)
+    return path
+
+
+def test_touches_end_where_all_is_released_and_nothing_told_is_not_untouched(collision: Run) -> None:
+    assert true_touches(collision) is None
+    assert true_touches(told(collision, {"touches": []})) == []
+    touches = [touch(collision, 1.0, 2.0), touch(collision, 3.0, None), touch(collision, 9.0, None, "b")]
+    found = true_touches(told(collision, {"touches": touches}, {"released": collision.start + 4.0}))
+    assert found is not None
+    assert [(one.sensor, pytest.approx(one.start), pytest.approx(one.end)) for one in found] == [
+        (SKIN, 1.0, 2.0),
+        (SKIN, 3.0, 4.0),
+        ("b", 9.0, math.inf),
+    ]
+
+
+@pytest.mark.parametrize("facts", [[], {"touches": [{}]}, {"touches": 5}, {"released": "now"}])
+def test_a_damaged_word_about_touches_is_refused(collision: Run, facts: Any) -> None:
+    with pytest.raises(RecordingError, match="does not say what touched the skin"):
+        true_touches(told(collision, facts))
+
+
+def judged(path: Path, run: Run, touches: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    (row,) = judge_run(write(path, told(run, {"touches": list(touches)})))
+    return row
+
+
+def test_missed_touches_false_alarms_and_delay_need_no_labels(collision: Run, tmp_path: Path) -> None:
+    seen = touch(collision, TOUCHED, TOUCHED + 0.15)
+    row = judged(tmp_path / "a.rec", collision, [seen, touch(collision, 2.0, 2.2), touch(collision, 60.0, None)])
+    assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 2, 1, 0)
+    assert row["delay_median_ms"] == pytest.approx(9.03, abs=0.05)
+    row = judged(tmp_path / "b.rec", collision, [])
+    assert (row["touches"], row["missed"], row["false_alarms"]) == (0, 0, 1)
+
+
+def test_a_cut_keeps_what_touched_the_skin_in_its_time(collision: Run, tmp_path: Path) -> None:
+    touches = [touch(collision, 0.1, 0.2), touch(collision, TOUCHED, TOUCHED + 0.15)]
+    cut = cut_run(told(collision, {"touches": touches}), tmp_path / "cut.rec", around=2.95)
+    found = true_touches(read_run(cut.path))
+    assert found is not None
+    assert len(found) == 2
+    (row,) = judge_run(cut.path)
+    assert (row["touches"], row["missed"], row["false_alarms"]) == (1, 0, 0)

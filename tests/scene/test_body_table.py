@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import pytest
+
+from coneskin.errors import SceneError, SensorError
+from coneskin.scene.reader import parse_scene
+from coneskin.skin.padding import Padding
+
+ARM = '[arm]\nmodel = "UR5e"\nhost = "127.0.0.1"\n'
+HAND = ARM + '[[body]]\nkind = "hand"\nxyz_mm = [400, 0, 500]\nmass_kg = 0.6\nstiffness_n_per_mm = 75\n'
+
+
+def test_a_body_is_read_in_si() -> None:
+    (body,) = parse_scene(HAND).bodies
+    assert (body.kind, body.mass) == ("hand", 0.6)
+    assert body.place == pytest.approx((0.4, 0.0, 0.5))
+    assert body.stiffness == pytest.approx(75e3)
+
+
+def test_a_scene_without_bodies_has_none_and_padding_is_the_assumed_one() -> None:
+    scene = parse_scene(ARM)
+    assert (scene.bodies, scene.padding) == ((), None)
+    assert parse_scene(ARM + "[padding]\n").padding == Padding()
+    assert parse_scene(ARM + "[padding]\nthickness_mm = 8\n").padding == Padding(thickness=8e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (HAND.replace("mass_kg = 0.6\n", ""), "a hand needs mass_kg"),
+        (HAND.replace('"hand"', '"person"'), "a person needs force_n"),
+        (HAND.replace('"hand"', '"wall"'), "a wall needs direction"),
+        (HAND + "direction = [0, 0, 0]\n", "direction must not be 0, 0, 0"),
+        (HAND.replace("[400, 0, 500]", "[0.4, 0]"), "xyz_mm must be a list of 3 numbers"),
+        (HAND.replace(ARM, ""), r"\[\[body\]\] needs an \[arm\]"),
+        (ARM + "[body]\nkind = 1\n", "body must be a list of tables"),
+        (ARM + "[padding]\nthickness_mm = 0\n", "padding.thickness_mm"),
+    ],
+)
+def test_mistakes_are_named(text: str, said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        parse_scene(text)
+
+
+def test_a_padding_is_a_spring_that_bottoms_out_and_never_pulls() -> None:
+    padding = Padding(thickness=5e-3, stiffness=10e3, hard_stiffness=1e6, loss=0.5)
+    assert padding.force(4e-3, 0.0) == pytest.approx(40.0)
+    assert padding.force(6e-3, 0.0) == pytest.approx(50.0 + 1000.0)
+    assert padding.force(4e-3, 0.2) == pytest.approx(40.0 * 1.1)
+    assert padding.force(4e-3, -3.0) == 0.0
+    assert padding.force(-1e-3, 1.0) == 0.0
+    with pytest.raises(SensorError, match="thickness"):
+        Padding(thickness=0.0)
+
+
+@pytest.mark.parametrize("depth", [-1e-3, 2e-3, 5e-3, 8e-3])
+def test_the_energy_of_a_padding_is_the_integral_of_its_force(depth: float) -> None:
+    padding, n = Padding(thickness=5e-3), 20_000
+    steps = [padding.elastic(depth * (k + 0.5) / n) * depth / n for k in range(n)]
+    assert padding.energy(depth) == pytest.approx(sum(steps), rel=1e-6, abs=1e-15)

@@ -1,0 +1,163 @@
+"""Requests of several threads over one channel: each gets its own answer, whoever has read it."""
+
+import threading
+
+import pytest
+
+from coneskin.channel import Channel, decode_json, encode_json, pair, wait_readable
+from coneskin.errors import Collision, KinematicsError, RobotConnectionError, RobotRefused
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.waypoint import Waypoint
+from coneskin.session.arm_client import ArmClient
+from coneskin.session.arm_requests import ArmRequests
+
+
+@pytest.fixture
+def ends():
+    program, driver = (Channel(end) for end in pair())
+    yield program, driver
+    program.close()
+    driver.close()
+
+
+def asked(driver):
+    """The next request that has come, and the number that it has."""
+    while True:
+        wait_readable([driver], 5.0)
+        if messages := driver.receive():
+            assert len(messages) == 1
+            return decode_json(messages[0])
+
+
+def answer(driver, number, **values):
+    driver.send(encode_json({"number": number, "ok": True, **values}))
+
+
+def call(function, into):
+    thread = threading.Thread(target=lambda: into.append(function()))
+    thread.start()
+    return thread
+
+
+def test_a_thread_that_waits_for_a_move_does_not_keep_the_answer_of_another(ends) -> None:
+    """Two threads read one channel: each threw away what the other one waited for."""
+    program, driver = ends
+    requests = ArmRequests(program, lambda stopped: None)
+    moved, stopped = [], []
+    first = call(lambda: requests.do(do="move"), moved)
+    number = asked(driver)["number"]
+    second = call(lambda: requests.do(do="stop"), stopped)
+    answer(driver, asked(driver)["number"], what="stop")
+    second.join(5.0)
+    assert [(one["what"]) for one in stopped] == ["stop"]
+    assert moved == []
+    answer(driver, number, what="move")
+    first.join(5.0)
+    assert [(one["what"]) for one in moved] == ["move"]
+
+
+def test_answers_that_nobody_waits_for_any_more_are_not_kept(ends) -> None:
+    program, driver = ends
+    gone = []
+
+    def check(stopped):
+        if gone:
+            raise RobotRefused("the guard has stopped the arm")
+
+    requests = ArmRequests(program, check)
+    raised = []
+
+    def ask():
+        with pytest.raises(RobotRefused) as error:
+            requests.do(do="move")
+        raised.append(error.value)
+
+    thread = call(ask, [])
+    number = asked(driver)["number"]
+    gone.append(True)
+    thread.join(5.0)
+    assert len(raised) == 1
+    answer(driver, number)
+    gone.clear()
+    thread = call(lambda: requests.do(do="again"), raised)
+    answer(driver, asked(driver)["number"], what="again")
+    thread.join(5.0)
+    assert raised[1]["what"] == "again"
+    assert requests._answers == {}
+
+
+@pytest.mark.parametrize(
+    ("reply", "error", "words"),
+    [
+        ({"ok": False, "stopped": False, "why": "no"}, RobotRefused, "move: no"),
+        ({"ok": False, "stopped": True, "why": "no"}, Collision, "touched"),
+    ],
+)
+def test_what_is_refused_is_raised(ends, reply, error, words) -> None:
+    program, driver = ends
+
+    def check(stopped):
+        if stopped:
+            raise Collision("touched", None, True, "")
+
+    thread = threading.Thread(target=lambda: driver.send(encode_json({"number": asked(driver)["number"], **reply})))
+    thread.start()
+    with pytest.raises(error, match=words):
+        ArmRequests(program, check).do(do="move")
+    thread.join()
+
+
+def test_a_driver_process_that_has_ended_is_told(ends) -> None:
+    program, driver = ends
+    driver.close()
+    with pytest.raises(RobotConnectionError, match="the driver process has ended"):
+        ArmRequests(program, lambda stopped: None).do(do="move")
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "words"),
+    [
+        ([], "a path needs at least one way point"),
+        ([Waypoint.move_j([0.0] * 6), Waypoint.move_j([90.0] * 6)], r"q\[0\] must be within"),
+        ([Waypoint.move_l([0.0] * 5)], "the target of way point 0 must be 6 finite numbers"),
+        ([Waypoint.move_l([0.0] * 6, speed=0.0)], "way point 0 needs a speed and an acceleration above 0"),
+        ([Waypoint.move_p([0.0] * 6, blend=-0.1)], "a blend"),
+        ([Waypoint.move_l([0.0] * 6, acceleration=float("nan"))], "got"),
+    ],
+)
+def test_a_path_that_cannot_be_is_refused_before_anything_is_sent(ends, waypoints, words) -> None:
+    program, driver = ends
+    arm = ArmClient(program, lambda stopped: None, arm_model("UR5e"), "nowhere")
+    with pytest.raises(KinematicsError, match=words):
+        arm.move_path(waypoints)
+    assert driver.receive() == []
+
+
+def test_the_last_way_point_has_no_blend(ends) -> None:
+    program, driver = ends
+    arm = ArmClient(program, lambda stopped: None, arm_model("UR5e"), "nowhere")
+    thread = call(lambda: arm.move_path([Waypoint.move_j([0.0] * 6, blend=0.1)] * 2), [])
+    request = asked(driver)
+    answer(driver, request["number"])
+    thread.join(5.0)
+    assert [point[-1] for point in request["waypoints"]] == [0.1, 0.0]
+
+
+def test_a_request_that_is_too_long_is_refused_and_not_waited_for(ends) -> None:
+    """A path of 100 000 way points was dropped by the channel, and its program waited for ever."""
+    program, _ = ends
+    refused: list[str] = []
+
+    def ask() -> None:
+        try:
+            requests.do(do="move_path", waypoints="x" * 5_000_000)
+        except RobotRefused as exc:
+            refused.append(str(exc))
+
+    requests = ArmRequests(program, lambda stopped: None)
+    asking = threading.Thread(target=ask, daemon=True)
+    asking.start()
+    asking.join(5.0)
+    program.hang_up()
+    assert len(refused) == 1
+    assert "move_path: the driver process does not take 50000" in refused[0]

@@ -1,0 +1,149 @@
+"""Event log: blocks to the file, events to waiting threads; neither a full disk nor a bad callback ends it."""
+
+import logging
+import os
+import threading
+
+import pytest
+
+from coneskin.channel import Channel, pair
+from coneskin.recording import Block, encode_block
+from coneskin.replay.replay import read_run
+from coneskin.robot.guard.journal import BlockKind, GuardEvent
+from coneskin.session.event_log import EventLog, new_recording
+from coneskin.session.guard_monitor import GuardMonitor
+
+
+@pytest.fixture
+def channel():
+    ours, theirs = (Channel(end) for end in pair())
+    yield ours, theirs
+    ours.close()
+    theirs.close()
+
+
+def emit(theirs, name, time=1.0, **details):
+    theirs.send(encode_block(GuardEvent(name, time, details).block()))
+
+
+def listen(log, channel):
+    """Let the log take what comes over the channel, as a session does."""
+    log.monitor = GuardMonitor(log, channel)
+    log.monitor.start()
+
+
+def close(log):
+    log.monitor.close()
+    log.close()
+
+
+def test_what_is_told_is_recorded_and_waited_for(tmp_path, channel):
+    ours, theirs = channel
+    seen = []
+    log = EventLog(tmp_path / "run.rec", seen.append)
+    log.open({"scene": "", "name": "x", "folder": "."})
+    listen(log, ours)
+    theirs.send(encode_block(Block(BlockKind.TICK, 0.5, b"")))
+    emit(theirs, "activated")
+    assert log.wait_for(("contact", "activated"), 5.0).name == "activated"
+    assert log.wait_for(("contact",), 0.0) is None
+    threading.Timer(0.01, emit, (theirs, "contact")).start()
+    assert log.wait_for(("contact",), 5.0, after=1).name == "contact"
+    theirs.close()
+    close(log)
+    close(log)
+    assert log.ended
+    assert log.wait_for(("never",), 60.0) is None  # nothing more will come
+    run = read_run(tmp_path / "run.rec")
+    assert run.missing == ""
+    assert [block.kind for block in run.blocks] == [BlockKind.TICK, BlockKind.EVENT, BlockKind.EVENT, BlockKind.EVENT]
+    assert [event.name for event in seen] == ["activated", "contact", "guard_exited"]  # without a word
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full on this system to stand for a full disk")
+def test_a_full_disk_ends_the_recording_and_says_so(tmp_path, channel):
+    ours, theirs = channel
+    log = EventLog(tmp_path / "run.rec", None)
+    log.open({})
+    log._recorder._file.close()
+    log._recorder._file = open("/dev/full", "wb", buffering=0)  # noqa: SIM115 - the log closes it
+    listen(log, ours)
+    emit(theirs, "activated")
+    message = log.wait_for(("message",), 5.0)
+    assert "recording ended" in message.details["what"]
+    assert "No space left" in message.details["what"]
+    emit(theirs, "contact")
+    assert log.wait_for(("contact",), 5.0) is not None
+    theirs.close()
+    close(log)
+
+
+def test_a_callback_that_fails_is_called_no_more(channel, caplog):
+    ours, theirs = channel
+
+    def fail(event):
+        raise KeyError(event.name)
+
+    log = EventLog(None, fail)
+    log.open({})
+    listen(log, ours)
+    with caplog.at_level(logging.ERROR, "coneskin"):
+        emit(theirs, "activated")
+        emit(theirs, "contact")
+        assert log.wait_for(("contact",), 5.0) is not None
+        theirs.close()
+        close(log)
+    assert caplog.text.count("on_event has failed") == 1
+
+
+def test_two_runs_in_one_second_have_folders_of_their_own(tmp_path):
+    assert len({new_recording(tmp_path / "runs") for _ in range(4)}) == 4
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of files are POSIX's")
+def test_folders_that_a_run_makes_are_for_their_owner_alone(tmp_path):
+    tmp_path.chmod(0o755)
+    made = new_recording(tmp_path / "all" / "runs").parent
+    assert [path.stat().st_mode & 0o777 for path in (made, *made.parents[:3])] == [0o700, 0o700, 0o700, 0o755]
+
+
+def test_what_cannot_be_taken_is_said_and_the_rest_is_heard(channel, monkeypatch, caplog):
+    ours, theirs = channel
+    log = EventLog(None, None)
+    write, fails = log._write, [True]
+
+    def once(blocks):
+        if fails and any(b"contact" in block.payload for block in blocks):
+            fails.clear()
+            raise MemoryError
+        write(blocks)
+
+    monkeypatch.setattr(log, "_write", once)
+    listen(log, ours)
+    with caplog.at_level(logging.CRITICAL, "coneskin"):
+        emit(theirs, "contact")
+        assert "is lost: MemoryError" in log.wait_for(("message",), 5.0).details["what"]
+        theirs.send(encode_block(Block(BlockKind.EVENT, 2.0, b"no event")))
+        assert "holds no event" in log.wait_for(("message",), 5.0, after=1).details["what"]
+        emit(theirs, "latched")
+        assert log.wait_for(("latched",), 5.0) is not None
+        theirs.close()
+        close(log)
+
+
+def test_what_touches_a_virtual_skin_is_recorded_by_the_thread_that_writes(tmp_path, channel):
+    ours, theirs = channel
+    log = EventLog(tmp_path / "run.rec")
+    log.open({"scene": "", "name": "x", "folder": "."})
+    listen(log, ours)
+    log.note_truth({"touches": []})
+    emit(theirs, "activated")
+    assert log.wait_for(("activated",), 5.0) is not None
+    theirs.close()
+    log.monitor.close()
+    log.note_truth({"released": 5.0})
+    log.close()
+    run = read_run(tmp_path / "run.rec")
+    assert run.start == log.began
+    told = [block.payload for block in run.blocks if block.kind == BlockKind.TRUTH]
+    assert told == [b'{"touches": []}', b'{"released": 5.0}']

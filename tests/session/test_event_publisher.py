@@ -1,0 +1,130 @@
+"""Published events: what a subscriber in Python, C and JavaScript gets, and what never reaches the guard."""
+
+import json
+import logging
+import math
+import shutil
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from coneskin.cli import main
+from coneskin.errors import SceneError
+from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.session.event_log import EventLog
+from coneskin.session.event_publisher import EventPublisher, event_message
+
+from ..scene.scenes import SKIN_ONLY
+
+FOLDER = Path(__file__).parents[2] / "demos" / "subscribers"
+CONTACT = GuardEvent(EventName.CONTACT, 12.5, {"sensor": "skin", "u": 0.1, "phi": math.nan, "normal": (0.0, math.inf)})
+ENDING = GuardEvent(EventName.ENDING, 13.0, {"what": "told to end"})
+
+
+def commands(folder: Path) -> dict[str, list[str]]:
+    """How each subscriber is run; C is compiled."""
+    return {
+        "py": [sys.executable, str(FOLDER / "subscribe.py")],
+        "c": [str(folder / "subscribe")],
+        "js": ["node", str(FOLDER / "subscribe.js")],
+    }
+
+
+@pytest.mark.parametrize("kind", ["py", "c", "js"])
+def test_a_subscriber_gets_the_events(kind: str, tmp_path: Path) -> None:
+    needed = {"py": sys.executable, "c": "cc", "js": "node"}[kind]
+    if shutil.which(needed) is None:
+        pytest.skip(f"there is no {needed}")
+    if kind == "c":
+        source, program = str(FOLDER / "subscribe.c"), str(tmp_path / "subscribe")
+        subprocess.run(["cc", "-std=gnu11", "-Wall", "-Werror", "-o", program, source], check=True, timeout=60)
+    with subprocess.Popen([*commands(tmp_path)[kind], "0"], stdout=subprocess.PIPE, text=True) as subscriber:
+        assert subscriber.stdout is not None
+        word, port = subscriber.stdout.readline().split()
+        assert word == "listening"
+        publisher = EventPublisher(f"udp://127.0.0.1:{port}")
+        for event in (CONTACT, ENDING):
+            publisher.publish(event, 10.0)
+        said = subscriber.stdout.read()
+        publisher.close()
+    assert subscriber.returncode == 0
+    assert [word in line for word, line in zip(("2.5", "3"), said.splitlines(), strict=True)] == [True, True]
+    assert [word in line for word, line in zip(("contact", "ending"), said.splitlines(), strict=True)] == [True, True]
+    assert len((FOLDER / f"subscribe.{kind}").read_text().splitlines()) <= 20
+    assert (publisher.sent, publisher.dropped) == (2, 0)
+
+
+def test_an_event_is_json_that_every_language_reads() -> None:
+    data = event_message(CONTACT, 10.0)
+    assert json.loads(data, parse_constant=pytest.fail) == {
+        **{"t": 2.5, "name": "contact", "sensor": "skin", "u": 0.1},
+        **{"phi": None, "normal": [0.0, None]},
+    }
+    long = event_message(GuardEvent(EventName.MESSAGE, 11.0, {"what": "x" * 10_000}), 10.0)
+    assert json.loads(long) == {"t": 1.0, "name": "message", "cut": 10_036}
+
+
+def test_what_the_network_does_not_take_is_dropped() -> None:
+    publisher = EventPublisher("udp://127.0.0.1:9")
+    publisher.close()
+    publisher.publish(CONTACT, 0.0)
+    publisher.publish(GuardEvent(EventName.MESSAGE, 0.0, {"what": object()}), 0.0)
+    assert (publisher.sent, publisher.dropped) == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("tcp://127.0.0.1:9870", "an address to publish to is udp://HOST:PORT"),
+        ("udp://127.0.0.1", "an address to publish to is udp://HOST:PORT"),
+        ("udp://127.0.0.1:door", "an address to publish to is udp://HOST:PORT"),
+        ("udp://[::1", "an address to publish to is udp://HOST:PORT"),
+        ("udp://127.0.0.1:9870?x", "an address to publish to is udp://HOST:PORT"),
+        (f"udp://{64 * 'a'}:9870", "aaa cannot be found: that is no name of a computer"),
+        ("udp://192.0.2.7:9870", "192.0.2.7 is not this computer"),
+        ("udp://255.255.255.255:9870", "255.255.255.255 is not this computer"),
+    ],
+)
+def test_addresses_that_are_refused(url: str, said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        EventPublisher(url)
+
+
+def test_each_address_is_published_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scene.toml").write_text(SKIN_ONLY)
+    for urls in (["udp://127.0.0.1:9", "tcp://one"], ["tcp://one", "udp://127.0.0.1:9"]):
+        words = [word for url in urls for word in ("--publish", url)]
+        assert main(["guard", str(tmp_path / "scene.toml"), "--duration-s", "0.01", *words]) == 1
+        assert "got 'tcp://one'" in capsys.readouterr().err
+
+
+def test_a_whole_network_is_published_to_where_that_is_allowed() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("", 0))
+        receiver.settimeout(5.0)
+        publisher = EventPublisher(f"udp://127.255.255.255:{receiver.getsockname()[1]}", beyond=True)
+        publisher.publish(ENDING, 10.0)
+        publisher.close()
+        assert (publisher.sent, publisher.dropped) == (1, 0)  # dropped without a word before it was allowed
+        assert json.loads(receiver.recv(9000))["name"] == "ending"
+
+
+def test_another_computer_is_published_to_where_that_is_allowed() -> None:
+    EventPublisher("udp://192.0.2.7:9870", beyond=True).close()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        EventPublisher(f"udp://localhost:{receiver.getsockname()[1]}").close()
+
+
+def test_every_event_is_logged_and_a_stop_is_a_warning(caplog: pytest.LogCaptureFixture) -> None:
+    log = EventLog()
+    with caplog.at_level(logging.INFO, "coneskin.events"):
+        log.report(EventName.ACTIVATED)
+        log.report(EventName.STOPPING, why="touch")
+    assert [(record.levelname, record.getMessage()) for record in caplog.records] == [
+        ("INFO", "activated {}"),
+        ("WARNING", "stopping {'why': 'touch'}"),
+    ]

@@ -1,0 +1,87 @@
+"""The arm under the names of ur_rtde: every public method of the wheel is there or refused, and the page says so."""
+
+import importlib.util
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+from coneskin.errors import RobotRefused
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.ur.ur_rtde import QUESTIONS
+from coneskin.session import ur_rtde_names
+from coneskin.session.ur_rtde_names import NAMES, UrRtdeArm
+from coneskin.session.ur_rtde_refusals import REFUSALS
+
+ROOT = Path(__file__).parents[2]
+ELSEWHERE = {"unlockProtectiveStop"}  # of the dashboard client
+
+
+@pytest.fixture(scope="module")
+def table():
+    pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
+    spec = importlib.util.spec_from_file_location("ur_rtde_table", ROOT / "scripts" / "ur_rtde_table.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def arm():
+    return UrRtdeArm(None, lambda stopped: None, arm_model("UR5e"), "nowhere")
+
+
+def test_every_public_method_of_the_wheel_is_there_or_refused_and_nothing_else_is(table) -> None:
+    wheel = {name for names in table.public_methods().values() for name in names}
+    assert len(wheel) > 120
+    assert not NAMES.keys() & REFUSALS.keys()
+    assert NAMES.keys() | REFUSALS.keys() == wheel | ELSEWHERE
+
+
+def test_the_page_is_what_the_script_writes(table) -> None:
+    text = table.PAGE.read_text(encoding="utf-8")
+    assert text.split(table.BEGIN)[1].split(table.END)[0] == table.table()
+
+
+def test_arguments_have_the_wheel_s_names(table) -> None:
+    """As far as the wheel names them; a question hands on what it gets."""
+    import rtde_control
+
+    compared = 0
+    for name in set(NAMES) - set(QUESTIONS):
+        for signature in re.findall(
+            rf"\b{name}\(self[^,)]*, (.*?)\) ->", getattr(rtde_control.RTDEControlInterface, name, str).__doc__
+        ):
+            wheel = re.findall(r"(\w+): ", signature)
+            if any(word.startswith("arg") for word in wheel) or wheel[0] == "path":
+                continue
+            ours = list(inspect.signature(NAMES[name].call).parameters)[1:]
+            assert ours[: len(wheel)] == wheel, name
+            compared += 1
+    assert compared >= 10
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_a_refused_method_says_why_and_what_to_do(arm, name) -> None:
+    method = getattr(arm, name)
+    with pytest.raises(RobotRefused, match=rf"{name} is refused: \w") as refused:
+        method([0.0] * 6, 1, asynchronous=True)
+    assert str(refused.value).endswith(REFUSALS[name])
+
+
+def test_a_name_that_neither_has_is_an_attribute_error(arm) -> None:
+    with pytest.raises(AttributeError, match="the arm has no 'moveK', nor has ur_rtde"):
+        arm.moveK()
+    assert not hasattr(arm, "__fspath__")
+
+
+def test_the_questions_are_those_of_the_driver() -> None:
+    assert ur_rtde_names._QUESTIONS == QUESTIONS
+
+
+def test_what_a_method_is_called_here_exists(arm) -> None:
+    for method in NAMES.values():
+        for word in re.findall(r"^(\w+)|, (\w+)", method.own):
+            own = word[0] or word[1]
+            assert own == "time" or own in dir(UrRtdeArm), method

@@ -1,0 +1,156 @@
+"""Workbench of the studio: what its handles do, and that it writes what ``coneskin design`` writes."""
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from coneskin.design.link import LinkMesh
+from coneskin.design.sheets import DesignOptions
+from coneskin.errors import GeometryError
+from coneskin.geometry.fit.cones import LinkFit
+from coneskin.geometry.fit.fitted_sheet import FittedSheet
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.pose import Pose
+from coneskin.geometry.ray_casting import RayCaster
+from coneskin.scene.reader import load_scene
+from coneskin.studio.design_text import design_facts, flat_drawing, warning_list
+from coneskin.studio.deviation_bands import deviation_bands
+from coneskin.studio.studio_page import StudioPage
+from coneskin.studio.workbench import Handles, Workbench, adjusted
+from coneskin.view.page_server import PageServer
+
+from ..geometry.synthetic import placed, revolve
+
+FULL = PlacedFrustum(Frustum(0.04, 0.06, 0.20), Pose.from_xyz_rpy((0.1, -0.2, 0.3), (0.4, 0.5, -0.6)))
+PART = PlacedFrustum(Frustum(0.04, 0.06, 0.20, math.radians(200.0)), FULL.link_frustum)
+HANDLES = Handles(0.03, 0.05, math.radians(150.0), math.radians(20.0))
+
+
+@pytest.mark.parametrize("found", [FULL, PART], ids=["a full wrap", "a partial wrap"])
+def test_an_adjusted_sheet_lies_within_the_found_one(found: PlacedFrustum) -> None:
+    sheet = adjusted(found, HANDLES)
+    for u in (0.0, sheet.frustum.slant):
+        for phi in (0.0, 1.0, sheet.frustum.wrap):
+            was_u, was_phi, off = found.locate(sheet.point(u, phi))
+            assert off == pytest.approx(0.0, abs=1e-12)
+            assert was_phi == pytest.approx(phi + math.radians(20.0))
+            along = was_u / found.frustum.slant * found.frustum.height
+            assert along == pytest.approx(0.03 if u == 0.0 else 0.15)
+            assert sheet.normal(phi) == pytest.approx(found.normal(was_phi))
+
+
+def test_nothing_set_changes_nothing() -> None:
+    same = adjusted(FULL, Handles())
+    assert same.frustum == FULL.frustum
+    assert same.point(0.1, 1.0) == pytest.approx(FULL.point(0.1, 1.0))
+
+
+def test_a_partial_wrap_is_not_turned_beyond_what_was_found() -> None:
+    sheet = adjusted(PART, Handles(wrap=math.radians(150.0), seam=math.radians(170.0)))
+    _, last, _ = PART.locate(sheet.point(0.05, sheet.frustum.wrap))
+    assert last == pytest.approx(PART.frustum.wrap)
+
+
+@pytest.mark.parametrize("handles", [Handles(0.1, 0.095), Handles(-0.01), Handles(0.0, -0.01), Handles(wrap=0.0)])
+def test_what_is_no_sheet_is_refused(handles: Handles) -> None:
+    with pytest.raises(GeometryError):
+        adjusted(FULL, handles)
+
+
+@pytest.fixture(scope="module")
+def bench() -> Workbench:
+    """A cone of 40 to 55 mm with shorter ones at its ends; the search for cones has tests of its own."""
+    mesh = placed(revolve([(0.0, 0.030), (0.02, 0.040), (0.18, 0.055), (0.20, 0.03)], 96, 4), Pose())
+    side = PlacedFrustum(Frustum(0.040, 0.055, 0.16), Pose(translation=(0.0, 0.0, 0.02)))
+    sheet = FittedSheet(side, 0.0, 2e-4, 1e-4, 0.0, 0.0, 0.8, 0.8, 0.0)
+    fit = LinkFit((sheet,), None, (), 1e-3, 0.2, 0.05, (), "", 1, "grid")
+    made = Workbench(LinkMesh("a <link>", mesh, "its own", ("a <note>",)), fit, DesignOptions(link="a link"))
+    made.handles = [Handles()]
+    made.update()
+    return made
+
+
+def test_the_bands_show_how_far_the_link_is_off_the_sheet(bench: Workbench) -> None:
+    (sheet,) = bench.fit.sheets
+    rays = RayCaster(bench.link.mesh)
+    on_it = {band.low for band in deviation_bands(rays, sheet.placed, 0.001)}
+    assert on_it == {-0.001 / 7.0} or max(map(abs, on_it)) < 0.0005
+    cone = sheet.frustum
+    inside = PlacedFrustum(
+        Frustum(cone.radius1 - 0.0008, cone.radius2 - 0.0008, cone.height), sheet.placed.link_frustum
+    )
+    bands = deviation_bands(rays, inside, 0.001)
+    assert all(band.low < 0.0008 for band in bands)
+    strongest = max(bands, key=lambda band: len(band.faces))
+    assert strongest.low < 0.0008 * math.cos(cone.half_angle) < strongest.high
+    assert strongest.colour[0] > 2 * strongest.colour[2], "what stands out is red"
+    assert sum(len(band.faces) for band in bands) == 2 * 40 * 96
+
+
+def test_a_handle_designs_the_sheet_again_and_is_said(bench: Workbench) -> None:
+    before = bench.designs[0].place.frustum.height
+    bench.handle(0, Handles(from_end1=0.02))
+    assert bench.designs[0].place.frustum.height == pytest.approx(before - 0.02)
+    assert f"{1e3 * (before - 0.02):.1f} mm" in design_facts(bench.designs)
+    bench.handle(0, Handles(from_end1=0.2))
+    assert bench.designs == ()
+    assert "a sheet needs 10 mm" in bench.warnings()[0]
+    bench.handle(0, Handles())
+    assert bench.designs[0].place.frustum.height == pytest.approx(before)
+
+
+def test_what_a_file_says_is_never_taken_for_html(bench: Workbench) -> None:
+    drawn = flat_drawing(bench.designs[0].cuts[0])
+    assert "<link>" not in drawn + warning_list(bench.warnings()) + design_facts(bench.designs)
+    assert "&lt;note&gt;" in warning_list(bench.warnings())
+    assert drawn.count("<svg") == 1
+
+
+@pytest.mark.long
+def test_it_writes_the_folder_that_a_scene_reads(bench: Workbench, tmp_path: Path) -> None:
+    bench.handle(0, Handles(from_end1=0.02))
+    files = bench.write(tmp_path / "skin", pictures=False)
+    assert {"report.md", "sensor.toml", "design.json"} <= set(files)
+    assert sum(name.startswith("cut/") and name.endswith(".dxf") for name in files) >= 7
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[[link]]\nname = "tube"\n[[link.sensor]]\nfile = "skin/sensor.toml"\n')
+    (sensor,) = load_scene(scene).sensors
+    assert sensor.placed.frustum.height == pytest.approx(bench.designs[0].active.frustum.height, abs=1e-6)
+    with pytest.raises(GeometryError, match="skin"):
+        bench.write(tmp_path / "skin", pictures=False)
+    bench.handle(0, Handles())
+
+
+def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench, tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="viser is not installed: no page is served")
+    other: list[LinkMesh] = []
+
+    def load(link: LinkMesh) -> Workbench:
+        other.append(link)
+        return bench
+
+    with PageServer("studio", port=18190, uploads=True) as server:
+        page = StudioPage(server, bench, tmp_path / "skin", False, load)
+        nodes = set(server.scene._handle_from_node_name)
+        assert {"/link", "/sheets/sheet 1/A", "/sheets/sheet 1/B", "/sheets/sheet 1/C", "/sheets/sheet 1/D"} <= nodes
+        assert "cm2" in page._facts.content
+        assert "<svg" in page._flat.content
+        page._upload = SimpleNamespace(value=SimpleNamespace(name="../evil<b>.txt", content=b"x"))
+        page._take_upload()
+        assert "&lt;b&gt;.txt is no" in page._said.content
+        page._upload.value = SimpleNamespace(name="../../tube.stl", content=b"solid nothing")
+        page._take_upload()
+        assert "tube.stl" in page._said.content
+        assert other == []
+        corners = bench.link.mesh.vertices[bench.link.mesh.faces]
+        record = np.zeros(len(corners), np.dtype([("n", "<3f4"), ("v", "<9f4"), ("a", "<u2")]))
+        record["v"] = corners.reshape(-1, 9)
+        data = bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes()
+        page._upload.value = SimpleNamespace(name="../../tube.stl", content=data)
+        page._take_upload()
+        assert [link.name for link in other] == ["tube"]
+        assert "1 sheets" in page._said.content

@@ -1,0 +1,141 @@
+"""What is built and installed: wheel, source distribution and editable install, each in an environment of its own.
+
+pip fetches the tools and the dependencies of these environments, so these tests need a package index.
+"""
+
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import coneskin
+
+pytestmark = pytest.mark.long
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("geometry", "skin", "robot")
+USER = """\
+from typing import assert_type
+
+from coneskin.geometry.frustum import Frustum
+from coneskin.robot.arm.kinematics import forward
+from coneskin.skin.sensor import Sensor
+
+cone = Frustum(0.04, 0.07, 0.15)
+assert_type(cone.radius1, float)
+Frustum("40", 0.07, 0.15)
+"""
+
+
+def run(*command: str | Path, cwd: Path) -> str:
+    done = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def environment(path: Path, *packages: str | Path) -> Path:
+    """Make an empty virtual environment with these packages and return the folder of its programs."""
+    run(sys.executable, "-m", "venv", path, cwd=path.parent)
+    programs = path / ("Scripts" if sys.platform == "win32" else "bin")
+    run(programs / "python", "-m", "pip", "install", "-q", *packages, cwd=path.parent)
+    return programs
+
+
+def copy(path: Path) -> Path:
+    """Copy the source tree, links as links, without what was built in it."""
+    built = shutil.ignore_patterns(".*", "build", "dist", "*.egg-info", "__pycache__")
+
+    def unwanted(folder: str, names: list[str]) -> set[str]:
+        return built(folder, names) | ({"runs"} if Path(folder) == ROOT else set())  # recorded there by a demo
+
+    return Path(shutil.copytree(ROOT, path, symlinks=True, ignore=unwanted))
+
+
+def contents(wheel: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@pytest.fixture(scope="module")
+def tools(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return environment(tmp_path_factory.mktemp("tools") / "venv", "build")
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory, tools: Path) -> Path:
+    """Folder with the source distribution and the wheel that was built from it."""
+    tree = copy(tmp_path_factory.mktemp("tree") / "coneskin")
+    run(tools / "python", "-m", "build", "-q", cwd=tree)
+    return tree / "dist"
+
+
+@pytest.fixture(scope="module")
+def wheel(built: Path) -> Path:
+    (found,) = built.glob("*.whl")
+    return found
+
+
+def test_the_wheel_holds_every_module_and_nothing_else(wheel: Path) -> None:
+    folders = {"coneskin": ROOT / "src" / "coneskin", **{f"coneskin/{name}": ROOT / name for name in FOLDERS}}
+    expected = {
+        f"{name}/{path.relative_to(folder).as_posix()}"
+        for name, folder in folders.items()
+        for pattern in ("*.py", "py.typed", "*.json", "*.csv", "*.ino", "*.h", "*.c")
+        for path in folder.rglob(pattern)
+    }
+    found = {name for name in contents(wheel) if ".dist-info/" not in name}
+    assert found == expected
+    assert wheel.name == f"coneskin-{coneskin.__version__}-py3-none-any.whl"
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_the_tree_and_its_sdist_build_the_same_wheel(wheel: Path, tools: Path, tmp_path: Path, links: bool) -> None:
+    """With the links of src/coneskin, and with the small files that a git without links makes of them."""
+    tree = copy(tmp_path / "coneskin")
+    if not links:
+        for name in FOLDERS:
+            link = tree / "src" / "coneskin" / name
+            link.unlink()
+            link.write_text(f"../../{name}", encoding="utf-8")
+    run(tools / "python", "-m", "build", "-q", "--wheel", cwd=tree)
+    (other,) = (tree / "dist").glob("*.whl")
+    assert contents(other) == contents(wheel)
+
+
+def test_the_sdist_holds_no_tests(built: Path) -> None:
+    (found,) = built.glob("*.tar.gz")
+    with tarfile.open(found) as archive:
+        tops = {name.split("/")[1] for name in archive.getnames() if "/" in name}
+    assert tops >= {"src", "pyproject.toml", "setup.py", "README.md", "LICENSE"}
+    assert not tops & {"tests", "bench", "demos"}
+
+
+def test_the_installed_wheel_runs_without_the_tree(wheel: Path, tmp_path: Path) -> None:
+    programs = environment(tmp_path / "venv", wheel)
+    assert run(programs / "coneskin", "--version", cwd=tmp_path) == f"coneskin {coneskin.__version__}\n"
+    cone = ("--radius1-mm", "40", "--radius2-mm", "70", "--height-mm", "150")
+    assert "203.960781 mm" in run(programs / "coneskin", "unroll", *cone, cwd=tmp_path)  # as in demos/01_unroll.py
+    if sys.platform != "win32":  # the demo's virtual skin needs a pseudo-terminal
+        assert "bit by bit" in run(programs / "coneskin", "demo", cwd=tmp_path)
+
+
+def test_type_checkers_see_an_editable_install(tmp_path: Path) -> None:
+    """As README installs it, and in a project of the user's elsewhere; only his mistake is reported."""
+    tree = copy(tmp_path / "coneskin")
+    if not all((tree / "src" / "coneskin" / name).is_symlink() for name in FOLDERS):
+        pytest.skip("this checkout has no symbolic links: git config core.symlinks")
+    programs = environment(tmp_path / "venv", "mypy", "numpy")
+    run(programs / "python", "-m", "pip", "install", "-q", "--no-deps", "-e", tree, cwd=tmp_path)
+    project = tmp_path / "project"
+    project.mkdir()
+    (project / "program.py").write_text(USER, encoding="utf-8")
+    command = [programs / "python", "-m", "mypy", "--strict", "program.py"]
+    done = subprocess.run(command, cwd=project, capture_output=True, text=True, timeout=300)
+    complaints = [line for line in done.stdout.splitlines() if ": error:" in line]
+    assert len(complaints) == 1, done.stdout + done.stderr
+    assert complaints[0].startswith("program.py:9: error:")
+    assert '"str"' in complaints[0]

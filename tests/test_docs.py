@@ -1,0 +1,319 @@
+"""README and the pages in docs/: every code block runs or says why not, and what the pages name exists.
+
+Each page has a folder of its own in which its blocks run from the first to the last:
+
+    ```python                     in a fresh interpreter
+    ```sh                         each command; the exit code must be 0, or what "# exit code N" says
+    ```toml title="scene.toml"    is saved under that name; a scene is parsed
+    ```text                       is only shown
+
+A command that ends with "&" runs until the end of its page. Loopback addresses are replaced by free ones, and the
+silences that a scene allows become as long as possible: a busy machine is no failure.
+"""
+
+import ast
+import functools
+import itertools
+import math
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from coneskin.cli import COMMANDS
+from coneskin.robot.sim.process import free_host
+from coneskin.scene.reader import parse_scene
+
+ROOT = Path(__file__).parents[1]
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path
+    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+}
+#: pages whose blocks start processes, or compute for seconds
+LONG = {"README.md", "docs/design.md", "docs/field.md", "docs/guard/external.md", "docs/guard/internal.md"}
+LONG |= {"docs/calibration.md", "docs/guard/commissioning.md"}
+LONG |= {"docs/index.md", "docs/replay.md", "docs/runs.md", "docs/sim-ur.md", "docs/physics.md"}
+#: blocks that no test runs, each with its reason in the page
+NOT_RUN = 3
+LANGUAGES = ("python", "sh", "toml", "text")
+TIMEOUT = 180.0  # s for one block; a busy machine takes ten times as long as an idle one
+SHELL = 'coneskin() { "$PYTHON" -m coneskin "$@"; }; python() { "$PYTHON" "$@"; };'
+
+
+class Block(NamedTuple):
+    """One fenced block of a page."""
+
+    language: str
+    title: str
+    line: int
+    text: str
+    not_run: str
+
+
+def blocks(path: Path) -> Iterator[Block]:
+    """The fenced blocks of a page, in order."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    start: int | None = None
+    language = title = reason = ""
+    for number, line in enumerate(lines):
+        if not line.startswith("```"):
+            continue
+        if start is None:
+            start = number
+            language, _, rest = line[3:].partition(" ")
+            title = match[1] if (match := re.fullmatch(r'title="(.+)"', rest)) else ""
+            before = lines[number - 1] if number else ""
+            reason = match[1] if (match := re.fullmatch(r"<!-- not run: (.+) -->", before)) else ""
+        else:
+            yield Block(language, title, start + 1, "\n".join(lines[start + 1 : number]) + "\n", reason)
+            start = None
+    assert start is None, f"{path.name}:{start} opens a block that nothing closes"
+
+
+def commands(text: str) -> Iterator[tuple[str, int]]:
+    """Each command of a shell block, which may go over several lines, and the exit code that is expected."""
+    command = ""
+    for line in text.splitlines():
+        command += line
+        try:
+            words = shlex.split(command, comments=True)
+        except ValueError:  # a quotation is open
+            command += "\n"
+            continue
+        if command.endswith("\\"):
+            command += "\n"
+            continue
+        if words:
+            match = re.search(r"# exit code (\d+)", command)
+            yield command, int(match[1]) if match else 0
+        command = ""
+    assert not command, f"a command does not end: {command}"
+
+
+def tube(path: Path, radius: float, start: float, end: float) -> None:
+    """Write the mesh of a tube about z, with both ends closed, as ASCII STL [m]."""
+    count = 96
+    angles = [2.0 * math.pi * k / count for k in range(count)]
+    corners = [(radius * math.cos(angle), radius * math.sin(angle)) for angle in angles]
+    facets = []
+    for (x1, y1), (x2, y2) in zip(corners, corners[1:] + corners[:1], strict=True):
+        low1, low2, high1, high2 = (x1, y1, start), (x2, y2, start), (x1, y1, end), (x2, y2, end)
+        bottom, top = (0.0, 0.0, start), (0.0, 0.0, end)
+        facets += [(low1, low2, high2), (low1, high2, high1), (bottom, low2, low1), (top, high1, high2)]
+    lines = ["solid tube"]
+    for facet in facets:
+        loop = "".join(f"vertex {x:.9f} {y:.9f} {z:.9f}\n" for x, y, z in facet)
+        lines.append(f"facet normal 0 0 0\nouter loop\n{loop}endloop\nendfacet")
+    path.write_text("\n".join([*lines, "endsolid tube\n"]), encoding="ascii")
+
+
+#: file that a page may name without making it -> radius, start and end of the tube that stands for it [m]
+READERS_FILES = {"upperarm.stl": (0.054, 0.0, 0.434), "forearm.stl": (0.0375, 0.08, 0.36)}
+
+
+class PageRun:
+    """Folder of one page, and what runs in it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._hosts: dict[str, str] = {}
+        self._running: list[tuple[str, subprocess.Popen[str]]] = []
+
+    def adapt(self, text: str) -> str:
+        """Make the readers' files, and replace loopback addresses."""
+        for name, sizes in READERS_FILES.items():
+            if name in text and not (self.folder / name).exists():
+                tube(self.folder / name, *sizes)
+        text = re.sub(r"coneskin sim-ur(?! --h)", "coneskin sim-ur --host 127.0.0.1", text)
+        text = re.sub(r"\b(skin_silence_ms|skin_late_ms|arm_silence_ms) = \d+", r"\1 = 1000", text)
+        return re.sub(r"127\.0\.0\.\d+", lambda match: self._host(match[0]), text)
+
+    def _host(self, shown: str) -> str:
+        return self._hosts.setdefault(shown, free_host(used=self._hosts.values()))
+
+    def python(self, block: Block) -> None:
+        script = self.folder / f"line_{block.line}.py"
+        script.write_text(self.adapt(block.text), encoding="utf-8")
+        self._finish([sys.executable, "-W", "error", script.name], 0, block.line)
+
+    def shell(self, block: Block) -> None:
+        for command, code in commands(self.adapt(block.text)):
+            if command.rstrip().endswith("&"):
+                self._start(command.rstrip()[:-1], block.line)
+            else:
+                self._finish(["bash", "-c", f"{SHELL} {command}"], code, block.line)
+
+    def toml(self, block: Block) -> None:
+        text = self.adapt(block.text)
+        if block.title:
+            self.save(block)
+        if "link" in tomllib.loads(text):
+            parse_scene(text, block.title or f"line {block.line}", self.folder)
+
+    def save(self, block: Block) -> None:
+        (self.folder / block.title).write_text(self.adapt(block.text), encoding="utf-8")
+
+    @property
+    def _environment(self) -> dict[str, str]:
+        return {**os.environ, "PYTHON": sys.executable, "MPLBACKEND": "Agg"}
+
+    def _start(self, command: str, line: int) -> None:
+        """Start a command that runs until the end of the page, and wait until it says that it is ready."""
+        words = [sys.executable, "-m", *shlex.split(command)]
+        child = subprocess.Popen(words, cwd=self.folder, env=self._environment, stdout=subprocess.PIPE, text=True)
+        self._running.append((command, child))
+        assert child.stdout is not None
+        assert child.stdout.readline(), f"line {line}: it ends at once: {command}"
+
+    def _finish(self, words: list[str], code: int, line: int) -> None:
+        done = subprocess.run(
+            words,
+            cwd=self.folder,
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+            stdin=subprocess.DEVNULL,
+        )
+        said = f"exit code {done.returncode} of {words[-1]}\n{done.stdout}{done.stderr}"
+        assert done.returncode == code, f"line {line}: {said}"
+
+    def close(self) -> None:
+        """End what runs in the background as Ctrl-C does, and see that it ends well."""
+        codes = {}
+        for _, child in self._running:
+            child.send_signal(signal.SIGINT)
+        for command, child in self._running:
+            try:
+                child.communicate(timeout=20.0)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.communicate()
+            codes[command] = child.returncode
+        assert set(codes.values()) <= {0}, codes
+
+
+@pytest.fixture
+def page_run(tmp_path: Path) -> Iterator[PageRun]:
+    run = PageRun(tmp_path)
+    yield run
+    run.close()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs pseudo-terminals and loopback addresses")
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=[pytest.mark.long] if page in LONG else []) for page in PAGES]
+)
+def test_the_blocks_of_a_page_run(page: str, page_run: PageRun) -> None:
+    for block in blocks(PAGES[page]):
+        if block.title:  # a command may stand above the file that it reads
+            page_run.save(block)
+    for block in blocks(PAGES[page]):
+        if block.not_run or block.language == "text":
+            continue
+        {"python": page_run.python, "sh": page_run.shell, "toml": page_run.toml}[block.language](block)
+
+
+def test_every_block_runs_or_says_why_not() -> None:
+    found = [(page, block) for page, path in PAGES.items() for block in blocks(path)]
+    others = [f"{page}:{block.line}" for page, block in found if block.language not in LANGUAGES]
+    assert others == []
+    left_out = [f"{page}:{block.line}: {block.not_run}" for page, block in found if block.not_run]
+    runs = sum(block.language != "text" for _, block in found) - len(left_out)
+    print(f"{runs} blocks run, {len(left_out)} do not:", *left_out, sep="\n")
+    assert len(left_out) == NOT_RUN, left_out
+
+
+def test_a_block_that_fails_is_seen(page_run: PageRun) -> None:
+    """Otherwise the tests above could not fail."""
+    with pytest.raises(AssertionError, match="exit code 1"):
+        page_run.python(Block("python", "", 1, "assert False\n", ""))
+    with pytest.raises(AssertionError, match="exit code 2"):
+        page_run.shell(Block("sh", "", 1, "coneskin nonsense\n", ""))
+    assert list(commands('a \\\n b # exit code 3\n# a remark\npython -c "\nx"\n')) == [
+        ("a \\\n b # exit code 3", 3),
+        ('python -c "\nx"', 0),
+    ]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_files_that_a_page_names_exist(page: str) -> None:
+    """Names of modules in code font, and paths that begin with a folder of the repository."""
+    text = re.sub(r"^```.*?^```$", "", PAGES[page].read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    folders = ("geometry", "skin", "robot", "src", "tests", "demos", "bench", "docs", "scripts")
+    named = set(re.findall(rf"`((?:{'|'.join(folders)})/[\w./-]+\.\w+)`", text))
+    planned = {"skin/sources/i2c_bus.py"}  # the example of docs/how-to-add/sensor-bus.md
+    assert sorted(name for name in named - planned if not (ROOT / name).is_file()) == []
+    modules = {path.name for folder in folders for path in (ROOT / folder).rglob("*.py")}
+    assert set(re.findall(r"`(\w+\.py)`", text)) - modules == set()
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"])
+def test_the_links_of_a_page_at_the_root_lead_somewhere(page: str) -> None:
+    """The links in docs/ are checked by mkdocs."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    targets = set(re.findall(r"\]\(([^)#]+)[^)]*\)", text))
+    assert sorted(name for name in targets if "://" not in name and not (ROOT / name).exists()) == []
+
+
+#: `test_core.py::test_nothing_moves`: a test by its file below tests/, with a folder where the name alone is not unique
+NAMED_TEST = re.compile(r"`(?:tests/)?([\w/]+\.py)::(\w+)`")
+
+
+@functools.cache
+def functions(path: Path) -> set[str]:
+    """Names of the functions of a file, which is read and not imported."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+def test_every_promise_names_a_test_that_shows_it() -> None:
+    lines = PAGES["docs/safety.md"].read_text(encoding="utf-8").splitlines()
+    heads = [number for number, line in enumerate(lines) if line.endswith("| shown by |")]
+    rows = [line for head in heads for line in itertools.takewhile(lambda one: one.startswith("|"), lines[head + 2 :])]
+    print(f"{len(rows)} promises")
+    assert "| what happens | what coneskin does | shown by |" in lines
+    assert [row for row in rows if not NAMED_TEST.search(row.rsplit(" | ", 1)[1])] == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_tests_that_a_page_names_exist(page: str) -> None:
+    text = PAGES[page].read_text(encoding="utf-8")
+    files = list((ROOT / "tests").rglob("test_*.py"))
+    missing = []
+    for file, name in set(NAMED_TEST.findall(text)):
+        found = [path for path in files if path.as_posix().endswith(f"/{file}")]
+        if len(found) != 1 or name not in functions(found[0]):
+            missing.append(f"{file}::{name}")
+    assert sorted(missing) == []
+    assert text.count(".py::") == len(NAMED_TEST.findall(text)), "one is broken over two lines, or not in code font"
+
+
+def test_readme_lists_every_command() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `coneskin ([\w-]+)", text, re.MULTILINE) == list(COMMANDS)
+
+
+def test_readme_names_every_folder_of_code() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = text.split("| folder | imported as |", 1)[1].split("\n\n", 1)[0]
+    folders = {
+        path.parent.name
+        for top in ("geometry", "skin", "robot", "src/coneskin")
+        for path in (ROOT / top).glob("*/__init__.py")
+    }
+    assert folders - set(re.findall(r"`([\w/]+?)/?`", table)) == set()
+
+
+def test_the_drawing_is_what_its_script_draws() -> None:
+    code = "from draw_touch_flow import TARGET, drawing; assert drawing() == TARGET.read_text(encoding='utf-8')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT / "scripts", timeout=60)
+    assert done.returncode == 0, "python scripts/draw_touch_flow.py draws it anew"

@@ -1,0 +1,93 @@
+"""Browser for tests of pages: Debian's chromium without a screen, drawing in software."""
+
+import io
+import math
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coneskin.geometry.pose import Vector
+from coneskin.view.page_server import PageServer
+
+FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
+SIZE = {"width": 820, "height": 400}
+TIMEOUT = 20_000.0  # ms; a busy machine draws slowly
+
+
+@contextmanager
+def browser_page() -> Iterator[Any]:
+    """Open a page of a browser; skip the test where there is none."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no browser is driven")
+    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    if program is None:
+        pytest.skip("chromium is not installed (Debian: apt-get install chromium): the page is not looked at")
+    with sync_api.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=program, args=list(FLAGS))
+        try:
+            page = browser.new_page(viewport=SIZE)
+            page.set_default_timeout(TIMEOUT)
+            page.wrong = []
+            page.on("pageerror", lambda error: page.wrong.append(str(error)))
+            yield page
+        finally:
+            browser.close()
+
+
+def wait_for_text(page: Any, selector: str, text: str) -> None:
+    """Wait until an element of the page has a text."""
+    page.wait_for_function(
+        "([selector, text]) => [...document.querySelectorAll(selector)].some((e) => e.textContent.includes(text))",
+        arg=[selector, text],
+    )
+
+
+def look_closely(server: PageServer, page: Any, point: Vector, normal: Vector) -> tuple[int, int]:
+    """Move the camera in front of a place, and return where on the page it then is [pixels]."""
+    (client,) = server._server.get_clients().values()
+    side = np.cross(normal, (0.3, 0.5, 0.8))
+    client.camera.position = tuple(np.array(point) + 0.35 * np.array(normal) + 0.12 * side / np.linalg.norm(side))
+    client.camera.look_at = point
+    page.wait_for_timeout(300)  # until the page has told its new camera
+    camera = client.camera
+    x, y, z = np.array(rotation(camera.wxyz)).T @ (np.array(point) - camera.position)
+    canvas = max((item.bounding_box() for item in page.query_selector_all("canvas")), key=lambda box: box["width"])
+    focal = 0.5 * canvas["height"] / math.tan(0.5 * camera.fov)
+    assert z > 0.1
+    return (
+        round(canvas["x"] + 0.5 * canvas["width"] + focal * x / z),
+        round(canvas["y"] + 0.5 * canvas["height"] + focal * y / z),
+    )
+
+
+def rotation(wxyz: Any) -> list[list[float]]:
+    """Rotation matrix of a quaternion."""
+    w, x, y, z = (float(value) for value in wxyz)
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+
+
+def pixels(page: Any, at: tuple[int, int], around: int = 5) -> np.ndarray:
+    """The page's pixels about a place, as red, green and blue."""
+    from PIL import Image
+
+    picture = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
+    return picture[at[1] - around : at[1] + around + 1, at[0] - around : at[0] + around + 1].reshape(-1, 3)
+
+
+def magenta(found: np.ndarray) -> int:
+    """How many of some pixels have the colour of a contact whose place is certain; a touched sheet is red."""
+    red, green, blue = found.T
+    return int(((red > 90) & (green < 0.6 * red) & (blue > 0.75 * red)).sum())
+
+
+def quiet(found: np.ndarray) -> int:
+    """How many of some pixels have the colour of a sheet that nothing touches."""
+    red, green, blue = found.T
+    return int(((green > 1.3 * red) & (green > blue)).sum())

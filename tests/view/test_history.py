@@ -1,0 +1,147 @@
+"""History of a run: what is shown at a time is what was recorded then."""
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coneskin.replay.replay import read_run
+from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent
+from coneskin.view.contact_mark import FADING, ContactLog
+from coneskin.view.history import History
+from coneskin.view.panel_text import event_list, status
+from coneskin.view.phase_words import UNKNOWN, PhaseWords, phase_after
+from coneskin.view.strand import Strand, read_strands
+from coneskin.view.timeline import timeline
+from coneskin.view.traces import trace_names, traces
+
+RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+
+
+@pytest.fixture(scope="module")
+def strand() -> Strand:
+    return read_strands([RUN])[0]
+
+
+def event(strand: Strand, name: str) -> GuardEvent:
+    return next(item for item in strand.history.events if item.name == name)
+
+
+def test_the_arm_stands_where_the_controller_measured_it(strand: Strand) -> None:
+    run = read_run(RUN)
+    blocks = list(run.select(kinds=frozenset({BlockKind.ARM})))
+    decode = load_driver("ur").decode_state
+    for block in blocks[:: len(blocks) // 7]:
+        assert strand.history.q(block.time) == decode(block.time, block.payload).q
+    between = 0.5 * (blocks[10].time + blocks[11].time)
+    assert strand.history.q(between) == decode(blocks[10].time, blocks[10].payload).q
+
+
+def test_the_sheet_is_touched_while_the_touch_lasts(strand: Strand) -> None:
+    (sheet,) = strand.stage.sheets
+    began = event(strand, EventName.CONTACT)
+    assert strand.history.level(sheet.name, began.time - 0.05) < sheet.touch_level
+    assert strand.history.level(sheet.name, began.time + 0.01) > sheet.touch_level
+
+
+def test_the_mark_is_where_the_touch_was_read_and_fades_when_it_is_over(strand: Strand) -> None:
+    began, located = event(strand, EventName.CONTACT), event(strand, EventName.CONTACT_LOCATED)
+    assert strand.history.marks(began.time - 0.001) == []
+    (mark,) = strand.history.marks(located.time)
+    assert list(mark.point) == located.details["point"]
+    assert list(mark.normal) == located.details["normal"]
+    assert mark.located
+    assert mark.strength == 1.0
+
+
+def touch(name: EventName, time: float, number: int = 1, **details: object) -> GuardEvent:
+    place = {"point": [0.1, 0.0, 0.0], "normal": [1.0, 0.0, 0.0], "sensor": "s", "level": 0.3, "location_valid": False}
+    return GuardEvent(name, time, {"number": number, **place, **details})
+
+
+def test_a_touch_that_is_over_fades() -> None:
+    log = ContactLog().take_all([touch(EventName.CONTACT, 1.0), touch(EventName.TOUCH_ENDED, 2.0)])
+    assert [mark.strength for mark in log.marks(2.0)] == [1.0]
+    assert log.marks(2.0 + 0.5 * FADING)[0].strength == pytest.approx(0.5)
+    assert log.marks(2.0 + FADING) == []
+
+
+@pytest.mark.parametrize("point", [None, [1.0, 2.0], [1.0, 2.0, "x"], [1e300, 0.0, 0.0], [math.nan, 0.0, 0.0], "abc"])
+def test_a_place_that_is_nonsense_has_no_mark(point: object) -> None:
+    assert ContactLog().take_all([touch(EventName.CONTACT, 1.0, point=point)]).marks(1.0) == []
+
+
+def test_a_page_that_stays_open_forgets_touches() -> None:
+    log = ContactLog().take_all(touch(EventName.CONTACT, float(k), number=k) for k in range(2000))
+    assert len(log.marks(1e9)) == 400
+
+
+def test_the_phases_are_those_of_the_guard(strand: Strand) -> None:
+    words = [change.phase.text for change in strand.history.phases]
+    assert words[0] == UNKNOWN.text
+    assert [words.index(text) for text in ("active", "stopping", "latched: stands until a manual reset")]
+    order = [words.index(text) for text in ("active", "stopping", "moving away from the touch")]
+    assert order == sorted(order)
+    latched = event(strand, EventName.LATCHED)
+    assert strand.history.phase(latched.time).text.startswith("latched")
+    assert not strand.history.phase(latched.time - 1e-3).text.startswith("latched")
+
+
+def test_a_latched_arm_that_is_measured_standing_again_stays_latched() -> None:
+    latched = phase_after(UNKNOWN, EventName.LATCHED)
+    assert phase_after(latched, EventName.STANDSTILL) == latched
+    assert phase_after(latched, EventName.WAITING) == latched
+    assert phase_after(latched, EventName.ACTIVATED).text == "active"
+
+
+def test_a_page_that_follows_does_not_grow(strand: Strand) -> None:
+    run = read_run(RUN)
+    blocks = list(run.select(kinds=frozenset({BlockKind.SKIN, BlockKind.ARM})))
+    length = blocks[-1].time - blocks[0].time
+    history = History(run.scene(), keep=1.0)
+    sizes = []
+    for turn in range(12):
+        history.take_all(block._replace(time=block.time + turn * length) for block in blocks)
+        sizes.append(len(history.joints.times) + sum(len(series.times) for series in history.levels.values()))
+    assert max(sizes[4:]) <= 1.2 * max(sizes[:4])
+    assert history.until - history.since <= 1.5 + length
+
+
+def test_what_a_recording_says_is_never_taken_for_html() -> None:
+    evil = '<img src=x onerror="alert(1)">'
+    run = [(evil, PhaseWords(evil, "#000000"), evil)]
+    fault = GuardEvent(EventName.FAULT, 0.0, {"what": evil})
+    for text in (status(run * 2, evil, evil), event_list([(fault, evil)], 0)):
+        assert "<img" not in text
+        assert "&lt;img" in text
+
+
+def test_traces_keep_the_peak(strand: Strand) -> None:
+    since, until = strand.span
+    names = trace_names([strand])
+    assert names == ["touch level", "joint speed [rad/s]", "channels of forearm skin"]
+    (series,) = strand.history.levels.values()
+    found = traces([strand], "touch level", since, until)
+    assert np.nanmax(found.values) == max(value for (value,) in series.values)
+    assert found.times[np.nanargmax(found.values[0])] == pytest.approx(
+        series.times[int(np.argmax([value for (value,) in series.values]))] - strand.zero, abs=(until - since) / 240
+    )
+    assert traces([strand], "channels of forearm skin", since, until).values.shape == (6, 480)
+
+
+def test_the_timeline_has_a_band_for_each_phase(strand: Strand) -> None:
+    drawn = timeline([strand], *strand.span)
+    phases = strand.history.phases
+    lasting = [change for change, after in pairwise(phases[1:]) if after.time > change.time]
+    assert len(lasting) >= 4
+    for change in lasting:
+        assert f"<title>{change.phase.text}</title>" in drawn
+
+
+def test_two_runs_are_laid_side_by_side_by_their_first_touch() -> None:
+    first, second = read_strands([RUN, RUN])
+    assert first.offset[1] == -second.offset[1] != 0.0
+    assert event(first, EventName.CONTACT).time == first.zero

@@ -1,0 +1,107 @@
+"""What a person sees in a browser: the phase in words, the contact where it was, and that nobody may rely on it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coneskin.recording import Block
+from coneskin.recording_file.recorder import Recorder
+from coneskin.replay.replay import read_run
+from coneskin.robot.guard.journal import BlockKind, EventName
+from coneskin.view.html_file import write_html
+from coneskin.view.live_page import LivePage
+from coneskin.view.live_run import LiveRun
+from coneskin.view.page_server import PageServer
+from coneskin.view.run_page import show_runs
+from coneskin.view.strand import Strand, read_strands
+
+from .browser import browser_page, look_closely, magenta, pixels, quiet, wait_for_text
+
+RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+NOTICE = "No safety display"
+pytestmark = pytest.mark.long
+
+
+def contact(strand: Strand) -> tuple[float, Any, Any]:
+    """When the demo's touch was located, and where that was in the base frame, with its normal."""
+    at = next(event for event in strand.history.events if event.name == EventName.CONTACT_LOCATED)
+    moment = strand.moment(at.time - strand.zero)
+    (mark,) = moment.marks
+    (sheet,) = strand.stage.sheets
+    pose = moment.poses[sheet.link]
+    return at.time - strand.zero, pose.apply(mark.point), pose.rotate(mark.normal)
+
+
+def test_a_recording_is_scrubbed_to_its_touch() -> None:
+    strands = read_strands([RUN])
+    _, point, normal = contact(strands[0])
+    with PageServer("a run", port=18180) as server, browser_page() as page:
+        show_runs(server, strands)
+        page.goto(server.url)
+        wait_for_text(page, "#coneskin-notice", NOTICE)
+        wait_for_text(page, ".coneskin-phase", "nothing is known of the guard")
+        forward = page.get_by_role("button", name=">", exact=True)
+        for words in ("activated", "stop: touch"):
+            forward.click()
+            wait_for_text(page, "#coneskin-events div[style*='700']", words if words == "activated" else "touch on")
+        wait_for_text(page, ".coneskin-phase", "stopping")
+        forward.click()
+        wait_for_text(page, "#coneskin-clock", "2.970 s")
+        place = look_closely(server, page, point, normal)
+        assert magenta(pixels(page, place)) > 5
+        page.get_by_role("button", name="|<", exact=True).click()
+        wait_for_text(page, "#coneskin-clock", "1.788 s")
+        assert magenta(pixels(page, place)) == 0
+        for words in ("a run", "play", "traces"):
+            assert words in page.inner_text("body")
+        assert page.wrong == []
+
+
+def test_a_file_without_python_jumps_to_the_touch(tmp_path: Path) -> None:
+    write_html(tmp_path / "run.html", read_strands([RUN, RUN]))
+    with browser_page() as page:
+        requests: list[str] = []
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(f"file://{tmp_path / 'run.html'}")
+        wait_for_text(page, "#coneskin-notice", NOTICE)
+        page.wait_for_selector("#root [role=slider]", state="attached")
+        page.evaluate("[...document.querySelectorAll('#coneskin-events div')].find((row) => "
+                      "row.textContent.includes('touch located')).click()")  # fmt: skip
+        wait_for_text(page, "#coneskin-clock", "0.021 s")
+        wait_for_text(page, ".coneskin-phase", "stopping")
+        assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
+        assert page.wrong == []
+
+
+def test_a_page_follows_a_recording_that_grows(tmp_path: Path) -> None:
+    run = read_run(RUN)
+    blocks = list(run.blocks)
+    path = tmp_path / "run.rec"
+    located, point, normal = contact(read_strands([RUN])[0])
+    with Recorder(path) as recorder, PageServer("live", port=18180) as server, browser_page() as page:
+        recorder.write(Block(BlockKind.HEADER, run.start, json.dumps(run.header).encode()), flush=True)
+        before = [block for block in blocks if block.time < run.start + located - 0.1]
+        recorder.write(*before, flush=True)
+        live = LiveRun(path)
+        shown = LivePage(server, live.strand.stage, lambda: live)
+        shown.look(0.0)
+        shown.draw(0.0)
+        page.goto(server.url)
+        wait_for_text(page, "#coneskin-notice", NOTICE)
+        wait_for_text(page, ".coneskin-phase", "active")
+        place = look_closely(server, page, point, normal)
+        recorder.write(*(b for b in blocks if run.start + located - 0.1 <= b.time <= run.start + located), flush=True)
+        assert shown.look(1.0), "an event has come"
+        shown.draw(1.0)
+        wait_for_text(page, ".coneskin-phase", "stopping")
+        wait_for_text(page, "#coneskin-events", "touch located")
+        assert magenta(pixels(page, place)) > 5
+        assert quiet(pixels(page, place, 40)) == 0
+        assert page.wrong == []
+        recorder.close()
+        shown.look(2.0)
+        shown.draw(2.0)
+        wait_for_text(page, "#coneskin-stale", "the run is over")
+        shown.close()

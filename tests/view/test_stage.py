@@ -1,0 +1,119 @@
+"""Solids and sheets: where they are, and that they are closed."""
+
+import math
+
+import numpy as np
+import pytest
+
+from coneskin.geometry.pose import Pose
+from coneskin.robot.arm.kinematics import link_poses
+from coneskin.robot.arm.skeleton import skeleton
+from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.scene.build import place_on_arm
+from coneskin.scene.reader import parse_scene
+from coneskin.view.arm_solids import arm_solids
+from coneskin.view.solid import Solid, barrel
+from coneskin.view.stage import set_stage
+from coneskin.view.stage_nodes import _along, _quaternion, level_colour
+
+from ..scene.scenes import DOUBLE_CONE
+
+POSES = ((0.0, -1.57, 1.2, -1.2, -1.57, 0.0), (0.4, -0.9, -1.1, 2.0, 1.0, 0.5))
+
+
+def test_a_barrel_is_closed_and_its_faces_look_out() -> None:
+    solid = barrel("b", 0, Pose(translation=(0.1, 0.2, 0.3)), 0.05, (0.2, 0.0), (1, 2, 3))
+    corners = solid.vertices[solid.faces]
+    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+    whole = math.pi * 0.05**2 * 0.2
+    assert 0.93 * whole < volume < whole
+
+
+def distance(points: np.ndarray, solid: Solid) -> np.ndarray:
+    """How far points are from the nearest vertex of a solid [m]."""
+    return np.linalg.norm(points[:, None] - solid.vertices[None], axis=2).min(axis=1)
+
+
+@pytest.mark.parametrize("name", MODEL_NAMES)
+@pytest.mark.parametrize("q", POSES)
+def test_the_solids_of_an_arm_lie_about_its_axes(name: str, q: tuple[float, ...]) -> None:
+    """Every corner of the skeleton is inside of a solid, and no solid stands off the arm."""
+    model = arm_model(name)
+    poses = link_poses(model, q)
+    solids = arm_solids(model)
+    thick = model.d[4]
+    placed = [solid._replace(vertices=poses[solid.link].apply_all(solid.vertices)) for solid in solids]
+    corners = np.array(skeleton(model, q))
+    for corner in corners:
+        assert min(distance(corner[None], solid)[0] for solid in placed) < 0.9 * thick
+    for solid in placed:
+        starts, ends = corners[:-1], corners[1:]
+        along = ends - starts
+        length2 = np.maximum((along**2).sum(axis=1), 1e-12)
+        share = np.clip(((solid.vertices[:, None] - starts) * along).sum(axis=2) / length2, 0.0, 1.0)
+        feet = starts + share[..., None] * along
+        off = np.linalg.norm(solid.vertices[:, None] - feet, axis=2).min(axis=1)
+        assert off.max() < 1.6 * thick, solid.name
+
+
+@pytest.mark.parametrize("name", MODEL_NAMES)
+@pytest.mark.parametrize("q", POSES)
+def test_neighbouring_links_meet(name: str, q: tuple[float, ...]) -> None:
+    model = arm_model(name)
+    poses = link_poses(model, q)
+    clouds: dict[int, list[np.ndarray]] = {}
+    for solid in arm_solids(model):
+        clouds.setdefault(solid.link, []).append(poses[solid.link].apply_all(solid.vertices))
+    for link in range(6):
+        here, there = np.concatenate(clouds[link]), np.concatenate(clouds[link + 1])
+        gap = min(np.linalg.norm(there - point, axis=1).min() for point in here[::7])
+        assert gap < 0.5 * model.d[4], (link, gap)
+
+
+def test_a_tube_does_not_stand_out_of_the_sheet_on_it() -> None:
+    scene = parse_scene(DOUBLE_CONE, "scene.toml")
+    placed = place_on_arm(scene)
+    stage = set_stage(scene, placed, "a scene")
+    for item, sheet in zip(placed, stage.sheets, strict=True):
+        if stage.model is None:
+            continue
+        (tube,) = [solid for solid in stage.solids if solid.link == item.link and solid.name.endswith("tube")]
+        back = item.frustum.link_frustum.inverse().apply_all(tube.vertices)
+        inside = (back[:, 2] > 0.0) & (back[:, 2] < item.frustum.frustum.height)
+        assert np.hypot(back[inside, 0], back[inside, 1]).max(initial=0.0) < sheet.slimmest / 0.97 + 1e-3
+
+
+def test_the_sheet_lies_on_its_frustum() -> None:
+    scene = parse_scene(DOUBLE_CONE, "scene.toml")
+    placed = place_on_arm(scene)
+    for item, sheet in zip(placed, set_stage(scene, placed, "a scene").sheets, strict=True):
+        _, _, off = item.frustum.locate_all(sheet.vertices)
+        assert off == pytest.approx(np.full(len(off), 0.0015), abs=2e-6)
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, -0.48, 0.64)])
+def test_an_arrow_points_along_its_normal(normal: tuple[float, float, float]) -> None:
+    pose = _along(normal)
+    Pose(pose.rotation)  # is a rotation
+    assert pose.rotate((0.0, 0.0, 1.0)) == pytest.approx(normal)
+    w, x, y, z = _quaternion(pose)
+    turned = (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+    assert turned == pytest.approx(normal)
+
+
+@pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (3.0, 0.1, 0.2), (0.1, 3.1, 0.0), (0.2, 0.1, 3.1), (1.0, -1.0, 2.0)])
+def test_a_quaternion_turns_as_its_pose(rpy: tuple[float, float, float]) -> None:
+    pose = Pose.from_xyz_rpy(rpy=rpy)
+    w, x, y, z = _quaternion(pose)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    assert np.array(rows) == pytest.approx(np.array(pose.rotation), abs=1e-12)
+
+
+def test_the_colour_tells_a_touch() -> None:
+    quiet, touched, firm = (level_colour(level, 0.1) for level in (0.0, 0.1, 0.9))
+    assert len({quiet, touched, firm}) == 3
+    assert level_colour(0.09, 0.1)[0] < touched[0]
