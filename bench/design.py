@@ -32,12 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 from report import head
 
-from coneskin.geometry.cones import Fit, Sheet, find_cones
-from coneskin.geometry.displacement import measure_displacement
-from coneskin.geometry.fit_cone import Cone
-from coneskin.geometry.fit_samples import surface_samples
+from coneskin.geometry.displacement_map import measure_displacement
+from coneskin.geometry.fit.cone_fit import InfiniteCone
+from coneskin.geometry.fit.cones import LinkFit, find_cones
+from coneskin.geometry.fit.fitted_sheet import FittedSheet
+from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
-from coneskin.geometry.rays import Rays
+from coneskin.geometry.ray_casting import RayCaster
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ TOLERANCE = 0.001
 
 
 def barrel() -> Mesh:
-    """A tube of 50 mm that bulges by 3 mm: smooth, curved, 46 000 faces."""
+    """Return a tube of 50 mm that bulges by 3 mm: smooth, curved, 46 000 faces."""
     z = np.linspace(0.0, 0.3, 121)
     radius = 0.05 + 0.003 * np.sin(math.pi * z / 0.3)
     segments = 192
@@ -76,14 +77,14 @@ def best(call: Callable[[], Any], number: int = 1, repeat: int = 5) -> float:
 # ---- the map ----
 
 
-def map_rows(mesh: Mesh, sheet: Sheet) -> Iterator[tuple[str, Floats, float, float, float, float, float]]:
+def map_rows(mesh: Mesh, sheet: FittedSheet) -> Iterator[tuple[str, Floats, float, float, float, float, float]]:
     """Name, errors [m], seconds of 1, 1000 and 1e6 places, seconds to build, bytes."""
     rng = np.random.default_rng(5)
     f = sheet.frustum
     u, phi = rng.uniform(0.005, f.slant - 0.005, PLACES), rng.uniform(0.0, f.wrap, PLACES)
     turn, shift = np.array(sheet.placed.link_frustum.rotation), np.array(sheet.placed.link_frustum.translation)
     feet, out = f.points(u, phi) @ turn.T + shift, f.normals(phi) @ turn.T
-    rays = Rays(mesh)
+    rays = RayCaster(mesh)
     true = 0.02 - rays.cast(feet + 0.02 * out, -out)[0]
     sound = true > -TOLERANCE
     target = (feet + true[:, None] * out)[sound]
@@ -121,7 +122,7 @@ def map_rows(mesh: Mesh, sheet: Sheet) -> Iterator[tuple[str, Floats, float, flo
         return np.asarray(start + (0.02 - depth)[:, None] * way)
 
     start = time.perf_counter()
-    Rays(mesh).cast(feet[:1] + out[:1], -out[:1])
+    RayCaster(mesh).cast(feet[:1] + out[:1], -out[:1])
     built = time.perf_counter() - start
     yield (
         f"ray ({rays.engine})",
@@ -151,7 +152,7 @@ def map_rows(mesh: Mesh, sheet: Sheet) -> Iterator[tuple[str, Floats, float, flo
         )
 
 
-def print_map(name: str, mesh: Mesh, fit: Fit) -> None:
+def print_map(name: str, mesh: Mesh, fit: LinkFit) -> None:
     sheet = fit.sheets[0]
     f = sheet.frustum
     print(
@@ -174,7 +175,7 @@ def print_map(name: str, mesh: Mesh, fit: Fit) -> None:
 # ---- the fit ----
 
 
-def line_gap(origin: Floats, axis: Floats, sheet: Sheet) -> tuple[float, float]:
+def line_gap(origin: Floats, axis: Floats, sheet: FittedSheet) -> tuple[float, float]:
     """Tilt [deg] from a sheet's axis, and distance [mm] from it at the sheet's middle."""
     way = np.array(sheet.placed.link_frustum.rotation)[:, 2]
     middle = np.array(sheet.placed.link_frustum.apply((0.0, 0.0, 0.5 * sheet.frustum.height)))
@@ -184,15 +185,17 @@ def line_gap(origin: Floats, axis: Floats, sheet: Sheet) -> tuple[float, float]:
     return tilt, 1e3 * float(np.linalg.norm(gap - (gap @ axis) * axis))
 
 
-def fit_rows(mesh: Mesh, fine: Sheet, long: bool) -> Iterator[tuple[str, float, float, float, float, float, float]]:
+def fit_rows(
+    mesh: Mesh, fine: FittedSheet, long: bool
+) -> Iterator[tuple[str, float, float, float, float, float, float]]:
     """Name, samples, seconds, tilt [deg], shift [mm], radius error [mm], rms residual [mm]."""
     middle = 0.5 * (fine.frustum.radius1 + fine.frustum.radius2)
-    hull = surface_samples(mesh, Rays(mesh))
+    hull = sample_surface(mesh, RayCaster(mesh))
     places = [fine.placed.locate((float(x), float(y), float(z))) for x, y, z in hull.points]
     under = hull.points[np.array([0.0 <= u <= fine.frustum.slant and abs(d) <= TOLERANCE for u, _, d in places])]
 
     def residual(origin: Floats, axis: Floats, radius: float, half_angle: float = 0.0) -> float:
-        cone = Cone(origin, axis / np.linalg.norm(axis), radius, half_angle)
+        cone = InfiniteCone(origin, axis / np.linalg.norm(axis), radius, half_angle)
         return 1e3 * float(np.sqrt((cone.distances(under) ** 2).mean()))
 
     for count in (500, 1000, 2000, 6000, 20_000):
@@ -239,7 +242,7 @@ def fit_rows(mesh: Mesh, fine: Sheet, long: bool) -> Iterator[tuple[str, float, 
             yield f"pyransac3d {rounds} rounds", len(hull), seconds, tilt, shift, 1e3 * (radius - middle), miss
 
 
-def print_fit(name: str, mesh: Mesh, fine: Sheet, long: bool) -> None:
+def print_fit(name: str, mesh: Mesh, fine: FittedSheet, long: bool) -> None:
     print(f"\nFIT  {name}: {len(mesh.faces)} faces")
     print(f"{'method':26}{'points':>8}{'ms':>9}{'tilt deg':>10}{'shift mm':>10}{'d radius':>11}{'rms mm':>9}")
     for label, count, seconds, tilt, shift, radius, rms in fit_rows(mesh, fine, long):

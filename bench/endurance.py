@@ -1,4 +1,4 @@
-"""A day's worth of frames through the guard's core, as fast as it goes: does memory grow, or a descriptor leak?
+"""Endurance of the guard's core: a day's worth of frames as fast as it goes, looking for leaks and missed touches.
 
     python bench/endurance.py [--hours 24] [--touch-every-s 60] [--json]
 
@@ -26,19 +26,20 @@ from pathlib import Path
 from typing import Any
 
 from report import head
-from scenes import forearm_scene
 
-from coneskin.build import build_core
-from coneskin.robot.journal import GuardEvent, Kind
-from coneskin.robot.owner_messages import Note, Stop
-from coneskin.robot.phase import Phase
-from coneskin.robot.state_reader import RECIPE
-from coneskin.scene_reader import parse_scene
-from coneskin.skin.recording import Block, encode_block
-from coneskin.skin.scripted_touch import ScriptedTouch
+from coneskin.recording import Block, encode_block
+from coneskin.robot.driver.messages import StopProgram
+from coneskin.robot.guard.journal import BlockKind, GuardEvent
+from coneskin.robot.guard.phase import Phase
+from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.scene.build import build_core
+from coneskin.scene.reader import parse_scene
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual import VirtualSkin
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import Frame, encode
+from coneskin.testing.companion_processes import CompanionProcesses
+from coneskin.testing.forearm import forearm_scene
 
 RATE_HZ = 1000
 QUIET, SCRIPTS, TOUCHED = 5000, 50, 150  # frames of each
@@ -47,7 +48,7 @@ GROWTH = 1 << 20  # bytes of resident memory after the first report that still c
 
 
 def contents(sensor: Sensor, seed: int) -> tuple[list[tuple[int, ...]], list[list[tuple[int, ...]]]]:
-    """What frames carry: without a touch, and during some touches."""
+    """Return the contents of frames without a touch, and during some touches."""
     rng = random.Random(seed)
     quiet = [tuple(frame)[6:] for _, frame in VirtualSkin(sensor, seed=seed, duration=QUIET / RATE_HZ).frames()]
     scripts = []
@@ -73,6 +74,7 @@ class Day:
         self._quiet, self._scripts = contents(scene.sensors[0].sensor, seed)
         self._every = max(2 * TOUCHED, round(touch_every * RATE_HZ))
         self._out: list[Any] = []
+        self._companions = CompanionProcesses()
         self._speed = 0.0
         self._braking = False
         self._q = [0.0, -1.5, 1.5, -1.5, -1.5, 0.0]
@@ -91,11 +93,13 @@ class Day:
                 self.touches += since == 0
             now = 1.0 + number / RATE_HZ
             head = (1, 0, 0, 0, number & 0xFFFF, 1000 * number & 0xFFFFFFFF)
-            block = Block(Kind.SKIN, now, encode(Frame(*head, *fields)))
+            block = Block(BlockKind.SKIN, now, encode(Frame(*head, *fields)))
             take(block, out)
             self.recorded += len(encode_block(block))
             if number % 2 == 0:
                 self._arm(now)
+            for block in self._companions.blocks(now):
+                take(block, out)
             if out:
                 self._serve()
             if number % 50 == 49:
@@ -103,20 +107,21 @@ class Day:
         self.frames += frames
 
     def _arm(self, now: float) -> None:
-        """A state of the arm, which moves while the guard is armed."""
+        """Feed a state of the arm, which moves while the guard is active."""
         if self._braking:
             self._speed = max(0.0, self._speed - 0.002 * DECELERATION)
-        elif self.core.phase is Phase.ARMED:
+        elif self.core.phase is Phase.ACTIVE:
             self._speed = SPEED
         self._q[0] = (self._q[0] + 0.002 * self._speed + 3.0) % 6.0 - 3.0
-        state = (now, tuple(self._q), (self._speed, 0.0, 0.0, 0.0, 0.0, 0.0), 7, 1, 2)
-        block = Block(Kind.ARM, now, RECIPE.pack(state))
+        state = (now, tuple(self._q), (self._speed, 0.0, 0.0, 0.0, 0.0, 0.0), 7, 1, 2, (0.0,) * 6, (0.0,) * 6)
+        block = Block(BlockKind.ARM, now, RECIPE.pack(state))
         self.core.take(block, self._out)
         self.recorded += len(encode_block(block))
 
     def _serve(self) -> None:
         for output in self._out:
-            if isinstance(output, Stop):
+            self._companions.take(output)
+            if isinstance(output, StopProgram):
                 self._braking = True
             elif isinstance(output, GuardEvent):
                 self._hear(output)
@@ -124,7 +129,7 @@ class Day:
 
     def _hear(self, event: GuardEvent) -> None:
         self.recorded += len(encode_block(event.block()))
-        if event.name == "armed":
+        if event.name == "activated":
             self._braking = False
         elif event.name == "stopping":
             self.stops += 1
@@ -133,11 +138,9 @@ class Day:
             self.trouble.append(f"{event.time:.3f} s {event.name}: {event.details}")
 
     def _person(self, now: float) -> None:
-        """Says that ur_rtde is there, and resets."""
-        if self.core.phase is Phase.STARTING:
-            self.core.take(Block(Kind.OWNER, now, Note("ready").encode()), self._out)
-        elif self.core.phase is Phase.LATCHED:  # refused while the touch lasts
-            self.core.take(Block(Kind.RESET, now, b""), self._out)
+        """Reset; refused while the touch lasts."""
+        if self.core.phase is Phase.LATCHED:
+            self.core.take(self._companions.reset(now), self._out)
 
 
 def resident() -> int:
@@ -226,7 +229,7 @@ def main() -> int:
 
 
 def judge(day: Day, reports: list[dict[str, Any]]) -> Iterator[str]:
-    """What must not be."""
+    """Yield what must not be, one line each."""
     if len(reports) > 1:
         first, last = reports[0], reports[-1]
         if last["resident"] - first["resident"] > GROWTH:

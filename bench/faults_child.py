@@ -1,4 +1,4 @@
-"""A process of a trial of the fault campaign, spoken to in lines of JSON."""
+"""Child process of a trial of the fault campaign, which takes and sends lines of JSON."""
 
 from __future__ import annotations
 
@@ -8,19 +8,22 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 
 class Child:
-    """A process that is spoken to in lines of JSON."""
+    """Process that takes and sends lines of JSON."""
 
-    def __init__(self, *arguments: str) -> None:
+    def __init__(self, *arguments: str, folder: Path | None = None) -> None:
         self._process = subprocess.Popen(
             [sys.executable, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
+            cwd=folder,
+            start_new_session=True,  # Linux divides its time among sessions; one for all would hold them all up
         )
         self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._threads = [threading.Thread(target=self._read), threading.Thread(target=self._read_errors)]
@@ -49,7 +52,7 @@ class Child:
             self._process.stdin.flush()
 
     def hear(self, timeout: float) -> dict[str, Any]:
-        """The next answer; empty if there is none in time."""
+        """Return the next answer; empty if there is none in time."""
         with suppress(queue.Empty):
             answer: dict[str, Any] = json.loads(self._lines.get(timeout=timeout))
             return answer
@@ -60,7 +63,7 @@ class Child:
         return self.hear(5.0)
 
     def close(self, patience: float = 0.0) -> bool:
-        """End it; whether it ended by itself within the patience [s]."""
+        """End the process; return whether it ended by itself within the patience [s]."""
         assert self._process.stdin is not None
         with suppress(OSError):
             self._process.stdin.close()

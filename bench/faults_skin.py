@@ -1,11 +1,12 @@
-"""A virtual skin in a process of its own, with which anything can go wrong at any time: for bench/faults.py.
+"""Virtual skin of bench/faults.py, in a process of its own, in which any fault can be injected at any time.
 
-Started with the name that its port shall have. A line of JSON in, a line of JSON with the time out::
+It is started with the name of its port, a seed, the model of its sheets and the number of its sensors.
+A line of JSON in, a line of JSON with the time out::
 
-    {"faults": {"corrupt_every": 2}}     faults of coneskin.skin.faults; ``..._after`` counts from now on
+    {"faults": {"corrupt_every": 2}}     of coneskin.skin.virtual.fault_injection; ``..._after`` counts from now
     {"replay": 300}                      the last 300 frames over and over
     {"slow": 1.0}                        from now on frames take so much longer to arrive, more with each
-    {"touch": {"u": 0.13, "phi": 1.5, "duration": 0.2}}
+    {"touches": [{"u": 0.13, "phi": 1.5, "after": 0.0, "duration": 0.2, "force": 5.0, "rise": 0.01, "sensor": ""}]}
     {"unplug": true}  {"plug": true}     the port goes away, and comes back under the same name
 
 Each answer also says how late the machine has made a frame at worst.
@@ -22,25 +23,29 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
+from faults_setup import give_precedence
+
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.faults import Faults, FaultyLine
-from coneskin.skin.pseudo_terminal import open_raw_terminal, wait_for_reader, write_all
-from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.sim_command import parse_fault
-from coneskin.skin.virtual import VirtualSkin
+from coneskin.skin.virtual.fault_injection import FaultInjection, FaultyLine
+from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, wait_for_reader, write_all
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
+from coneskin.skin.virtual.typed_script import parse_fault
 
 RADIUS1, RADIUS2, HEIGHT = 0.0376, 0.0372, 0.26
+UPPER_ARM = 0.048
 CLOCK = time.monotonic
 
 
 class FaultySkin:
     """Plays, and does what it is told."""
 
-    def __init__(self, link: Path, seed: int) -> None:
-        sensor = Sensor(Frustum(RADIUS1, RADIUS2, HEIGHT))
-        self._skin = VirtualSkin(sensor, seed=seed, model="ladder")  # starts sooner; the place is not what is tested
-        self._line = FaultyLine(Faults(), seed)
+    def __init__(self, link: Path, seed: int, sheets: str, sensors: int) -> None:
+        shapes = (Frustum(RADIUS1, RADIUS2, HEIGHT), Frustum(UPPER_ARM, UPPER_ARM, HEIGHT))[:sensors]
+        skins = [Sensor(shape, number, name=str(number)) for number, shape in enumerate(shapes)]
+        self._skin = VirtualSkin(skins, seed=seed, model=sheets)
+        self._line = FaultyLine(FaultInjection(), seed)
         self._link = link
         self._sent: deque[bytes] = deque(maxlen=1000)
         self._replayed: list[bytes] = []
@@ -98,10 +103,10 @@ class FaultySkin:
                     self._replayed = [data for data in self._sent if data][-value:]
                 case "slow":
                     self._slow, self._lag_since = value, self._due
-                case "touch":
+                case "touches":
                     at = CLOCK() + 0.002
-                    start = at - self._began
-                    self._skin.touch(ScriptedTouch(start, start + value["duration"], value["u"], value["phi"]))
+                    for touch in value:
+                        self._touch(at - self._began + touch.pop("after"), **touch)
                 case "unplug":
                     for descriptor in (self._keep, self._master):
                         if descriptor is not None:
@@ -111,13 +116,16 @@ class FaultySkin:
                     self._plug()
         say(at=at, late=self._worst_late)
 
+    def _touch(self, start: float, duration: float, **values: Any) -> None:
+        self._skin.touch(ScriptedTouch(start, start + duration, **values))
+
     def _break(self, values: dict[str, Any]) -> None:
         known = {}
         for name, value in values.items():
             if isinstance(value, str):
                 name, value = parse_fault(f"{name}={value}")
             known[name] = value + self._index if name.endswith("_after") else value
-        self._skin.faults = self._line.faults = Faults(**known)
+        self._skin.faults = self._line.faults = FaultInjection(**known)
 
 
 def say(**facts: Any) -> None:
@@ -125,4 +133,5 @@ def say(**facts: Any) -> None:
 
 
 if __name__ == "__main__":
-    FaultySkin(Path(sys.argv[1]), int(sys.argv[2])).run()
+    give_precedence(os.getpid())
+    FaultySkin(Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3], int(sys.argv[4])).run()

@@ -1,7 +1,7 @@
-"""One trial of the fault campaign: a guarded arm moves, something goes wrong, and what the arm then does is judged.
+"""Trial of the fault campaign: a guarded arm moves, something goes wrong, and what the arm then does is judged.
 
-Arm, skin and the guarded program are processes of their own, so that each can be frozen and killed. What decides is not
-the guard's word but the log of the simulated controller, and its state.
+Arm, skin and the guarded program are processes of their own, so that each can be frozen and killed. What decides is
+not a report of the guard but the log of the simulated controller, and its state.
 """
 
 from __future__ import annotations
@@ -12,73 +12,54 @@ import random
 import select
 import signal
 import socket
+import subprocess
+import sys
 import tempfile
 import threading
 import time
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 from faults_child import Child
-from scenes import ESCALATE, START, forearm_scene, start_with
+from faults_motion import BEHIND, ArmMotion, Touch
+from faults_setup import ACCELERATION, CLOCK, GOAL, MONITORING, SECOND_SKIN, SPEED, USUAL, Setup, give_precedence
 
 from coneskin.errors import ConeSkinError, RobotConnectionError
-from coneskin.robot.sim_process import SimulatedController, free_host
+from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.scene.reader import load_scene
+from coneskin.testing.commissioned import write_passed_record
+from coneskin.testing.forearm import START, forearm_scene
 
 HERE = Path(__file__).parent
-GOAL = start_with(140.0)
-SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
-SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
-STUCK = 200  # frames
-RETREAT = 'kind = "retreat"\ndistance_mm = 60'
-SLOW = 'kind = "slow"\nslow_to = 0.5\ntime_budget_s = 30'
-WATCH = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nstuck_frames = 200"
-#: v / a, and four times the patience: what docs/safety.md promises once the fault is known
-STOP = SPEED / DECELERATION + 4.0 * ESCALATE
-CLOCK = time.monotonic
-
-
-@dataclass
-class Outcome:
-    """What a trial showed.
-
-    Attributes:
-        seconds: from the fault to the measured standstill; None where there was none to measure.
-        failures: what must not be, one line each.
-        why: what the guard said.
-        skin_late: how late the machine had made the frames of the virtual skin before the fault [s].
-        repeated: trials that were thrown away for that.
-        held_up: the longest time that the guard's loop was held up, as it says itself [s].
-    """
-
-    seconds: float | None = None
-    held_up: float = 0.0
-    skin_late: float = 0.0
-    repeated: int = 0
-    failures: list[str] = field(default_factory=list)
-    why: str = ""
 
 
 class Trial:
-    """The things that can go wrong, for the kinds of fault to reach; used in a ``with``.
+    """Processes of a trial, and the faults that can be injected into them; used in a ``with``.
 
     Attributes:
-        control: "owner" or "foreign".
+        control: "internal" or "external".
         simulated: the controller.
         skin: the skin's process.
         program: the guarded program's process.
         pids: of the guard and of its helpers.
         rng: of this trial.
         happened: when the fault happened, where time does not run from then on.
+        motion: of the arm, as the controller has reported it, since it runs.
+        touches: that were made.
+        mover: program that starts again after each stop, where there is one.
     """
 
     _starting = threading.Lock()  # two trials must not choose the same address
     _hosts: ClassVar[set[str]] = set()  # a killed controller's address must stay dead while its trial lasts
 
-    def __init__(self, control: str, seed: str, reaction: str = RETREAT) -> None:
+    def __init__(self, control: str, seed: str, setup: Setup = USUAL) -> None:
         self.control = control
-        self._reaction = reaction
+        self.setup = setup
+        self.motion: ArmMotion | None = None
+        self.touches: list[Touch] = []
+        self.mover: Child | None = None
         self.rng = random.Random(seed)
         self.pids: dict[str, int] = {}
         self.happened: float | None = None
@@ -94,14 +75,20 @@ class Trial:
                 self._hosts.add(self.host)
                 controller = SimulatedController("UR5e", self.host, START, log=self.folder / "log.jsonl")
                 self.simulated = stack.enter_context(controller)
+                give_precedence(self.simulated.pid)
             port = self.folder / "port"
-            self.skin = Child(str(HERE / "faults_skin.py"), str(port), str(self.rng.randrange(1 << 30)))
+            seed = str(self.rng.randrange(1 << 30))
+            self.skin = Child(str(HERE / "faults_skin.py"), str(port), seed, self.setup.sheets, str(self.setup.skins))
             stack.callback(self.skin.close)
-            if not self.skin.hear(10.0):
+            if not self.skin.hear(30.0):
                 raise RuntimeError(f"the skin did not start: {self.skin.errors}")
-            (self.folder / "scene.toml").write_text(
-                forearm_scene(self.host, self.control, port, self._reaction, WATCH), encoding="utf-8"
-            )
+            scene = forearm_scene(self.host, self.control, str(port), self.setup.reaction, MONITORING)
+            if self.setup.arm:
+                scene = scene.replace("[[link]]", f"{self.setup.arm}\n[[link]]", 1)
+            (self.folder / "scene.toml").write_text(scene + SECOND_SKIN * (self.setup.skins - 1), encoding="utf-8")
+            for name, text in self.setup.files:
+                (self.folder / name).write_text(text, encoding="utf-8")
+            write_passed_record(load_scene(self.folder / "scene.toml"))
         except BaseException:
             self._stack.close()
             raise
@@ -115,13 +102,26 @@ class Trial:
 
     # ---- what the kinds of fault use; each returns when it happened
 
+    def press(self, *touches: Touch) -> float:
+        """Touch the skin in some places, each so long after now as it says."""
+        asked = [asdict(touch) for touch in touches]
+        at = float(self.skin.ask(touches=asked)["at"])
+        self.touches += [replace(touch, after=at + touch.after) for touch in touches]
+        return at
+
     def breaks(self, **faults: Any) -> float:
-        """Faults of the skin from the next frame on."""
+        """Inject faults of the skin from the next frame on."""
         return float(self.skin.ask(faults=faults)["at"])
 
     def touch(self) -> float:
-        """Touch the skin."""
-        return self.skins(touch={"u": 0.13, "phi": 1.55, "duration": 0.2})
+        """Touch the skin where it runs ahead, ever more lightly, as a touch does from which the arm moves away."""
+        return self.press(Touch(duration=0.5, grown_force=0.3, growth_time=0.3))
+
+    def start_again(self) -> float:
+        """Let a raw program be sent again and again from now on: no arm gains speed if it is from the beginning."""
+        assert self.mover is not None
+        self.mover.say(go=True)
+        return CLOCK()
 
     def move_away(self) -> float:
         """Touch the skin, and let the arm stand and then retreat for a random time."""
@@ -129,19 +129,19 @@ class Trial:
         end = CLOCK() + 5.0
         while self.stood_at(touched) is None or not self.moves():  # it stands for 10 ms, which a look may miss
             if CLOCK() > end:
-                raise RuntimeError("the arm does not move away")
+                raise RuntimeError(f"the arm does not move away: {self.program.hear(0.0)}")
             time.sleep(0.002)
         time.sleep(0.1 * self.rng.random())
         self.happened = touched
         return CLOCK()
 
     def go_slow(self) -> float:
-        """Touch the skin for long, and let the arm go on slowly for a random time."""
-        self.happened = self.skins(touch={"u": 0.13, "phi": 1.55, "duration": 20.0})
+        """Touch the skin for long from behind, and let the arm go on slowly, away from the touch, for a random time."""
+        self.happened = self.press(Touch(phi=BEHIND, duration=20.0))
         end = CLOCK() + 5.0
         while not 0.0 < self.simulated.state()["qd"][0] < 0.7 * SPEED:
             if CLOCK() > end:
-                raise RuntimeError("the arm does not go slower")
+                raise RuntimeError(f"the arm does not go slower: {self.program.hear(0.0)}")
             time.sleep(0.005)
         time.sleep(0.3 + 0.2 * self.rng.random())
         return CLOCK()
@@ -155,18 +155,18 @@ class Trial:
         return CLOCK()
 
     def skins(self, **request: Any) -> float:
-        """Anything that bench/faults_skin.py can do."""
+        """Send a request to bench/faults_skin.py."""
         return float(self.skin.ask(**request)["at"])
 
     def controller(self, line: str) -> float:
-        """A fault of the simulated controller."""
+        """Inject a fault of the simulated controller."""
         at = CLOCK()
         self.simulated.call(line)
         return at
 
-    def signal(self, who: str, number: signal.Signals) -> float:
-        """Send a signal to "guard", "owner", "keeper", "program" or "skin"."""
-        pid = {"program": self.program.pid, "skin": self.skin.pid, **self.pids}[who]
+    def signal(self, process: str, number: signal.Signals) -> float:
+        """Send a signal to "guard", "driver", "watchdog", "program" or "skin"."""
+        pid = {"program": self.program.pid, "skin": self.skin.pid, **self.pids}[process]
         at = CLOCK()
         os.kill(pid, number)
         if number == signal.SIGSTOP:
@@ -186,13 +186,19 @@ class Trial:
     # ---- the course of a trial
 
     def start_program(self, timeout: float) -> dict[str, Any]:
-        """Start the guarded program; what it says once the guard has armed, or has refused to."""
+        """Start the guarded program; return its report once the guard is active, or has refused to become so."""
         arguments = [str(HERE / "faults_program.py"), str(self.folder / "scene.toml"), str(self.recording)]
-        self.program = Child(*arguments, repr(timeout), json.dumps(GOAL))
+        manners = ",".join(self.setup.manners)
+        self.program = Child(*arguments, repr(timeout), json.dumps(GOAL), manners, folder=self.folder)
         self._stack.callback(self.program.close)
         answer = self.program.hear(timeout + 15.0)
         self.pids = answer.get("pids", {})
         return answer
+
+    def _heartbeat(self) -> str:
+        """Return the lines with which a program on the controller ends where the guard is gone."""
+        command = [sys.executable, "-m", "coneskin", "heartbeat", str(self.folder / "scene.toml")]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     @property
     def recording(self) -> Path:
@@ -200,9 +206,18 @@ class Trial:
 
     def run_up(self) -> None:
         """Let the arm move, and a random time pass."""
-        if self.control == "owner":
+        self.motion = self._stack.enter_context(ArmMotion(self.host))
+        if self.control == "internal":
             self.program.say(go=True)
-        else:
+        elif self.setup.mover == "heartbeat":
+            self.send_script(
+                f"def bench_move():\n{self._heartbeat()}\n  movej({GOAL}, a={ACCELERATION}, v={SPEED})\nend\n"
+            )
+        elif self.setup.mover:
+            words = self.setup.mover.split()
+            self.mover = Child(str(HERE / "faults_restarter.py"), self.host, json.dumps(GOAL), *words)
+            self._stack.callback(self.mover.close)
+        if self.control == "external" and not self.setup.mover.startswith(("heartbeat", "loop")):
             self.send_script(f"def bench_move():\n  movej({GOAL}, a={ACCELERATION}, v={SPEED})\nend\n")
         end = CLOCK() + 10.0
         while abs(self.simulated.state()["qd"][0]) < 0.95 * SPEED:
@@ -212,22 +227,22 @@ class Trial:
         time.sleep(0.8 * self.rng.random())
 
     def moves(self) -> bool:
-        """Whether the arm moves now."""
+        """Tell whether the arm moves now."""
         return any(self.simulated.state()["qd"])
 
     def await_standing(self, seconds: float) -> list[float] | None:
-        """Joint positions once the arm stands; None if it does not in time."""
+        """Return the joint positions once the arm stands; None if it does not in time."""
         with suppress(ConeSkinError):
-            found: list[float] = self.simulated.wait_standing(seconds)["q"]
+            found: list[float] = self.simulated.wait_for_standstill(seconds)["q"]
             return found
         return None
 
     def stood_at(self, since: float) -> float | None:
-        """When the arm came to its first standstill after a time, by the controller's own log."""
+        """Return when the arm came to its first standstill after a time, by the controller's own log."""
         return next((e["monotonic"] for e in self.simulated.events("standstill") if e["monotonic"] >= since), None)
 
     def thaw_all(self) -> None:
-        """Whoever was stopped goes on."""
+        """Let every frozen process go on."""
         for pid in self._frozen:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGCONT)

@@ -30,10 +30,12 @@ from typing import Any
 
 import field_ours
 import numpy as np
-from field_problems import Problem, ports
-from field_reference import Reference, load, provenance
 from field_tables import Run, draw, print_agreement, print_table, print_work, show_time
 from report import head
+
+from coneskin.testing.field.problems import Problem, port_solution
+from coneskin.testing.field.reference import Reference, load_references, provenance
+from coneskin.testing.field.solution import solve_discs, solve_general
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
 CELLS = ((8, 2), (12, 3), (16, 4), (24, 5), (32, 7), (48, 9), (64, 11))
@@ -44,17 +46,17 @@ def installed() -> list[Any]:
     found: list[Any] = []
     if find_spec("ngsolve") is None:
         return found
-    import peers_ngsolve
+    from coneskin.testing.field import ngsolve_peer
 
-    found.append(peers_ngsolve)
+    found.append(ngsolve_peer)
     if find_spec("skfem") is not None:
-        import peers_skfem
+        from coneskin.testing.field import skfem_peer
 
-        found.append(peers_skfem)
+        found.append(skfem_peer)
         if find_spec("pyeit") is not None:
-            import peers_pyeit
+            from coneskin.testing.field import pyeit_peer
 
-            found.append(peers_pyeit)
+            found.append(pyeit_peer)
     return found
 
 
@@ -96,7 +98,7 @@ def peer_runs(reference: Reference, peers: list[Any], quick: bool) -> Iterator[R
             first = sum(solved.seconds.values())
             runs = [call() for _ in range(2 if quick else 5)] if first < 1.0 else [solved]
             totals = [(sum(r.seconds.values()), r.seconds["mesh"]) for r in runs]
-            voltages = ports(solved.energies, problem.load).voltages
+            voltages = port_solution(solved.energies, problem.load).voltages
             error = float(np.abs(voltages - reference.ports.voltages).max())
             whole = statistics.median(total for total, _ in totals)
             yield Run(
@@ -158,11 +160,11 @@ def main() -> int:
     print(head("numpy", "scipy", "ngsolve", "scikit-fem", "pyeit") + "; one thread used")
     made = provenance()
     print(f"reference: {made['command']}, NGSolve {made['versions']['ngsolve']}, {made['date']}; {made['order']}")
-    references = load()
+    references = load_references()
     general = [r for r in references if r.problem.patches or r.problem.name.startswith("clipped")]
     discs = [r for r in references if r not in general]
-    print_agreement(discs, field_ours.solve, "discs at the order that the solver chooses")
-    print_agreement(general, field_ours.solve_general, "general method with its default cells")
+    print_agreement(discs, solve_discs, "discs at the order that the solver chooses")
+    print_agreement(general, solve_general, "general method with its default cells")
     if not peers:
         print("\nno peer is installed, so no ratio is printed: pip install 'coneskin[bench]'")
     measured = [*discs[:3], *general[:3]]

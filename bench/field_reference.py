@@ -1,6 +1,6 @@
 """Reference solutions of the field problems by NGSolve, written once and committed with their provenance.
 
-    python bench/field_reference.py --write      # makes bench/data/field_reference.json, about four minutes
+    python bench/field_reference.py --write      # makes src/coneskin/testing/field/reference.json, about four minutes
     python bench/field_reference.py              # compares the committed file with this machine's NGSolve
 
 Every sensor is solved twice, at degree 12 on one mesh and at degree 10 on a finer one; the file keeps the first and the
@@ -15,51 +15,26 @@ import math
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from field_problems import (
+
+from coneskin.testing.field.ngsolve_peer import solve
+from coneskin.testing.field.problems import (
     Array,
-    Disc,
-    Patch,
-    Ports,
     Problem,
     general_problems,
     hard_problems,
-    ports,
+    port_solution,
     random_problems,
-    standard,
+    standard_problems,
 )
-
-PATH = Path(__file__).parent / "data" / "field_reference.json"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Reference:
-    """One problem and its reference solution.
-
-    `energies` as in field_problems; `potentials` [V] at `points` (r [m], theta [rad]) for both phases, shape
-    (2, points, 2 sheets); `estimate`: largest difference between two meshes and orders of the electrodes' voltages (at
-    1 V of drive) and currents (in units of the drive current); `field_estimate`: that of the potentials [V].
-    """
-
-    problem: Problem
-    energies: Array
-    points: Array
-    potentials: Array
-    estimate: float
-    field_estimate: float
-
-    @property
-    def ports(self) -> Ports:
-        return ports(self.energies, self.problem.load)
+from coneskin.testing.field.reference import PATH, Reference, encode_reference, load_references
 
 
 def phases(problem: Problem, energies: Array, modes: Array) -> Array:
     """Potentials of the two phases from those of the three modes, shape (2, points, 2)."""
-    seen = ports(energies, problem.load).voltages
+    seen = port_solution(energies, problem.load).voltages
     radial = modes[0] + (seen[0, 2] - seen[0, 3]) * modes[1] + seen[0, 3] * modes[2]
     angular = modes[1] + (seen[1, 1] - seen[1, 0]) * modes[0] + seen[1, 0] * (1.0 - modes[2])
     return np.array([radial, angular])
@@ -95,8 +70,6 @@ def sample_points(problem: Problem) -> Array:
 
 def reference(problem: Problem) -> Reference:
     """Solve twice and keep the difference."""
-    from peers_ngsolve import solve
-
     points = sample_points(problem)
     widths = [c.radius * math.sqrt(c.conductance * (problem.upper + problem.lower)) for _, c in problem.contacts]
     # Resolve the layer of width 1/k along the rims: the potentials there converge less fast than the ports.
@@ -107,7 +80,7 @@ def reference(problem: Problem) -> Reference:
         assert solved.potentials is not None
         found.append((solved.energies, phases(problem, solved.energies, solved.potentials)))
     (first, fields), (second, other_fields) = found
-    a, b = ports(first, problem.load), ports(second, problem.load)
+    a, b = port_solution(first, problem.load), port_solution(second, problem.load)
     scale = np.abs(a.currents).max(axis=1, keepdims=True)
     estimate = max(
         np.abs(a.voltages - b.voltages).max(),
@@ -117,17 +90,6 @@ def reference(problem: Problem) -> Reference:
     return Reference(problem, (first + first.T) / 2, points, fields, float(estimate), float(field_estimate))
 
 
-def load(path: Path = PATH) -> list[Reference]:
-    """The committed references."""
-    return [_decode(entry) for entry in json.loads(path.read_text())["sensors"]]
-
-
-def provenance(path: Path = PATH) -> dict[str, Any]:
-    """Versions, orders, date and command of the committed file."""
-    found: dict[str, Any] = json.loads(path.read_text())["provenance"]
-    return found
-
-
 def write(path: Path = PATH, progress: Callable[[str], None] = print) -> None:
     """Make the file: the standard problems, the hard ones and the random sensors."""
     import ngsolve
@@ -135,13 +97,13 @@ def write(path: Path = PATH, progress: Callable[[str], None] = print) -> None:
     ngsolve.SetNumThreads(1)
     start = time.perf_counter()
     references = []
-    for problem in [*standard(), *hard_problems(), *general_problems(), *random_problems()]:
+    for problem in [*standard_problems(), *hard_problems(), *general_problems(), *random_problems()]:
         references.append(reference(problem))
         last = references[-1]
         progress(f"{problem.name}: ports agree to {last.estimate:.1e}, potentials to {last.field_estimate:.1e}")
     content = {
         "provenance": {
-            "what": "hp-FEM in the physical plane, discs meshed with curved elements; bench/peers_ngsolve.py",
+            "what": "hp-FEM in the physical plane, discs meshed with curved elements; testing/field/ngsolve_peer.py",
             "command": "python bench/field_reference.py --write",
             "versions": {"ngsolve": ngsolve.__version__, "numpy": np.__version__, "python": sys.version.split()[0]},
             "order": "degree 12, edges 0.5 width / 0.7 radius; checked by degree 10, 0.4 width / 0.5 radius",
@@ -150,48 +112,13 @@ def write(path: Path = PATH, progress: Callable[[str], None] = print) -> None:
             "worst_field_estimate": max(r.field_estimate for r in references),
             "units": "m, rad, ohm per square, S/m^2 (null: perfect bond), ohm (null: open), S, V at 1 V of drive",
         },
-        "sensors": [_encode(r) for r in references],
+        "sensors": [encode_reference(r) for r in references],
     }
     lines = json.dumps(content["provenance"], indent=1)
     sensors = ",\n".join(json.dumps(s, separators=(",", ":")) for s in content["sensors"])
     path.parent.mkdir(exist_ok=True)
     path.write_text(f'{{"provenance": {lines},\n"sensors": [\n{sensors}\n]}}\n')
     progress(f"{len(references)} sensors in {time.perf_counter() - start:.0f} s -> {path}")
-
-
-def _encode(r: Reference) -> dict[str, Any]:
-    problem = asdict(r.problem)
-    problem["load"] = None if math.isinf(r.problem.load) else r.problem.load
-    problem["discs"] = [
-        [d.r, d.theta, d.radius, None if math.isinf(d.conductance) else d.conductance] for d in r.problem.discs
-    ]
-    problem["patches"] = [list(asdict(p).values()) for p in r.problem.patches]
-    return {
-        "problem": problem,
-        "energies": r.energies[np.triu_indices(3)].tolist(),
-        "points": r.points.tolist(),
-        "potentials": np.round(r.potentials, 15).tolist(),
-        "estimate": float(f"{r.estimate:.2e}"),
-        "field_estimate": float(f"{r.field_estimate:.2e}"),
-    }
-
-
-def _decode(entry: dict[str, Any]) -> Reference:
-    raw = dict(entry["problem"])
-    raw["discs"] = tuple(Disc(d[0], d[1], d[2], math.inf if d[3] is None else d[3]) for d in raw["discs"])
-    raw["patches"] = tuple(Patch(*p) for p in raw["patches"])
-    raw["load"] = math.inf if raw["load"] is None else raw["load"]
-    energies = np.zeros((3, 3))
-    energies[np.triu_indices(3)] = entry["energies"]
-    energies += np.triu(energies, 1).T
-    return Reference(
-        Problem(**raw),
-        energies,
-        np.array(entry["points"]),
-        np.array(entry["potentials"]),
-        entry["estimate"],
-        entry["field_estimate"],
-    )
 
 
 def main() -> int:
@@ -202,7 +129,7 @@ def main() -> int:
         write()
         return 0
     worst = 0.0
-    for committed in load():
+    for committed in load_references():
         fresh = reference(committed.problem)
         worst = max(worst, float(np.abs(fresh.ports.voltages - committed.ports.voltages).max()))
     print(f"largest difference between {PATH.name} and this machine's NGSolve: {worst:.1e} V at 1 V of drive")

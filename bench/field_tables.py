@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from field_problems import Ports, Problem
-from field_reference import Reference
+
+from coneskin.testing.field.problems import PortSolution, Problem
+from coneskin.testing.field.reference import Reference
 
 TARGETS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 
@@ -89,7 +90,7 @@ def family(problem: Problem) -> str:
     return "hard: extreme values, and the standard problems"
 
 
-def print_agreement(references: list[Reference], solve: Callable[[Problem], Ports], title: str) -> float:
+def print_agreement(references: list[Reference], solve: Callable[[Problem], PortSolution], title: str) -> float:
     """Agreement with the committed references, family by family; the worst |dV|."""
     groups: dict[str, list[tuple[float, float, float, float]]] = {}
     for reference in references:

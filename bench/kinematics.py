@@ -9,24 +9,20 @@ from __future__ import annotations
 
 import argparse
 import random
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from report import head
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from coneskin.robot.commands import ArmState, ContactOnLink, Reaction  # noqa: E402
-from coneskin.robot.compiled import compile_contact  # noqa: E402
-from coneskin.robot.kinematics import link_pose, point_jacobian  # noqa: E402
-from coneskin.robot.retreat import RetreatPlan, plan_retreat, retreat_step  # noqa: E402
-from coneskin.robot.ur_models import MODEL_NAMES, ArmModel, model  # noqa: E402
-from tests.robot.pin_arm import pin, pin_arm, pin_jacobian, pin_place  # noqa: E402
+from coneskin.robot.arm.compiled_kinematics import compile_contact
+from coneskin.robot.arm.kinematics import link_pose, point_jacobian
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_step
+from coneskin.robot.reaction.types import ArmState, ContactOnLink, Reaction
+from coneskin.testing.pinocchio_arm import load_pinocchio, pin_arm, pin_jacobian, pin_place
 
 Q = (0.3, -1.2, 1.1, 0.4, 0.5, 0.6)
 POINT = (0.1, 0.02, 0.05)
@@ -40,7 +36,7 @@ def main() -> None:
     print(head("pin") + "\n")
     errors()
     print(f"\n{'microseconds a call':44} {'hot med':>8} {'paced med':>10} {'p99':>7}")
-    nominal = model("UR10e")
+    nominal = arm_model("UR10e")
     tilted = nominal.calibrated((1e-4,) * 6, (1e-4,) * 6, (1e-3,) * 6, (1e-3,) * 6)
     for arm, which in ((nominal, "nominal"), (tilted, "calibrated")):
         for link, name in ((3, "forearm"), (6, "tool")):
@@ -59,7 +55,7 @@ def errors() -> None:
     print(f"{'largest difference from pinocchio':36} {'place m':>9} {'Jacobian m/rad':>15}   (300 random q, all links)")
     source = random.Random(0)
     for name in MODEL_NAMES:
-        arm, place, slope = model(name), 0.0, 0.0
+        arm, place, slope = arm_model(name), 0.0, 0.0
         for _ in range(300):
             q = [source.uniform(-6.3, 6.3) for _ in range(6)]
             link = source.randint(1, 6)
@@ -75,13 +71,14 @@ def errors() -> None:
 
 def rows(arm: ArmModel, link: int) -> list[tuple[str, Callable[[], Any]]]:
     written = compile_contact(arm, link)
-    plan = plan_retreat(arm, ArmState(0.0, Q), [ContactOnLink(link, POINT, AWAY)], Reaction())
+    plan = plan_retreat(arm, ArmState(0.0, Q), [ContactOnLink(link, POINT, AWAY)], Reaction(kind="retreat"))
     if not isinstance(plan, RetreatPlan):
-        raise SystemExit(f"the bench's own touch has no way out: {plan.reason}")
+        raise SystemExit(f"no retreat is possible from the bench's own touch: {plan.reason}")
     state = ArmState(0.01, Q)
     pin_model, data, frames = pin_arm(arm)
     held = pin_model.frames[frames[link]]
     placed, q = held.placement.act(np.array(POINT)), np.array(Q)
+    pin = load_pinocchio()
     point = pin.SE3(np.eye(3), placed)
 
     def pinocchio() -> Any:

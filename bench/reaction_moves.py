@@ -1,13 +1,14 @@
-"""The motions of bench/reaction.py: under guard, by a foreign program, and bare, in a process without coneskin's guard.
+"""Motions of bench/reaction.py: under guard, by an external program, and bare, in a process without a guard.
 
-python bench/reaction_moves.py mover HOST            # lines on stdin: "prepare", or the side to move to
-python bench/reaction_moves.py floor HOST MODE TOOL  # lines: [side, seconds to move before the stop, *q]
+python bench/reaction_moves.py planner HOST            # lines on stdin: "prepare", or the side to move to
+python bench/reaction_moves.py baseline HOST MODE TOOL  # lines: [side, seconds to move before the stop, *q]
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
 import select
 import socket
 import subprocess
@@ -18,13 +19,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
-from scenes import START
-
 from coneskin.errors import ConeSkinError
-from coneskin.session import Session
+from coneskin.session.session import Session
+from coneskin.testing.forearm import START
 
 MODES = ("moveJ", "moveL", "speedJ", "servoJ", "sync", "script")
-FOREIGN = ("sync", "script")
+EXTERNAL = ("sync", "script", "urcl")
+URCL_MOVER = "CONESKIN_URCL_MOVER"  # environment variable: program and script of mode urcl, with a tab between
 REACH = 0.9  # rad of the base to both sides of START
 SPEED, ACCELERATION, DECELERATION = 1.0, 20.0, 10.0
 TOOL_SPEED, TOOL_ACCELERATION = 0.5, 10.0  # of moveL: about 0.8 rad/s of the base
@@ -36,17 +37,17 @@ def goal(side: int) -> list[float]:
 
 
 def poses(tool: Sequence[float]) -> dict[int, list[float]]:
-    """Tool poses to both sides of the one at START, on a straight line the way that the base turns it."""
+    """Return tool poses to both sides of the one at START, on a straight line along which the base turns it."""
     x, y, *rest = tool
     radius = math.hypot(x, y)
     return {side: [x - side * 0.35 * y / radius, y + side * 0.35 * x / radius, *rest] for side in (-1, 1)}
 
 
 def servo_target(start: Sequence[float], side: int, seconds: float) -> list[float]:
-    """Speeds up in 0.1 s and then goes on with SPEED; never farther than REACH."""
+    """Return the target after this time: speed up in 0.1 s, go on with SPEED, never farther than REACH."""
     ramp = min(seconds, 0.1)
-    way = SPEED * (0.5 * ramp * ramp / 0.1 + max(0.0, seconds - 0.1))
-    return [min(max(start[0] + side * way, START[0] - REACH), START[0] + REACH), *start[1:]]
+    travel = SPEED * (0.5 * ramp * ramp / 0.1 + max(0.0, seconds - 0.1))
+    return [min(max(start[0] + side * travel, START[0] - REACH), START[0] + REACH), *start[1:]]
 
 
 def script(side: int) -> bytes:
@@ -54,7 +55,7 @@ def script(side: int) -> bytes:
 
 
 class GuardedArm:
-    """Moves the arm in an owner's mode, through the session."""
+    """Arm moved in a mode of the driver process, through the session."""
 
     def __init__(self, session: Session, mode: str, tool: Sequence[float]) -> None:
         self._arm, self._mode, self._poses = session.arm, mode, poses(tool)
@@ -67,7 +68,7 @@ class GuardedArm:
             case "moveL":
                 self._arm.move_l(self._poses[side], TOOL_SPEED, TOOL_ACCELERATION, wait=False)
             case "speedJ":
-                self._arm.speed_j([side * SPEED, 0.0, 0.0, 0.0, 0.0, 0.0], ACCELERATION)
+                self._arm.speed_j([side * SPEED, 0.0, 0.0, 0.0, 0.0, 0.0], ACCELERATION, duration=5.0)
             case _:
                 self._thread = threading.Thread(target=self._stream, args=(side, q))
                 self._thread.start()
@@ -86,11 +87,17 @@ class GuardedArm:
             self._thread = None
 
 
-class ForeignArm:
-    """Moves the arm beside the guard: by a program in another process, or one in the controller."""
+class ExternalArm:
+    """Arm moved beside the guard: by a program in another process, or one in the controller."""
 
     def __init__(self, mode: str, host: str, stack: ExitStack) -> None:
-        self._child: Child | None = stack.enter_context(Child("mover", host)) if mode == "sync" else None
+        self._mode = mode
+        self._child: Child | None = None
+        if mode == "sync":
+            self._child = stack.enter_context(Child(sys.executable, __file__, "planner", host))
+        elif mode == "urcl":
+            program, text = os.environ[URCL_MOVER].split("\t")
+            self._child = stack.enter_context(Child(program, host, text))
         self._raw = stack.enter_context(script_socket(host)) if mode == "script" else None
 
     def start(self, side: int, _q: list[float]) -> None:
@@ -98,7 +105,7 @@ class ForeignArm:
             self._raw.sendall(script(side))
         elif self._child is not None:
             self._child.ask("prepare")
-            self._child.say(str(side))
+            self._child.say(str(goal(side)[0] if self._mode == "urcl" else side))
 
     def over(self) -> None:
         if self._child is not None:
@@ -118,17 +125,17 @@ def script_socket(host: str) -> Iterator[socket.socket]:
 
 
 def _drain(raw: socket.socket, enough: threading.Event) -> None:
-    """The controller may talk on this port, and must not be kept waiting."""
+    """Discard what the controller sends: it must not be kept waiting."""
     while not enough.is_set():
         if select.select([raw], [], [], 0.1)[0] and not raw.recv(1 << 16):
             return
 
 
 class Child:
-    """This script again, in a process of its own: a line in, a line out."""
+    """Process that moves an arm: a line in, a line out."""
 
-    def __init__(self, *arguments: str) -> None:
-        self._command = [sys.executable, __file__, *arguments]
+    def __init__(self, *command: str) -> None:
+        self._command = command
 
     def __enter__(self) -> Child:
         self._process = subprocess.Popen(self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -168,7 +175,7 @@ def answer(*values: float) -> None:
 
 
 def run_mover(host: str) -> None:
-    """In a child: synchronous moves of a program that knows nothing of a guard."""
+    """Make synchronous moves in a child, as a program that knows nothing of a guard."""
     import rtde_control
 
     control = rtde_control.RTDEControlInterface(host)
@@ -190,11 +197,11 @@ def revive(control: Any) -> None:
             time.sleep(0.005)
 
 
-def run_floor(host: str, mode: str, tool: list[float]) -> None:
-    """In a child: move, wait so long, and call the stop; answers when it called."""
-    if mode in FOREIGN:
+def run_baseline(host: str, mode: str, tool: list[float]) -> None:
+    """Move in a child, wait so long, call the stop, and answer when it was called."""
+    if mode in EXTERNAL:
         with ExitStack() as stack:
-            arm, raw = ForeignArm(mode, host, stack), stack.enter_context(script_socket(host))
+            arm, raw = ExternalArm(mode, host, stack), stack.enter_context(script_socket(host))
             stop = f"def bench_stop():\n  stopj({DECELERATION})\nend\n".encode()
             answer()
             for line in sys.stdin:
@@ -235,7 +242,7 @@ def run_floor(host: str, mode: str, tool: list[float]) -> None:
 
 if __name__ == "__main__":
     job, host, *rest = sys.argv[1:]
-    if job == "mover":
+    if job == "planner":
         run_mover(host)
     else:
-        run_floor(host, rest[0], json.loads(rest[1]))
+        run_baseline(host, rest[0], json.loads(rest[1]))

@@ -6,6 +6,7 @@ import json
 import math
 import random
 import select
+import sys
 import tempfile
 import threading
 import time
@@ -14,24 +15,26 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from reaction_moves import CLOCK, FOREIGN, Child, ForeignArm, GuardedArm
-from scenes import START, forearm_scene
+from reaction_moves import CLOCK, EXTERNAL, Child, ExternalArm, GuardedArm
 
 from coneskin.errors import ConeSkinError
-from coneskin.replay import read_run
-from coneskin.robot.journal import Kind, decode_event
-from coneskin.robot.sim_process import SimulatedController, free_host
-from coneskin.robot.state_reader import StateReader, decode_state
-from coneskin.robot.stop_watch import StopWatch, Way
-from coneskin.scene_reader import parse_scene
-from coneskin.session import Session, guard
+from coneskin.replay.replay import read_run
+from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.guard.journal import BlockKind, decode_event
+from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.stop.monitor import StopMonitor
+from coneskin.robot.ur.state_reader import StateReader, decode_state
+from coneskin.scene.reader import parse_scene
+from coneskin.session.session import Session, guard
+from coneskin.testing.forearm import START, forearm_scene
 
-WATCH = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nsettle_ms = 10"
+MOVES = str(Path(__file__).with_name("reaction_moves.py"))
+LIMITS = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nsettle_ms = 10"
 
 
 def chosen(simulated: SimulatedController, mode: str, rng: random.Random) -> tuple[int, float, list[float]]:
-    """The side with more room, how long to move before the stop [s], and where the arm is."""
-    q = simulated.wait_standing()["q"]
+    """Return the side with more room, how long to move before the stop [s], and where the arm is."""
+    q = simulated.wait_for_standstill()["q"]
     side = -1 if q[0] > START[0] else 1
     speeding_up = 0.15 if mode == "servoJ" else 0.10  # the arm lags behind its targets
     return side, speeding_up + 0.08 * rng.random(), q
@@ -42,10 +45,14 @@ def guarded_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, An
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         host, log = free_host(), folder / "log.jsonl"
         simulated = stack.enter_context(SimulatedController("UR5e", host, START, log=log))
-        control = "foreign" if mode in FOREIGN else "owner"
-        scene = parse_scene(forearm_scene(host, control, watch=WATCH))
+        control = "external" if mode in EXTERNAL else "internal"
+        text = forearm_scene(host, control, limits=LIMITS)
+        if mode == "urcl":  # the library takes the slider, as the ROS driver does
+            text = text.replace("[arm]\n", "[arm]\nslider_stop = false\n")
+        scene = parse_scene(text)
         session = stack.enter_context(guard(scene, recording=folder / "run.rec"))
-        arm = ForeignArm(mode, host, stack) if mode in FOREIGN else GuardedArm(session, mode, simulated.state()["tcp"])
+        external = mode in EXTERNAL
+        arm = ExternalArm(mode, host, stack) if external else GuardedArm(session, mode, simulated.state()["tcp"])
         touched, before = [], 0
         for _ in range(count):
             side, wait, q = chosen(simulated, mode, rng)
@@ -76,8 +83,8 @@ def reset(session: Session) -> None:
 
 
 def came(mode: str, simulated: SimulatedController) -> list[float]:
-    """When a stop came to the controller, in order [s]."""
-    if mode in FOREIGN:
+    """Return when the stops came to the controller, in order [s]."""
+    if mode in EXTERNAL:
         return [e["monotonic"] for e in simulated.events("script") if "stop" in e["first_line"]]
     return [e["monotonic"] for e in simulated.events("received") if e["command"] == STOP_COMMANDS[mode]]
 
@@ -87,19 +94,21 @@ STOP_COMMANDS = {"moveJ": 34, "moveL": 34, "speedJ": 15, "servoJ": 16}
 
 
 def read_turn(mode: str, path: Path, touched: list[float], arrivals: list[float]) -> list[dict[str, Any]]:
-    """The times of each collision, from the recording."""
+    """Return the times of each collision, from the recording."""
     run = read_run(path)
-    states = [decode_state(b.time, b.payload) for b in run.blocks if b.kind == Kind.ARM]
+    states = [decode_state(b.time, b.payload) for b in run.blocks if b.kind == BlockKind.ARM]
     samples = [(state.time, state.speed) for state in states]
-    commands = [b.time for b in run.blocks if b.kind == Kind.COMMAND and b.payload[:7] in (b"owner\nS", b"script\n")]
-    events = [decode_event(b) for b in run.blocks if b.kind == Kind.EVENT]
+    commands = [
+        b.time for b in run.blocks if b.kind == BlockKind.COMMAND and b.payload.startswith((b"driver\nS", b"program\n"))
+    ]
+    events = [decode_event(b) for b in run.blocks if b.kind == BlockKind.EVENT]
     rows = []
     for number, begin in enumerate(touched):
         end = touched[number + 1] if number + 1 < len(touched) else math.inf
         mine = [event for event in events if begin <= event.time < end]
         stop = next((event for event in mine if event.name == "stopping"), None)
         if stop is None:
-            rows.append({"mode": mode, "who": "guard", "missed": True, "events": [event.name for event in mine]})
+            rows.append({"mode": mode, "by": "guard", "missed": True, "events": [event.name for event in mine]})
             continue
         frame = stop.time  # when the bytes were read that made it stop
         command = commands[bisect_left(commands, frame)]
@@ -112,13 +121,15 @@ def read_turn(mode: str, path: Path, touched: list[float], arrivals: list[float]
     return rows
 
 
-def floor_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, Any]]:
+def baseline_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, Any]]:
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         host, log = free_host(), folder / "log.jsonl"
         simulated = stack.enter_context(SimulatedController("UR5e", host, START, log=log))
         reader = stack.enter_context(StateReader(host))
-        child = stack.enter_context(Child("floor", host, mode, json.dumps(simulated.state()["tcp"])))
+        child = stack.enter_context(
+            Child(sys.executable, MOVES, "baseline", host, mode, json.dumps(simulated.state()["tcp"]))
+        )
         samples: list[tuple[float, float]] = []
         over = threading.Event()
         thread = threading.Thread(target=read_states, args=(reader, samples, over))
@@ -129,10 +140,10 @@ def floor_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, Any]
         for _ in range(count):
             side, wait, q = chosen(simulated, mode, rng)
             called += child.ask(json.dumps([side, wait, *q]))
-            simulated.wait_standing()
+            simulated.wait_for_standstill()
             time.sleep(0.05)
         arrivals = came(mode, simulated)
-        return [follow(mode, "floor", call, samples, arrivals, since=call) for call in called]
+        return [follow(mode, "baseline", call, samples, arrivals, since=call) for call in called]
 
 
 def read_states(reader: StateReader, samples: list[tuple[float, float]], over: threading.Event) -> None:
@@ -144,27 +155,27 @@ def read_states(reader: StateReader, samples: list[tuple[float, float]], over: t
 
 
 def follow(
-    mode: str, who: str, command: float, samples: list[tuple[float, float]], arrivals: list[float], since: float
+    mode: str, by: str, command: float, samples: list[tuple[float, float]], arrivals: list[float], since: float
 ) -> dict[str, Any]:
-    """How a stop went on after it was sent [s], by the guard's own rule for slower and standing.
+    """Return the times of a stop after it was sent [s], by the guard's own rule for slower and standing.
 
-    The first arrival since then counts: a stop may be there before its send has returned.
+    The first arrival from ``since`` on counts: a stop may be there before its send has returned.
     """
     at = bisect_left(samples, (command, 0.0))
     speed = samples[at - 1][1]
-    watch = StopWatch(command, speed, (Way.OWNER,), 9.0, 9.0, 0.01)
+    monitor = StopMonitor(command, speed, (StopPath.DRIVER,), 9.0, 9.0, 0.01)
     for time_, value in samples[at:]:
-        watch.sample(time_, value)
-        if watch.standing_at is not None:
+        monitor.sample(time_, value)
+        if monitor.standing_at is not None:
             break
-    if watch.slowed_at is None or watch.standing_at is None:
-        raise RuntimeError(f"{mode}: the arm did not stand after a stop of the {who}")
+    if monitor.slowed_at is None or monitor.standing_at is None:
+        raise RuntimeError(f"{mode}: the arm did not stand after a stop by the {by}")
     arrival = bisect_left(arrivals, since)
     return {
         "mode": mode,
-        "who": who,
+        "by": by,
         "speed": speed,
         "command_came": arrivals[arrival] - command if arrival < len(arrivals) else math.nan,
-        "command_slower": watch.slowed_at - command,
-        "command_standing": watch.standing_at - command,
+        "command_slower": monitor.slowed_at - command,
+        "command_standing": monitor.standing_at - command,
     }

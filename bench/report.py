@@ -1,4 +1,4 @@
-"""What every benchmark prints: where, when and on which commit it ran, and quantiles of what it measured."""
+"""Report of a benchmark: machine, date and commit of the run, and quantiles of what it measured."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["head", "quantile"]
 
 
 def head(*packages: str) -> str:
-    """Two lines: processor, cores and versions; commit (with "-dirty" where a file of it has changed), date and load.
+    """Return two lines: processor, cores, versions; commit (with "-dirty" where a file of it has changed), date, load.
 
     Args:
         packages: names of distributions whose versions matter; those that are not installed are left out.
@@ -32,7 +32,7 @@ def head(*packages: str) -> str:
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """The value below which this share of the values lies; NaN where there are none."""
+    """Return the value below which this share of the values lies; NaN where there are none."""
     ordered = sorted(values)
     return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else math.nan
 

@@ -1,4 +1,4 @@
-"""What becomes of retreats from anywhere: python bench/retreat.py [--runs 300].
+"""Success of retreats from random poses: python bench/retreat.py [--runs 300].
 
 Each run puts an arm at random joint positions, touches a link at random, and follows the retreat at 500 Hz with
 speedj's ramps and commands that act two cycles late. First table: retreats that were begun. Second: what the touched
@@ -11,20 +11,15 @@ from __future__ import annotations
 import argparse
 import math
 import random
-import sys
-from pathlib import Path
 
 from report import head
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from coneskin.robot.commands import ArmState, Reaction  # noqa: E402
-from coneskin.robot.damped import FLOOR, damped_speeds  # noqa: E402
-from coneskin.robot.kinematics import point_jacobian  # noqa: E402
-from coneskin.robot.retreat import LEAST_PROGRESS, RetreatPlan, plan_retreat  # noqa: E402
-from coneskin.robot.ur_models import MODEL_NAMES, model  # noqa: E402
-from tests.robot.speedj import follow, joints_within, touch  # noqa: E402
+from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds
+from coneskin.robot.arm.kinematics import point_jacobian
+from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.reaction.retreat import LEAST_PROGRESS, RetreatPlan, plan_retreat
+from coneskin.robot.reaction.types import ArmState, Reaction
+from coneskin.testing.retreat_simulation import follow, joints_within, touch
 
 LINKS = {1: "shoulder", 2: "upper arm", 3: "forearm", 4: "wrist 1", 5: "wrist 2", 6: "wrist 3"}
 
@@ -33,7 +28,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=300, help="retreats for each link (default: %(default)s)")
     runs = parser.parse_args().runs
-    print(f"{head()}\n{Reaction()}\n")
+    print(f"{head()}\n{Reaction(kind='retreat')}\n")
     followed(runs)
     print()
     objectives(runs)
@@ -52,16 +47,16 @@ def followed(runs: int) -> None:
     for link, name in LINKS.items():
         results = []
         for run in range(runs):
-            arm = model(MODEL_NAMES[run % len(MODEL_NAMES)])
+            arm = arm_model(MODEL_NAMES[run % len(MODEL_NAMES)])
             q = joints_within(arm, source)
-            plan = plan_retreat(arm, ArmState(0.0, q), [touch(arm, source, link)], Reaction())
+            plan = plan_retreat(arm, ArmState(0.0, q), [touch(arm, source, link)], Reaction(kind="retreat"))
             if isinstance(plan, RetreatPlan):
                 results.append(follow(arm, plan, q))
         if not results:
             print(f"{name:10} {0:6.0f}")
             continue
         whole = [r for r in results if r.done.complete]
-        ends = [1e3 * (r.made - Reaction().distance) for r in whole]
+        ends = [1e3 * (r.made - Reaction(kind="retreat").distance) for r in whole]
         drifts = sorted(r.drift / max(r.made, 1e-9) for r in whole)
         times = sorted(r.time for r in results)
         print(
@@ -86,16 +81,16 @@ def objectives(runs: int) -> None:
         one: list[float] = []
         fast3 = fast1 = 0.0
         for run in range(4 * runs):
-            arm = model(MODEL_NAMES[run % len(MODEL_NAMES)])
+            arm = arm_model(MODEL_NAMES[run % len(MODEL_NAMES)])
             q, contact = joints_within(arm, source), touch(arm, source, link)
-            plan = plan_retreat(arm, ArmState(0.0, q), [contact], Reaction())
+            plan = plan_retreat(arm, ArmState(0.0, q), [contact], Reaction(kind="retreat"))
             if not isinstance(plan, RetreatPlan):
                 continue
             away = plan.tracks[0].away
             rows = point_jacobian(arm, q, link, contact.point)
             columns = [(rows[0][i], rows[1][i], rows[2][i]) for i in range(link)]
             row = [sum(c * u for c, u in zip(column, away, strict=True)) for column in columns]
-            least = sum(g * g for g in row) + FLOOR
+            least = sum(g * g for g in row) + DAMPING_FLOOR
             for speeds, ratios in ((damped_speeds(columns, away), three), ([g / least for g in row], one)):
                 v = [sum(w * column[k] for w, column in zip(speeds, columns, strict=True)) for k in range(3)]
                 along = sum(a * b for a, b in zip(v, away, strict=True))

@@ -1,10 +1,10 @@
-"""How long the paths to the simulated controller take, through the real ur_rtde wheel, on this machine's loopback.
+"""Latency of commands to the simulated controller, through the real ur_rtde wheel and this machine's loopback.
 
     python bench/sim_ur.py [--calls 300] [--stops 30] [--json]
 
-First table, arm at rest: from the call to its bytes in the controller, to the cycle that acts on them, to the return.
-Second table, arm at 1 rad/s (0.1 m/s): from the call to the first slower sample and to standstill, both as a client of
-our own sees them in its RTDE packets. The wheel runs in a child process with a time limit. All milliseconds.
+First table, arm at rest: time from the call to its bytes in the controller, to the cycle that executes them, and to its
+return. Second table, arm at 1 rad/s (0.1 m/s): time from the call to the first slower sample and to standstill, both as
+an RTDE client of the bench sees them. The wheel runs in a child process with a time limit. All times in milliseconds.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from typing import Any
 
 from report import head, quantile
 
-from coneskin.robot.rtde_codec import PacketKind, Recipe, pack_outputs_request, pack_start_request, split
-from coneskin.robot.sim_process import SimulatedController, free_host
+from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.ur.rtde_codec import PacketKind, Recipe, pack_outputs_request, pack_start_request, split
 
 HOME = (0.0, -1.4, 1.5, -1.7, -1.4, 0.2)
-# path -> the event in the controller's log that says: it came; it is acted on
+# command -> event in the controller's log for its arrival, and for its execution
 EVENTS = {
     "stopJ": ("received", "motion"),
     "stopJ async": ("received", "motion"),
@@ -46,7 +46,7 @@ EVENTS = {
 
 
 class Reader(threading.Thread):
-    """Our own small RTDE client: when it saw which speed of the leading joint."""
+    """RTDE client that records the speed of the leading joint and the time at which it came."""
 
     def __init__(self, host: str) -> None:
         super().__init__(daemon=True)
@@ -74,7 +74,7 @@ class Reader(threading.Thread):
 
 
 def measure(host: str, calls: int, stops: int) -> dict[str, Any]:
-    """In the child: make the calls. Returns path -> [time of call, time of return], and the stops."""
+    """Make the calls, in the child; return command -> [time of call, time of return], and the stops."""
     import dashboard_client
     import rtde_control
     import rtde_io
@@ -108,7 +108,7 @@ def measure(host: str, calls: int, stops: int) -> dict[str, Any]:
         control.speedStop(20.0)
 
     def nothing() -> None:
-        """Go on at once."""
+        """Do nothing between two calls."""
 
     def wait_for_start() -> None:
         time.sleep(0.03)  # the next program would overtake this one before it starts
@@ -202,14 +202,14 @@ def cell(values: Sequence[float]) -> str:
 
 
 def rows(timed: dict[str, list[list[float]]], events: list[dict[str, Any]]) -> dict[str, tuple[list[float], ...]]:
-    """Path -> delays from the call to: came, acted on, returned [s]."""
+    """Return command -> delays from the call to arrival, execution and return [s]."""
     when = {kind: [e["monotonic"] for e in events if e["event"] == kind] for kinds in EVENTS.values() for kind in kinds}
     out = {}
     for name, calls in timed.items():
-        came, acted = EVENTS[name]
+        arrival, execution = EVENTS[name]
         delays: tuple[list[float], ...] = ([], [], [])
         for begin, end in calls:
-            for column, kind in enumerate((came, acted)):
+            for column, kind in enumerate((arrival, execution)):
                 if kind and (at := bisect_left(when[kind], begin)) < len(when[kind]):
                     delays[column].append(when[kind][at] - begin)
             delays[2].append(end - begin)
@@ -219,8 +219,8 @@ def rows(timed: dict[str, list[list[float]]], events: list[dict[str, Any]]) -> d
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--calls", type=int, default=300, help="calls of each path at rest (%(default)s)")
-    parser.add_argument("--stops", type=int, default=30, help="stops of each path while moving (%(default)s)")
+    parser.add_argument("--calls", type=int, default=300, help="calls of each command at rest (%(default)s)")
+    parser.add_argument("--stops", type=int, default=30, help="stops of each kind while the arm moves (%(default)s)")
     parser.add_argument("--json", action="store_true", help="print the quantiles as JSON")
     parser.add_argument("--measure", metavar="HOST", help=argparse.SUPPRESS)
     args = parser.parse_args()
@@ -251,7 +251,7 @@ def main() -> int:
         print(json.dumps({"at_rest": at_rest, "moving": moving}))
         return 0
     print(f"{head()}; ms, median / p99\n")
-    print(f"{'arm at rest':30s} {'n':>4s} {'came':>16s} {'acted on':>16s} {'returned':>16s}")
+    print(f"{'arm at rest':30s} {'n':>4s} {'received':>16s} {'executed':>16s} {'returned':>16s}")
     for name, delays in table.items():
         print(f"{name:30s} {len(delays[2]):4d} " + " ".join(cell(column) for column in delays))
     print(f"\n{'moving':30s} {'n':>4s} {'slower':>16s} {'standing':>16s}")

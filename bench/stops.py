@@ -1,13 +1,15 @@
-"""Do stops show before the next way to stop is taken? Real processes, real wheel, simulated controller.
+"""Time from a stop command to deceleration and standstill, and false escalations to the next stop path.
+
+Real processes, real wheel, simulated controller.
 
     python bench/stops.py [--stops 30]
 
-In turns: a guarded arm moved by ur_rtde (asynchronous moveJ), and one moved by a program that knows nothing of the
-guard (raw URScript); on an idle machine, and with a busy process on each core. With the default limits. A touch stops
-the arm; a reset lets it go on. From the guard's own record: command -> first measured slowdown, command -> standing;
-escalations (a next way was taken although the first one worked), and stops for another reason than the touch.
+The arm is moved by ur_rtde (asynchronous moveJ), then by a program that knows nothing of the guard (URScript); on an
+idle machine, then with a busy process on each core; with default limits. A touch stops the arm, and a reset lets it go
+on. From the guard's events: command -> first measured deceleration, command -> standstill; escalations (the next stop
+path was used although the first one worked); stops for a reason other than the touch.
 
-What it does not show: a real controller, whose start of a program and braking are not known here.
+It does not show a real controller, whose start of a program and braking are not known here.
 """
 
 import argparse
@@ -21,12 +23,12 @@ import threading
 import time
 
 from report import head
-from scenes import START, forearm_scene, start_with
 
 from coneskin.errors import ConeSkinError
-from coneskin.robot.sim_process import SimulatedController, free_host
-from coneskin.scene_reader import parse_scene
-from coneskin.session import Session, guard
+from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.scene.reader import parse_scene
+from coneskin.session.session import Session, guard
+from coneskin.testing.forearm import START, forearm_scene, start_with
 
 GOAL = start_with(150.0)
 RAW = f"def users():\n  while True:\n    movej({GOAL}, a=8, v=1)\n    movej({START}, a=8, v=1)\n  end\nend\n"
@@ -41,7 +43,7 @@ def main() -> None:
     print(f"{'ms':34}{'stops':>6}{'slower med':>12}{'worst':>8}{'standing med':>14}{'worst':>8}", end="")
     print(f"{'escalated':>11}{'other':>7}")
     for busy in (False, True):
-        for control in ("owner", "foreign"):
+        for control in ("internal", "external"):
             load = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(busy * os.cpu_count())]  # type: ignore[operator]
             try:
                 row(f"{control}, {'busy' if busy else 'idle'} machine", *measure(control, args.stops))
@@ -52,7 +54,7 @@ def main() -> None:
 
 
 def row(name: str, slower: list[float], standing: list[float], escalated: int, other: list[str]) -> None:
-    """One line of the table."""
+    """Print one line of the table."""
     values = [f(x) * 1e3 if x else math.nan for x in (slower, standing) for f in (statistics.median, max)]
     print(f"{name:34}{len(standing):6}{values[0]:12.1f}{values[1]:8.1f}{values[2]:14.1f}{values[3]:8.1f}", end="")
     print(f"{escalated:11}{len(other):7}", flush=True)
@@ -61,7 +63,7 @@ def row(name: str, slower: list[float], standing: list[float], escalated: int, o
 
 
 def measure(control: str, stops: int) -> tuple[list[float], list[float], int, list[str]]:
-    """Touch a moving arm so often."""
+    """Touch a moving arm this many times; return delays to deceleration and standstill [s], and what went wrong."""
     slower: list[float] = []
     standing: list[float] = []
     escalated, other = 0, []
@@ -70,7 +72,7 @@ def measure(control: str, stops: int) -> tuple[list[float], list[float], int, li
         with guard(scene) as session:
             for _ in range(stops):
                 seen = len(session.events)
-                mover = start(session, control, simulated.host)
+                planner = start(session, control, simulated.host)
                 while max(map(abs, simulated.state()["qd"])) < 0.9:
                     time.sleep(0.01)
                     if session.wait_for(("stopping",), 0.0, after=seen):
@@ -78,13 +80,13 @@ def measure(control: str, stops: int) -> tuple[list[float], list[float], int, li
                 session.touch(0.13, 1.55, duration=0.1)
                 if session.wait_for(("latched",), 10.0, after=seen) is None:
                     raise SystemExit("the arm did not stand within 10 s")
-                mover.join()
+                planner.join()
                 events = {event.name: event for event in reversed(session.events[seen:])}
                 if events["stopping"].details["why"] != "touch":
                     other.append(events["stopping"].details["why"])
                 else:
                     begin = events["stopping"].time
-                    slower.append(events["slower"].time - begin)
+                    slower.append(events["decelerating"].time - begin)
                     standing.append(events["standstill"].time - begin)
                 escalated += sum(event.name == "escalated" for event in session.events[seen:])
                 again(session)
@@ -92,27 +94,27 @@ def measure(control: str, stops: int) -> tuple[list[float], list[float], int, li
 
 
 def start(session: Session, control: str, host: str) -> threading.Thread:
-    """Let something move the arm."""
+    """Move the arm from a thread, through the session or past it."""
 
-    def owned() -> None:
+    def internal() -> None:
         try:
             session.arm.move_j(GOAL, 1.0, 8.0)
             session.arm.move_j(START, 1.0, 8.0)
         except ConeSkinError:
             pass  # the touch
 
-    def foreign() -> None:
+    def external() -> None:
         with socket.create_connection((host, 30002), 5.0) as sock:
             sock.sendall(RAW.encode())
             time.sleep(0.1)
 
-    thread = threading.Thread(target=owned if control == "owner" else foreign)
+    thread = threading.Thread(target=internal if control == "internal" else external)
     thread.start()
     return thread
 
 
 def again(session: Session) -> None:
-    """Reset as soon as the skin is free."""
+    """Reset as soon as nothing touches the skin."""
     for _ in range(100):
         try:
             session.reset()

@@ -4,9 +4,9 @@
 
 The first table is the processor time from frame to frame, without pacing, in microseconds: a frame each millisecond
 has 1000. The worst is a frame with which the next eight are solved, or the places of touches are prepared. The second
-paces the frames in real time, as ``coneskin.skin_process`` does, adds touches while it runs, and says how late frames
-left (what else the machine does included: look at the ladder's row), the processor time, and the longest from the
-start of a touch to the device clock of the first frame that shows it.
+paces the frames in real time, as ``coneskin.session.skin_process`` does, adds touches while it runs, and says how
+late frames left (what else the machine does included: look at the ladder's row), the processor time, and the longest
+from the start of a touch to the device clock of the first frame that shows it.
 """
 
 import gc
@@ -16,14 +16,14 @@ from collections.abc import Iterable
 from report import head
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.pseudo_terminal import Pacing, play
-from coneskin.skin.scripted_touch import ScriptedTouch
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual import VirtualSkin
+from coneskin.skin.virtual.pseudo_terminal import Pacing, play
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import frame_at
 
 LINK = Frustum(0.03762, 0.0373, 0.24)
-SOON = 0.002  # as in coneskin.skin_process
+SOON = 0.002  # as in coneskin.session.skin_process
 
 
 def main() -> None:

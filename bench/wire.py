@@ -15,14 +15,14 @@ from collections.abc import Callable
 from report import head
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detector import Detector
-from coneskin.skin.memory_source import MemorySource
-from coneskin.skin.reading import read
-from coneskin.skin.scripted_touch import ScriptedTouch
+from coneskin.skin.detection.detector import Detector
+from coneskin.skin.detection.reading import read
+from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.stream import Stream
-from coneskin.skin.virtual import VirtualSkin
-from coneskin.skin.wire import FRAME_LENGTH, Decoder, encode, frame_at
+from coneskin.skin.virtual.memory_source import MemorySource
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
+from coneskin.skin.wire import FRAME_LENGTH, FrameDecoder, encode, frame_at
 
 SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))
 COUNT = 20_000
@@ -45,23 +45,23 @@ def main() -> None:
     print(f"{'us per frame':44}{'median':>9}{'p99':>9}{'p99.9':>9}")
     row("the clock itself", lambda _: None, frames)
     row("encode", encode, frames)
-    row("decode, aligned frame", Decoder().feed, quiet)
-    row("decode, frame in two pieces (per piece)", Decoder().feed, halves)
-    row("decode, 36 bytes of noise", Decoder().feed, noise)
+    row("decode, aligned frame", FrameDecoder().feed, quiet)
+    row("decode, frame in two pieces (per piece)", FrameDecoder().feed, halves)
+    row("decode, 36 bytes of noise", FrameDecoder().feed, noise)
     row("read, untouched", lambda frame: read(SENSOR, frame), frames)
     row("read, touched (place included)", lambda frame: read(SENSOR, frame), touched)
     row("detect (read included), untouched", timed(Detector(SENSOR)), frames)
     row("detect, touched", timed(Detector(SENSOR)), held_frames)
-    row("bytes -> events, untouched", timed(Stream([SENSOR])), quiet)
-    row("bytes -> events, touched", timed(Stream([SENSOR])), held)
+    row("bytes -> events, untouched", timed(TouchStream([SENSOR])), quiet)
+    row("bytes -> events, touched", timed(TouchStream([SENSOR])), held)
 
     joined = b"".join(quiet)
     start = time.perf_counter()
-    found = len(Decoder().feed(joined))
+    found = len(FrameDecoder().feed(joined))
     span = time.perf_counter() - start
     print(f"decode in one piece: {span / found * 1e6:.2f} us per frame, {found / span / 1e3:.0f} k frames/s")
     start = time.perf_counter()
-    source, stream, seconds = MemorySource(VirtualSkin(SENSOR, duration=60.0)), Stream([SENSOR]), 59.0
+    source, stream, seconds = MemorySource(VirtualSkin(SENSOR, duration=60.0)), TouchStream([SENSOR]), 59.0
     with source:
         while source.clock() < seconds:
             stream.feed(source.read(1.0), source.clock())
@@ -69,7 +69,7 @@ def main() -> None:
     print(f"virtual skin -> bytes -> events in memory: {seconds / span:.0f} times as fast as real time at 1 kHz")
 
 
-def timed(stage: Detector | Stream) -> Callable[[object], object]:
+def timed(stage: Detector | TouchStream) -> Callable[[object], object]:
     """Feed a stage with a clock of its own, 1 ms a frame."""
     now = [0.0]
 

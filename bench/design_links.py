@@ -1,0 +1,133 @@
+"""Coverage of links by the sheets found on them, against a bound by brute force.
+
+    python bench/design_links.py LINK ...        # meshes of yours; minutes for each, nearly all of them for the bound
+    python bench/design_links.py --sheets 4 --no-bound LINK ...
+
+The bound: hypotheses of cones from many draws; each is fitted with every gate, and a line of revolution is looked for
+from each. The axes that are left, up to hundreds, are packed by the same rules as ever on coarse profiles (120 x 53
+rays), exactly within the tolerance. It shows what the search misses by trying few axes and by refining only the best
+packings; it shares the rules of packing, so it does not show what these miss.
+"area" is that of the sheets over that of the hull.
+
+Meshes of makers that are not in ../shared/data, all of licences that permit it (fetched, not stored here): Franka
+(franka_ros, Apache-2.0), UFACTORY (xarm_ros, BSD-3), Doosan (doosan-robot, BSD-3), FANUC (fanuc, BSD-3), KUKA
+(kuka_experimental, Apache-2.0 and BSD), ABB (abb, BSD-3 and Apache-2.0).
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import resource
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from report import head
+
+from coneskin.errors import MeshError
+from coneskin.geometry.fit import hypotheses, plan
+from coneskin.geometry.fit.axis_plan import SheetRequirements
+from coneskin.geometry.fit.candidates import AxisCandidate
+from coneskin.geometry.fit.cone_fit import fit_cone
+from coneskin.geometry.fit.cones import LEAST_GAIN, find_cones
+from coneskin.geometry.fit.revolution_axis import find_revolution_axis
+from coneskin.geometry.fit.surface_samples import SurfaceSamples, sample_surface
+from coneskin.geometry.mesh import Mesh, load_mesh
+from coneskin.geometry.ray_casting import RayCaster
+
+TOLERANCE = 0.001
+SEEDS = 6
+MAX_AXES = 250
+
+
+def brute_axes(samples: SurfaceSamples) -> list[AxisCandidate]:
+    """Every axis that many draws give, told apart by a twentieth of a degree and a twentieth of a millimetre."""
+    found: dict[tuple[int, ...], AxisCandidate] = {}
+
+    def add(origin: np.ndarray, axis: np.ndarray, cones: tuple) -> None:  # type: ignore[type-arg]
+        axis = axis * math.copysign(1.0, axis[int(np.abs(axis).argmax())])
+        foot = origin - ((origin - middle) @ axis) * axis
+        key = tuple(np.round(axis / 1e-3).astype(int)) + tuple(np.round(foot / 5e-5).astype(int))
+        known = found.get(key)
+        if known is None or len(known.cones) < 4:
+            found[key] = AxisCandidate(foot, axis, (known.cones if known else ()) + cones)
+
+    middle = samples.points.mean(axis=0)
+    size = float(np.ptp(samples.points, axis=0).max())
+    for seed in range(10, 10 + SEEDS):
+        for distance in (0.001, max(0.0015, 0.004 * size)):
+            for start in hypotheses.cone_hypotheses(samples, distance, 20, seed):
+                line = find_revolution_axis(samples, (start.origin, start.axis))
+                if line is not None:
+                    add(*line, ())
+                wide = max(0.006, 0.06 * start.radius)
+                for gates in ((0.002, 0.0005), (0.002,), (0.001,), (0.005,)):
+                    cone = fit_cone(samples, start, (wide, *gates))
+                    if cone is not None:
+                        sign = math.copysign(1.0, cone.axis[int(np.abs(cone.axis).argmax())])
+                        add(
+                            cone.origin,
+                            cone.axis,
+                            (replace(cone, axis=sign * cone.axis, half_angle=sign * cone.half_angle),),
+                        )
+    return list(found.values())[:MAX_AXES]
+
+
+def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
+    """Area of the best packing over the area of the hull, and the number of axes tried."""
+    rays = RayCaster(mesh)
+    hull = sample_surface(mesh, rays, 12_000, seed=7)
+    whole = len(hull) * hull.area
+    wanted = SheetRequirements(
+        TOLERANCE,
+        sheets,
+        None,
+        0.025,
+        math.radians(150.0),
+        0.010,
+        np.array([1.0, 0.0, 0.0]),
+        0.004,
+        0.0062,
+        0.001,
+        LEAST_GAIN * whole,
+    )
+    axes = brute_axes(hull)
+    surveys = plan.survey_axes(mesh, rays, axes, wanted)
+    packings = plan._packings(surveys, wanted)
+    best = packings[0] if packings else []
+    return sum(choice.plan.area for choice in best) / whole, len(axes)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("links", nargs="+", type=Path, metavar="LINK")
+    parser.add_argument("--sheets", type=int, default=3, help="sheets at most (default 3)")
+    parser.add_argument("--no-bound", action="store_true", help="only what is found, and its time")
+    arguments = parser.parse_args()
+    print(head("numpy", "scipy", "trimesh", "embreex"))
+    columns = {"link": -22, "faces": 9, "cpu s": 7, "MB": 6, "sheets": 7, "axes": 5, "area": 7, "bound": 7, "ratio": 7}
+    print(
+        "".join(f"{name:<{-width}}" if width < 0 else f"{name:>{width}}" for name, width in columns.items()) + "   of"
+    )
+    for path in arguments.links:
+        try:
+            mesh = load_mesh(path)
+        except MeshError:  # metres by its header, and 200 of them
+            mesh = load_mesh(path, "mm")
+        start = time.process_time()
+        fit = find_cones(mesh, TOLERANCE, arguments.sheets)
+        spent = time.process_time() - start
+        area = sum(sheet.frustum.area for sheet in fit.sheets) / fit.hull_area
+        top = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        line = f"{path.name:22}{len(mesh.faces):9}{spent:7.2f}{top:6.0f}{len(fit.sheets):7}"
+        line += f"{len({sheet.axis for sheet in fit.sheets}):5}{area:7.3f}"
+        if not arguments.no_bound:
+            most, tried = bound(mesh, arguments.sheets)
+            line += f"{most:7.3f}{area / most if most else math.nan:7.3f}{tried:5}"
+        print(line + ("" if fit.sheets else f"  refused: {fit.reason[:60]}"), flush=True)
+
+
+if __name__ == "__main__":
+    main()

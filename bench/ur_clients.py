@@ -1,0 +1,119 @@
+"""Clients that others wrote, against the simulated controller: client x test -> pass or fail, and whose fault it is.
+
+    python bench/ur_clients.py --urcl BUILD [--source SOURCE] [--only WORD,...] [--json] [--markdown FILE]
+    python bench/ur_clients.py --rtde-client FOLDER --urx --ur-rtde
+
+* ``--urcl``: a build of Universal Robots' own C++ client library (github
+  UniversalRobots/Universal_Robots_Client_Library) with ``-DINTEGRATION_TESTS=ON``, and its source where that is not the
+  folder above the build. Its tests that ask for a robot, and its examples, run one after the other: their ports are
+  fixed.
+* ``--rtde-client``: Universal Robots' RTDE_Python_Client_Library; its examples run.
+* ``--urx``: python-urx, if it is installed.
+* ``--ur-rtde``: the installed wheel's own four interfaces; its examples are in tests/robot/sim.
+
+Nothing of these is fetched here: who runs this gives the paths, and what is not given is skipped, with the reason. A
+test that fails in the run of its program is repeated by itself, with a controller of its own. The exit code is 0 where
+ur_clients_faults.py explains each failure by what is not the controller's fault.
+
+Some tests expect that nothing answers at 192.168.56.100 and .123, and port 80 must be free: where ``unshare``
+(util-linux) can make one, all runs in a network of its own that has nothing but its loopback.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from report import head
+from ur_clients_faults import explain
+from ur_clients_python import rtde_client, ur_rtde, urx
+from ur_clients_urcl import Trial, urcl
+
+_IN_OWN_NETWORK = "UR_CLIENTS_IN_OWN_NETWORK"  # environment variable that says so
+
+
+def show(trials: Iterable[Trial]) -> list[str]:
+    """Return a table of all trials, and a line of counts for each client."""
+    trials = list(trials)
+    lines = ["| client | pass | fail | skipped | its own fake server or hardware |", "|---|---|---|---|---|"]
+    for client in dict.fromkeys(trial.client for trial in trials):
+        count = Counter(trial.result for trial in trials if trial.client == client)
+        lines.append(f"| {client} | {count['pass']} | {count['fail']} | {count['skip']} | {count['apart']} |")
+    judged = [trial for trial in trials if trial.result in ("pass", "fail")]
+    passed = sum(trial.result == "pass" for trial in judged)
+    if judged:
+        lines += ["", f"{passed} of {len(judged)} pass: {100.0 * passed / len(judged):.1f} %."]
+    lines += ["", "| client | test | result | s | whose fault, and the evidence |", "|---|---|---|---|---|"]
+    for trial in trials:
+        why = trial.why if trial.result != "fail" else explain(trial) or f"not explained: {trial.why}"
+        why = why.replace("|", "/").replace("\n", " ")[:400]
+        lines.append(f"| {trial.client} | {trial.test} | {trial.result} | {trial.seconds:.1f} | {why} |")
+    return lines
+
+
+def enter_own_network() -> None:
+    """Start this program again in a network that has nothing but its loopback, where that is possible."""
+    inner = ["unshare", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
+    if os.environ.get(_IN_OWN_NETWORK) or shutil.which("unshare") is None or shutil.which("ip") is None:
+        return
+    if subprocess.run([*inner, "true"], capture_output=True, check=False).returncode == 0:
+        os.environ[_IN_OWN_NETWORK] = "1"
+        os.execvp("unshare", [*inner, sys.executable, *sys.argv])
+
+
+def run_all(args: argparse.Namespace) -> Iterator[Trial]:
+    """Run what the options ask for, and say what is skipped."""
+    if args.urcl is None:
+        print("skipped: Universal Robots' client library; give --urcl BUILD", file=sys.stderr)
+    else:
+        yield from urcl(args.urcl, args.source or args.urcl.parent, args.only.split(","))
+    if args.rtde_client is None:
+        print("skipped: the official RTDE client; give --rtde-client FOLDER", file=sys.stderr)
+    else:
+        yield from rtde_client(args.rtde_client)
+    yield from urx() if args.urx else ()
+    yield from ur_rtde() if args.ur_rtde else ()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--urcl", type=Path, metavar="BUILD")
+    parser.add_argument("--source", type=Path, metavar="FOLDER")
+    parser.add_argument("--rtde-client", type=Path, metavar="FOLDER")
+    parser.add_argument("--urx", action="store_true")
+    parser.add_argument("--ur-rtde", action="store_true")
+    parser.add_argument("--only", default="", metavar="WORD,...", help="programs whose name has one of these words")
+    parser.add_argument(
+        "--keep", type=Path, metavar="FILE", help="add each result to this file, and show all that it has"
+    )
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table there too")
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    enter_own_network()
+    trials = []
+    if args.keep and args.keep.exists():
+        trials = [Trial(**json.loads(line)) for line in args.keep.read_text().splitlines()]
+    for trial in run_all(args):
+        trials.append(trial)
+        if args.keep:
+            with args.keep.open("a") as file:
+                file.write(json.dumps(trial._asdict()) + "\n")
+    machine = head("ur_rtde", "urx")
+    if args.json:
+        print(json.dumps({"machine": machine, "trials": [trial._asdict() for trial in trials]}))
+    else:
+        print("\n".join([machine, "", *show(trials)]))
+    if args.markdown:
+        args.markdown.write_text("\n".join(["# UR clients", "", machine, "", *show(trials), ""]))
+    return 1 if any(trial.result == "fail" and not explain(trial) for trial in trials) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

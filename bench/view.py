@@ -1,0 +1,218 @@
+"""The page beside a guard: first picture, touch to viewer, pictures a second, ten viewers, and what the guard feels.
+
+    python bench/view.py [--seconds 8] [--touches 8]
+
+One guard, one run: a simulated UR5e, a virtual skin of 1 kHz. It is guarded without a page, then with a page and one
+browser, then with ten viewers. How late a frame is at the guard is its host time less the device's clock, less the
+least such difference of the run. Needs the extra `view`, playwright and chromium, which draws in software here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from report import head, quantile
+
+from coneskin.errors import ConeSkinError
+from coneskin.replay.replay import read_run
+from coneskin.robot.guard.journal import BlockKind
+from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.scene.reader import parse_scene
+from coneskin.session.session import Session, guard
+from coneskin.skin.wire import FrameDecoder
+from coneskin.testing.forearm import START, forearm_scene
+
+FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
+LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000"
+#: counts the pictures that the browser draws, and the changes of the page's text
+WATCH = """() => {
+  window.pictures = 0; window.texts = 0;
+  const look = () => { window.pictures += 1; requestAnimationFrame(look); };
+  new MutationObserver(() => { window.texts += 1; }).observe(document.body, { subtree: true, childList: true });
+  look();
+}"""
+
+
+def page_of(recording: Path) -> tuple[subprocess.Popen[str], str, float]:
+    """Start the page beside the guard; its process, address, and how long that took [s]."""
+    began = time.monotonic()
+    command = [sys.executable, "-m", "coneskin", "view", str(recording), "--no-browser", "--json", "--port", "18300"]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None
+    return child, json.loads(child.stdout.readline())["url"], time.monotonic() - began
+
+
+def first_picture(page: Any, url: str) -> float:
+    """Open the page; time until its phase is said and the arm is drawn [s]."""
+    began = time.monotonic()
+    page.goto(url)
+    page.wait_for_function(
+        "() => document.querySelector('.coneskin-phase') && document.querySelector('canvas')", timeout=60_000
+    )
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return time.monotonic() - began
+
+
+class Viewer:
+    """Viewer that takes all that is sent, as a browser does, and draws nothing.
+
+    Attributes:
+        touched: when the words came that the arm stops [s, monotonic]; None until then.
+        messages: that came.
+        active: the newest words are that the guard is active.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.touched: float | None = None
+        self.messages, self.active = 0, False
+        self._url, self._over = url, threading.Event()
+        self._thread = threading.Thread(target=self._view, daemon=True)
+        self._thread.start()
+
+    def _view(self) -> None:
+        import viser
+        import zstandard
+        from websockets.exceptions import ConnectionClosed
+        from websockets.sync.client import connect
+
+        protocol: Any = f"viser-v{viser.__version__}"
+        with (
+            contextlib.suppress(ConnectionClosed),  # the page has ended
+            connect(self._url.replace("http", "ws"), subprotocols=[protocol], max_size=None) as socket,
+        ):
+            while not self._over.is_set():
+                data = socket.recv()
+                came = time.monotonic()
+                assert isinstance(data, bytes)
+                size, packed = (int.from_bytes(data[at : at + 8], "little") for at in (0, 8))
+                inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], size)
+                self.messages += 1
+                if b"coneskin-phase" in inner:
+                    self.active = b">active<" in inner
+                    if self.touched is None and (b">stopping<" in inner or b">latched" in inner):
+                        self.touched = came
+
+    def end(self) -> None:
+        """Leave."""
+        self._over.set()
+
+
+def touch_to_viewer(session: Session, viewer: Viewer) -> float:
+    """Touch the skin; time until a viewer is told so [s]; NaN where that takes longer than 10 s."""
+    viewer.touched = None
+    touched = session.touch(u=0.13, phi=1.57, duration=0.1)
+    session.wait_for(("none",), 0.6)
+    while viewer.touched is None and time.monotonic() < touched + 10.0:
+        session.wait_for(("none",), 0.2)
+    for _ in range(100):
+        try:
+            session.reset()
+            break
+        except ConeSkinError:
+            session.wait_for(("none",), 0.05)
+    while not viewer.active and time.monotonic() < touched + 30.0:
+        session.wait_for(("none",), 0.1)
+    return float("nan") if viewer.touched is None else viewer.touched - touched
+
+
+def lateness(recording: Path, spans: dict[str, tuple[float, float]]) -> dict[str, list[float]]:
+    """How late the frames of each span were at the guard [ms]."""
+    decoder, late = FrameDecoder(), []
+    for block in read_run(recording).select(kinds=frozenset({BlockKind.SKIN})):
+        late += [(block.time, block.time - 1e-6 * frame.clock_us) for frame in decoder.feed(block.payload)]
+    least = min(value for _, value in late)
+    return {
+        name: [1e3 * (value - least) for at, value in late if since <= at < until]
+        for name, (since, until) in spans.items()
+    }
+
+
+def resident(pid: int) -> int:
+    """Memory of a process [kB]."""
+    return int(next(li for li in Path(f"/proc/{pid}/status").read_text().splitlines() if "VmRSS" in li).split()[1])
+
+
+def processor_time(pid: int) -> float:
+    """Time that a process has run [s]."""
+    return sum(map(int, Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13])) / os.sysconf(
+        "SC_CLK_TCK"
+    )
+
+
+def look(url: str, span: Callable[[str], None], seconds: float) -> None:
+    """Look at the page in a browser for a while, and print what it draws."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path="/usr/bin/chromium", args=list(FLAGS))
+        page = browser.new_page(viewport={"width": 960, "height": 540})
+        print(f"browser: {first_picture(page, url):.2f} s until the first picture", flush=True)
+        page.evaluate(WATCH)
+        span("page and browser")
+        pictures, texts = page.evaluate("() => [window.pictures, window.texts]")
+        rates = f"{pictures / seconds:.1f} pictures and {texts / seconds:.1f} changes of the text"
+        print(f"browser, drawing in software: {rates} a second", flush=True)
+        browser.close()
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=8.0)
+    parser.add_argument("--touches", type=int, default=8)
+    parser.add_argument("--no-browser", action="store_true", help="measure without chromium")
+    args = parser.parse_args()
+    print(head("viser", "playwright"), flush=True)
+    host, spans = free_host(), {}
+    folder = tempfile.TemporaryDirectory()
+    recording = Path(folder.name) / "run.rec"
+    scene = parse_scene(forearm_scene(host, limits=LIMITS).replace('"virtual"', '"virtual"\nrate_hz = 1000'))
+
+    def span(name: str) -> None:
+        began = time.monotonic()
+        session.wait_for(("none",), args.seconds)
+        spans[name] = began, time.monotonic()
+
+    with SimulatedController("UR5e", host, START), guard(scene, recording=recording) as session:
+        span("no page")
+        child, url, started = page_of(recording)
+        print(f"page: served {started:.2f} s after its start", flush=True)
+        if not args.no_browser:
+            look(url, span, args.seconds)
+        viewer = Viewer(url)
+        session.wait_for(("none",), 1.0)
+        times = [touch_to_viewer(session, viewer) for _ in range(args.touches)]
+        words = ", ".join(f"{1e3 * quantile(times, share):.0f}" for share in (0.0, 0.5, 0.99))
+        print(f"touch to the words at a viewer: {words} ms (least, median, most of {len(times)})", flush=True)
+        before, cpu = resident(child.pid), processor_time(child.pid)
+        crowd = [viewer, *(Viewer(url) for _ in range(9))]
+        told = sum(one.messages for one in crowd)
+        span("ten viewers")
+        spent = processor_time(child.pid) - cpu
+        told = sum(one.messages for one in crowd) - told
+        print(f"ten viewers: {100.0 * spent / args.seconds:.0f} % of a core for the page's process, "
+              f"{told / 10.0 / args.seconds:.1f} messages a second each, {before} kB before, "
+              f"{resident(child.pid)} kB after {args.seconds:g} s")  # fmt: skip
+        for one in crowd:
+            one.end()
+        child.terminate()
+        child.wait(20)
+    for name, late in lateness(recording, spans).items():
+        print(f"a frame at the guard, {name}: {quantile(late, 0.5):.2f} ms (median), {quantile(late, 0.99):.2f} (p99), "
+              f"{max(late):.1f} (most) of {len(late)}")  # fmt: skip
+    folder.cleanup()
+
+
+if __name__ == "__main__":
+    main()
