@@ -1,4 +1,4 @@
-"""A program moves a simulated UR5e under guard; its skin is touched; the program gets Collision and a person resets.
+"""Guard a program: it moves a simulated UR5e whose skin is touched, gets Collision, and resets the guard.
 
 python demos/04_guard_a_program.py [HOST]      HOST: loopback address of the simulated controller
 """
@@ -7,10 +7,7 @@ import math
 import sys
 import threading
 
-from coneskin.errors import Collision
-from coneskin.robot.sim_process import SimulatedController
-from coneskin.scene_reader import parse_scene
-from coneskin.session import guard
+import coneskin as cs
 
 SCENE = """
 [arm]
@@ -33,7 +30,7 @@ kind = "virtual"
 kind = "retreat"
 distance_mm = 30
 
-[watch]
+[monitoring]
 skin_silence_ms = 250
 skin_late_ms = 250
 arm_silence_ms = 250
@@ -48,21 +45,24 @@ HOME, GOAL = rad(-40, -90, 90, -90, -90, 0), rad(60, -80, 80, -90, -90, 0)
 
 
 def main(host: str) -> None:
-    scene = parse_scene(SCENE.format(host=host))
-    # the silences in the scene are long because a busy machine can stall a pseudo-terminal; a real port needs 50 ms
-    with SimulatedController("UR5e", host, HOME), guard(scene) as g:
-        finger = threading.Timer(0.8, lambda: g.touch(u=0.130, phi=math.pi / 2, duration=0.2))
+    scene = cs.parse_scene(SCENE.format(host=host))
+    # the arm retreats only if the skin reads touches where they are; a real one: `coneskin commission scene.toml`
+    scene = cs.commission_virtual_skin(scene)
+    # the limits of silence are long because a busy machine can stall a pseudo-terminal; a real port needs 50 ms
+    with cs.SimulatedController("UR5e", host, HOME), cs.guard(scene) as session:
+        finger = threading.Timer(0.8, lambda: session.touch(u=0.130, phi=math.pi / 2, duration=0.15))
         finger.start()
         try:
-            g.arm.move_j(GOAL, speed=0.8, acceleration=2.0)
-            print("arrived, untouched")
-        except Collision as exc:
-            print(f"Collision: {exc}")
+            session.arm.move_j(GOAL, speed=0.8, acceleration=2.0)
+            print("arrived without a touch")
+        except cs.Collision as collision:
+            print(f"Collision: {collision}")
         finger.join()
-        print("events: " + ", ".join(event.name for event in g.events))
-        g.reset()  # because a person has looked
-        g.arm.move_j(HOME, speed=1.5, acceleration=3.0)
-        print("reset, and back home")
+        session.wait_for((cs.EventName.TOUCH_ENDED,), timeout=10.0)  # a touched skin refuses a reset
+        print("events: " + ", ".join(event.name for event in session.events))
+        session.reset()  # because a person has looked
+        session.arm.move_j(HOME, speed=1.5, acceleration=3.0)
+        print("after the reset: back home")
 
 
 if __name__ == "__main__":
