@@ -1,35 +1,57 @@
-# make demo: set everything up and run the whole chain in simulation.  make test: the same for the tests.
+# make demo    set everything up and run the whole chain in simulation
+# make test    the short run of the tests
+# make check   what CI runs: format, lint, types, all tests
+# make docs    the site, in build/site
+# make fuzz    the property tests with new random examples; SEED=123 repeats a run, MINUTES=5 goes on with new seeds
+# make dist    wheel and source distribution, in dist/
 VENV ?= .venv
 BIN := $(VENV)/bin
 # ur-rtde ships wheels for Python 3.11 and 3.12
 PYTHON ?= $(shell for p in python3.12 python3.11 python3; do \
 	$$p -c 'import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' 2>/dev/null && echo $$p && break; done)
 
-.PHONY: demo test check clean
+.PHONY: demo test check docs fuzz dist clean
 demo: $(VENV)/demo.stamp
 	$(BIN)/coneskin demo
 
 test: $(VENV)/test.stamp
-	$(BIN)/python -m pytest
+	@failed=0; \
+	$(BIN)/python -m pytest -m "not long and not processes" -n auto || failed=1; \
+	$(BIN)/python -m pytest -m "not long and processes" || failed=1; \
+	exit $$failed
 
 check: $(VENV)/test.stamp $(VENV)/dev.stamp
 	PATH="$(CURDIR)/$(BIN):$$PATH" scripts/check
+
+docs: $(VENV)/docs.stamp
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+
+fuzz: $(VENV)/test.stamp
+	PATH="$(CURDIR)/$(BIN):$$PATH" scripts/fuzz
+
+dist: $(VENV)/dev.stamp
+	rm -rf dist
+	$(BIN)/python -m build
 
 $(VENV)/bin/python:
 	@test -n "$(PYTHON)" || { echo "coneskin needs Python 3.11 or 3.12 with venv: name one with make PYTHON=..."; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/demo.stamp: $(VENV)/bin/python pyproject.toml
+$(VENV)/demo.stamp: $(VENV)/bin/python pyproject.toml setup.py
 	$(BIN)/python -m pip install -q -e '.[pictures,design]'
 	touch $@
 
-$(VENV)/test.stamp: $(VENV)/bin/python pyproject.toml
+$(VENV)/test.stamp: $(VENV)/bin/python pyproject.toml setup.py
 	$(BIN)/python -m pip install -q -e '.[pictures,design,test]'
 	touch $@
 
 $(VENV)/dev.stamp: $(VENV)/test.stamp
-	$(BIN)/python -m pip install -q -e '.[pictures,design,test,dev]'
+	$(BIN)/python -m pip install -q -e '.[pictures,design,test,dev,docs]'
+	touch $@
+
+$(VENV)/docs.stamp: $(VENV)/bin/python pyproject.toml setup.py
+	$(BIN)/python -m pip install -q -e '.[docs]'
 	touch $@
 
 clean:
-	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) build dist *.egg-info src/*.egg-info .pytest_cache .mypy_cache .ruff_cache

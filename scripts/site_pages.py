@@ -1,0 +1,80 @@
+"""Pages of the site with another source: one for each folder, the public names, CONTRIBUTING, CHANGELOG.
+
+A hook of mkdocs (mkdocs.yml). The module names come from the disk, so a new module is on its folder's page at once.
+"""
+
+import importlib
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "coneskin"
+#: page -> file at the root
+COPIED = {"contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the pages (called by mkdocs)."""
+    for name, text in generated_pages():
+        files.append(File.generated(config, name, content=text))
+    return files
+
+
+def generated_pages() -> Iterator[tuple[str, str]]:
+    """Yield the name and the text of each page."""
+    for page, source in COPIED.items():
+        text = (ROOT / source).read_text(encoding="utf-8").replace("](docs/", "](")
+        for other, name in COPIED.items():
+            text = text.replace(f"]({name})", f"]({other})")
+        yield page, text
+    yield "api/public-names.md", public_names()
+    for folder in folders(PACKAGE):
+        yield f"api/{folder}.md", folder_page(folder)
+
+
+def folders(path: Path, prefix: str = "") -> Iterator[str]:
+    """Yield the folders of the package that hold modules, by their import names without ``coneskin.``."""
+    if not prefix:
+        yield "coneskin"
+    for inner in sorted(path.iterdir()):
+        if (inner / "__init__.py").is_file():
+            if modules(inner):
+                yield f"{prefix}{inner.name}"
+            yield from folders(inner, f"{prefix}{inner.name}.")
+
+
+def modules(path: Path) -> list[str]:
+    """Return the names of the modules in a folder."""
+    return sorted(file.stem for file in path.glob("*.py") if not file.stem.startswith("__"))
+
+
+def folder_page(folder: str) -> str:
+    """Return the page of one folder: its modules, each by its docstrings."""
+    package = "coneskin" if folder == "coneskin" else f"coneskin.{folder}"
+    path = PACKAGE if folder == "coneskin" else PACKAGE.joinpath(*folder.split("."))
+    opening = inspect.getdoc(importlib.import_module(package)) or ""
+    lines = [f"# `{package}`", "", opening.split("\n\n")[0], ""]
+    for name in modules(path):
+        lines += [f"::: {package}.{name}", ""]
+    return "\n".join(lines)
+
+
+def public_names() -> str:
+    """Return the page of the public names, grouped as in README, each with its first sentence and a link."""
+    face = importlib.import_module("coneskin")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = readme.split("<!-- public names -->")[1].split("<!-- end of public names -->")[0]
+    lines = ["# Public names", "", "`import coneskin as cs` loads nothing; each name is loaded when it is used.", ""]
+    for group, names in re.findall(r"^\| ([a-z ]+) \| (.*) \|$", table, re.MULTILINE):
+        lines += [f"## {group.capitalize()}", "", "| name | meaning |", "|---|---|"]
+        for name in re.findall(r"`(\w+)`", names):
+            opening = (inspect.getdoc(getattr(face, name)) or "").split("\n\n")[0]
+            summary = " ".join(opening.split()).replace("|", "\\|")
+            lines.append(f"| [`{name}`][coneskin.{face._HOMES[name]}.{name}] | {summary} |")
+        lines.append("")
+    return "\n".join(lines)
