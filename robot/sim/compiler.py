@@ -21,7 +21,7 @@ from coneskin.robot.sim.urscript.quirk_fixes import QUIRK_FIXES
 from coneskin.robot.sim.urscript.translator import Translation, translate
 from coneskin.robot.sim.urscript.values import ScriptError
 
-from .builtins import Builtins
+from .functions.builtins import Builtins
 from .memory_bound import TRANSLATOR, bounded_memory
 
 __all__ = ["Compiler"]

@@ -15,9 +15,9 @@ from coneskin.robot.sim.urscript.arithmetic import OPERATIONS
 from coneskin.robot.sim.urscript.translator import Translation
 from coneskin.robot.sim.urscript.values import ScriptError
 
-from .builtins import Builtins
-from .script_host import ScriptHost
-from .script_socket import ScriptSocket
+from .functions.builtins import Builtins
+from .functions.script_host import ScriptHost
+from .functions.script_socket import ScriptSocket
 
 __all__ = ["Program", "Thread"]
 

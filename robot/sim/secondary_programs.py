@@ -5,9 +5,9 @@ from __future__ import annotations
 from coneskin.robot.sim.urscript.translator import Translation
 from coneskin.robot.sim.urscript.values import ScriptError
 
+from .functions.script_host import ScriptHost
 from .notices import ProgramNotice
 from .program import Program
-from .script_host import ScriptHost
 
 __all__ = ["MAX_SECONDARY", "SecondaryPrograms"]
 

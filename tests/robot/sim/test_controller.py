@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from coneskin.errors import KinematicsError, RobotRefused
-from coneskin.robot.sim.builtins import Builtins
 from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.functions.builtins import Builtins
 from coneskin.robot.sim.options import Options
 from coneskin.robot.sim.polyscope.dashboard import Dashboard
 from coneskin.robot.sim.polyscope.user_interface import UserInterface

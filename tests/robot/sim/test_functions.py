@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.robot.sim.builtins import Builtins
 from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.functions.builtins import Builtins
 from coneskin.robot.sim.options import Options
 from coneskin.robot.sim.urscript.published_functions import NOT_SIMULATED
 from coneskin.robot.sim.urscript.translator import translate

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.sim.builtins import Builtins
 from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.functions.builtins import Builtins
 from coneskin.robot.sim.options import Options
 from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
 from coneskin.robot.sim.ports.rtde_session import RtdeSession

@@ -6,8 +6,8 @@ import gzip
 from pathlib import Path
 from typing import Any
 
-from coneskin.robot.sim.builtins import Builtins
 from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.functions.builtins import Builtins
 from coneskin.robot.sim.options import Options
 from coneskin.robot.sim.polyscope.dashboard import Dashboard
 from coneskin.robot.sim.polyscope.user_interface import UserInterface

@@ -14,10 +14,10 @@ import struct
 from collections.abc import Callable, Generator
 from typing import Any
 
+from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.urscript.strings import text_of
 from coneskin.robot.sim.urscript.values import Array, ScriptError, number, show
 
-from .motion.arm import CYCLE
 from .script_host import CallingProgram, ScriptHost
 from .script_socket import ScriptSocket, may_connect
 

@@ -16,6 +16,9 @@ from typing import Any
 from coneskin.errors import KinematicsError
 from coneskin.robot.arm.inverse_kinematics import nearest, solutions
 from coneskin.robot.arm.kinematics import forward
+from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
+from coneskin.robot.sim.motion.path import Path
+from coneskin.robot.sim.notices import PopupNotice, TextNotice
 from coneskin.robot.sim.urscript.math_functions import MathFunctions
 from coneskin.robot.sim.urscript.strings import StringFunctions
 from coneskin.robot.sim.urscript.values import (
@@ -30,10 +33,7 @@ from coneskin.robot.sim.urscript.values import (
 
 from .force_functions import ForceFunctions
 from .io_functions import IoFunctions, index_of
-from .motion.arm import CYCLE, SimulatedArm
-from .motion.path import Path
 from .moves import MoveFunctions, Wait
-from .notices import PopupNotice, TextNotice
 from .socket_functions import SocketFunctions
 
 __all__ = ["Builtins"]

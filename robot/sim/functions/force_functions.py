@@ -13,9 +13,9 @@ import math
 from collections.abc import Generator
 from typing import Any
 
+from coneskin.robot.sim.notices import ErrorNotice, Report
 from coneskin.robot.sim.urscript.values import Array, ScriptError, number, numbers, show
 
-from .notices import ErrorNotice, Report
 from .script_host import CallingProgram, ScriptHost
 
 __all__ = ["ForceFunctions"]

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+from coneskin.robot.sim.client_inputs import ClientInputs
+from coneskin.robot.sim.motion.arm import SimulatedArm
+from coneskin.robot.sim.notices import Notice
+from coneskin.robot.sim.terminals import Terminals
 from coneskin.robot.sim.urscript.values import ScriptError
 
-from .client_inputs import ClientInputs
-from .motion.arm import SimulatedArm
-from .notices import Notice
 from .script_socket import ScriptSocket
-from .terminals import Terminals
 
 __all__ = ["CallingProgram", "ScriptHost"]
 

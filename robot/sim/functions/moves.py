@@ -11,12 +11,12 @@ from typing import Any
 from coneskin.errors import KinematicsError
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.inverse_kinematics import nearest
+from coneskin.robot.sim.motion.arm import CYCLE, JOINT_ACCELERATION, Motion, MotionFault
+from coneskin.robot.sim.motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
+from coneskin.robot.sim.motion.path import Path
+from coneskin.robot.sim.motion.path_motions import JointLine, ToolArc, ToolLine
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, number, numbers, pose_of, show
 
-from .motion.arm import CYCLE, JOINT_ACCELERATION, Motion, MotionFault
-from .motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
-from .motion.path import Path
-from .motion.path_motions import JointLine, ToolArc, ToolLine
 from .script_host import CallingProgram, ScriptHost
 
 __all__ = ["MoveFunctions", "Wait"]

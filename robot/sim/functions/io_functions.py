@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from coneskin.robot.sim.terminals import CURRENT, VOLTAGE
 from coneskin.robot.sim.urscript.values import ScriptError, show
 from coneskin.robot.ur.rtde_variables import VARIABLES
 
 from .script_host import ScriptHost
-from .terminals import CURRENT, VOLTAGE
 
 __all__ = ["IoFunctions", "index_of"]
 

@@ -1,0 +1,1 @@
+"""URScript functions of the simulated controller, and what they see of it."""
