@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.commands.design_arguments import EXAMPLES
+from coneskin.commands.arguments.design import EXAMPLES
 from coneskin.design import files as design_files
 from coneskin.scene.sensor_table import build_sensor, merge_sensor_file
 

@@ -10,7 +10,7 @@ import pytest
 import coneskin
 from coneskin.commands import design as design_command
 from coneskin.commands import unroll as unroll_command
-from coneskin.commands.dimension_arguments import given_dimensions, option_name
+from coneskin.commands.arguments.dimensions import given_dimensions, option_name
 from coneskin.design.sheets import DesignOptions, design_sheets
 from coneskin.design.summary import design_summary, sensor_toml
 from coneskin.errors import GeometryError

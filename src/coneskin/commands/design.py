@@ -20,7 +20,7 @@ from coneskin.design.sheets import SheetDesign, design_sheets
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.skin.matched_electronics import shunt_ohms
 
-from .design_arguments import (
+from .arguments.design import (
     add_arguments,
     design_options,
     links_from_dimensions,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from coneskin.errors import ConeSkinError, RecordingError
 from coneskin.terminal_text import printable
 
-from .runs_arguments import INCOMPLETE, add_arguments
+from .arguments.runs import INCOMPLETE, add_arguments
 
 if TYPE_CHECKING:
     from coneskin.replay.replay import Run

@@ -8,7 +8,7 @@ import math
 
 from coneskin.scene.cone_keys import LINK_CONE_KEYS
 
-from .dimension_arguments import add_dimension_options, given_dimensions
+from .arguments.dimensions import add_dimension_options, given_dimensions
 
 __all__ = ["add_arguments", "run"]
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from coneskin.geometry.drawing.nesting import nest_on_beds
 from coneskin.terminal_text import printable
 
-from .build_figures import measure_build
 from .files import FileOptions, new_folder, write_sheets
 from .report import report_text
 from .sheets import SheetDesign
 from .summary import design_summary
+from .workshop.build_figures import measure_build
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit

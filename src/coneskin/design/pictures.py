@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from coneskin.errors import MissingExtra
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 
-from .build_figures import BuildFigures
 from .layout_picture import FOIL_COLOUR, INK_COLOUR, draw_layout
 from .parts_picture import draw_parts
 from .sheets import SheetDesign
 from .stack_picture import draw_seam, draw_stack
+from .workshop.build_figures import BuildFigures
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea

@@ -11,12 +11,12 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.sector import unroll
 from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
 
-from .bill_of_materials import bill_of_materials
-from .build_figures import BuildFigures
-from .build_guide import guide_lines
 from .files import sheet_folder
 from .sheets import SheetDesign
 from .summary import design_summary, material_rows
+from .workshop.bill_of_materials import bill_of_materials
+from .workshop.build_figures import BuildFigures
+from .workshop.build_guide import guide_lines
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit

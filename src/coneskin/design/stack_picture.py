@@ -7,9 +7,9 @@ from typing import Any
 
 from coneskin.geometry.drawing.outline import Outline
 
-from .build_figures import BuildFigures
 from .layout_picture import FOIL_COLOUR, INK_COLOUR
 from .sheets import SheetDesign
+from .workshop.build_figures import BuildFigures
 
 __all__ = ["draw_seam", "draw_stack"]
 

@@ -6,12 +6,12 @@ import re
 import numpy as np
 import pytest
 
-from coneskin.design.bill_of_materials import bill_of_materials
-from coneskin.design.build_figures import BuildFigures, measure_build
-from coneskin.design.build_guide import guide_lines
-from coneskin.design.placement import find_placement
 from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
-from coneskin.design.wiring import LOOP, cable_exit
+from coneskin.design.workshop.bill_of_materials import bill_of_materials
+from coneskin.design.workshop.build_figures import BuildFigures, measure_build
+from coneskin.design.workshop.build_guide import guide_lines
+from coneskin.design.workshop.placement import find_placement
+from coneskin.design.workshop.wiring import LOOP, cable_exit
 from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.surface_shape import SheetSide

@@ -7,10 +7,10 @@ from collections import defaultdict
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from coneskin.design.sheets import SheetDesign
 from coneskin.geometry.drawing.nesting import MaterialBed
 
 from .build_figures import BuildFigures
-from .sheets import SheetDesign
 
 __all__ = ["ADHESIVE", "BillItem", "bill_of_materials"]
 

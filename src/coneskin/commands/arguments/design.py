@@ -23,7 +23,7 @@ from coneskin.scene.cone_keys import DOUBLE_CONE_KEYS
 from coneskin.scene.sensor_table import SENSOR_KEYS
 from coneskin.skin.matched_electronics import GivenElectronics
 
-from .dimension_arguments import add_dimension_options, add_setting_option, given_dimensions, option_name
+from .dimensions import add_dimension_options, add_setting_option, given_dimensions, option_name
 
 __all__ = [
     "EXAMPLES",

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from coneskin.design.sheets import SheetDesign
 from coneskin.geometry.drawing.surface_shape import ShapeTab, SurfaceShape, drawing_point
 from coneskin.geometry.frustum import Frustum
 
 from .expected_readings import PairReading, expected_frame, pair_readings
 from .placement import SheetPlacement, find_placement
-from .sheets import SheetDesign
 from .wiring import CableExit, cable_exit
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from coneskin.design.sheets import SheetDesign
 from coneskin.geometry.drawing.cut_sheet import CutSheet
 
 from .bill_of_materials import ADHESIVE
 from .build_figures import BuildFigures
-from .sheets import SheetDesign
 from .wiring import STRIPPED
 
 __all__ = ["guide_lines"]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import tomllib
 from typing import NamedTuple
 
+from coneskin.design.sheets import SheetDesign
+from coneskin.design.summary import sensor_toml
 from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.electrode_layout import SurfaceRectangle
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
@@ -13,9 +15,6 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.scene.sensor_table import build_sensor
 from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import sheet_resistances
-
-from .sheets import SheetDesign
-from .summary import sensor_toml
 
 __all__ = ["PairReading", "expected_frame", "pair_readings"]
 
