@@ -17,6 +17,7 @@ from .cut_sheet import CutPart, CutSheet, Stroke
 __all__ = ["MaterialBed", "nest_on_beds"]
 
 _GRID = 1e-3  # m; boxes are packed in whole millimetres
+_SHORTEST = 0.05  # m; side of a bed
 _LONGEST = 10.0  # m; side of a bed
 
 
@@ -84,10 +85,10 @@ def nest_on_beds(
         import rpack
     except ImportError as exc:
         raise MissingExtra("rectangle-packer", "nesting parts on a bed", "design") from exc
-    if not (0.0 < width <= _LONGEST and 0.0 < depth <= _LONGEST and 0.0 <= gap <= 0.1):
+    if not (_SHORTEST <= width <= _LONGEST and _SHORTEST <= depth <= _LONGEST and 0.0 <= gap <= 0.1):
         raise GeometryError(
-            f"a bed is above 0 and at most {_LONGEST * 1e3:g} mm wide and deep, with gaps from 0 to 100 mm, got "
-            f"{width * 1e3:.4g} x {depth * 1e3:.4g} mm with {gap * 1e3:.4g} mm"
+            f"a bed is from {_SHORTEST * 1e3:g} to {_LONGEST * 1e3:g} mm wide and deep, with gaps from 0 to 100 mm, "
+            f"got {width * 1e3:.4g} x {depth * 1e3:.4g} mm with {gap * 1e3:.4g} mm"
         )
     room = math.floor((width - gap) / _GRID + 1e-6), math.floor((depth - gap) / _GRID + 1e-6)
 

@@ -29,6 +29,8 @@ TURN = 2.0 * math.pi
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.05  #: share of the hull that a further sheet must add; a fillet adds less
 SEARCH_SAMPLES = 6000  #: points on the mesh from which the axes are found, whatever ``samples`` is
+_MOST_TOLERANCE = 0.020  # m; a sheet that stands off further does not follow the link
+_MOST_BRIDGE = 0.100  # m; over a wider hole a sheet sags
 _HINT_STEP = 1e-5  # m; a tolerance is advised in hundredths of a millimetre
 
 
@@ -129,6 +131,9 @@ def find_cones(
     for name, value in lengths.items():
         if not (math.isfinite(value) and value > 0.0):
             raise GeometryError(f"{name} must be above 0 mm, got {value * 1e3:g} mm")
+    for name, value, most in (("tolerance", tolerance, _MOST_TOLERANCE), ("max_bridge", max_bridge, _MOST_BRIDGE)):
+        if value > most:
+            raise GeometryError(f"{name} must be at most {most * 1e3:g} mm, got {value * 1e3:g} mm")
     for name, value in {"thickness": thickness, "gap": gap}.items():
         if not (math.isfinite(value) and value >= 0.0):
             raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:g} mm")
@@ -252,6 +257,8 @@ class _Search:
         """Return a plan within the least of some tolerances that gives one, and that tolerance [m]."""
         for factor in (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0):
             tolerance = math.ceil(factor * self.requirements.tolerance / _HINT_STEP - 1e-6) * _HINT_STEP
+            if tolerance > _MOST_TOLERANCE:
+                break
             plan, _ = self.plan(tolerance)
             if plan is not None:
                 return plan, tolerance

@@ -107,6 +107,8 @@ def _line(z: Floats, radius: Floats, spread: float) -> tuple[float, float]:
         return start, slope
     for _ in range(20):
         total = float(weights.sum())
+        if total <= 0.0:  # no slice is near the last line
+            break
         zm, rm = float(weights @ z) / total, float(weights @ radius) / total
         before = start, slope
         slope = float(weights @ ((z - zm) * (radius - rm)) / (weights @ (z - zm) ** 2))

@@ -14,6 +14,8 @@ from coneskin.cli import main
 from coneskin.commands.arguments.design import EXAMPLES
 from coneskin.design import files as design_files
 from coneskin.scene.sensor_table import build_sensor, merge_sensor_file
+from tests.geometry.synthetic import frustum
+from tests.geometry.test_mesh import write_stl
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 CYLINDER = ["--radius1-mm", "54", "--height-mm", "200"]
@@ -169,6 +171,14 @@ def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
         ([*CYLINDER, "--supply-v", "3.3"], "supply_v must be at most 95 % of adc_v"),
         ([*CYLINDER, "--overlap-mm", "5", "--wires", "edge1"], "an overlap at edge1 would cover the tabs"),
         (["nowhere.stl"], "nowhere.stl"),
+        ([*CYLINDER, "--seam", "0", "0", "0"], "--seam is for a mesh: by its dimensions a link has no directions"),
+        ([*CYLINDER, "--touch-side", "1", "0", "0"], "--touch-side is for a mesh"),
+        ([*CYLINDER, "--cover-seam", "--wrap-deg", "180"], "no sheet has a seam to cover: the widest wraps 180 deg"),
+        (
+            [*CYLINDER, "--bed-mm", "1e-9", "1e-9"],
+            "a bed is from 50 to 10000 mm wide and deep, with gaps from 0 to 100",
+        ),
+        ([*CYLINDER, "--bed-mm", "600", "nan"], "a bed is from 50 to 10000 mm wide and deep"),
         ([*CYLINDER, "--tab-mm", "nan"], "tab must be finite and not negative mm, got nan mm"),
         (["nowhere.stl", "--radius1-mm", "5"], "a mesh and --radius1-mm cannot go together"),
     ],
@@ -179,6 +189,27 @@ def test_a_mistake_is_one_clear_line_and_leaves_nothing(words, line, tmp_path, c
     assert len(errors) == 1
     assert line in errors[0]
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["--seam", "0", "0", "0"], "--seam takes a direction X Y Z, finite and not 0 0 0, got 0.0 0.0 0.0"),
+        (["--touch-side", "0", "0", "0"], "--touch-side takes a direction X Y Z"),
+        (["--seam", "nan", "0", "0"], "--seam takes a direction X Y Z, finite and not 0 0 0, got nan 0.0 0.0"),
+        (["--max-bridge-mm", "1e6"], "max_bridge must be at most 100 mm, got 1e+06 mm"),
+        (["--tolerance-mm", "1e9"], "tolerance must be at most 20 mm, got 1e+09 mm"),
+        (["--tolerance-mm", "nan"], "tolerance must be above 0 mm, got nan mm"),
+    ],
+)
+def test_a_mistake_about_a_mesh_is_one_clear_line(words, line, tmp_path, capsys):
+    folder = tmp_path / "out"
+    mesh = write_stl(tmp_path / "tube.stl", frustum(0.05, 0.05, 0.2, 24, 1))
+    assert design(str(mesh), *words, "-o", str(folder)) == 1
+    errors = [row for row in capsys.readouterr().err.splitlines() if row.startswith("coneskin design:")]
+    assert len(errors) == 1
+    assert line in errors[0]
+    assert not folder.exists()
 
 
 def test_a_failure_halfway_leaves_nothing(tmp_path, monkeypatch, capsys):

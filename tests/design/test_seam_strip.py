@@ -60,8 +60,11 @@ def test_only_full_wraps_have_a_seam_to_cover() -> None:
     designs = cover_seams(design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15), options))
     assert [design.above for design in designs] == ["", "", "sheet 1", "sheet 2"]
     assert [design.name for design in designs] == [f"sheet {n}" for n in (1, 2, 3, 4)]
-    partial = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2, 4.0))], options)
-    assert cover_seams(partial) == partial
+    partial = PlacedFrustum(Frustum(0.05, 0.05, 0.2, 4.0))
+    mixed = cover_seams(design_sheets([partial, *double_cone(0.04, 0.07, 0.04, 0.15, 0.15)], options))
+    assert [design.above for design in mixed] == ["", "", "", "sheet 2", "sheet 3"]
+    with pytest.raises(GeometryError, match=r"no sheet has a seam to cover: the widest wraps 229 deg, .* at least 324"):
+        cover_seams(design_sheets([partial], options))
     full = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))])
     assert cover_seams(full) == full, "nobody asked for it"
 

@@ -39,7 +39,8 @@ def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
         the sheets, followed by their strips.
 
     Raises:
-        GeometryError: a strip would meet itself on the other side of its sheet, or cannot be made.
+        GeometryError: no sheet wraps a whole turn; a strip would meet itself on the other side of its sheet, or cannot
+            be made.
     """
     strips: list[SheetDesign] = []
     for design in designs:
@@ -51,6 +52,12 @@ def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
             place, offset = _strip_place(design)
             (strip,) = design_sheets([place], options, number)
             strips.append(replace(strip, above=design.name, seam_offset=offset))
+    if not strips and any(design.options.cover_seam for design in designs):
+        widest = max(design.place.frustum.wrap for design in designs)
+        raise GeometryError(
+            f"no sheet has a seam to cover: the widest wraps {math.degrees(widest):.0f} deg, and a seam needs at least "
+            f"{math.degrees(_FULL * _TURN):.0f}; leave the covered seam out"
+        )
     return (*designs, *strips)
 
 

@@ -69,7 +69,7 @@ def test_what_is_larger_than_the_bed_is_named() -> None:
     )
     named = sum(len(sheet.parts) for one in beds for sheet in one.sheets) + len(larger)
     assert named == sum(len(sheet.parts) for sheet in CONE)
-    with pytest.raises(GeometryError, match=r"a bed is above 0 and at most 10000 mm wide and deep.* got 0 x 200 mm"):
-        nest_on_beds(CONE, 0.0, 0.2)
+    with pytest.raises(GeometryError, match=r"a bed is from 50 to 10000 mm wide and deep.* got 1e-09 x 200 mm"):
+        nest_on_beds(CONE, 1e-12, 0.2)
     with pytest.raises(GeometryError, match="got nan x 200 mm"):
         nest_on_beds(CONE, math.nan, 0.2)

@@ -244,6 +244,11 @@ def seam_direction(args: argparse.Namespace) -> tuple[float, float, float]:
     """
     if args.seam is not None and args.touch_side is not None:
         raise GeometryError("--seam and --touch-side cannot go together: the seam faces away from the touch side")
+    for option, way in (("--seam", args.seam), ("--touch-side", args.touch_side)):
+        if way is not None and not 0.0 < math.hypot(*way) < math.inf:
+            raise GeometryError(
+                f"{option} takes a direction X Y Z, finite and not 0 0 0, got {' '.join(map(str, way))}"
+            )
     x, y, z = args.seam or (1.0, 0.0, 0.0)
     if args.touch_side is not None:
         x, y, z = (-value for value in args.touch_side)
@@ -257,6 +262,12 @@ def links_from_dimensions(args: argparse.Namespace) -> tuple[PlacedFrustum, ...]
         GeometryError: a dimension is missing or out of range.
     """
     values = given_dimensions(args, DOUBLE_CONE_KEYS)
+    for option in ("seam", "touch_side"):
+        if getattr(args, option) is not None:
+            raise GeometryError(
+                f"--{option.replace('_', '-')} is for a mesh: by its dimensions a link has no directions, and its seam "
+                "is at phi = 0"
+            )
     if not {"radius1", "height"} <= values.keys():
         raise GeometryError("name a mesh file, or give --radius1-mm and --height-mm")
     if ("radius3" in values) != ("height2" in values):
