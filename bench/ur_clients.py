@@ -1,19 +1,20 @@
 """Clients that others wrote, against the simulated controller: client x test -> pass or fail, and whose fault it is.
 
-    python bench/ur_clients.py --urcl BUILD [--source SOURCE] [--only WORD,...] [--json] [--markdown FILE]
-    python bench/ur_clients.py --rtde-client FOLDER --urx --ur-rtde
+    python bench/ur_clients.py [--urcl BUILD [--source SOURCE]] [--rtde-client FOLDER] [--urx FOLDER] [--wheels FOLDER]
+                               [--only WORD,...] [--json] [--markdown FILE]
 
-* ``--urcl``: a build of Universal Robots' own C++ client library (github
-  UniversalRobots/Universal_Robots_Client_Library) with ``-DINTEGRATION_TESTS=ON``, and its source where that is not the
-  folder above the build. Its tests that ask for a robot, and its examples, run one after the other: their ports are
-  fixed.
-* ``--rtde-client``: Universal Robots' RTDE_Python_Client_Library; its examples run.
-* ``--urx``: python-urx, if it is installed.
-* ``--ur-rtde``: the installed wheel's own four interfaces; its examples are in tests/robot/sim.
+| option, and environment variable | |
+|---|---|
+| ``--urcl``, URCL_BUILD | build of Universal Robots' C++ client library (github \
+UniversalRobots/Universal_Robots_Client_Library) with ``-DBUILDING_TESTS=ON -DINTEGRATION_TESTS=ON`` |
+| ``--source``, URCL_SOURCE | its source, where that is not the folder above the build |
+| ``--rtde-client``, RTDE_CLIENT | folder of Universal Robots' RTDE_Python_Client_Library; its examples run |
+| ``--urx``, PYTHON_URX | folder of python-urx, with math3d below version 4 beside it or installed |
+| ``--wheels``, UR_RTDE_WHEELS | folder of ur_rtde's wheels, from ``pip download --no-deps ur-rtde==1.5.8 -d FOLDER`` |
 
-Nothing of these is fetched here: who runs this gives the paths, and what is not given is skipped, with the reason. A
-test that fails in the run of its program is repeated by itself, with a controller of its own. The exit code is 0 where
-ur_clients_faults.py explains each failure by what is not the controller's fault.
+Nothing of these is fetched here, and what is not given is skipped, with the reason. The installed ur_rtde needs no
+path and runs always. A test that fails is repeated by itself, with a controller of its own. The exit
+code is 0 where ur_clients_faults.py explains each failure by what is not the controller's fault.
 
 Some tests expect that nothing answers at 192.168.56.100 and .123, and port 80 must be free: where ``unshare``
 (util-linux) can make one, all runs in a network of its own that has nothing but its loopback.
@@ -33,8 +34,9 @@ from pathlib import Path
 
 from report import head
 from ur_clients_faults import explain
-from ur_clients_python import rtde_client, ur_rtde, urx
+from ur_clients_python import rtde_client, urx
 from ur_clients_urcl import Trial, urcl
+from ur_clients_wheels import installed_wheel, wheels
 
 _IN_OWN_NETWORK = "UR_CLIENTS_IN_OWN_NETWORK"  # environment variable that says so
 
@@ -70,26 +72,43 @@ def enter_own_network() -> None:
 
 def run_all(args: argparse.Namespace) -> Iterator[Trial]:
     """Run what the options ask for, and say what is skipped."""
+    only = args.only.split(",")
     if args.urcl is None:
-        print("skipped: Universal Robots' client library; give --urcl BUILD", file=sys.stderr)
+        skip("Universal Robots' client library", "--urcl BUILD or URCL_BUILD")
     else:
-        yield from urcl(args.urcl, args.source or args.urcl.parent, args.only.split(","))
-    if args.rtde_client is None:
-        print("skipped: the official RTDE client; give --rtde-client FOLDER", file=sys.stderr)
-    else:
-        yield from rtde_client(args.rtde_client)
-    yield from urx() if args.urx else ()
-    yield from ur_rtde() if args.ur_rtde else ()
+        yield from urcl(args.urcl, args.source or args.urcl.parent, only)
+    for name, how, folder, trials in (
+        ("the official RTDE client", "--rtde-client FOLDER or RTDE_CLIENT", args.rtde_client, rtde_client),
+        ("python-urx", "--urx FOLDER or PYTHON_URX", args.urx, urx),
+        ("other versions of ur_rtde", "--wheels FOLDER or UR_RTDE_WHEELS", args.wheels, wheels),
+    ):
+        if folder is None:
+            skip(name, how)
+        elif any(word in name for word in only):
+            yield from trials(folder)
+    if any(word in "ur_rtde wheel" for word in only):
+        yield from installed_wheel()
+
+
+def skip(name: str, how: str) -> None:
+    """Say on one line that a client is skipped, and what it wants."""
+    print(f"skipped: {name}, which nothing here fetches; give {how}", file=sys.stderr)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--urcl", type=Path, metavar="BUILD")
-    parser.add_argument("--source", type=Path, metavar="FOLDER")
-    parser.add_argument("--rtde-client", type=Path, metavar="FOLDER")
-    parser.add_argument("--urx", action="store_true")
-    parser.add_argument("--ur-rtde", action="store_true")
-    parser.add_argument("--only", default="", metavar="WORD,...", help="programs whose name has one of these words")
+    for option, variable, metavar in (
+        ("--urcl", "URCL_BUILD", "BUILD"),
+        ("--source", "URCL_SOURCE", "SOURCE"),
+        ("--rtde-client", "RTDE_CLIENT", "FOLDER"),
+        ("--urx", "PYTHON_URX", "FOLDER"),
+        ("--wheels", "UR_RTDE_WHEELS", "FOLDER"),
+    ):
+        given = os.environ.get(variable)
+        parser.add_argument(option, type=Path, metavar=metavar, default=Path(given).resolve() if given else None)
+    parser.add_argument(
+        "--only", default="", metavar="WORD,...", help="programs, or clients, whose name has one of these words"
+    )
     parser.add_argument(
         "--keep", type=Path, metavar="FILE", help="add each result to this file, and show all that it has"
     )

@@ -1,4 +1,4 @@
-"""Trials of bench/ur_clients.py with Python clients: Universal Robots' RTDE client, python-urx, the ur_rtde wheel."""
+"""Trials of bench/ur_clients.py with Python clients: Universal Robots' RTDE client and python-urx."""
 
 from __future__ import annotations
 
@@ -98,40 +98,38 @@ _URX = {
 }
 
 
-def urx() -> Iterator[Trial]:
-    """Run what python-urx's examples do, one by one."""
+#: before python-urx is imported: names that Python has moved since, and numbers of numpy 2 as text that URScript knows
+_COMPATIBLE = """
+import collections, collections.abc as c, numpy
+collections.Iterable, collections.Sequence = c.Iterable, c.Sequence
+if int(numpy.__version__.split(".")[0]) >= 2:
+    numpy.set_printoptions(legacy="1.25")
+"""
+
+
+def urx(source: Path) -> Iterator[Trial]:
+    """Run what python-urx's examples do, one by one; the packages beside its own may be in its folder too.
+
+    Its realtime monitor is told the version of the software: without one its thread ends with an error of its own.
+    """
     label = "python-urx"
-    if find_spec("urx") is None:
-        yield Trial(label, "*", "skip", 0.0, "urx is not installed: pip install urx math3d")
-        return
-    patch = (
-        "import collections, collections.abc as c; collections.Iterable = c.Iterable; collections.Sequence = c.Sequence"
-    )
     with tempfile.TemporaryDirectory() as folder:
         for test, line in _URX.items():
-            with controller() as simulated:
-                body = "\n    ".join(part.strip() for part in line.split(";"))
-                text = (
-                    f"{patch}\nimport urx\nrob = urx.Robot({simulated.host!r}, use_rt=True)\nrob.set_tcp((0,) * 6)\n"
-                    f"rob.set_payload(0.5, (0, 0, 0))\ntry:\n    {body}\nfinally:\n    rob.close()\n"
-                )
-                yield _run(label, test, [sys.executable, "-c", text], Path(folder))
+            body = "\n    ".join(part.strip() for part in line.split(";"))
 
+            def attempt(test: str = test, body: str = body) -> Trial:
+                with controller() as simulated:
+                    text = (
+                        f"import sys; sys.path[:0] = {[str(source), str(source / 'packages')]!r}\n{_COMPATIBLE}\n"
+                        f"import urx\nrob = urx.Robot({simulated.host!r}, use_rt=True, urFirm=5.9)\n"
+                        f"rob.set_tcp((0,) * 6)\nrob.set_payload(0.5, (0, 0, 0))\n"
+                        f"try:\n    {body}\nfinally:\n    rob.close()\n"
+                    )
+                    return _run(label, test, [sys.executable, "-c", text], Path(folder), 30.0)
 
-def ur_rtde() -> Iterator[Trial]:
-    """Run the four interfaces of the installed wheel, in each version of the software that it tells apart."""
-    label = "ur_rtde wheel"
-    if find_spec("rtde_control") is None:
-        yield Trial(label, "*", "skip", 0.0, "ur_rtde is not installed")
-        return
-    text = (
-        "import sys, rtde_control, rtde_receive, rtde_io, dashboard_client\nhost = sys.argv[1]\n"
-        "c = rtde_control.RTDEControlInterface(host); r = rtde_receive.RTDEReceiveInterface(host)\n"
-        "i = rtde_io.RTDEIOInterface(host); d = dashboard_client.DashboardClient(host); d.connect()\n"
-        "q = r.getActualQ(); q[0] += 0.1\nassert c.moveJ(q, 1.0, 2.0)\nassert i.setSpeedSlider(0.5)\n"
-        "assert 'RUNNING' in d.robotmode()\nassert abs(r.getActualQ()[0] - q[0]) < 1e-3\nc.stopScript()\n"
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        for version in ("5.4", "5.11", "5.23", "5.25"):
-            with controller(version=version) as simulated:
-                yield _run(label, f"PolyScope {version}", [sys.executable, "-c", text, simulated.host], Path(folder))
+            trial = attempt()
+            if trial.result == "fail":
+                again = attempt()
+                if again.result != "fail":
+                    trial = again._replace(why=f"on the second try; on the first: {trial.why}")
+            yield trial

@@ -1,21 +1,22 @@
-"""What the examples of the ur_rtde package do, with each of its versions, against the simulated controller.
+"""Trials of bench/ur_clients.py with the ur_rtde package: what its examples do, with each of its versions.
 
-    python -m pip download --no-deps --only-binary :all: ur-rtde==1.5.8 -d WHEELS     # and other versions
-    python bench/ur_clients_wheels.py WHEELS
-
-Each wheel of the folder is unpacked into a scratch folder; each trial is a process with that folder first on its path.
+Each wheel of a folder is unpacked into a scratch folder; each trial is a process with that folder first on its path.
 A trial passes where the package's calls succeed and the arm is where they should have brought it, or where what is not
 simulated was told by name in the controller's log.
 """
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 import tempfile
+import time
 import zipfile
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from ur_clients_urcl import Trial
 
 from coneskin.robot.sim.process import SimulatedController, free_host
 
@@ -76,12 +77,66 @@ c.forceModeStop(); near(r.getActualQ(), home)""",
 TOLD = {"force mode": "force_mode"}  #: what the controller must have said is not simulated
 
 
-def run(wheel: Path, name: str, folder: Path) -> str:
-    """Return what went wrong in a trial with an unpacked wheel; empty where nothing did."""
+#: versions of the controller's software that the package tells apart; the examples run on the last
+SOFTWARE = ("5.4", "5.11", "5.23", "5.25")
+_CONNECT = """
+import dashboard_client
+i = rtde_io.RTDEIOInterface(host); d = dashboard_client.DashboardClient(host); d.connect()
+q = r.getActualQ(); q[0] += 0.1
+assert c.moveJ(q, 1.0, 2.0); near(r.getActualQ(), q)
+assert i.setSpeedSlider(0.5) and "RUNNING" in d.robotmode()
+"""
+
+
+def wheels(archives: Path) -> Iterator[Trial]:
+    """Run every example with every wheel of a folder."""
+    for archive in sorted(archives.glob("ur_rtde-*.whl")):
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch)
+            with zipfile.ZipFile(archive) as file:
+                file.extractall(folder / "wheel")
+            label = f"ur_rtde wheel {archive.name.split('-')[1]}"
+            for name, lines in TRIALS.items():
+                yield _tried(label, name, lines, folder, wheel=folder / "wheel")
+
+
+def installed_wheel() -> Iterator[Trial]:
+    """Run every example with the installed package, and connect it to each version of the controller's software."""
+    try:
+        label = f"ur_rtde wheel {version('ur_rtde')}, installed"
+    except PackageNotFoundError:
+        yield Trial("ur_rtde wheel", "*", "skip", 0.0, "ur_rtde is not installed")
+        return
+    with tempfile.TemporaryDirectory() as scratch:
+        for software in SOFTWARE:
+            yield _tried(label, f"PolyScope {software}", _CONNECT, Path(scratch), software)
+        for name, lines in TRIALS.items():
+            yield _tried(label, name, lines, Path(scratch))
+
+
+def _tried(
+    label: str, name: str, lines: str, folder: Path, software: str = SOFTWARE[-1], wheel: Path | None = None
+) -> Trial:
+    """Run a trial, and once more where it fails; say how it went."""
+    begin = time.monotonic()
+    first = problem = run(lines, TOLD.get(name, ""), folder, software, wheel)
+    if first:
+        begin = time.monotonic()
+        problem = run(lines, TOLD.get(name, ""), folder, software, wheel)
+    why = problem or (first and f"on the second try; on the first: {first}")
+    trial = Trial(label, name, "fail" if problem else "pass", time.monotonic() - begin, why)
+    print(f"{trial.result:5} {trial.seconds:6.1f} {label} {name} {trial.why[:200]}", file=sys.stderr, flush=True)
+    return trial
+
+
+def run(lines: str, told: str, folder: Path, software: str, wheel: Path | None) -> str:
+    """Return what went wrong in a trial with the installed package or an unpacked wheel; empty where nothing did."""
     log = folder / "log.jsonl"
-    with SimulatedController(host=free_host(), start_q=(0.1, -1.4, 1.5, -1.7, -1.4, 0.2), log=log) as simulated:
-        code = _HEAD + TRIALS[name] + _TAIL
-        command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(wheel)!r})\n{code}", simulated.host]
+    log.unlink(missing_ok=True)
+    start_q = (0.1, -1.4, 1.5, -1.7, -1.4, 0.2)
+    with SimulatedController(host=free_host(), start_q=start_q, log=log, version=software) as simulated:
+        path = f"import sys; sys.path.insert(0, {str(wheel)!r})\n" if wheel else ""
+        command = [sys.executable, "-c", path + _HEAD + lines + _TAIL, simulated.host]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
         except subprocess.TimeoutExpired:
@@ -89,32 +144,4 @@ def run(wheel: Path, name: str, folder: Path) -> str:
         if done.returncode:
             return (done.stderr.strip().splitlines() or ["no message"])[-1][:200]
         said = [event["what"] for event in simulated.events("not_simulated")]
-    if TOLD.get(name, "") not in " ".join(said):
-        return "the controller did not say what is not simulated"
-    return ""
-
-
-def main() -> int:
-    """Run every trial with every wheel; return 1 if one failed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("wheels", type=Path, help="folder of ur_rtde's wheels")
-    parser.add_argument("--only", default="", help="part of a version")
-    args = parser.parse_args()
-    failed = 0
-    for archive in sorted(args.wheels.glob("ur_rtde-*.whl")):
-        version = archive.name.split("-")[1]
-        if args.only not in version:
-            continue
-        with tempfile.TemporaryDirectory() as scratch:
-            folder = Path(scratch)
-            with zipfile.ZipFile(archive) as file:
-                file.extractall(folder / "wheel")
-            for name in TRIALS:
-                problem = run(folder / "wheel", name, folder)
-                failed += bool(problem)
-                print(f"| {version} | {name} | {'fail: ' + problem if problem else 'pass'} |", flush=True)
-    return 1 if failed else 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    return "" if told in " ".join(said) else "the controller did not say what is not simulated"
