@@ -23,6 +23,7 @@ def saved(folder: Path, name: str, text: str) -> str:
 
 
 @pytest.mark.long
+@pytest.mark.processes
 def test_unknown_leads_are_found_and_taken_off(tmp_path: Path, capsys: Output) -> None:
     scene = saved(tmp_path, "scene.toml", NAMED)
     built = saved(tmp_path, "built.toml", TEXT.replace("radius1_mm", "lead_ohm = [4, 12, 9, 6]\nradius1_mm"))
@@ -51,6 +52,7 @@ def test_unknown_leads_are_found_and_taken_off(tmp_path: Path, capsys: Output) -
 
 
 @pytest.mark.long
+@pytest.mark.processes
 def test_known_forces_give_a_threshold_in_newtons(tmp_path: Path, capsys: Output) -> None:
     scene = saved(tmp_path, "scene.toml", NAMED.replace("radius1_mm", "touch_force_n = 2\nradius1_mm", 1))
     words = ["calibrate", scene, "--simulated", "--marks", "4", "--forces", "1,3,8", "--json"]
@@ -67,6 +69,7 @@ def test_known_forces_give_a_threshold_in_newtons(tmp_path: Path, capsys: Output
 
 
 @pytest.mark.long
+@pytest.mark.processes
 def test_a_mirrored_sheet_is_refused_and_nothing_is_written(tmp_path: Path, capsys: Output) -> None:
     scene = saved(tmp_path, "scene.toml", TEXT)
     built = saved(tmp_path, "built.toml", TEXT.replace("radius1_mm", 'angular_positive = "D"\nradius1_mm'))

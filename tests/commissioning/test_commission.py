@@ -28,6 +28,7 @@ def wired(keys: str) -> Scene:
 
 
 @pytest.mark.long
+@pytest.mark.processes
 def test_a_right_skin_passes_and_the_record_is_valid(tmp_path: Path, capsys: Output) -> None:
     path = saved(tmp_path)
     assert main(["guard", str(path), "--check"]) == 0
@@ -41,6 +42,7 @@ def test_a_right_skin_passes_and_the_record_is_valid(tmp_path: Path, capsys: Out
 
 
 @pytest.mark.long
+@pytest.mark.processes
 @pytest.mark.parametrize(
     ("keys", "cause"),
     [
@@ -57,6 +59,7 @@ def test_exchanged_wires_fail_and_are_named(keys: str, cause: str) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.processes
 def test_a_program_commissions_its_virtual_skin() -> None:
     known = commission_virtual_skin(parse_scene(TEXT)).commissioning
     assert known is not None
