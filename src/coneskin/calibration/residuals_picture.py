@@ -67,7 +67,6 @@ def _draw(axes: Any, result: CalibrationResult) -> None:
         axes.plot([1e3 * x], [1e3 * y], "o" if used else "x", ms=3, mfc="white", mec=OUTLINE)
     said = "refused" if fit is None else f"{1e3 * fit.before.rms:.2f} mm became {1e3 * fit.after.rms:.2f} mm (rms)"
     axes.set_title(f"{item.sensor.name}: {said}; arrows {scale} times as long as the errors", fontsize=10)
-    axes.set_xlabel("along the flat sheet, seen from outside the link [mm]")
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), ncols=2, fontsize=8, frameon=False)
 
 

@@ -11,6 +11,8 @@ import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from coneskin.time_argument import positive_seconds
+
 if TYPE_CHECKING:
     from coneskin.design.link import LinkMesh
     from coneskin.studio.workbench import Workbench
@@ -44,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=int, default=8090, help="to listen at, the next free one if it is taken (8090)")
     parser.add_argument("--no-browser", action="store_true", help="open no browser: only print the address")
     parser.add_argument("--json", action="store_true", help="print one JSON object: the address")
-    parser.add_argument("--duration-s", type=float, metavar="S", help="end after this time [s]")
+    parser.add_argument("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,6 +72,6 @@ def run(args: argparse.Namespace) -> int:
             print(f"the studio is at {server.url} (Ctrl-C ends it)", flush=True)
         if not args.no_browser:
             webbrowser.open(server.url)
-        over.wait(args.duration_s)
+        over.wait(None if args.duration_s is None else min(args.duration_s, threading.TIMEOUT_MAX))
         del page
     return 0

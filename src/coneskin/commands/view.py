@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.errors import SceneError
+from coneskin.time_argument import positive_seconds
 
 if TYPE_CHECKING:
     from coneskin.view.live_run import LiveRun
@@ -56,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=int, default=8080, help="to listen at, the next free one if it is taken (8080)")
     parser.add_argument("--no-browser", action="store_true", help="open no browser: only print the address")
     parser.add_argument("--json", action="store_true", help="print one JSON object: the address, or the file")
-    parser.add_argument("--duration-s", type=float, metavar="S", help="end after this time [s]")
+    parser.add_argument("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -98,7 +99,7 @@ def _show(args: argparse.Namespace) -> int:
         strands = read_strands(args.what)
         show_runs(server, strands)
         over = _announce(args, server)
-        over.wait(args.duration_s)
+        over.wait(None if args.duration_s is None else min(args.duration_s, threading.TIMEOUT_MAX))
     return 0
 
 

@@ -32,8 +32,8 @@ def draw_sheet(axes: Any, cone: Frustum) -> None:
     ):
         x, y = cone.flat_point(u, phi)
         axes.text(1e3 * x, 1e3 * y, name, rotation=_along(cone, u, phi) if len(name) > 1 else 0.0, **_STYLE)
-    axes.set_xlabel("along the flat sheet [mm]")
-    axes.set_ylabel("up the flat sheet [mm]")
+    axes.set_xlabel("flat x: around the link, seen from outside [mm]")
+    axes.set_ylabel("flat y: along the link, towards end 2 [mm]")
     axes.set_aspect("equal")
     axes.margins(0.14)
 

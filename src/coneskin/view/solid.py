@@ -28,6 +28,7 @@ class Solid(NamedTuple):
         vertices: in that frame [m], shape (n, 3).
         faces: indices of vertices, counter-clockwise from outside, shape (m, 3).
         colour: red, green and blue, 0 to 255.
+        closed: nobody sees its inside, which then is not drawn; False for a mesh of unknown quality.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Solid(NamedTuple):
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     colour: tuple[int, int, int]
+    closed: bool = False
 
 
 def revolve(
@@ -83,4 +85,4 @@ def barrel(
     inner = radius - edge
     profile = [(0.0, low), (inner, low), (radius, low + edge), (radius, high - edge), (inner, high), (0.0, high)]
     vertices, faces = revolve(profile)
-    return Solid(name, link, place.apply_all(vertices), faces, colour)
+    return Solid(name, link, place.apply_all(vertices), faces, colour, closed=True)

@@ -40,7 +40,10 @@ def level_colour(level: float, touch_level: float) -> tuple[int, int, int]:
 
 
 def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
-    """Draw the floor, and set from where a new viewer looks.
+    """Draw the floor, set the lights, and set from where a new viewer looks.
+
+    viser's own lights are left out: reflections of its surroundings and shadows of three cascades cost two thirds of a
+    picture where a processor draws it (bench/RESULTS-view.md).
 
     Args:
         server: of the page.
@@ -49,8 +52,12 @@ def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
     """
     away = 0.5 * reach * (1.0 + 0.5 * (count - 1))
     server.look_from((away, -away, 0.55 * reach), (0.0, 0.0, 0.28 * reach))
-    server.scene.configure_default_lights(cast_shadow=False)  # shadows cost half of the pictures without a GPU
-    server.scene.add_grid("/floor", width=4.0 * reach, height=4.0 * reach, cell_size=0.1, section_size=0.5)
+    scene = server.scene
+    scene.configure_environment_map(hdri=None)
+    scene.configure_default_lights(enabled=False, cast_shadow=False)
+    scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.0)
+    scene.add_light_directional("/sun", intensity=2.2, position=(1.5, -2.0, 3.0), cast_shadow=False)
+    scene.add_grid("/floor", width=4.0 * reach, height=4.0 * reach, cell_size=0.1, section_size=0.5)
 
 
 class StageNodes:
@@ -73,7 +80,9 @@ class StageNodes:
                 _single(solid.vertices),
                 solid.faces,
                 color=solid.colour,
-                side="double",
+                side="front" if solid.closed else "double",
+                cast_shadow=False,
+                receive_shadow=False,
             )
         self._sheets = {}
         self._colours: dict[str, tuple[int, int, int]] = {}
@@ -81,7 +90,13 @@ class StageNodes:
             name = f"{root}/link {sheet.link}/sheet {number} {_node(sheet.name)}"
             colour = self._colours[sheet.name] = level_colour(0.0, sheet.touch_level)
             self._sheets[sheet.name] = scene.add_mesh_simple(
-                name, _single(sheet.vertices), sheet.faces, color=colour, side="double", cast_shadow=False
+                name,
+                _single(sheet.vertices),
+                sheet.faces,
+                color=colour,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
             )
             scene.add_line_segments(f"{name}/active area", _single(sheet.rim), colors=(20, 40, 35), thickness=0.0015)
         links = sorted({sheet.link for sheet in stage.sheets})
