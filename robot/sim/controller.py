@@ -19,10 +19,12 @@ from coneskin.robot.ur.rtde_codec import Value
 from .client_inputs import ClientInputs, InputWatchdog
 from .event_log import write_event
 from .motion.arm import CYCLE, SimulatedArm
-from .notices import ErrorNotice, Notice, ProgramFailed, ProgramNotice, Report, SafetyNotice
+from .motion.stop_cause import TRIGGERED, StopCause
+from .notices import Notice, ProgramFailed, ProgramNotice
 from .options import Options
 from .program import Program
 from .safety import MOVING, RobotMode, Runtime, SafetyMode
+from .safety_system import SafetySystem
 from .secondary_programs import SecondaryPrograms
 from .terminals import Terminals, digital_outputs
 
@@ -32,7 +34,6 @@ MAX_NOTICES = 1000  #: that wait to be sent; a program that writes more in a cyc
 HISTORY = 500  #: cycles; the range of get_actual_joint_positions_history
 REDUCED_SHARE = 0.5  #: of the speed slider, in reduced mode; a real controller has limits of its own instead
 _AT_STANDSTILL = {Runtime.STOPPING: Runtime.STOPPED, Runtime.PAUSING: Runtime.PAUSED}
-_PROTECTIVE_STOP = 209  # number of its log entry, "a protective stop was triggered"; a real one has others by cause
 
 
 class Controller:
@@ -43,7 +44,7 @@ class Controller:
         inputs: what clients write.
         program: main program; None while none is loaded.
         secondary: ``sec`` programs that run beside it.
-        protective_stop_cycle: cycle of the last protective stop.
+        safety_system: what may stop the arm whatever the program does.
         notices: what clients are still to be told.
         history: joint positions of the last cycles, oldest first [rad].
     """
@@ -73,9 +74,7 @@ class Controller:
         self.secondary = SecondaryPrograms(self)
         self.runtime = Runtime.STOPPED
         self.robot_mode = RobotMode.RUNNING
-        self.safety = SafetyMode.NORMAL
-        self._reduced = False
-        self.protective_stop_cycle = 0
+        self.safety_system = SafetySystem(options.unlock_after, self.log, self.tell)
         self.history: deque[list[float]] = deque([list(self.arm.q)], maxlen=HISTORY)
         self.notices: deque[Notice] = deque(maxlen=MAX_NOTICES)
         self._arrived = 0  # cycle in which the last program came in
@@ -109,8 +108,8 @@ class Controller:
             self.log("standstill", q=self.arm.q)
         if not self.arm.moving:
             self.runtime = _AT_STANDSTILL.get(self.runtime, self.runtime)
-        if fault:
-            self.protective_stop(fault)
+        if fault is not None:
+            self.protective_stop(str(fault), fault.cause)
             self.stop_program("ended by the safety system")
         self.history.append(self.arm.q)
 
@@ -204,15 +203,15 @@ class Controller:
 
     # safety system
 
-    def protective_stop(self, reason: str) -> None:
+    @property
+    def safety(self) -> SafetyMode:
+        """State of the safety system."""
+        return self.safety_system.mode
+
+    def protective_stop(self, reason: str, cause: StopCause = TRIGGERED) -> None:
         """Stop the arm and hold the program, until a person unlocks it."""
-        if self.safety not in MOVING:
+        if not self.safety_system.protective_stop(reason, cause, self.cycle):
             return
-        self.safety = SafetyMode.PROTECTIVE_STOP
-        self.protective_stop_cycle = self.cycle
-        self.log("protective_stop", reason=reason)
-        self.tell(SafetyNotice(self.safety))
-        self.tell(ErrorNotice(_PROTECTIVE_STOP, 0, Report.WARNING, reason))
         if self.options.after_protective_stop == "stop":
             self.stop_program("protective stop")
         else:
@@ -220,41 +219,25 @@ class Controller:
 
     def unlock(self, early: bool = False) -> bool:
         """End a protective stop; return False where it is too early, and that is not allowed."""
-        if self.safety is SafetyMode.PROTECTIVE_STOP:
-            if not early and (self.cycle - self.protective_stop_cycle) * CYCLE < self.options.unlock_after:
-                return False
-            self.log("unlocked")
-            self._release()
-        return True
+        return self.safety_system.unlock(self.cycle, early)
 
     def safeguard(self, open: bool) -> str:
         """Open or close the safeguard: the arm brakes, the program is held, and a person has to start it again."""
-        if open and self.safety in MOVING:
-            self.safety = SafetyMode.SAFEGUARD_STOP
-            self.log("safeguard_stop")
-            self.tell(SafetyNotice(self.safety))
+        if not open:
+            self.safety_system.close_safeguard()
+        elif self.safety_system.open_safeguard():
             self.pause_program()
-        elif not open and self.safety is SafetyMode.SAFEGUARD_STOP:
-            self._release()
         return self.safety.name
 
     def reduce(self, on: bool) -> str:
         """Begin or end reduced mode, in which paths and speeds are at most `REDUCED_SHARE` of what is commanded."""
-        self._reduced = on
-        if self.safety in MOVING:
-            self._release()
+        self.safety_system.reduce(on)
         return self.safety.name
-
-    def _release(self) -> None:
-        self.safety = SafetyMode.REDUCED if self._reduced else SafetyMode.NORMAL
-        self.tell(SafetyNotice(self.safety))
 
     def emergency_stop(self) -> None:
         """Act on the emergency stop button: the arm brakes and loses power, the program ends."""
-        self.safety = SafetyMode.ROBOT_EMERGENCY_STOP
+        self.safety_system.emergency_stop()
         self.robot_mode = RobotMode.POWER_OFF
-        self.log("emergency_stop")
-        self.tell(SafetyNotice(self.safety))
         self.stop_program("emergency stop")
 
     # inputs

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .controller import Controller
-from .safety import MOVING, RobotMode, SafetyMode
+from .safety import MOVING, RobotMode
 
 __all__ = ["POWER_COMMANDS", "power"]
 
@@ -18,8 +18,7 @@ def power(controller: Controller, command: str) -> str:
         controller.robot_mode = RobotMode.POWER_OFF
         return "Powering off"
     if command == "restart safety":
-        if controller.safety not in (*MOVING, SafetyMode.PROTECTIVE_STOP):
-            controller.safety = SafetyMode.NORMAL
+        if controller.safety_system.restart():
             controller.robot_mode = RobotMode.POWER_OFF
         return "Restarting safety"
     if controller.safety in MOVING:

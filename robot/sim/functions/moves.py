@@ -15,6 +15,7 @@ from coneskin.robot.sim.motion.arm import CYCLE, JOINT_ACCELERATION, Motion, Mot
 from coneskin.robot.sim.motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
 from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.motion.path_motions import JointLine, ToolArc, ToolLine
+from coneskin.robot.sim.motion.stop_cause import INVALID_SETPOINT
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, number, numbers, pose_of, show
 
 from .script_host import CallingProgram, ScriptHost
@@ -38,7 +39,8 @@ class MoveFunctions:
         try:
             motion = make()
         except (MotionFault, KinematicsError) as exc:  # a path that no arm can follow: the safety system acts
-            self._host.protective_stop(str(exc))
+            cause = exc.cause if isinstance(exc, MotionFault) else INVALID_SETPOINT
+            self._host.protective_stop(str(exc), cause)
             yield
             raise ScriptError(str(exc)) from exc
         self._arm.motion = motion

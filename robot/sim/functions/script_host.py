@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from coneskin.robot.sim.client_inputs import ClientInputs
 from coneskin.robot.sim.motion.arm import SimulatedArm
+from coneskin.robot.sim.motion.stop_cause import TRIGGERED, StopCause
 from coneskin.robot.sim.notices import Notice
 from coneskin.robot.sim.terminals import Terminals
 from coneskin.robot.sim.urscript.values import ScriptError
@@ -58,7 +59,7 @@ class ScriptHost(Protocol):
     def set_digital(self, bit: int, on: bool) -> None:
         """Switch digital outputs."""
 
-    def protective_stop(self, reason: str) -> None:
+    def protective_stop(self, reason: str, cause: StopCause = TRIGGERED) -> None:
         """Stop the arm as its safety system does."""
 
     def tell(self, notice: Notice) -> None:

@@ -1,7 +1,8 @@
 """Simulated arm: positions, speeds, its tool, and the checks of its safety system.
 
 The model is ideal tracking: the arm does what the trajectory generator commands, so measured and commanded speeds are
-equal. No dynamics, no friction, no vibration. Every stop ends in a ramp of joint speeds down to zero.
+equal. No friction, no vibration, no payload. What the motors cannot do is not done: a motion that takes more torque
+than they have ends in a protective stop. Stops are not held to that: each is a ramp of joint speeds to zero.
 """
 
 from __future__ import annotations
@@ -11,8 +12,20 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from coneskin.geometry.pose import Pose
+from coneskin.robot.arm.inertia import joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
-from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
+from coneskin.robot.arm.ur_inertias import arm_inertia
+
+from .stop_cause import (
+    CLOSE_TO_JOINT_LIMITS,
+    IN_SINGULARITY,
+    INVALID_SETPOINT,
+    NEAR_SINGULARITY,
+    SUDDEN_CHANGE,
+    StopCause,
+    deviation,
+)
 
 __all__ = [
     "CYCLE",
@@ -33,16 +46,31 @@ DEFAULT_DECELERATION = 10.0  #: of the leading joint where the command gives non
 JOINT_ACCELERATION = 40.0  #: highest acceleration of a joint, as a UR5e reports it in its configuration [rad/s^2]
 MAX_ACCELERATION = 100.0  #: of a joint; a step of speed beyond it is a trajectory fault [rad/s^2]
 SPEED_MARGIN = 1.01  #: share of its highest speed at which the safety system stops a joint
+_EASY_ACCELERATION = 5.0  # rad/s^2, of every joint; what no arm's motors lack the torque for: it is not worked out
 
 
 class MotionFault(Exception):
-    """Trajectory that cannot go on: the controller makes a protective stop of it."""
+    """Trajectory that cannot go on: the controller makes a protective stop of it.
+
+    Attributes:
+        cause: of that stop.
+    """
+
+    def __init__(self, cause: StopCause, detail: str) -> None:
+        super().__init__(f"{cause}: {cause.title}: {detail}")
+        self.cause = cause
 
 
 class Motion(Protocol):
-    """Command that moves the arm."""
+    """Command that moves the arm.
+
+    Attributes:
+        done: it has come to its end.
+        brakes: it is a stop, which the checks let pass.
+    """
 
     done: bool
+    brakes: bool
 
     def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
         """Return joint positions [rad] and speeds [rad/s] after one cycle.
@@ -67,26 +95,29 @@ class SimulatedArm:
 
     def __init__(self, model: ArmModel, q: Sequence[float]) -> None:
         self.model = model
+        self.inertia = arm_inertia(model)
         self.q = [float(angle) for angle in q]
         self.qd = [0.0] * 6
         self.qdd = [0.0] * 6
         self.tcp = Pose()
         self.motion: Motion | None = None
 
-    def step(self, scale: float, hold: bool) -> str:
-        """Advance by one cycle; return why the safety system must stop the arm, or an empty string."""
-        fault = ""
+    def step(self, scale: float, hold: bool) -> MotionFault | None:
+        """Advance by one cycle; return why the safety system must stop the arm, if it must."""
+        fault = None
         motion = self.motion
         if motion is None and not any(self.qd) and not any(self.qdd):
-            return ""
+            return None
         try:
             if motion is None:
                 q, qd = decelerate(self.q, self.qd, DEFAULT_DECELERATION)
             else:
                 q, qd = motion.step(self, scale, hold)
                 self._check(q, qd)
+                if not (hold or motion.brakes):
+                    self._check_torques(qd)
         except (MotionFault, ArithmeticError, ValueError) as exc:  # numbers of a program that are finite, but huge
-            fault = str(exc)
+            fault = exc if isinstance(exc, MotionFault) else MotionFault(INVALID_SETPOINT, str(exc))
             self.motion = None
             q, qd = decelerate(self.q, self.qd, DEFAULT_DECELERATION)
         if motion is not None and motion.done:
@@ -107,18 +138,45 @@ class SimulatedArm:
 
     def _check(self, q: list[float], qd: list[float]) -> None:
         model = self.model
+        of_tool = getattr(self.motion, "of_tool", False)  # whose joints are quick where the arm is nearly singular
         for i in range(6):
             speed = qd[i]
             if not math.isfinite(q[i] + speed):
-                raise MotionFault(f"joint {i + 1}: its position or its speed is not a number")
-            if abs(speed) > SPEED_MARGIN * model.joint_speed[i]:
-                raise MotionFault(f"joint {i + 1}: speed {speed:.2f} rad/s above its limit {model.joint_speed[i]:.2f}")
+                raise MotionFault(INVALID_SETPOINT, f"joint {i + 1}: its position or its speed is not a number")
             if abs(speed - self.qd[i]) > MAX_ACCELERATION * CYCLE:
-                raise MotionFault(f"joint {i + 1}: speed jumps by {speed - self.qd[i]:.2f} rad/s in one cycle")
+                detail = f"joint {i + 1}: speed jumps by {speed - self.qd[i]:.2f} rad/s in one cycle"
+                raise MotionFault(NEAR_SINGULARITY if of_tool else SUDDEN_CHANGE, detail)
+            if abs(speed) > SPEED_MARGIN * model.joint_speed[i]:
+                detail = f"joint {i + 1}: speed {speed:.2f} rad/s above its limit {model.joint_speed[i]:.2f}"
+                raise MotionFault(NEAR_SINGULARITY if of_tool else INVALID_SETPOINT, detail)
             if speed:
                 rest = q[i] + speed * abs(speed) / (2.0 * DEFAULT_DECELERATION)  # where braking at once would end
                 if (speed > 0.0 and rest > model.joint_upper[i]) or (speed < 0.0 and rest < model.joint_lower[i]):
-                    raise MotionFault(f"joint {i + 1}: position {q[i]:.3f} rad is about to leave its limits")
+                    detail = f"joint {i + 1}: position {q[i]:.3f} rad is about to leave its limits"
+                    raise MotionFault(CLOSE_TO_JOINT_LIMITS, detail)
+
+    def _check_torques(self, qd: list[float]) -> None:
+        """Refuse a motion for which a motor has not the torque: a real arm would fall behind it."""
+        qdd = [(new - old) / CYCLE for new, old in zip(qd, self.qd, strict=True)]
+        if max_abs(qdd) < _EASY_ACCELERATION:
+            return
+        torques = joint_torques(self.model, self.inertia, self.q, qd, qdd)
+        for i, (torque, limit) in enumerate(zip(torques, self.inertia.torque, strict=True)):
+            if abs(torque) > limit:
+                detail = f"it takes {abs(torque):.0f} N m, and the motor has {limit:.0f} N m"
+                raise MotionFault(deviation(i), detail)
+
+    def feasible_acceleration(self, direction: Sequence[float]) -> float:
+        """Return the highest acceleration along a direction of the joints for which their motors have the torque.
+
+        Args:
+            direction: of the six joints; where the greatest of them is 1, the result is in rad/s^2.
+        """
+        still = joint_torques(self.model, self.inertia, self.q, ZERO_VELOCITY, ZERO_VELOCITY)
+        rows = mass_matrix(self.model, self.inertia, self.q)
+        needed = [abs(sum(m * d for m, d in zip(row, direction, strict=True))) for row in rows]
+        left = [limit - abs(torque) for limit, torque in zip(self.inertia.torque, still, strict=True)]
+        return min((a / b for a, b in zip(left, needed, strict=True) if b > 0.0), default=MAX_ACCELERATION)
 
     # tool
 
@@ -163,7 +221,7 @@ def solve_linear(rows: Sequence[Sequence[float]], right: Sequence[float]) -> lis
     for k in range(n):
         lead = max(range(k, n), key=lambda i: abs(m[i][k]))
         if abs(m[lead][k]) < 1e-4:
-            raise MotionFault("the arm is in a singular position")
+            raise MotionFault(IN_SINGULARITY, "the arm is in a singular position")
         m[k], m[lead] = m[lead], m[k]
         pivot = m[k]
         for i in range(k + 1, n):

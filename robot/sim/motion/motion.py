@@ -14,11 +14,13 @@ from .arm import (
     DEFAULT_DECELERATION,
     JOINT_ACCELERATION,
     MAX_ACCELERATION,
+    MotionFault,
     SimulatedArm,
     decelerate,
     integrate,
     max_abs,
 )
+from .stop_cause import SUDDEN_CHANGE
 
 __all__ = ["ServoJoints", "SpeedJoints", "SpeedTool", "StopJoints", "StopTool"]
 
@@ -26,7 +28,7 @@ __all__ = ["ServoJoints", "SpeedJoints", "SpeedTool", "StopJoints", "StopTool"]
 class SpeedJoints:
     """Constant joint speeds, reached with one acceleration of the leading joint and held (speedj)."""
 
-    done = False
+    done = brakes = False
 
     def __init__(self, target: Sequence[float], acceleration: float) -> None:
         self.retarget(target, acceleration)
@@ -53,7 +55,8 @@ class SpeedJoints:
 class SpeedTool:
     """Constant velocity and angular velocity of the tool centre point in the base frame (speedl)."""
 
-    done = False
+    done = brakes = False
+    of_tool = True
 
     def __init__(self, arm: SimulatedArm, target: Sequence[float], acceleration: float, angular: float) -> None:
         self.twist = arm.twist()
@@ -86,12 +89,18 @@ class ServoJoints:
 
     As the URScript manual has it: the gain is the P-term towards the position, and the look-ahead time projects the
     present position forward in time with the present speed; a short one overshoots. So the acceleration [rad/s^2] is
-    gain (target - (q + lookahead qd)); its unit, 1/s^2, is an assumption. The speed slider does not act.
+    gain (target - (q + lookahead qd)); its unit, 1/s^2, is an assumption. The speed slider does not act. A step of
+    the target for which it is more than `MAX_ACCELERATION` is a sudden change, by assumption; otherwise it is held to
+    what an arm's configuration has as its highest acceleration, and the speed to that of the joint.
+
+    Raises:
+        MotionFault: from ``step``: such a target.
     """
 
-    done = False
+    done = brakes = False
 
     def __init__(self, target: Sequence[float], lookahead: float, gain: float) -> None:
+        self._followed: list[float] | None = None  # target of the last cycle
         self.retarget(target, lookahead, gain)
 
     def retarget(self, target: Sequence[float], lookahead: float, gain: float) -> None:
@@ -106,6 +115,7 @@ class ServoJoints:
             return decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
         largest = JOINT_ACCELERATION * CYCLE
         qd = []
+        self._check_jump(arm.q)
         for target, q, speed, limit in zip(self.target, arm.q, arm.qd, arm.model.joint_speed, strict=True):
             error = target - q
             change = max(-largest, min(largest, self.gain * (error - self.lookahead * speed) * CYCLE))
@@ -113,12 +123,22 @@ class ServoJoints:
             qd.append(0.0 if still else max(-limit, min(limit, speed + change)))
         return integrate(arm.q, arm.qd, qd), qd
 
+    def _check_jump(self, q: Sequence[float]) -> None:
+        before, self._followed = self._followed or q, self.target
+        for joint, (target, last) in enumerate(zip(self.target, before, strict=True), 1):
+            wanted = self.gain * abs(target - last)
+            if wanted > MAX_ACCELERATION:
+                detail = f"joint {joint}: servoj takes {wanted:.0f} rad/s^2 to a target {target - last:.2f} rad away"
+                raise MotionFault(SUDDEN_CHANGE, detail)
+
 
 class StopJoints:
     """Ramp of all joints to a standstill in proportion, the leading one at a deceleration [rad/s^2] (stopj).
 
     The speed slider does not act.
     """
+
+    brakes = True
 
     def __init__(self, deceleration: float) -> None:
         self.deceleration = max(abs(deceleration), 1e-3)
@@ -133,6 +153,8 @@ class StopJoints:
 
 class StopTool:
     """Ramp of the tool to a standstill at a deceleration [m/s^2, rad/s^2], joints in proportion (stopl)."""
+
+    brakes = True
 
     def __init__(self, arm: SimulatedArm, deceleration: float, angular: float) -> None:
         twist = arm.twist()

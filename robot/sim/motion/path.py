@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from coneskin.geometry.pose import Pose
 
 from .arm import CYCLE, DEFAULT_DECELERATION, MotionFault, SimulatedArm, max_abs
+from .stop_cause import INVALID_SETPOINT
 
 __all__ = ["Path", "Residual"]
 
@@ -66,10 +67,12 @@ class Path:
     """
 
     goal: Pose
+    brakes = False
 
     def __init__(self, arm: SimulatedArm, length: float, speed: float, acceleration: float, rate: float) -> None:
         if not (speed > 0.0 and acceleration > 0.0):
-            raise MotionFault(f"speed and acceleration must be above 0, got {speed} and {acceleration}")
+            detail = f"speed and acceleration must be above 0, got {speed} and {acceleration}"
+            raise MotionFault(INVALID_SETPOINT, detail)
         self.profile = _Profile(length, speed, acceleration)
         self.residual = Residual(arm.qd, rate)
         self.done = self.blends = False

@@ -12,13 +12,14 @@ from coneskin.robot.sim.urscript.values import interpolate, rotation_of, rotvec_
 
 from .arm import CYCLE, DEFAULT_DECELERATION, JOINT_ACCELERATION, MotionFault, SimulatedArm, max_abs
 from .path import Path, Residual
+from .stop_cause import INVALID_SETPOINT
 
 __all__ = ["JointLine", "ToolArc", "ToolLine"]
 
 TURN_LENGTH = 0.25  #: path length that takes as long as a turn of 1 rad [m/rad]; an assumption
 _SAMPLES = 40  # places on a path at which its joint speeds are looked at
-# of a move with a time that is too short for it; assumptions: rad/s2, m/s, m/s2
-_MOST_JOINT_ACCELERATION, _MOST_TOOL_SPEED, _MOST_TOOL_ACCELERATION = 40.0, 1.0, 10.0
+# of a move with a time that is too short for it; assumptions: share of what the motors can do at first, m/s, m/s2
+_SHARE_OF_TORQUE, _MOST_TOOL_SPEED, _MOST_TOOL_ACCELERATION = 0.7, 1.0, 10.0
 _STRAIGHT = 1e-6  # m^2; three positions that enclose less have no circle
 
 
@@ -39,10 +40,11 @@ class JointLine(Path):
         self.start = [a + b for a, b in zip(arm.q, way, strict=True)]
         delta = [a - b for a, b in zip(target, self.start, strict=True)]
         length = max_abs(delta)
+        self.unit = [value / length for value in delta] if length else [0.0] * 6
         if time > 0.0:  # a time that is too short makes the move as fast as it can be
             speed, acceleration = max(1.5 * length / time, 1e-9), max(4.5 * length / time**2, 1e-9)
-            acceleration = min(acceleration, _MOST_JOINT_ACCELERATION)
-        self.unit = [value / length for value in delta] if length else [0.0] * 6
+            most = _SHARE_OF_TORQUE * arm.feasible_acceleration(self.unit)
+            acceleration = min(acceleration, JOINT_ACCELERATION, most)
         for share, limit in zip(self.unit, limits or arm.model.joint_speed, strict=True):
             if abs(share) * speed > limit:
                 speed = limit / abs(share)
@@ -63,6 +65,8 @@ class _ToolPath(Path):
     Raises:
         MotionFault: the target is out of reach.
     """
+
+    of_tool = True
 
     def __init__(self, arm: SimulatedArm, length: float, acceleration: float, speed: float, time: float) -> None:
         if time > 0.0:
@@ -89,7 +93,7 @@ class _ToolPath(Path):
         try:
             return list(nearest(arm.model, self._pose(share) @ self.back, self.q))
         except KinematicsError as exc:
-            raise MotionFault(str(exc)) from exc
+            raise MotionFault(INVALID_SETPOINT, str(exc)) from exc
 
     def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""

@@ -12,7 +12,7 @@ from coneskin.errors import MissingExtra
 from coneskin.robot.arm.inertia import ArmInertia
 from coneskin.robot.arm.model import ArmModel
 
-__all__ = ["load_pinocchio", "pin_arm", "pin_jacobian", "pin_mass_matrix", "pin_place", "pin_rotation"]
+__all__ = ["load_pinocchio", "pin_arm", "pin_jacobian", "pin_mass_matrix", "pin_place", "pin_rotation", "pin_torques"]
 
 
 @functools.cache
@@ -77,6 +77,24 @@ def pin_jacobian(arm: ArmModel, q: list[float], link: int, p_link: tuple[float, 
 def pin_mass_matrix(arm: ArmModel, inertia: ArmInertia, q: list[float]) -> NDArray[np.float64]:
     """Return the mass matrix of the arm [kg m^2], shape (6, 6), by the composite rigid body algorithm."""
     pin = load_pinocchio()
+    heavy = _heavy(arm, inertia)
+    found = np.array(pin.crba(heavy, heavy.createData(), np.array(q)))
+    return np.asarray(np.triu(found) + np.triu(found, 1).T)
+
+
+def pin_torques(
+    arm: ArmModel, inertia: ArmInertia, gravity: float, q: list[float], qd: list[float], qdd: list[float]
+) -> NDArray[np.float64]:
+    """Return the torques of the joints [N m], shape (6,), of an upright arm in a motion."""
+    pin = load_pinocchio()
+    heavy = _heavy(arm, inertia)
+    heavy.gravity.linear = np.array([0.0, 0.0, -gravity])
+    return np.asarray(pin.rnea(heavy, heavy.createData(), np.array(q), np.array(qd), np.array(qdd)))
+
+
+def _heavy(arm: ArmModel, inertia: ArmInertia) -> Any:
+    """Return the pinocchio model with the links' masses and the rotors."""
+    pin = load_pinocchio()
     model, _, frames = pin_arm(arm)
     heavy = pin.Model(model)
     for link, frame in zip(inertia.links, frames[1:], strict=True):
@@ -84,5 +102,4 @@ def pin_mass_matrix(arm: ArmModel, inertia: ArmInertia, q: list[float]) -> NDArr
         body = pin.Inertia(link.mass, np.array(link.centre), np.array(link.tensor))
         heavy.appendBodyToJoint(held.parentJoint, body, held.placement)
     heavy.armature = np.array(inertia.rotor)
-    found = np.array(pin.crba(heavy, heavy.createData(), np.array(q)))
-    return np.asarray(np.triu(found) + np.triu(found, 1).T)
+    return heavy

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coneskin.errors import KinematicsError
-from coneskin.robot.arm.inertia import effective_mass, mass_matrix
+from coneskin.robot.arm.inertia import GRAVITY, effective_mass, joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import point_jacobian
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.ur_inertias import arm_inertia
@@ -40,6 +40,28 @@ def test_the_mass_matrix_is_that_of_pinocchio(name: str) -> None:
         wanted = pin_mass_matrix(model, inertia, q)
         # rounding of sums of about 100 products
         np.testing.assert_allclose(mass_matrix(model, inertia, q), wanted, rtol=0, atol=1e-13 * wanted.max())
+
+
+@ARMS
+def test_the_torques_are_those_of_pinocchio(name: str) -> None:
+    pytest.importorskip("pinocchio", reason="the independent dynamics are pinocchio's (PyPI: pin)")
+    from coneskin.testing.pinocchio_arm import pin_torques
+
+    model, inertia, source = arm_model(name), arm_inertia(name), np.random.default_rng(2)
+    for _ in range(10):
+        q, qd, qdd = (list(source.uniform(-size, size, 6)) for size in (2 * np.pi, 3.0, 40.0))
+        wanted = pin_torques(model, inertia, GRAVITY, q, qd, qdd)
+        found = joint_torques(model, inertia, q, qd, qdd)
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
+@ARMS
+def test_an_arm_at_rest_can_hold_itself(name: str) -> None:
+    """Stretched out, its shoulder carries the arm with much of its torque left."""
+    inertia = arm_inertia(name)
+    torques = joint_torques(arm_model(name), inertia, (0.0,) * 6, (0.0,) * 6, (0.0,) * 6)
+    shares = [abs(torque) / limit for torque, limit in zip(torques, inertia.torque, strict=True)]
+    assert 0.1 < max(shares) < 0.8
 
 
 def test_a_blow_feels_the_effective_mass() -> None:

@@ -12,6 +12,7 @@ import pytest
 from coneskin.errors import KinematicsError, RobotRefused
 from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.functions.builtins import Builtins
+from coneskin.robot.sim.notices import ErrorNotice
 from coneskin.robot.sim.options import Options
 from coneskin.robot.sim.polyscope.dashboard import Dashboard
 from coneskin.robot.sim.polyscope.user_interface import UserInterface
@@ -262,6 +263,31 @@ def test_a_mistake_ends_the_program_and_not_the_controller(bench: Bench, line: s
     bench.step(20)
     assert reason in bench.events("abort")[0]["reason"]
     assert bench.controller.runtime.name == "STOPPED"
+
+
+JUMPS = {
+    "servoj": ("servoj([1.5, -1.5708, 1.5708, -1.5708, -1.5708, 0], t=0.1)", "C204A1"),
+    "speedj": ("speedj([0, -1, 0, 0, 0, 0], a=60)", "C153A1"),
+    "speedj at once": ("speedj([1, 0, 0, 0, 0, 0], a=1000)", "C204A1"),
+    "movej": (f"movej({FAR}, a=150, v=2)", "C204A1"),
+    "speedj too fast": ("speedj([0, 0, 0, 0, 0, 4], a=5, t=9)", "C204A5"),
+    "speedl": ("speedl([0, 0, 1.0, 0, 0, 0], a=200)", "C204A7"),
+    "protective_stop": ("protective_stop()", "C209A0"),
+}
+
+
+@pytest.mark.parametrize("name", JUMPS)
+def test_a_motion_that_no_arm_can_follow_is_a_protective_stop_under_its_published_number(name: str) -> None:
+    """The program is ended, the log says which, and so does a message to each client of the primary interface."""
+    text, number = JUMPS[name]
+    bench = Bench()
+    bench.send(f"def p():\n  {text}\nend\n")
+    bench.step(1000)
+    assert [event["cause"] for event in bench.events("protective_stop")] == [number]
+    assert bench.controller.safety.name == "PROTECTIVE_STOP"
+    assert not bench.controller.arm.moving
+    told = [notice for notice in bench.controller.notices if isinstance(notice, ErrorNotice)]
+    assert [f"C{notice.code}A{notice.argument}" for notice in told] == [number]
 
 
 def test_a_line_that_the_arm_cannot_follow_is_a_protective_stop(bench: Bench) -> None:

@@ -49,7 +49,7 @@ def test_kinematics_and_configuration_come_once():
 
 def test_it_says_where_the_arm_is_and_what_it_does():
     controller = Controller(Options(model="ur5e", start_q=Q))
-    controller.safety, controller.slider = SafetyMode.PROTECTIVE_STOP, 0.5
+    controller.safety_system.mode, controller.slider = SafetyMode.PROTECTIVE_STOP, 0.5
     state = sub_packages(encode_state(controller))
     joints = [struct.unpack(">dddffffB", state[1][41 * i : 41 * i + 41]) for i in range(6)]
     assert [joint[0] for joint in joints] == list(Q)
