@@ -13,6 +13,7 @@ from .intervals import balance_borders, choose_intervals, longest_intervals
 from .partial_wrap import largest_region
 from .profile import RadialProfile
 from .side import StraightSide, azimuth_columns, fit_side
+from .touch_weights import TouchWeights
 
 __all__ = ["AxisPlan", "SheetRequirements", "SideLine", "plan_sheets", "side_lines"]
 
@@ -27,7 +28,10 @@ _APART = 0.002  # m; least distance between two of them
 
 @dataclass(frozen=True, slots=True)
 class SheetRequirements:
-    """Requirements on the sheets: the arguments of ``find_cones``, and what a further sheet must add [m2]."""
+    """Requirements on the sheets: the arguments of ``find_cones``, and what a further sheet must add [m2].
+
+    With weights, that area and every other one is weighed by them.
+    """
 
     tolerance: float
     max_sheets: int
@@ -40,6 +44,7 @@ class SheetRequirements:
     thickness: float
     gap: float
     least_gain: float
+    weights: TouchWeights | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,7 +186,8 @@ def _partial_wrap(
         good &= (line >= requirements.min_radius)[:, None]
         if int(good.sum()) < rows * columns:
             continue
-        region = largest_region(good, rows, columns, exact)
+        worth = None if requirements.weights is None else profile.weight
+        region = largest_region(good, rows, columns, exact, worth)
         if region is None:
             continue
         side = fit_side(profile, *region, requirements.tolerance, rise)

@@ -66,7 +66,8 @@ def bare_areas(
         if further.area >= requirements.least_gain:
             take(f"a sheet more would cover it: allow {plan.count + 1} sheets", seen)
         else:
-            take("room for a sheet that is too small to be worth its four wires", seen)
+            little = "is too small" if requirements.weights is None else "covers too little that counts"
+            take(f"room for a sheet that {little} to be worth its four wires", seen)
     if hindered is not None:
         take(
             "a sheet here would run into another one or reach too far around it",

@@ -20,13 +20,14 @@ from .coverage_notes import bare_lengths, hull_note
 from .fitted_sheet import FittedSheet, fitted_sheet
 from .plan import AxisSurvey, SheetPlan, best_plan, survey_axes
 from .surface_samples import SurfaceSamples, sample_surface
+from .touch_weights import TouchWeights, exposure_weights
 
 __all__ = ["BareLength", "LinkFit", "find_cones"]
 
 Floats = NDArray[np.float64]
 
 TURN = 2.0 * math.pi
-HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
+HULL_SHARE = 0.10  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.05  #: share of the hull that a further sheet must add; a fillet adds less
 SEARCH_SAMPLES = 6000  #: points on the mesh from which the axes are found, whatever ``samples`` is
 _MOST_TOLERANCE = 0.020  # m; a sheet that stands off further does not follow the link
@@ -67,6 +68,7 @@ class LinkFit:
         ray_engine: the engine that cast the rays, "embree" or "grid".
         needed_tolerance: where nothing fits, a tolerance with which something does, tried [m]; infinite without one.
         bare_areas: what no sheet covers, by reason, the largest first; empty where no sheet fits.
+        weights: name of the map by which areas were weighed; empty where all count the same.
     """
 
     sheets: tuple[FittedSheet, ...]
@@ -81,6 +83,7 @@ class LinkFit:
     ray_engine: str
     needed_tolerance: float = math.inf
     bare_areas: tuple[BareArea, ...] = ()
+    weights: str = ""
 
 
 def find_cones(
@@ -99,8 +102,10 @@ def find_cones(
     min_radius: float = 0.004,
     thickness: float = 0.0062,
     gap: float = 0.001,
+    weights: TouchWeights | None = None,
+    exposure: bool = False,
 ) -> LinkFit:
-    """Find the frusta that cover most of a link, about one or several axes.
+    """Find the frusta that cover most of a link, about one or several axes; with weights, most of what is touched.
 
     The search draws nothing by chance: the same mesh gives the same sheets.
 
@@ -119,6 +124,8 @@ def find_cones(
         min_radius: smallest radius of a sheet [m]; a cone is covered up to there, not up to its apex.
         thickness: of a sheet [m]; sheets about different axes do not run into each other.
         gap: smallest distance between sheets about different axes, and between partial wraps [m].
+        weights: what areas count, where touches are likelier on some than on others; None for all the same.
+        exposure: True to weigh areas by how much of the space above them is free (``exposure_weights``).
 
     Returns:
         the fit; without sheets where nothing fits within the tolerance.
@@ -150,12 +157,19 @@ def find_cones(
     size = float(np.linalg.norm(seam))
     if not (math.isfinite(size) and size > 0.0):
         raise GeometryError(f"the direction of the seam must be finite and not zero, got {tuple(seam_direction)}")
+    if weights is not None and exposure:
+        raise GeometryError("weights of touches come from a map or from the exposure, not from both")
     say = progress or (lambda _: None)
     say("sampling the hull")
     rays = RayCaster(mesh)
     hull = sample_surface(mesh, rays, SEARCH_SAMPLES)
     counted = hull if samples == SEARCH_SAMPLES else sample_surface(mesh, rays, samples)
     hull_area = len(hull) * hull.area
+    if exposure:
+        say("casting rays to the outside")
+        weights = exposure_weights(hull, rays)
+    worth = None if weights is None else weights.at(counted.points)
+    weighed = hull_area if weights is None else float(weights.at(hull.points).sum()) * hull.area
     requirements = SheetRequirements(
         tolerance,
         max_sheets if max_wires is None else min(max_sheets, max_wires // 4),
@@ -167,14 +181,16 @@ def find_cones(
         min_radius,
         thickness,
         gap,
-        LEAST_GAIN * hull_area,
+        LEAST_GAIN * weighed,
+        weights,
     )
     say("looking for axes")
     candidates = find_axis_candidates(hull)
     say("measuring profiles")
     surveys = survey_axes(mesh, rays, candidates, requirements)
-    search = _Search(mesh, rays, hull, surveys, requirements)
+    search = _Search(mesh, rays, hull, weighed, surveys, requirements)
     plan, refusal = search.plan(tolerance)
+    name = "" if weights is None else weights.name
     nearest, needed, length = None, math.inf, _longest(hull)
     if plan is None:
         reason = refusal or f"no cone fits within {tolerance * 1e3:g} mm over a length of {min_length * 1e3:g} mm"
@@ -185,7 +201,7 @@ def find_cones(
         if looser is not None:
             first = looser.axes[0]
             widest = max(first.sides, key=lambda side: side.area(first.profile))
-            nearest = fitted_sheet(first, widest, 0, counted, needed)
+            nearest = fitted_sheet(first, widest, 0, counted, needed, worth)
         return LinkFit(
             sheets=(),
             nearest=nearest,
@@ -198,11 +214,12 @@ def find_cones(
             reason=reason,
             candidates=len(candidates),
             ray_engine=rays.engine,
+            weights=name,
         )
     first = plan.axes[0]
     return LinkFit(
         sheets=tuple(
-            fitted_sheet(about, side, number, counted, tolerance)
+            fitted_sheet(about, side, number, counted, tolerance, worth)
             for number, about in enumerate(plan.axes)
             for side in about.sides
         ),
@@ -226,6 +243,7 @@ def find_cones(
         reason="",
         candidates=len(candidates),
         ray_engine=rays.engine,
+        weights=name,
     )
 
 
@@ -236,6 +254,7 @@ class _Search:
     mesh: Mesh
     rays: RayCaster
     hull: SurfaceSamples
+    weighed: float  # area of the hull, by the weights [m2]
     surveys: list[AxisSurvey]
     requirements: SheetRequirements
 
@@ -243,7 +262,7 @@ class _Search:
         """Return the best plan within a tolerance [m]; or None and, for a mesh that is a bare hull, the reason."""
         wanted = replace(self.requirements, tolerance=tolerance)
         plan = best_plan(self.mesh, self.rays, self.hull, self.surveys, wanted)
-        area, whole = plan.area if plan else 0.0, len(self.hull) * self.hull.area
+        area, whole = plan.area if plan else 0.0, self.weighed
         # a requested wrap implies that the shape is known; otherwise sheets should cover some of a convex body
         if area >= HULL_SHARE * whole or (plan and wanted.wrap):
             return plan, ""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -37,6 +38,8 @@ class FittedSheet:
         area_share: share of the hull that the sheet covers.
         facet_rise: mean distance by which the corners of the mesh lie outside its facets [m]; the radii include it.
         axis: number of its axis; sheets with the same number lie about the same axis.
+        touch_share: share of the hull that the sheet covers, weighed by what touches count there; without weights the
+            same as ``area_share``.
     """
 
     placed: PlacedFrustum
@@ -49,6 +52,15 @@ class FittedSheet:
     area_share: float
     facet_rise: float
     axis: int = 0
+    touch_share: float = 0.0
+
+    @property
+    def facet_height(self) -> float:
+        """Largest distance by which the facets of the mesh lie inside the surface of their corners [m].
+
+        A facet of a tube lies two thirds of that inside on average, which is ``facet_rise``.
+        """
+        return 1.5 * self.facet_rise
 
     @property
     def frustum(self) -> Frustum:
@@ -66,7 +78,14 @@ class FittedSheet:
         return unroll(self.placed.frustum)
 
 
-def fitted_sheet(plan: AxisPlan, side: StraightSide, axis: int, hull: SurfaceSamples, tolerance: float) -> FittedSheet:
+def fitted_sheet(
+    plan: AxisPlan,
+    side: StraightSide,
+    axis: int,
+    hull: SurfaceSamples,
+    tolerance: float,
+    worth: NDArray[np.float64] | None = None,
+) -> FittedSheet:
     """Return one side of a plan as a sheet on the link.
 
     Args:
@@ -75,6 +94,7 @@ def fitted_sheet(plan: AxisPlan, side: StraightSide, axis: int, hull: SurfaceSam
         axis: number of the axis.
         hull: samples of the link.
         tolerance: largest distance between sheet and hull [m].
+        worth: what each sample counts, shape (n,); the same for all by default.
     """
     profile, frame = plan.profile, plan.profile.frame
     start, end = _ends(plan)[plan.sides.index(side)]
@@ -94,6 +114,7 @@ def fitted_sheet(plan: AxisPlan, side: StraightSide, axis: int, hull: SurfaceSam
     hole = profile.bridged[side.first : side.end][:, cells] - radius > tolerance
     miss = (radius - line) * cosine
     seen = miss[~hole]
+    below = covered_points(profile, side, hull, tolerance)
     return FittedSheet(
         placed=PlacedFrustum(Frustum(max(radii[0], 0.0), max(radii[1], 0.0), end - start, wrap), pose),
         start_azimuth=turn,
@@ -102,9 +123,10 @@ def fitted_sheet(plan: AxisPlan, side: StraightSide, axis: int, hull: SurfaceSam
         bridged_share=float(hole.mean()),
         bridged_depth=float(-miss[hole].min()) if hole.any() else 0.0,
         length_share=(end - start) / (profile.step * len(profile.z)),
-        area_share=float(covered_points(profile, side, hull, tolerance).mean()),
+        area_share=float(below.mean()),
         facet_rise=side.rise,
         axis=axis,
+        touch_share=float(below.mean() if worth is None else worth[below].sum() / worth.sum()),
     )
 
 

@@ -211,7 +211,8 @@ def _profile(
 ) -> RadialProfile:
     slices, around = grid
     length = float(np.ptp(frame.local(mesh.vertices)[:, 2]))
-    return measure_profile(mesh, rays, frame, max(length / slices, 0.0005), around, requirements.max_bridge)
+    profile = measure_profile(mesh, rays, frame, max(length / slices, 0.0005), around, requirements.max_bridge)
+    return profile if requirements.weights is None else profile.weighed(requirements.weights)
 
 
 def _refined(

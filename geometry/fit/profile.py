@@ -13,6 +13,7 @@ from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import perpendicular_vectors
+from .touch_weights import TouchWeights
 
 __all__ = ["AxisFrame", "RadialProfile", "measure_profile"]
 
@@ -96,6 +97,16 @@ class RadialProfile:
     def free(self) -> NDArray[np.bool_]:
         """Return whether a sheet may lie on each cell, shape (k, p)."""
         return np.ones(self.radius.shape, bool) if self.weight is None else self.weight > 0.0
+
+    def points(self) -> Floats:
+        """Return the places of the cells on the hull [m], shape (k, p, 3)."""
+        out = self.frame.columns[:, :2] @ np.stack([np.cos(self.phi), np.sin(self.phi)])
+        along = self.frame.origin + self.z[:, None] * self.frame.axis
+        return np.asarray(along[:, None] + self.radius[..., None] * out.T)
+
+    def weighed(self, weights: TouchWeights) -> RadialProfile:
+        """Return the profile of which each cell counts what a map says."""
+        return replace(self, weight=weights.at(self.points().reshape(-1, 3)).reshape(self.radius.shape))
 
     def blocked(self, cells: NDArray[np.bool_]) -> RadialProfile:
         """Return the profile with cells, shape (k, p), on which no sheet may lie."""

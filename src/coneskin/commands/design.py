@@ -17,6 +17,7 @@ from coneskin.design.folder import write_design
 from coneskin.design.link import LinkMesh, fit_link
 from coneskin.design.seam_strip import cover_seams
 from coneskin.design.sheets import SheetDesign, design_sheets
+from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.skin.matched_electronics import shunt_ohms
 
@@ -33,6 +34,7 @@ from .ending_signals import ending_signals
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
+    from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.placed_frustum import PlacedFrustum
 
 __all__ = ["add_arguments", "run"]
@@ -120,7 +122,24 @@ def _load_and_fit(args: argparse.Namespace, say: Callable[[str], None]) -> tuple
         thickness=sum(args.thickness_mm) * 1e-3 if args.thickness_mm else PAPER_STACK.thickness,
         gap=args.sheet_gap_mm * 1e-3,
         seam_direction=seam_direction(args),
+        weights=_touch_weights(args),
+        exposure=args.exposure,
     )
+
+
+def _touch_weights(args: argparse.Namespace) -> TouchWeights | None:
+    """Return the user's map of what areas count; None without one.
+
+    Raises:
+        GeometryError: it cannot be read, or the exposure is asked for too.
+    """
+    if args.weights is None:
+        return None
+    if args.exposure:
+        raise GeometryError("--weights and --exposure cannot go together: areas count by a map or by their exposure")
+    from coneskin.geometry.fit.touch_weights import read_touch_weights
+
+    return read_touch_weights(args.weights)
 
 
 def _nothing_fits(source: LinkMesh, fit: LinkFit) -> int:
@@ -154,6 +173,8 @@ def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
         if design.fit is not None:
             worst, rms = design.fit.max_deviation, design.fit.rms_deviation
             line += f", deviation {worst * 1e3:.3f} mm at most, {rms * 1e3:.3f} mm rms"
+            if design.fit.facet_height > 0.0:
+                line += f", of which the facets of the mesh are up to {design.fit.facet_height * 1e3:.3f} mm"
             if design.fit.bridged_share > 0.0:
                 line += (
                     f", but {design.fit.bridged_share:.1%} of it spans holes and grooves, down to "
@@ -168,5 +189,8 @@ def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
             f"{shunt_ohms(parts):.3g} ohm, {parts.adc_bits} bits: a count is {_count_size(design)} "
             "(--upper-sheet-ohm and so on change it)"
         )
+    if fit is not None and fit.weights:
+        share = sum(sheet.touch_share for sheet in fit.sheets)
+        print(f"weighed by {fit.weights}, the sheets cover {share:.0%} of the hull")
     for area in fit.bare_areas if fit else ():
         print(f"no sheet: {area.share:.0%} of the hull: {area.reason}")

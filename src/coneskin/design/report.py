@@ -81,6 +81,11 @@ def _coverage(fit: LinkFit) -> Iterator[str]:
         f"* {count}, within {fit.tolerance * 1e3:g} mm of the mesh and about {axes} ax{'i' if axes == 1 else 'e'}s, "
         f"{sum(sheet.area_share for sheet in fit.sheets):.0%} of the hull of the link"
     )
+    if fit.weights:
+        yield (
+            f"* Weighed by {fit.weights}, that is {sum(sheet.touch_share for sheet in fit.sheets):.0%} of it: the "
+            "sheets are those that cover most of what counts"
+        )
     for area in fit.bare_areas:
         yield f"* No sheet on {area.share:.0%} of the hull: {area.reason}"
 
@@ -103,6 +108,9 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         fit = data["fit"]
         deviation = f"{fit['max_deviation_mm']:.3f} mm at most, {fit['rms_deviation_mm']:.3f} mm rms"
         rows.append(["deviation from the mesh", deviation])
+        if fit["facet_height_mm"] > 0.0:
+            facets = f"up to {fit['facet_height_mm']:.3f} mm inside the link's surface, as part of that deviation"
+            rows.append(["facets of the mesh", facets])
         rows.append(
             ["share of the link", f"{fit['length_share']:.0%} of its length, {fit['area_share']:.0%} of its hull"]
         )

@@ -70,8 +70,10 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
         data["fit"] = {
             "max_deviation_mm": _round(1e3 * fit.max_deviation),
             "rms_deviation_mm": _round(1e3 * fit.rms_deviation),
+            "facet_height_mm": _round(1e3 * fit.facet_height),
             "length_share": round(fit.length_share, 4),
             "area_share": round(fit.area_share, 4),
+            "touch_share": round(fit.touch_share, 4),
             "bridged_share": round(fit.bridged_share, 4),
             "bridged_depth_mm": _round(1e3 * fit.bridged_depth),
         }

@@ -36,6 +36,34 @@ def brute(good: Grid, rows: int, columns: int, exact: bool) -> int:
     )
 
 
+@settings(max_examples=80)
+@given(GRIDS, st.integers(1, 3), st.integers(1, 3), st.booleans(), st.integers(0, 9))
+def test_the_weighed_region_counts_most(good: Grid, rows: int, columns: int, exact: bool, seed: int) -> None:
+    worth = np.random.default_rng(seed).integers(0, 5, good.shape).astype(float)
+    count, around = good.shape
+
+    def value(region: Region) -> float:
+        first, end, column, wide = region
+        return float(worth[first:end][:, (column + np.arange(wide)) % around].sum())
+
+    most = max(
+        (
+            value((first, end, column, wide))
+            for first in range(count)
+            for end in range(first + rows, count + 1)
+            for column in range(around)
+            for wide in ([columns] if exact else range(columns, around + 1))
+            if wide <= around and holds(good, (first, end, column, wide))
+        ),
+        default=0.0,
+    )
+    region = largest_region(good, rows, columns, exact, worth)
+    assert (value(region) if region else 0.0) == most
+    if region:
+        assert holds(good, region)
+        assert region[1] - region[0] >= rows
+
+
 @settings(max_examples=150)
 @given(GRIDS, st.integers(1, 3), st.integers(1, 3), st.booleans())
 def test_largest_region_is_the_largest(good: Grid, rows: int, columns: int, exact: bool) -> None:

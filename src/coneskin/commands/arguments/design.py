@@ -110,6 +110,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     seam = {"nargs": 3, "metavar": ("X", "Y", "Z")}
     add("--seam", type=float, help="direction in which the seam faces, as the cable (default 1 0 0)", **seam)  # type: ignore[arg-type]
     add("--touch-side", type=float, help="side on which touches are likely: the seam faces away from it", **seam)  # type: ignore[arg-type]
+    add("--weights", type=Path, metavar="FILE", help="cover what counts: CSV with x_mm,y_mm,z_mm,weight of places")
+    add("--exposure", action="store_true", help="cover what can be touched: areas count by the free space above them")
 
     add = parser.add_argument_group(
         "layers, from the link outwards: lower substrate (LS), lower conductive (LC), isolation (I), "
@@ -268,6 +270,9 @@ def links_from_dimensions(args: argparse.Namespace) -> tuple[PlacedFrustum, ...]
                 f"--{option.replace('_', '-')} is for a mesh: by its dimensions a link has no directions, and its seam "
                 "is at phi = 0"
             )
+    if args.weights is not None or args.exposure:
+        option = "--exposure" if args.exposure else "--weights"
+        raise GeometryError(f"{option} is for a mesh: a link by its dimensions is covered whole")
     if not {"radius1", "height"} <= values.keys():
         raise GeometryError("name a mesh file, or give --radius1-mm and --height-mm")
     if ("radius3" in values) != ("height2" in values):

@@ -1,0 +1,128 @@
+"""Weights of touches on a link: how much an area counts, by a map of the user's or by what can be touched at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.arrays import frozen
+from coneskin.bounded_file import read_file
+from coneskin.errors import GeometryError
+from coneskin.geometry.ray_casting import RayCaster
+
+from .cone_fit import perpendicular_vectors
+from .surface_samples import SurfaceSamples
+
+__all__ = ["LEAST_WEIGHT", "TouchWeights", "exposure_weights", "read_touch_weights"]
+
+Floats = NDArray[np.float64]
+
+LEAST_WEIGHT = 1e-3  #: of the largest; where nothing touches, a sheet may still lie, and it is worth nearly nothing
+_COLUMNS = ("x_mm", "y_mm", "z_mm", "weight")
+_MAX_SIZE = 50_000_000  # bytes of a map; a million places
+_RAYS = 32  # from each sample of the hull
+_LIFT = 0.002  # m; a fingertip above the surface, not in its seams and grooves
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TouchWeights:
+    """What an area of a link counts, at places on it; elsewhere as at the nearest of them.
+
+    Attributes:
+        points: places on the link, in the frame of its mesh [m], shape (n, 3).
+        weights: what an area counts there, not negative and not all 0, shape (n,).
+        name: of the map, for reports.
+
+    Raises:
+        GeometryError: no place, a value that is not finite, a negative weight, or nothing but zeros.
+    """
+
+    points: Floats
+    weights: Floats
+    name: str = "weights"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen(self.points, (None, 3), f"{self.name}: places"))
+        weights = frozen(self.weights, (len(self.points),), f"{self.name}: weights")
+        if len(weights) == 0 or float(weights.max()) <= 0.0:
+            raise GeometryError(f"{self.name}: at least one place must have a weight above 0")
+        if float(weights.min()) < 0.0:
+            raise GeometryError(f"{self.name}: a weight must not be negative, got {float(weights.min()):g}")
+        object.__setattr__(self, "weights", weights)
+
+    def at(self, points: Floats) -> Floats:
+        """Return the weights of points [m], shape (n, 3), as shares of the largest one, shape (n,)."""
+        from scipy.spatial import cKDTree
+
+        nearest = cKDTree(self.points).query(points)[1]
+        return np.asarray(np.maximum(self.weights[nearest] / self.weights.max(), LEAST_WEIGHT))
+
+
+def read_touch_weights(path: str | Path) -> TouchWeights:
+    """Read a map of weights: a CSV file with the columns x_mm, y_mm, z_mm and weight, one line for each place.
+
+    The places are in the frame of the mesh; an area counts as the nearest place does, so a few places are enough.
+
+    Args:
+        path: the file, in UTF-8. Columns of other names are ignored.
+
+    Raises:
+        GeometryError: the file cannot be read, a column is missing, or a value is no number or out of range.
+    """
+    path = Path(path)
+    try:
+        text = read_file(path, _MAX_SIZE).decode("utf-8-sig")
+    except OSError as exc:
+        raise GeometryError(f"{path}: {exc.strerror or exc}") from exc
+    except UnicodeDecodeError as exc:
+        raise GeometryError(f"{path}: a map of weights is a text file, and byte {exc.start} is not UTF-8") from exc
+    rows = csv.DictReader(io.StringIO(text))
+    head = [name.strip() for name in rows.fieldnames or ()]
+    missing = [name for name in _COLUMNS if name not in head]
+    if missing:
+        raise GeometryError(
+            f"{path}: a map of weights has the columns {', '.join(_COLUMNS)} in its first line; "
+            f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        )
+    rows.fieldnames = head
+    values: list[list[float]] = []
+    for row in rows:
+        try:
+            values.append([float(row[name]) for name in _COLUMNS])
+        except (TypeError, ValueError) as exc:
+            raise GeometryError(
+                f"{path}: line {rows.line_num} must have a number in each of {', '.join(_COLUMNS)}"
+            ) from exc
+        if not all(math.isfinite(value) for value in values[-1]) or values[-1][3] < 0.0:
+            raise GeometryError(
+                f"{path}: line {rows.line_num}: places must be finite and weights not negative, got {values[-1]}"
+            )
+    table = np.array(values, float).reshape(-1, 4)
+    return TouchWeights(table[:, :3] * 1e-3, table[:, 3], path.name)
+
+
+def exposure_weights(hull: SurfaceSamples, rays: RayCaster) -> TouchWeights:
+    """Return the exposure of a link: the share of the half-space above each place from which it can be reached.
+
+    Rays leave each sample in directions spread evenly over the hemisphere about its normal, weighted by their cosine;
+    those that meet the link count nothing. A convex body has the weight 1 everywhere; the corner between two housings
+    has less. Other links are not known: where they stand, name a map.
+
+    Args:
+        hull: samples of the link.
+        rays: a ray caster of the same mesh.
+    """
+    turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(_RAYS)  # the golden angle spreads them evenly
+    out = np.sqrt((np.arange(_RAYS) + 0.5) / _RAYS)  # evenly over the disc: by the cosine over the hemisphere
+    spread = np.stack([out * np.cos(turn), out * np.sin(turn), np.sqrt(1.0 - out**2)], axis=1)
+    frames = np.array([np.stack([*perpendicular_vectors(normal), normal], axis=1) for normal in hull.normals])
+    ways = np.einsum("nij,rj->nri", frames, spread).reshape(-1, 3)
+    starts = np.repeat(hull.points + _LIFT * hull.normals, _RAYS, axis=0)
+    free = np.isinf(rays.cast(starts, ways)[0]).reshape(-1, _RAYS)
+    return TouchWeights(hull.points, free.mean(axis=1), "exposure")
