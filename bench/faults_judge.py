@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from coneskin.errors import ConeSkinError
-from coneskin.replay.replay import Run, read_run, replay
+from coneskin.replay.run import Run, read_run, replay
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.skin.wire import FrameDecoder
 

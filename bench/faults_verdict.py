@@ -13,7 +13,7 @@ from faults_setup import CLOCK, GOAL, SLOW, STOP, MachineWatch, Outcome
 from faults_trial import Trial
 
 from coneskin.errors import ConeSkinError
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import BlockKind
 
 PATIENCE = 3.0  # s beyond the budget for which a late standstill is waited for

@@ -20,7 +20,7 @@ from pathlib import Path
 from report import head, quantile
 
 from coneskin.errors import Collision
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.replay.run_picture import draw_run
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.sim.process import SimulatedController, free_host

@@ -18,7 +18,7 @@ from typing import Any
 from reaction_moves import CLOCK, EXTERNAL, Child, ExternalArm, GuardedArm
 
 from coneskin.errors import ConeSkinError
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.journal import BlockKind, decode_event
 from coneskin.robot.sim.process import SimulatedController, free_host

@@ -24,7 +24,7 @@ from replay_long_run import record_long_run
 from replay_memory import memory
 from report import head
 
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 from coneskin.replay.touch_scan import scan_touches
 from coneskin.robot.guard.journal import INPUTS
 from coneskin.robot.guard.outputs import Output

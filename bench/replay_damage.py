@@ -17,7 +17,8 @@ from coneskin.recording import Block
 from coneskin.recording_file.chunk import FILE_HEAD_SIZE, decode_body
 from coneskin.recording_file.reader import read_recording
 from coneskin.recording_file.scan import Chunk, walk
-from coneskin.replay.replay import Verdict, read_run, replay
+from coneskin.replay.replay import Verdict
+from coneskin.replay.run import read_run, replay
 
 __all__ = ["damage", "kill"]
 
@@ -28,7 +29,7 @@ import sys, time
 from pathlib import Path
 from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 blocks = list(read_run(sys.argv[1]).blocks)
 header = read_run(sys.argv[1]).header
 import json

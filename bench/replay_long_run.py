@@ -9,7 +9,7 @@ from pathlib import Path
 
 from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.guard.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.outputs import Output

@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import BlockKind
 
 __all__ = ["memory"]
 
-_SCAN = "import sys; from coneskin.replay.replay import read_run; from coneskin.replay.touch_scan import scan_touches; "
+_SCAN = "import sys; from coneskin.replay.run import read_run; from coneskin.replay.touch_scan import scan_touches; "
 _SCAN += "scan_touches(read_run(sys.argv[1]))"
 
 

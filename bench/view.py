@@ -25,7 +25,7 @@ from typing import Any
 from report import head, quantile
 
 from coneskin.errors import ConeSkinError
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene

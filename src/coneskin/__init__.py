@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from .geometry.sector import Sector as Sector
     from .geometry.sector import roll_up as roll_up
     from .geometry.sector import unroll as unroll
-    from .replay.replay import Run as Run
-    from .replay.replay import read_run as read_run
+    from .replay.run import Run as Run
+    from .replay.run import read_run as read_run
     from .robot.arm.ur_models import arm_model as arm_model
     from .robot.driver.waypoint import Waypoint as Waypoint
     from .robot.guard.journal import EventName as EventName
@@ -92,7 +92,7 @@ _PUBLIC = {
     "geometry.placed_frustum": "PlacedFrustum",
     "geometry.pose": "Pose",
     "geometry.sector": "Sector roll_up unroll",
-    "replay.replay": "Run read_run",
+    "replay.run": "Run read_run",
     "robot.arm.ur_models": "arm_model",
     "robot.driver.waypoint": "Waypoint",
     "robot.guard.journal": "EventName GuardEvent",

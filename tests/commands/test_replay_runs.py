@@ -23,7 +23,7 @@ def test_a_what_if_shows_differences_and_invents_nothing(capsys: pytest.CaptureF
 
 
 def test_another_scene_is_a_what_if_as_well(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from coneskin.replay.replay import read_run
+    from coneskin.replay.run import read_run
 
     scene = tmp_path / "scene.toml"
     scene.write_text(read_run(COLLISION).header["scene"].replace('kind = "retreat"', 'kind = "stop"'))

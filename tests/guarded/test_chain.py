@@ -12,7 +12,7 @@ import time
 import pytest
 
 from coneskin.errors import Collision, RobotConnectionError, RobotRefused, SkinConnectionError
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START

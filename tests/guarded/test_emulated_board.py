@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from coneskin.errors import Collision, RobotRefused
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 from coneskin.session.session import guard
 from coneskin.testing.firmware.emulated_board import BoardPrograms, EmulatedBoard
 from coneskin.testing.firmware.firmware_build import build_emulator, build_sketch, missing_tools

@@ -15,7 +15,7 @@ import time
 import pytest
 
 from coneskin.errors import Collision, RobotRefused
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 from coneskin.session.session import guard
 from coneskin.testing.forearm import START
 

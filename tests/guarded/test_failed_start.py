@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.errors import SkinConnectionError
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 

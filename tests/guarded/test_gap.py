@@ -6,7 +6,8 @@ from coneskin.cli import main
 from coneskin.recording import Block, decode_blocks, encode_block
 from coneskin.recording_file.reader import read_recording
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import Verdict, read_run, replay
+from coneskin.replay.replay import Verdict
+from coneskin.replay.run import read_run, replay
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.guard.overflow import RecordingOverflowFilter
 

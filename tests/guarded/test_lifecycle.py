@@ -13,7 +13,7 @@ import pytest
 
 from coneskin import child_process
 from coneskin.errors import Collision, RobotConnectionError, RobotRefused
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START
 

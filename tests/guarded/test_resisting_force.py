@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from coneskin.errors import Collision
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 from coneskin.session.session import guard
 from coneskin.testing.forearm import START
 

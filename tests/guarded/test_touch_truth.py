@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import EventName
 from coneskin.runs.touch_labels import true_touches
 from coneskin.runs.what_if import judge_run

@@ -9,7 +9,7 @@ import pytest
 
 from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 from coneskin.robot.guard.journal import BlockKind, EventName
 from coneskin.scene.body import BodyScene
 from coneskin.scene.reader import parse_scene

@@ -12,7 +12,7 @@ from coneskin.recording_file.defect import DefectKind
 from coneskin.recording_file.reader import read_recording
 from coneskin.recording_file.recorder import Recorder
 from coneskin.recording_file.retention import prune_file
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.session.event_log import EventLog, discard_recording, new_recording
 from coneskin.session.retention import prune_run

@@ -18,7 +18,7 @@ from coneskin.errors import ConeSkinError, SceneError
 from coneskin.recording import Block
 from coneskin.recording_file.reader import read_recording
 from coneskin.replay.event_text import describe
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 
 RUN = Path(__file__).parents[1] / "data" / "collision.rec"
 

@@ -15,7 +15,8 @@ from coneskin.errors import RecordingError
 from coneskin.recording import Block
 from coneskin.recording_file.defect import Defect, DefectKind
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import Run, Verdict, read_run, replay
+from coneskin.replay.replay import Verdict
+from coneskin.replay.run import Run, read_run, replay
 from coneskin.robot.guard.journal import BlockKind, GuardEvent
 from coneskin.runs.comparison import compare_decisions
 from coneskin.runs.comparison_text import comparison_lines

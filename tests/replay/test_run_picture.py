@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.errors import MissingExtra, RecordingError
 from coneskin.recording import Block
-from coneskin.replay.replay import Run, read_run
+from coneskin.replay.run import Run, read_run
 from coneskin.replay.run_picture import draw_run
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.ur_models import arm_model

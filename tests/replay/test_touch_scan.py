@@ -9,7 +9,7 @@ import pytest
 from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
 from coneskin.replay import touch_scan
-from coneskin.replay.replay import Run, read_run
+from coneskin.replay.run import Run, read_run
 from coneskin.replay.touch_scan import scan_touches
 from coneskin.robot.guard.journal import BlockKind, EventName
 from coneskin.skin.frame_batch import find_frames

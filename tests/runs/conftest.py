@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.replay.replay import Run, read_run
+from coneskin.replay.run import Run, read_run
 from coneskin.runs.decisions import Decisions, decide_again
 
 COLLISION = Path(__file__).parents[1] / "data" / "collision.rec"

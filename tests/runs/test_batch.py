@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from coneskin.errors import RecordingError
-from coneskin.replay.replay import Run
+from coneskin.replay.run import Run
 from coneskin.runs.batch import judge_runs
 from coneskin.runs.comparison_text import comparison_lines
 from coneskin.runs.what_if import judge_run, what_if

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.replay.replay import Run
+from coneskin.replay.run import Run
 from coneskin.runs.batch import judge_runs
 from coneskin.runs.block_progress import Progress
 from coneskin.runs.cut import cut_run

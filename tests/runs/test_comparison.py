@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.recording_file.defect import Defect, DefectKind
 from coneskin.replay.quantities import Tolerances
-from coneskin.replay.replay import Run, read_run
+from coneskin.replay.run import Run, read_run
 from coneskin.robot.guard.journal import EventName, GuardEvent
 from coneskin.runs.arm_command import ArmCommand, first_divergence, recorded_commands
 from coneskin.runs.comparison import compare_decisions

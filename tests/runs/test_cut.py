@@ -8,7 +8,7 @@ import pytest
 from coneskin.code_version import running_version
 from coneskin.errors import RecordingError
 from coneskin.recording_file.defect import Defect, DefectKind
-from coneskin.replay.replay import Run, read_run, replay
+from coneskin.replay.run import Run, read_run, replay
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.runs.cut import cut_run
 from coneskin.runs.run_summary import summarise_run

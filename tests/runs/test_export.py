@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from coneskin.errors import RecordingError
-from coneskin.replay.replay import Run
+from coneskin.replay.run import Run
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.runs.export import export_run
 from coneskin.runs.tables import Table, arm_states, run_tables, skin_frames, table_pieces

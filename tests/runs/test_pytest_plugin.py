@@ -52,7 +52,7 @@ def project(tmp_path: Path) -> Project:
 
 def golden(project: Project, change: object = None) -> None:
     """Write golden events that are the recorded ones, changed."""
-    from coneskin.replay.replay import read_run
+    from coneskin.replay.run import read_run
     from coneskin.runs.event_file import event_facts
 
     run = read_run(COLLISION)

@@ -12,7 +12,7 @@ import pytest
 from coneskin.errors import RecordingError
 from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import Run, read_run
+from coneskin.replay.run import Run, read_run
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.runs.cut import cut_run
 from coneskin.runs.touch_labels import true_touches

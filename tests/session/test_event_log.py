@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.channel import Channel, pair
 from coneskin.recording import Block, encode_block
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import BlockKind, GuardEvent
 from coneskin.session.event_log import EventLog, new_recording
 from coneskin.session.guard_monitor import GuardMonitor

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent
 from coneskin.view.contact_mark import FADING, ContactLog

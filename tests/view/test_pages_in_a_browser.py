@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import BlockKind, EventName
 from coneskin.view.html_file import write_html
 from coneskin.view.live_page import LivePage

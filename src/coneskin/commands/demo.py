@@ -21,7 +21,7 @@ from coneskin.robot.guard.journal import EventName, describe_way
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
     from coneskin.robot.guard.journal import GuardEvent
     from coneskin.scene.scene import Scene
 
@@ -92,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo."""
-    from coneskin.replay.replay import read_run, replay
+    from coneskin.replay.run import read_run, replay
     from coneskin.robot.sim.process import SimulatedController, free_host
     from coneskin.scene.reader import parse_scene
 

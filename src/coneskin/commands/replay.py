@@ -98,7 +98,7 @@ def _list_runs(folder: Path) -> int:
 
 
 def _replay_one(args: argparse.Namespace) -> int:
-    from coneskin.replay.replay import read_run, replay
+    from coneskin.replay.run import read_run, replay
     from coneskin.runs.progress_bar import ProgressBar
 
     recorded = read_run(args.runs[0], ProgressBar("read"))

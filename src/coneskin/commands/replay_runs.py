@@ -18,7 +18,7 @@ __all__ = ["replay_many", "replay_with_settings"]
 def replay_with_settings(path: Path, words: Sequence[str], scene_file: Path | None, listed: bool, as_json: bool) -> int:
     """Say what a run would have been with other settings, or another scene, and return the exit code 0."""
     from coneskin.replay.event_text import describe
-    from coneskin.replay.replay import read_run
+    from coneskin.replay.run import read_run
     from coneskin.runs.comparison import compare_decisions, without_invented
     from coneskin.runs.comparison_text import comparison_facts, comparison_lines
     from coneskin.runs.decisions import decide_again, recorded_decisions

@@ -14,7 +14,7 @@ from coneskin.terminal_text import printable
 from .arguments.runs import INCOMPLETE, add_arguments
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
     from coneskin.runs.decisions import Decisions
     from coneskin.runs.progress_bar import ProgressBar
     from coneskin.runs.run_summary import RunSummary
@@ -63,7 +63,7 @@ def _summary(path: Path) -> RunSummary:
 
 
 def _read(path: Path) -> Run:
-    from coneskin.replay.replay import read_run
+    from coneskin.replay.run import read_run
 
     return read_run(path, _bar(f"reading {path}"))
 

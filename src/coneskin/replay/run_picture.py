@@ -16,7 +16,7 @@ from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.guard.journal import BlockKind, GuardEvent, stopping_contact
 from coneskin.scene.scene import Scene
 
-from .replay import Run
+from .run import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

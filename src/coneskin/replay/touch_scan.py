@@ -17,7 +17,7 @@ from coneskin.robot.guard.journal import BlockKind
 from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.frame_batch import FrameBatch, find_frames
 
-from .replay import Run
+from .run import Run
 
 if TYPE_CHECKING:
     import numpy as np

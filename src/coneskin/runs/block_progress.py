@@ -9,7 +9,7 @@ from coneskin.recording import Block
 from coneskin.recording_file.reader import RecordedBlocks
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
 
 __all__ = ["Progress", "silent", "watch"]
 

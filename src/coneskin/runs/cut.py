@@ -33,7 +33,7 @@ from .decisions import Decisions, decide_again, recorded_decisions
 from .event_pairs import SKIN_EVENTS
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
 
 __all__ = ["CUT_TOLERANCES", "CutRun", "cut_run", "first_touch"]
 

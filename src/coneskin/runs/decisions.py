@@ -15,7 +15,7 @@ from .arm_command import ArmCommand, command_of, recorded_commands
 from .block_progress import Progress, silent, watch
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
     from coneskin.scene.scene import Scene
 
 __all__ = ["Decisions", "decide_again", "recorded_decisions", "scene_with"]

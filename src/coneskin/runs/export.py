@@ -16,7 +16,7 @@ from .block_progress import Progress, silent
 from .tables import Pieces, Table, table_pieces
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
 
 __all__ = ["FORMATS", "export_run"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from coneskin.errors import RecordingError
 from coneskin.replay.quantities import Tolerances
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 
 from .comparison import Comparison, compare_decisions, without_invented
 from .comparison_text import comparison_lines

@@ -26,7 +26,7 @@ from .foxglove_schemas import SCHEMAS
 from .tables import arm_states, skin_frames, slider_positions, wall_clock
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
     from coneskin.robot.driver.state import ControllerState
     from coneskin.scene.build import SensorOnArm
 

@@ -166,7 +166,7 @@ def replayed() -> Callable[..., Decisions]:
     """
 
     def replay_file(path: Path | str, settings: Mapping[str, Any] | None = None) -> Decisions:
-        from coneskin.replay.replay import read_run
+        from coneskin.replay.run import read_run
 
         from .decisions import decide_again
 

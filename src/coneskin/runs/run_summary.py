@@ -16,7 +16,7 @@ from .block_progress import Progress, silent, watch
 from .run_files import run_name
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
 
 __all__ = ["RunSummary", "summarise_run"]
 

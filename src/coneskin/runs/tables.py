@@ -24,7 +24,7 @@ from .arm_command import recorded_commands
 from .block_progress import Progress, silent, watch
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
     from coneskin.robot.driver.state import ControllerState
 
 __all__ = [

@@ -16,7 +16,7 @@ from coneskin.robot.guard.journal import BlockKind, EventName
 from .decisions import Decisions
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
 
 __all__ = ["TouchLabel", "label_path", "read_labels", "recorded_labels", "true_touches"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import ConeSkinError
 from coneskin.replay.quantities import Tolerances
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import EventName
 
 from .block_progress import Progress, silent
@@ -19,7 +19,7 @@ from .run_files import run_name
 from .touch_labels import TouchLabel, label_path, read_labels, recorded_labels, true_touches
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Run
+    from coneskin.replay.run import Run
 
 __all__ = ["AS_RECORDED", "broken_rows", "judge_run", "variant_name", "what_if"]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from coneskin.errors import RecordingError
 from coneskin.recording import Block
-from coneskin.replay.replay import Run
+from coneskin.replay.run import Run
 from coneskin.robot.guard.journal import BlockKind
 
 from .history import History

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from coneskin.errors import RecordingError
 from coneskin.geometry.pose import Vector
-from coneskin.replay.replay import Run, read_run
+from coneskin.replay.run import Run, read_run
 from coneskin.robot.guard.journal import EventName
 
 from .history import History, history_of

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coneskin.recording import Block
-from coneskin.replay.replay import read_run
+from coneskin.replay.run import read_run
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.journal import INPUTS, BlockKind
