@@ -18,7 +18,7 @@ from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 
 from .controller import Controller
 from .memory_bound import SIMULATOR, bounded_memory
-from .options import START_Q, Options, Version
+from .options import DEFAULT_MODEL, START_Q, Options, Version
 from .server import PORTS, Server, is_loopback
 
 __all__ = ["EXAMPLE", "add_arguments", "main", "run"]
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     add = parser.add_argument
     add("--host", default="127.0.0.1", help="address to listen on; others can reach all but 127.* (%(default)s)")
-    add("--model", default="ur10e", help=f"arm: {', '.join(MODEL_NAMES)} (%(default)s)")
+    add("--model", default=DEFAULT_MODEL, help=f"arm: {', '.join(MODEL_NAMES)} (%(default)s)")
     add("--version", default="5.25", metavar="MAJOR.MINOR", help="PolyScope version to report (%(default)s)")
     add(
         "--quirks",

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-__all__ = ["START_Q", "Options", "Version"]
+__all__ = ["DEFAULT_MODEL", "START_Q", "Options", "Version"]
 
 Version = tuple[int, int]
 
+#: arm that is simulated where none is named
+DEFAULT_MODEL = "UR5e"
 #: default joint positions at the start [rad]; clear of every singular position
 START_Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 
@@ -35,7 +37,7 @@ class Options:
         robot_api_port: on which the robot API of PolyScope X is served; 0 where it is not.
     """
 
-    model: str = "ur10e"
+    model: str = DEFAULT_MODEL
     version: Version = (5, 25)
     start_q: Sequence[float] = START_Q
     quirks: Literal["real", "fixed"] = "real"

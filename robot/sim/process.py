@@ -24,6 +24,7 @@ from typing import Any
 
 from coneskin.errors import RobotConnectionError, RobotTimeout
 
+from .options import DEFAULT_MODEL
 from .server import PORTS
 
 __all__ = ["SimulatedController", "free_host"]
@@ -81,7 +82,7 @@ class SimulatedController:
 
     def __init__(
         self,
-        model: str = "ur10e",
+        model: str = DEFAULT_MODEL,
         host: str = "127.0.0.1",
         start_q: Sequence[float] | None = None,
         *,

@@ -122,13 +122,20 @@ class MoveFunctions:
         yield from self._move(make, r, target=list(goal), a=a, v=v)
 
     def _sustain(self, motion: Any, t: float) -> Wait:
-        """Let a motion without an end drive the arm until it has reached its speed, or for a time t [s]."""
+        """Let a motion without an end drive the arm until it has reached its speed, or for a time t [s].
+
+        The time is that of the program, which the speed slider stretches: at 25 % one cycle of it lasts four. So a
+        program that gives a speed for each cycle goes the whole of its way. What goes beyond t counts for the next.
+        """
         self._arm.motion = motion
         cycles = max(1, round(t / CYCLE))
+        passed = motion.surplus if t > 0.0 else 0.0
+        motion.surplus = 0.0
         while True:
             yield
-            cycles -= 1
-            if cycles <= 0 and (t > 0.0 or getattr(motion, "reached", True)):
+            passed += self._host.speed_scaling if t > 0.0 and motion.scaled else 1.0
+            if passed >= cycles - 1e-9 and (t > 0.0 or getattr(motion, "reached", True)):
+                motion.surplus = max(0.0, passed - cycles)
                 return
             self._program.drive()
             if self._arm.motion is not motion:

@@ -50,6 +50,10 @@ class ScriptHost(Protocol):
     payload_inertia: tuple[float, ...]
 
     @property
+    def speed_scaling(self) -> float:
+        """Share of the commanded speeds at which the arm moves, 0..1."""
+
+    @property
     def history(self) -> Sequence[list[float]]:
         """Joint positions of the last cycles, oldest first [rad]."""
 

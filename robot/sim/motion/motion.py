@@ -25,10 +25,21 @@ from .stop_cause import SUDDEN_CHANGE
 __all__ = ["ServoJoints", "SpeedJoints", "SpeedTool", "StopJoints", "StopTool"]
 
 
-class SpeedJoints:
-    """Constant joint speeds, reached with one acceleration of the leading joint and held (speedj)."""
+class Sustained:
+    """Motion that goes on while the program repeats its command.
+
+    Attributes:
+        scaled: the speed slider acts on it, and stretches the time of its commands.
+        surplus: part of the present cycle that the next command has already been given.
+    """
 
     done = brakes = False
+    scaled = True
+    surplus = 0.0
+
+
+class SpeedJoints(Sustained):
+    """Constant joint speeds, reached with one acceleration of the leading joint and held (speedj)."""
 
     def __init__(self, target: Sequence[float], acceleration: float) -> None:
         self.retarget(target, acceleration)
@@ -52,10 +63,9 @@ class SpeedJoints:
         return integrate(arm.q, arm.qd, qd), qd
 
 
-class SpeedTool:
+class SpeedTool(Sustained):
     """Constant velocity and angular velocity of the tool centre point in the base frame (speedl)."""
 
-    done = brakes = False
     of_tool = True
 
     def __init__(self, arm: SimulatedArm, target: Sequence[float], acceleration: float, angular: float) -> None:
@@ -84,7 +94,7 @@ class SpeedTool:
         return integrate(arm.q, arm.qd, qd), qd
 
 
-class ServoJoints:
+class ServoJoints(Sustained):
     """Follower of a stream of positions, smoothed by look-ahead time and gain (servoj).
 
     As the URScript manual has it: the gain is the P-term towards the position, and the look-ahead time projects the
@@ -97,7 +107,7 @@ class ServoJoints:
         MotionFault: from ``step``: such a target.
     """
 
-    done = brakes = False
+    scaled = False
 
     def __init__(self, target: Sequence[float], lookahead: float, gain: float) -> None:
         self._followed: list[float] | None = None  # target of the last cycle

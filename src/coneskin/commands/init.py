@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.errors import GeometryError
+from coneskin.robot.sim.options import DEFAULT_MODEL
 
 if TYPE_CHECKING:
     from coneskin.design.first_scene import ArmAddress, DesignFolder
@@ -26,7 +27,6 @@ The scene names the sensors of the design, their link, poses and electronics; th
 existing scene is not replaced without --force. Exit code: 0 written, 1 not written.
 """
 _SIMULATED_HOST = "127.0.0.1"
-_SIMULATED_MODEL = "UR5e"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--arm",
         metavar="MODEL",
-        help=f"model of the arm, such as UR10e; with --simulated {_SIMULATED_MODEL} by default",
+        help=f"model of the arm, such as UR10e; with --simulated {DEFAULT_MODEL} by default",
     )
     add("--host", metavar="ADDRESS", help=f"of the controller; with --simulated {_SIMULATED_HOST} by default")
     add(
@@ -88,7 +88,7 @@ def _arm(args: argparse.Namespace) -> ArmAddress | None:
         if args.arm or args.host:
             raise GeometryError("--skin-only is a scene without an arm: leave --arm and --host out")
         return None
-    model = args.arm or (_SIMULATED_MODEL if args.simulated else "")
+    model = args.arm or (DEFAULT_MODEL if args.simulated else "")
     host = args.host or (_SIMULATED_HOST if args.simulated else "")
     missing = [name for name, value in (("--arm MODEL", model), ("--host ADDRESS", host)) if not value]
     if missing:

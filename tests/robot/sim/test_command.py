@@ -44,7 +44,7 @@ needs_proc = pytest.mark.skipif(not (PROC / "self" / "stat").exists(), reason="l
 def test_two_arms_run_side_by_side_and_end_with_their_context() -> None:
     with SimulatedController(host=free_host()) as one, SimulatedController("ur5", free_host(), (0.5,) * 6) as two:
         assert one.host != two.host
-        assert (one.facts["model"], two.facts["model"]) == ("UR10e", "UR5")
+        assert (one.facts["model"], two.facts["model"]) == ("UR5e", "UR5")
         assert two.state()["q"] == pytest.approx([0.5] * 6)
         pids = [one.pid, two.pid]
     assert all(ends(pid) for pid in pids)
@@ -55,7 +55,7 @@ def test_it_ends_cleanly_on_a_signal(number: signal.Signals) -> None:
     host = free_host()
     process = subprocess.Popen([*COMMAND, "--host", host], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    assert process.stdout.readline().startswith(f"simulated UR10e (PolyScope 5.25) ready on {host}: RTDE 30004")
+    assert process.stdout.readline().startswith(f"simulated UR5e (PolyScope 5.25) ready on {host}: RTDE 30004")
     process.send_signal(number)
     said, problem = process.communicate(timeout=10)
     assert (process.returncode, said, problem) == (0, "", "")
@@ -123,11 +123,11 @@ def test_a_taken_port_is_one_line_that_names_it() -> None:
         (["--version", "five"], "--version must be MAJOR.MINOR such as 5.25, got 'five'"),
         (
             ["--start-q-deg", "0", "0", "200", "0", "0", "0"],
-            "--start-q-deg: joint 3 of the UR10e must be from -180 to 180 deg, got 200 deg",
+            "--start-q-deg: joint 3 of the UR5e must be from -180 to 180 deg, got 200 deg",
         ),
         (
             ["--start-q-deg", "0", "nan", "0", "0", "0", "0"],
-            "joint 2 of the UR10e must be from -360 to 360 deg, got nan",
+            "joint 2 of the UR5e must be from -360 to 360 deg, got nan",
         ),
         (["--log", "/nowhere/at/all"], "--log /nowhere/at/all cannot be written"),
         (["--program", "/nowhere/at/all"], "--program /nowhere/at/all cannot be read"),

@@ -421,7 +421,7 @@ def test_a_move_with_a_blend_that_nothing_follows_ends_at_its_goal(bench: Bench)
     while not bench.controller.output_ints[0]:
         bench.step(1)
     assert bench.controller.arm.q[0] < 1.49
-    bench.step(240)
+    bench.step(300)
     assert bench.controller.arm.q[0] == pytest.approx(1.5)
     bench = Bench()
     bench.send(f"movej({FAR}, a=5, v=1, r=0.2)\n")  # the program's last statement
@@ -484,3 +484,23 @@ def test_pause_holds_the_program_where_it_stands(bench: Bench) -> None:
     assert bench.dashboard("play") == "Starting program"
     bench.step(2)
     assert bench.controller.output_ints[0] == 2
+
+
+@pytest.mark.parametrize("slider", [1.0, 0.5, 0.3, 0.25])
+def test_speeds_for_each_cycle_go_their_whole_way_at_any_slider(bench: Bench, slider: float) -> None:
+    """As a trajectory of Universal Robots' driver: 0.2 (1 - cos(pi t)) rad in 2 s of its own time."""
+    bench.send(
+        "def p():\n  t = 0\n  while t < 2:\n    t = t + 0.002\n"
+        "    speedj([0.2 * 3.14159265 * sin(3.14159265 * t), 0, 0, 0, 0, 0], 10, 0.002)\n"
+        "    write_output_float_register(0, t)\n  end\n  stopj(10)\nend\n"
+    )
+    controller, start, worst = bench.controller, bench.controller.arm.q[0], 0.0
+    controller.slider = slider
+    cycles = 0
+    while controller.runtime.name == "PLAYING" or cycles < 10:
+        bench.step(1)
+        cycles += 1
+        wanted = 0.2 * (1.0 - math.cos(math.pi * controller.output_doubles[0]))
+        worst = max(worst, abs(controller.arm.q[0] - start - wanted))
+    assert worst < 0.003
+    assert cycles == pytest.approx(1000 / slider, abs=10)

@@ -28,14 +28,14 @@ STOP_J = 34  # number of the command in the wheel's program
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedController]:
     log = tmp_path_factory.mktemp("sim") / "log.jsonl"
-    with SimulatedController(host=free_host(), start_q=HOME, log=log, unlock_after=1.5) as controller:
+    with SimulatedController("ur10e", free_host(), HOME, log=log, unlock_after=1.5) as controller:
         yield controller
 
 
 @pytest.fixture
 def fresh(tmp_path: Path) -> Iterator[SimulatedController]:
     """One that a test may break."""
-    with SimulatedController(host=free_host(), start_q=HOME, log=tmp_path / "log.jsonl") as controller:
+    with SimulatedController("ur10e", free_host(), HOME, log=tmp_path / "log.jsonl") as controller:
         yield controller
 
 
@@ -293,7 +293,7 @@ def test_forward_kinematics_without_a_tool_uses_stale_registers(simulated: Simul
 def test_the_corrected_program_has_none_of_these(tmp_path: Path) -> None:
     asked = [0.4, -1.1, 1.2, -1.5, -1.2, 0.3]
     log = tmp_path / "log.jsonl"
-    with SimulatedController(host=free_host(), start_q=HOME, quirks="fixed", log=log) as corrected:
+    with SimulatedController("ur10e", free_host(), HOME, quirks="fixed", log=log) as corrected:
         got = wheel.run("stop_in_speed_mode", corrected.host)
         assert got == {"running": True, "stands": True, "moves": True}
         wheel.run("stop_types", corrected.host)
@@ -308,7 +308,7 @@ def test_the_corrected_program_has_none_of_these(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("version", ["3.15", "5.4", "5.22", "10.11"])
 def test_other_versions_connect_and_move(version: str) -> None:
-    with SimulatedController(host=free_host(), start_q=HOME, version=version) as old:
+    with SimulatedController("ur10e", free_host(), HOME, version=version) as old:
         assert wheel.run("connect_and_move", old.host) == {"moved": True, "off": pytest.approx(0.0, abs=ROUNDING)}
 
 
