@@ -13,6 +13,7 @@ __all__ = ["ScriptSocket", "may_connect"]
 
 _PENDING = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 MAX_UNREAD = 65_536  #: bytes that have come and that the program has not read; more wait in the network
+MAX_READS = 10  #: of one connection in a control cycle; an assumption, so that a program that is sent more gives way
 
 
 def may_connect(address: str, beyond: bool) -> str:
@@ -56,6 +57,7 @@ class ScriptSocket:
         self._peer = (address, port)
         self.unread = bytearray()
         self.ended = False
+        self._cycle = self._reads = 0
 
     def connect(self) -> bool | None:
         """Return whether it is connected; None while that is not known yet."""
@@ -76,6 +78,13 @@ class ScriptSocket:
             if not data:
                 self.ended = True
             self.unread += data
+
+    def gives_way(self, cycle: int) -> bool:
+        """Count a read of what has come; return whether it has to wait for the next control cycle."""
+        if cycle != self._cycle:
+            self._cycle, self._reads = cycle, 0
+        self._reads += 1
+        return bool(self.unread) and self._reads > MAX_READS
 
     def take(self, count: int) -> bytes:
         """Return the first bytes of what has come, and forget them."""

@@ -1,7 +1,8 @@
 """URScript functions of sockets: a program is the client of a server.
 
 A read that has nothing to return by its timeout, or whose server has gone, returns at the earliest in the next cycle,
-so that a program which reads for ever gives way. A timeout of 0 waits without an end.
+so that a program which reads for ever gives way; so does one that is sent more than it reads. A timeout of 0 waits
+without an end.
 
 Source: Universal Robots, "The URScript Programming Language", module interfaces (socket_close to socket_set_var).
 """
@@ -197,6 +198,9 @@ class SocketFunctions:
             connection = self._program.sockets.get(str(name))
             if connection is not None:
                 connection.fill()
+                if connection.gives_way(self._host.cycle):
+                    yield
+                    continue
                 if take(connection):
                     return
             yield

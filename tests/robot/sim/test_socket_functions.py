@@ -11,7 +11,7 @@ import pytest
 
 from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.functions.builtins import Builtins
-from coneskin.robot.sim.functions.script_socket import MAX_UNREAD
+from coneskin.robot.sim.functions.script_socket import MAX_READS, MAX_UNREAD
 from coneskin.robot.sim.options import Options
 from coneskin.robot.sim.urscript.translator import translate
 
@@ -133,6 +133,20 @@ def test_a_server_that_sends_without_end_fills_no_memory(peer: Peer) -> None:
         assert len(program.sockets["peer"].unread) <= MAX_UNREAD
     peer.controller.stop_program("test")
     assert not program.sockets
+
+
+def test_a_program_that_is_sent_more_than_it_reads_gives_way_and_misses_nothing(peer: Peer) -> None:
+    server = peer.run(
+        'while True:\na = socket_read_binary_integer(1, "peer", 0.002)\nif a[0] > 0:\n'
+        "write_output_integer_register(0, read_output_integer_register(0) + 1)\n"
+        "write_output_integer_register(1, a[1])\nend\nend"
+    )
+    server.sendall(struct.pack(">1000i", *range(1000)))
+    peer.step(5)
+    assert peer.controller.output_ints[0] <= 5 * MAX_READS
+    peer.step(200)
+    assert peer.controller.output_ints[:2] == [1000, 999]
+    assert peer.controller.program is not None
 
 
 def test_a_program_has_a_bounded_number_of_sockets(peer: Peer) -> None:
