@@ -61,13 +61,14 @@ MAY_IMPORT: dict[str, str] = {
     "runs": "code_version replay scene recording_file geometry robot.arm robot.driver robot.guard robot.sim skin "
     "skin.detection skin.virtual",
     "monitor": "recording_file robot.guard scene session skin skin.detection skin.diagnosis skin.sources skin.virtual",
+    "view.stage": "scene robot.arm skin skin.field geometry",
     "studio": "view design geometry geometry.fit geometry.drawing",
-    "view": "replay scene recording_file robot.arm robot.driver robot.guard skin geometry",
+    "view": "view.stage replay scene recording_file robot.arm robot.driver robot.guard skin geometry",
     "design": "design.workshop scene skin skin.firmware geometry geometry.fit geometry.drawing robot.arm",
     "design.workshop": "design scene skin skin.diagnosis geometry geometry.drawing",
     "commands": "physics calibration commissioning design doctor monitor scene session replay runs studio view "
-    "geometry geometry.fit geometry.drawing skin skin.field skin.firmware skin.detection skin.sources robot.arm "
-    "robot.driver robot.guard robot.sim commands.arguments",
+    "view.stage geometry geometry.fit geometry.drawing skin skin.field skin.firmware skin.detection skin.sources "
+    "robot.arm robot.driver robot.guard robot.sim commands.arguments",
     "commands.arguments": "design geometry geometry.drawing scene skin",
     "testing": "scene robot.arm robot.driver robot.guard robot.reaction robot.stop robot.ur skin skin.detection "
     "skin.sources skin.virtual geometry",

@@ -7,6 +7,7 @@ again: ``GuardCore.take`` is fed the same blocks, live and in a replay.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from enum import IntEnum, StrEnum
 from typing import Any, NamedTuple
@@ -20,8 +21,10 @@ __all__ = [
     "BlockKind",
     "EventName",
     "GuardEvent",
+    "contact_force",
     "decode_event",
     "describe_way",
+    "force_block",
     "stopping_contact",
 ]
 
@@ -43,7 +46,7 @@ class BlockKind(IntEnum):
     HEADER = 20  #: JSON: the scene and the versions
     OVERRUN = 21  #: JSON: how late the loop was
     SURFACE = 22  #: heights of a mesh below a sensor, see ``coneskin.scene.surface_record``
-    TRUTH = 23  #: JSON: with what a virtual skin was touched, whether it was noticed or not
+    TRUTH = 23  #: JSON: with what a virtual skin was touched, whether it was noticed or not; the force of a contact
     ECHO = 30  #: payload of the heartbeat's connection, for the driver's ``decode_heartbeat``
     SUSPENDED = 31  #: for how long the loop did nothing [s], by a clock that goes on while the computer sleeps
     REOPENED = 32  #: what was lost is open again; the payload says which: the skin
@@ -152,6 +155,21 @@ def stopping_contact(stop: GuardEvent, events: Sequence[GuardEvent]) -> GuardEve
         return None
     same = [event for event in events if event.name in _CONTACTS and event.details["number"] == contact["number"]]
     return max(same, key=lambda event: event.name == EventName.CONTACT_LOCATED, default=None)
+
+
+def force_block(time: float, force: float) -> Block:
+    """Return the block that records which force physics found between the arm and what it meets [N]."""
+    return Block(BlockKind.TRUTH, time, json.dumps({"contact_force_N": force}).encode())
+
+
+def contact_force(payload: bytes) -> float | None:
+    """Return the force in what ``force_block`` has recorded [N]; None for another truth, and for nonsense."""
+    try:
+        force = json.loads(payload).get("contact_force_N")
+    except (ValueError, AttributeError, RecursionError):
+        return None
+    known = isinstance(force, int | float) and math.isfinite(force) and force >= 0.0
+    return float(force) if known else None
 
 
 def decode_event(block: Block) -> GuardEvent:

@@ -21,7 +21,7 @@ from coneskin.time_argument import positive_seconds
 if TYPE_CHECKING:
     from coneskin.view.live_run import LiveRun
     from coneskin.view.page_server import PageServer
-    from coneskin.view.stage import Stage
+    from coneskin.view.stage.stage import Stage
 
 __all__ = ["add_arguments", "run"]
 
@@ -119,7 +119,7 @@ def _follow_scene(args: argparse.Namespace, path: Path) -> int:
     from coneskin.scene.build import place_on_arm
     from coneskin.scene.reader import load_scene
     from coneskin.view.live_run import LiveRun, find_live_run
-    from coneskin.view.stage import set_stage
+    from coneskin.view.stage.stage import set_stage
 
     scene = load_scene(path)
     stage = set_stage(scene, place_on_arm(scene), str(path), meshes=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from coneskin.bounded_file import read_file
 from coneskin.errors import RecordingError
 from coneskin.recording import is_time
-from coneskin.robot.guard.journal import BlockKind, EventName
+from coneskin.robot.guard.journal import BlockKind, EventName, contact_force
 
 from .decisions import Decisions
 
@@ -71,7 +71,7 @@ def true_touches(run: Run) -> list[TouchLabel] | None:
     Raises:
         RecordingError: what the recording tells is damaged.
     """
-    told = list(run.select(kinds=_TRUTH))
+    told = [block for block in run.select(kinds=_TRUTH) if contact_force(block.payload) is None]
     if not told:
         return None
     labels: list[TouchLabel] = []

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.errors import RecordingError, RobotConnectionError
 from coneskin.recording import Block
-from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, decode_event
+from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, contact_force, decode_event
 
 from .contact_mark import ContactLog, ContactMark
 from .phase_words import UNKNOWN, PhaseWords, phase_after
@@ -85,6 +85,7 @@ class History:
         speeds: measured joint speeds [rad/s].
         levels: by the names of the sensors: touch level.
         channels: by the names of the sensors: fractions of the supply, in the order of ``CHANNELS``.
+        forces: between the arm and what it met, where the run was in physics [N].
         events: the newest.
         phases: when each began.
         since: time of the first block [s, host clock].
@@ -92,7 +93,7 @@ class History:
     """
 
     def __init__(self, scene: Scene, keep: float = math.inf) -> None:
-        self.joints, self.speeds = Series(), Series()
+        self.joints, self.speeds, self.forces = Series(), Series(), Series()
         self.sensors = [item.sensor for item in scene.sensors]
         self.levels = {sensor.name: Series() for sensor in self.sensors}
         self.channels = {sensor.name: Series() for sensor in self.sensors}
@@ -128,6 +129,10 @@ class History:
             with suppress(RecordingError):
                 self._take_event(decode_event(block))
 
+        elif block.kind == BlockKind.TRUTH and (force := contact_force(block.payload)) is not None:
+            self.forces.times.append(block.time)
+            self.forces.values.append((force,))
+
     def take_all(self, blocks: Iterable[Block]) -> None:
         """Take blocks, and read the skin's bytes among them."""
         for block in blocks:
@@ -143,7 +148,7 @@ class History:
             self._read_skin(times, parts)
         if math.isfinite(self._keep) and self.until - self.since > _SPARE * self._keep:
             self.since = self.until - self._keep
-            for series in (self.joints, self.speeds, *self.levels.values(), *self.channels.values()):
+            for series in (self.joints, self.speeds, self.forces, *self.levels.values(), *self.channels.values()):
                 series.drop_before(self.since)
 
     def q(self, time: float) -> Joints | None:
@@ -153,6 +158,13 @@ class History:
     def level(self, sensor: str, time: float) -> float:
         """Return the touch level of a sensor at a time; 0 before it was read."""
         found = self.levels[sensor].at(time)
+        return 0.0 if found is None else found[0]
+
+    def force(self, time: float) -> float | None:
+        """Return the force between the arm and what it meets at a time [N]; None where nothing tells."""
+        if not self.forces.times:
+            return None
+        found = self.forces.at(time)
         return 0.0 if found is None else found[0]
 
     def phase(self, time: float) -> PhaseWords:

@@ -5,16 +5,19 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 from coneskin.errors import ConeSkinError
 from coneskin.replay.event_text import describe
 
+from .field_choice import FieldChoice
 from .live_run import LiveRun
 from .moment import Moment
 from .page_server import PageServer
 from .panel_text import event_list, notice, status
 from .phase_words import UNKNOWN, PhaseWords
-from .stage import Stage
+from .stage.level_scale import level_bars
+from .stage.stage import Stage
 from .stage_nodes import StageNodes, look_at_stages
 from .strand import Strand
 from .timeline import timeline
@@ -25,7 +28,8 @@ __all__ = ["LivePage"]
 _PERIOD = 1.0 / 30.0  # s between two pictures
 _POLL = 0.008  # s between two looks at the recording
 _TEXT_PERIOD = 0.1  # s between two changes of the text
-_PLOT_PERIOD = 0.5  # s between two changes of timeline and traces
+_PLOT_PERIOD = 0.5  # s between two changes of timeline, traces and potentials
+_ROOT = "/run"
 _SEARCH_PERIOD = 0.3  # s between two looks for a guard
 _STALE = 0.7  # s without news after which the page says so
 _WINDOW = 20.0  # s of the timeline
@@ -54,8 +58,12 @@ class LivePage:
         gui.add_html(notice())
         self._timeline = gui.add_html("")
         self._status = gui.add_html("")
+        self._levels = gui.add_html("")
         self._events = gui.add_html("")
+        self._choices: dict[int, FieldChoice] = {}
+        self._entering = threading.Lock()  # viewers come and go in threads of their own
         self._stand(stage)
+        server.on_viewer(self._enter)
 
     def serve(self, over: threading.Event, ended: Callable[[], bool] = lambda: False) -> None:
         """Show what happens until an event is set, or ``ended`` says so.
@@ -121,8 +129,30 @@ class LivePage:
         assert self._nodes is not None
         with self._server.together():
             self._nodes.show(moment)
+        self._show_levels(now, moment)
         self._text(now, [(strand.stage.title, moment.phase, moment.health)], f"{at:9.3f} s", self._stale())
         self._draw_past(now, strand, at)
+
+    def _enter(self, client: Any) -> Callable[[], None]:
+        """Give a viewer its choice of potentials; return what takes it away."""
+        with self._entering:
+            self._choices[client.client_id] = FieldChoice(client, [(self._drawn, _ROOT)])
+
+        def leave() -> None:
+            with self._entering:
+                self._choices.pop(client.client_id, None)
+
+        return leave
+
+    def _show_levels(self, now: float, moment: Moment) -> None:
+        if now - self._texted >= _TEXT_PERIOD:
+            levels = level_bars(self._drawn.sheets, moment.levels, moment.force)
+            if levels != self._levels.content:
+                self._levels.content = levels
+        if now - self._plotted >= _PLOT_PERIOD:
+            with self._entering:
+                for choice in self._choices.values():
+                    choice.show([moment])
 
     def _stale(self) -> str:
         assert self._run is not None
@@ -164,10 +194,13 @@ class LivePage:
             return
         self._drawn = stage
         scene, reach = self._server.scene, stage.reach
+        with self._entering:
+            for choice in self._choices.values():
+                choice.stand([(stage, _ROOT)])
         scene.reset()
         scene.set_up_direction("+z")
         look_at_stages(self._server, reach)
-        self._nodes = StageNodes(scene, stage)
+        self._nodes = StageNodes(scene, stage, _ROOT)
         levels = {sheet.name: 0.0 for sheet in stage.sheets}
         self._nodes.show(Moment(0.0, stage.poses(None), levels, [], UNKNOWN, ""))
 

@@ -15,7 +15,7 @@ from coneskin.robot.guard.journal import BlockKind
 
 from .history import History
 from .recording_tail import RecordingTail
-from .stage import set_stage
+from .stage.stage import set_stage
 from .strand import Strand
 
 __all__ = ["KEPT", "LiveRun", "find_live_run", "is_live"]

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .contact_mark import ContactMark
     from .history import History
     from .phase_words import PhaseWords
-    from .stage import Stage
+    from .stage.stage import Stage
 
 __all__ = ["Moment", "moment_at"]
 
@@ -27,6 +27,7 @@ class Moment:
         marks: of contacts.
         phase: of the guard.
         health: what is wrong; empty where nothing is.
+        force: between the arm and what it meets [N]; None where nothing tells.
     """
 
     time: float
@@ -35,10 +36,13 @@ class Moment:
     marks: list[ContactMark]
     phase: PhaseWords
     health: str
+    force: float | None = None
 
 
 def moment_at(stage: Stage, history: History, time: float) -> Moment:
     """Return what is seen at a time [s, host clock]."""
     levels = {sheet.name: history.level(sheet.name, time) for sheet in stage.sheets}
     poses = stage.poses(history.q(time))
-    return Moment(time, poses, levels, history.marks(time), history.phase(time), history.health(time))
+    return Moment(
+        time, poses, levels, history.marks(time), history.phase(time), history.health(time), history.force(time)
+    )

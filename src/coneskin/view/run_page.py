@@ -13,9 +13,11 @@ from typing import Any
 from coneskin.replay.event_text import describe
 from coneskin.robot.guard.journal import EventName
 
+from .field_choice import FieldChoice
 from .page_server import PageServer
 from .panel_text import event_list, notice, status
 from .playback import SPEEDS, Playback
+from .stage.level_scale import level_bars
 from .stage_nodes import StageNodes, look_at_stages
 from .strand import Strand
 from .timeline import timeline
@@ -89,6 +91,10 @@ class _Player:
         self._buttons = gui.add_button_group("", ("play", "pause", "|<", "<", ">"))
         self._speed = gui.add_dropdown("speed", [f"{speed:g}x" for speed in SPEEDS], initial_value="1x")
         choices = ["jump to an event", *(self._choice(index) for index in self._jumps[:500])]
+        self._levels = gui.add_html("")
+        self._field = FieldChoice(
+            self._client, [(strand.stage, f"/run {number}") for number, strand in enumerate(self._strands, 1)]
+        )
         self._jump = gui.add_dropdown("event", choices, initial_value=choices[0])
         self._events = gui.add_html("")
         self._plot = TracePlot(gui, self._strands, playback.since, playback.until)
@@ -96,6 +102,7 @@ class _Player:
         self._buttons.on_click(self._pressed)
         self._speed.on_update(self._speeded)
         self._jump.on_update(self._jumped)
+        self._field.on_update(lambda _event: self._do(lambda _playback: None))
 
     def _choice(self, index: int) -> str:
         return f"{index}: {' '.join(self._lines[index][1].split())[:70]}"
@@ -154,6 +161,11 @@ class _Player:
         if playing and now - self._texted < _TEXT_PERIOD:
             return
         self._texted = now
+        self._field.show(moments)
+        self._levels.content = "".join(
+            level_bars(strand.stage.sheets, moment.levels, moment.force)
+            for strand, moment in zip(self._strands, moments, strict=True)
+        )
         playback = self._playback
         share = (at - playback.since) / max(playback.until - playback.since, 1e-9)
         runs = [

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from coneskin.geometry.pose import Pose, Vector
+from coneskin.geometry.pose import Vector
+
+from .stage.level_scale import level_colour
+from .stage.rotation import along, quaternion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,29 +17,16 @@ if TYPE_CHECKING:
     from .contact_mark import ContactMark
     from .moment import Moment
     from .page_server import PageServer
-    from .stage import Stage
+    from .stage.stage import Stage
 
-__all__ = ["StageNodes", "level_colour", "look_at_stages"]
+__all__ = ["StageNodes", "look_at_stages"]
 
 _MARKS = 6  # nodes for contacts on each link with a sheet, used again and again
-_STEPS = 24  # colours of a sheet: a change below one is not worth a message
-_QUIET, _TOUCHED, _FIRM = (46, 125, 107), (245, 158, 11), (220, 38, 38)
 _LOCATED, _UNCERTAIN, _PAST = (192, 38, 211), (249, 115, 22), (120, 113, 108)
 _NORMAL = 0.14  # m; length of the arrow along the normal
 _LEAST = 0.004  # m; half axes of an ellipse that can still be seen
 _FADES = 8  # steps in which a mark fades
 _SEGMENTS = 32
-
-
-def level_colour(level: float, touch_level: float) -> tuple[int, int, int]:
-    """Return the colour of a sheet: quiet below its touch level, then from touched to firm."""
-    if level < touch_level:
-        low, high, share = _QUIET, _TOUCHED, 0.5 * max(level, 0.0) / touch_level
-    else:
-        low, high, share = _TOUCHED, _FIRM, min(1.0, (level - touch_level) / max(0.6 - touch_level, 1e-3))
-    share = round(share * _STEPS) / _STEPS
-    red, green, blue = (round(a + share * (b - a)) for a, b in zip(low, high, strict=True))
-    return red, green, blue
 
 
 def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
@@ -109,7 +99,7 @@ class StageNodes:
         """Move and colour the nodes; what has not changed is not sent."""
         for link, frame in self._frames.items():
             pose = moment.poses[link]
-            frame.wxyz, frame.position = _quaternion(pose), pose.translation
+            frame.wxyz, frame.position = quaternion(pose), pose.translation
         for sheet in self._stage.sheets:
             colour = level_colour(moment.levels[sheet.name], sheet.touch_level)
             if colour != self._colours[sheet.name]:
@@ -147,7 +137,7 @@ class _MarkNodes:
     def _draw(self, mark: ContactMark, strength: float) -> None:
         colour = _PAST if strength < 1.0 else _LOCATED if mark.located else _UNCERTAIN
         shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
-        self._frame.position, self._frame.wxyz = mark.point, _quaternion(_along(mark.normal))
+        self._frame.position, self._frame.wxyz = mark.point, quaternion(along(mark.normal))
         arrow, faces = _arrow()
         self._scene.add_mesh_simple(f"{self._name}/normal", arrow, faces, color=colour, opacity=shade, side="double")
         patch, fan = _ellipse(mark)
@@ -157,7 +147,7 @@ class _MarkNodes:
 
 
 def _arrow() -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    from .solid import revolve
+    from .stage.solid import revolve
 
     head, shaft, width = 0.035, 0.0035, 0.010
     profile = [(0.0, 0.0), (shaft, 0.0), (shaft, _NORMAL - head), (width, _NORMAL - head), (0.0, _NORMAL)]
@@ -169,7 +159,7 @@ def _ellipse(mark: ContactMark) -> tuple[NDArray[np.float32], NDArray[np.int64]]
     """Return the ellipse of a mark in its own frame; a small disc where nothing is known of its size."""
     import numpy as np
 
-    back = _along(mark.normal).inverse()
+    back = along(mark.normal).inverse()
     axes = mark.ellipse or ((_LEAST, 0.0, 0.0), (0.0, _LEAST, 0.0))
     first, second = (np.array(back.rotate(axis) if mark.ellipse else axis) for axis in axes)
     first, second = _visible(first), _visible(second)
@@ -185,37 +175,6 @@ def _visible(axis: NDArray[np.float64]) -> NDArray[np.float64]:
 
     length = float(np.linalg.norm(axis))
     return axis * max(1.0, _LEAST / length) if length > 0.0 else np.array((_LEAST, 0.0, 0.0))
-
-
-def _along(normal: Vector) -> Pose:
-    """Return a pose whose z axis is along a direction."""
-    x, y, z = normal
-    length = math.sqrt(x * x + y * y + z * z) or 1.0
-    x, y, z = x / length, y / length, z / length
-    ax, ay, az = (1.0, 0.0, 0.0) if abs(x) < 0.7 else (0.0, 1.0, 0.0)
-    ux, uy, uz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
-    length = math.sqrt(ux * ux + uy * uy + uz * uz)
-    ux, uy, uz = ux / length, uy / length, uz / length
-    vx, vy, vz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
-    return Pose.trusted(((ux, vx, x), (uy, vy, y), (uz, vz, z)), (0.0, 0.0, 0.0))
-
-
-def _quaternion(pose: Pose) -> tuple[float, float, float, float]:
-    """Return the rotation of a pose as w, x, y, z (Shepperd's method)."""
-    (a, b, c), (d, e, f), (g, h, i) = pose.rotation
-    trace = a + e + i
-    parts = (trace, a, e, i)
-    largest = parts.index(max(parts))
-    if largest == 0:
-        w, x, y, z = 1.0 + trace, h - f, c - g, d - b
-    elif largest == 1:
-        w, x, y, z = h - f, 1.0 + a - e - i, b + d, c + g
-    elif largest == 2:
-        w, x, y, z = c - g, b + d, 1.0 - a + e - i, f + h
-    else:
-        w, x, y, z = d - b, c + g, f + h, 1.0 - a - e + i
-    size = math.sqrt(w * w + x * x + y * y + z * z)
-    return w / size, x / size, y / size, z / size
 
 
 def _single(values: NDArray[np.float64]) -> NDArray[np.float32]:

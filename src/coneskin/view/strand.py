@@ -13,7 +13,7 @@ from coneskin.robot.guard.journal import EventName
 
 from .history import History, history_of
 from .moment import Moment, moment_at
-from .stage import Stage, set_stage
+from .stage.stage import Stage, set_stage
 
 __all__ = ["Strand", "read_strands"]
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["Traces", "trace_names", "traces"]
 
 _BINS = 240  # each with its least and its largest value
-_LEVELS, _SPEEDS = "touch level", "joint speed [rad/s]"
+_LEVELS, _SPEEDS, _FORCE = "touch level", "joint speed [rad/s]", "contact force [N]"
 
 
 class Traces(NamedTuple):
@@ -37,7 +37,8 @@ def trace_names(strands: Sequence[Strand]) -> list[str]:
     """Return what can be drawn of runs."""
     sensors = [sheet.name for sheet in strands[0].stage.sheets]
     arm = [_SPEEDS] if any(strand.history.speeds.times for strand in strands) else []
-    return [_LEVELS, *arm, *(f"channels of {name}" for name in sensors)]
+    force = [_FORCE] if any(strand.history.forces.times for strand in strands) else []
+    return [_LEVELS, *force, *arm, *(f"channels of {name}" for name in sensors)]
 
 
 def traces(strands: Sequence[Strand], what: str, since: float, until: float) -> Traces:
@@ -67,6 +68,8 @@ def _columns(strand: Strand, what: str) -> list[tuple[str, Series, int]]:
     history = strand.history
     if what == _LEVELS:
         return [(name, series, 0) for name, series in history.levels.items()]
+    if what == _FORCE:
+        return [("force", history.forces, 0)]
     if what == _SPEEDS:
         return [(f"joint {joint + 1}", history.speeds, joint) for joint in range(6)]
     sensor = what.removeprefix("channels of ")

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from coneskin.scene.build import SensorOnArm
+    from coneskin.skin.sensor import Sensor
 
 __all__ = ["SheetSurface", "sheet_surfaces"]
 
@@ -30,6 +31,8 @@ class SheetSurface(NamedTuple):
         rim: line segments around the active area [m], shape (k, 2, 3).
         touch_level: from which the sensor is touched.
         slimmest: the least radius of its link there [m].
+        sensor: with its electronics, and what force its level stands for.
+        item: its place on the arm.
     """
 
     name: str
@@ -39,19 +42,21 @@ class SheetSurface(NamedTuple):
     rim: NDArray[np.float64]
     touch_level: float
     slimmest: float
+    sensor: Sensor
+    item: SensorOnArm
 
 
-def sheet_surfaces(placed: Sequence[SensorOnArm], touch_levels: Sequence[float]) -> tuple[SheetSurface, ...]:
+def sheet_surfaces(placed: Sequence[SensorOnArm], sensors: Sequence[Sensor]) -> tuple[SheetSurface, ...]:
     """Return the active areas of sensors, each in the DH frame of its link.
 
     Args:
         placed: the sensors on the arm.
-        touch_levels: of each.
+        sensors: the same ones.
     """
-    return tuple(_surface(item, level) for item, level in zip(placed, touch_levels, strict=True))
+    return tuple(_surface(item, sensor) for item, sensor in zip(placed, sensors, strict=True))
 
 
-def _surface(item: SensorOnArm, touch_level: float) -> SheetSurface:
+def _surface(item: SensorOnArm, sensor: Sensor) -> SheetSurface:
     import numpy as np
 
     cone = item.frustum.frustum
@@ -68,8 +73,9 @@ def _surface(item: SensorOnArm, touch_level: float) -> SheetSurface:
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     edges = [points[0], points[-1], points[:, 0], points[:, -1]]
     rim = np.concatenate([np.stack([edge[:-1], edge[1:]], axis=1) for edge in edges])
+    touch_level = sensor.thresholds.touch_level
     slimmest = 0.97 * min(cone.radius1, cone.radius2)
-    return SheetSurface(item.name, item.link, points.reshape(-1, 3), faces, rim, touch_level, slimmest)
+    return SheetSurface(item.name, item.link, points.reshape(-1, 3), faces, rim, touch_level, slimmest, sensor, item)
 
 
 def _count(length: float, least: int = 8) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.geometry.pose import Pose
 
+from .body_solids import body_solids
 from .sheet_surface import SheetSurface, sheet_surfaces
 from .solid import Solid
 
@@ -30,7 +31,7 @@ class Stage:
     Attributes:
         title: for people.
         model: of the arm; None where the scene has none.
-        solids: of the arm.
+        solids: of the arm, and of the bodies around it.
         sheets: on it.
     """
 
@@ -86,9 +87,9 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
         KinematicsError: nobody knows where the tubes of the arm are.
         MeshError: a mesh cannot be read.
     """
-    sheets = sheet_surfaces(placed, [item.sensor.thresholds.touch_level for item in scene.sensors])
+    sheets = sheet_surfaces(placed, [item.sensor for item in scene.sensors])
     if scene.arm is None:
-        return Stage(title, None, (), sheets)
+        return Stage(title, None, tuple(body_solids(scene.bodies)), sheets)
     from coneskin.robot.arm.ur_models import arm_model
 
     from .arm_solids import arm_solids
@@ -101,7 +102,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     if meshes:
         own = _link_meshes(scene, model)
         solids = (*(solid for solid in solids if solid.link not in {mesh.link for mesh in own}), *own)
-    return Stage(title, model, solids, sheets)
+    return Stage(title, model, (*solids, *body_solids(scene.bodies)), sheets)
 
 
 def _link_meshes(scene: Scene, model: ArmModel) -> list[Solid]:

@@ -11,12 +11,13 @@ from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
-from coneskin.view.arm_solids import arm_solids
-from coneskin.view.solid import Solid, barrel
-from coneskin.view.stage import set_stage
-from coneskin.view.stage_nodes import _along, _quaternion, level_colour
+from coneskin.view.stage.arm_solids import arm_solids
+from coneskin.view.stage.level_scale import level_colour
+from coneskin.view.stage.rotation import along, quaternion
+from coneskin.view.stage.solid import Solid, barrel
+from coneskin.view.stage.stage import set_stage
 
-from ..scene.scenes import DOUBLE_CONE
+from ...scene.scenes import DOUBLE_CONE
 
 POSES = ((0.0, -1.57, 1.2, -1.2, -1.57, 0.0), (0.4, -0.9, -1.1, 2.0, 1.0, 0.5))
 
@@ -93,10 +94,10 @@ def test_the_sheet_lies_on_its_frustum() -> None:
 
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, -0.48, 0.64)])
 def test_an_arrow_points_along_its_normal(normal: tuple[float, float, float]) -> None:
-    pose = _along(normal)
+    pose = along(normal)
     Pose(pose.rotation)  # is a rotation
     assert pose.rotate((0.0, 0.0, 1.0)) == pytest.approx(normal)
-    w, x, y, z = _quaternion(pose)
+    w, x, y, z = quaternion(pose)
     turned = (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
     assert turned == pytest.approx(normal)
 
@@ -104,7 +105,7 @@ def test_an_arrow_points_along_its_normal(normal: tuple[float, float, float]) ->
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (3.0, 0.1, 0.2), (0.1, 3.1, 0.0), (0.2, 0.1, 3.1), (1.0, -1.0, 2.0)])
 def test_a_quaternion_turns_as_its_pose(rpy: tuple[float, float, float]) -> None:
     pose = Pose.from_xyz_rpy(rpy=rpy)
-    w, x, y, z = _quaternion(pose)
+    w, x, y, z = quaternion(pose)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),

@@ -1,0 +1,147 @@
+"""Choice of one viewer to see the potential on the sheets; nobody else sees what it chose."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import FieldError
+
+from .stage.field_patches import SQUARE, FieldPatches, field_patches, linear, potential_colours
+from .stage.level_scale import gradient
+from .stage.sheet_field import PHASES, ContactOnSheet, SheetField
+
+if TYPE_CHECKING:
+    from .moment import Moment
+    from .stage.sheet_surface import SheetSurface
+    from .stage.stage import Stage
+
+__all__ = ["FieldChoice", "contact_on"]
+
+_OFF = "off"
+_FLAT = 1e-3  # of the supply: what differs by less than this is drawn in one colour
+
+
+class FieldChoice:
+    """Choice of one viewer.
+
+    Args:
+        client: viser's ``ClientHandle``.
+        stages: on the page, each with the name of the node above it.
+    """
+
+    def __init__(self, client: Any, stages: list[tuple[Stage, str]]) -> None:
+        self._scene, self._stages = client.scene, stages
+        self._fields: dict[str, tuple[SheetField, FieldPatches]] = {}
+        self._nodes: dict[str, Any] = {}
+        self._choice = client.gui.add_dropdown("potential", (_OFF, *PHASES), initial_value=_OFF)
+        self._legend = client.gui.add_html("")
+
+    def on_update(self, changed: Any) -> None:
+        """Have a function called when the viewer chooses."""
+        self._choice.on_update(changed)
+
+    def stand(self, stages: list[tuple[Stage, str]]) -> None:
+        """Take other stages in the place of those before."""
+        self._clear()
+        self._fields.clear()
+        self._stages = stages
+
+    def show(self, moments: list[Moment]) -> None:
+        """Draw what is chosen.
+
+        Args:
+            moments: of the stages.
+        """
+        what = str(self._choice.value)
+        if what not in PHASES:
+            self._clear()
+            return
+        shown, said = [], ""
+        for (stage, root), moment in zip(self._stages, moments, strict=True):
+            for sheet in stage.sheets:
+                name = f"{root}/link {sheet.link}/potential of {stage.sheets.index(sheet)}"
+                if name not in self._fields:
+                    patches = field_patches(sheet)
+                    self._fields[name] = SheetField(sheet.sensor, patches.u, patches.phi), patches
+                field, patches = self._fields[name]
+                contact = contact_on(sheet, moment)
+                try:
+                    volts = field.potentials(what, contact)
+                except FieldError as exc:
+                    said = f"{sheet.name}: {exc}"
+                    volts = field.potentials(what, None)
+                shown.append((name, patches, volts, field.supply))
+        low, high = _range(shown)
+        for name, patches, volts, _ in shown:
+            self._draw(name, patches, linear(potential_colours(volts, low, high)))
+        legend = _legend(low, high, said)
+        if legend != self._legend.content:
+            self._legend.content = legend
+
+    def _draw(self, name: str, patches: FieldPatches, colours: Any) -> None:
+        import numpy as np
+
+        node = self._nodes.get(name)
+        if node is not None:
+            if not np.array_equal(node.batched_colors, colours):
+                node.batched_colors = colours
+            return
+        vertices, faces = SQUARE
+        self._nodes[name] = self._scene.add_batched_meshes_simple(
+            name,
+            np.array(vertices, dtype="float32"),
+            np.array(faces),
+            batched_wxyzs=patches.rotations,
+            batched_positions=patches.positions,
+            batched_scales=patches.sizes,
+            batched_colors=colours,
+            lod="off",
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def _clear(self) -> None:
+        for node in self._nodes.values():
+            node.remove()
+        self._nodes.clear()
+        if self._legend.content:
+            self._legend.content = ""
+
+
+def contact_on(sheet: SheetSurface, moment: Moment) -> ContactOnSheet | None:
+    """Return the contact that touches a sheet at a moment; None for none."""
+    level = moment.levels[sheet.name]
+    for mark in moment.marks:
+        if mark.sensor == sheet.name and mark.strength >= 1.0 and level > 0.0:
+            u, phi, _ = sheet.item.frustum.locate(mark.point)
+            wrap = sheet.sensor.frustum.wrap
+            if phi > wrap:  # in the gap of a partial wrap: at the nearer of its two edges
+                phi = wrap if phi - wrap < 2.0 * math.pi - phi else 0.0
+            return ContactOnSheet(u, phi, level)
+    return None
+
+
+def _range(shown: list[Any]) -> tuple[float, float]:
+    """Return from where to where the colours go [V]: as far as anything drawn, the whole supply where it is all one."""
+    low, high = min(float(volts.min()) for _, _, volts, _ in shown), max(float(volts.max()) for _, _, volts, _ in shown)
+    supply = max(supply for _, _, _, supply in shown)
+    return (low, high) if high - low > _FLAT * supply else (0.0, supply)
+
+
+def _legend(low: float, high: float, said: str) -> str:
+    import numpy as np
+
+    colours = [
+        (int(r), int(g), int(b)) for r, g, b in potential_colours(np.linspace(low, high, 41), low, high).tolist()
+    ]
+    wrong = f'<div style="color:#b91c1c">{escape(said[:300])}</div>' if said else ""
+    return (
+        '<div id="coneskin-potential" style="font-size:12px;margin:4px 10px">'
+        f'<div style="height:10px;background:{gradient(colours)}"></div>'
+        f'<div style="display:flex;justify-content:space-between"><span>{low:.3f} V</span><span>{high:.3f} V</span>'
+        "</div><div>a contact is drawn as a disc of 5 mm that gives the level that was read</div>"
+        f"{wrong}</div>"
+    )

@@ -1,0 +1,76 @@
+"""The potential on a sheet: straight without a contact, and with one the level that was read."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coneskin.replay.run import read_run
+from coneskin.skin.sensor import Sensor
+from coneskin.view.stage.sheet_field import PHASES, ContactOnSheet, SheetField
+
+RUN = Path(__file__).parents[2] / "data" / "collision.rec"
+
+
+@pytest.fixture(scope="module")
+def sensor() -> Sensor:
+    return read_run(RUN).scene().sensors[0].sensor
+
+
+def field_at(sensor: Sensor, *places: tuple[float, float]) -> SheetField:
+    u, phi = np.array(places).T
+    return SheetField(sensor, u, phi)
+
+
+def test_the_driven_sheets_have_the_potentials_of_the_sensors_law(sensor: Sensor) -> None:
+    """eq. 19 and 22, less what the leads of 1 ohm take: 1e-3 of the sheets' resistance."""
+    cone = sensor.frustum
+    places = [(0.1 * cone.slant, 0.2), (0.5 * cone.slant, 3.0), (0.9 * cone.slant, cone.wrap - 0.1)]
+    field = field_at(sensor, *places)
+    law = np.array([sensor.potentials(*place) for place in places])
+    for column, what in enumerate(("radial phase, upper sheet", "angular phase, lower sheet")):
+        assert field.potentials(what, None) == pytest.approx(law[:, column], abs=3e-3 * field.supply)
+
+
+@pytest.mark.parametrize("level", [0.05, 0.3, 0.78])
+@pytest.mark.parametrize("place", [(0.4, 0.5), (0.01, 0.5), (0.5, 0.02)])
+def test_the_guides_have_the_level_that_was_read(sensor: Sensor, place: tuple[float, float], level: float) -> None:
+    """C and D are the edges of the lower sheet; the conductance is interpolated between tried ones 1.4 apart."""
+    cone = sensor.frustum
+    field = field_at(sensor, (0.5 * cone.slant, 0.0), (0.5 * cone.slant, cone.wrap))
+    contact = ContactOnSheet(place[0] * cone.slant, place[1] * cone.wrap, level)
+    guides = field.potentials("touch phase, lower sheet", contact)
+    assert guides.mean() == pytest.approx(level * field.supply, rel=0.03)
+
+
+def test_a_touch_lowers_the_upper_sheet_where_it_is_and_raises_the_lower_one(sensor: Sensor) -> None:
+    cone = sensor.frustum
+    u, phi = np.meshgrid(np.linspace(0.0, cone.slant, 21), np.linspace(0.0, cone.wrap, 31), indexing="ij")
+    field = SheetField(sensor, u.ravel(), phi.ravel())
+    contact = ContactOnSheet(0.3 * cone.slant, 0.6 * cone.wrap, 0.6)
+    for what, extreme in (("touch phase, upper sheet", np.argmin), ("touch phase, lower sheet", np.argmax)):
+        at = int(extreme(field.potentials(what, contact)))
+        assert (u.ravel()[at], phi.ravel()[at]) == pytest.approx(contact[:2])
+
+
+@pytest.mark.parametrize("what", PHASES)
+@pytest.mark.parametrize(
+    "contact", [None, ContactOnSheet(-0.1, 9.0, 0.5), ContactOnSheet(0.0, 0.0, 0.5), ContactOnSheet(0.1, 1.0, 1.0)]
+)
+def test_a_place_beyond_an_edge_and_a_short_are_drawn_all_the_same(
+    sensor: Sensor, what: str, contact: ContactOnSheet | None
+) -> None:
+    found = field_at(sensor, (0.05, 1.0), (0.1, 2.0)).potentials(what, contact)
+    assert np.isfinite(found).all()
+    assert found.min() >= -1e-9
+    assert found.max() <= sensor.electronics.supply_volts * (1.0 + 1e-9)
+
+
+def test_the_same_contact_is_not_solved_twice(sensor: Sensor) -> None:
+    field = field_at(sensor, (0.05, 1.0))
+    contact = ContactOnSheet(0.1, 1.0, 0.5)
+    first = field.potentials("touch phase, lower sheet", contact)
+    assert field.potentials("touch phase, lower sheet", ContactOnSheet(0.1 + 1e-5, 1.0, 0.5)) is first
+    assert field.potentials("touch phase, lower sheet", ContactOnSheet(0.12, 1.0, 0.5)) is not first
+    assert math.isfinite(float(first[0]))
