@@ -23,6 +23,11 @@ class SheetMaterial(NamedTuple):
     name: str
     ohms: float
 
+    @property
+    def label(self) -> str:
+        """Short name for a part that is cut from it."""
+        return f"conductive sheet {self.ohms:g} ohm/sq"
+
 
 #: in ascending order of resistance; nominal values of data sheets
 SHEET_MATERIALS = (

@@ -28,6 +28,7 @@ MAY_IMPORT: dict[str, str] = {
     "geometry": "",
     "geometry.fit": "geometry",
     "geometry.drawing": "geometry",
+    "geometry.solid": "",
     "skin": "geometry",
     "skin.firmware": "skin",
     "skin.sources": "skin",
@@ -64,8 +65,9 @@ MAY_IMPORT: dict[str, str] = {
     "view.stage": "scene robot.arm skin skin.field geometry",
     "studio": "view design geometry geometry.fit geometry.drawing",
     "view": "view.stage replay scene recording_file robot.arm robot.driver robot.guard skin geometry",
-    "design": "design.workshop scene skin skin.firmware geometry geometry.fit geometry.drawing robot.arm",
-    "design.workshop": "design scene skin skin.diagnosis geometry geometry.drawing",
+    "design": "design.workshop scene skin skin.firmware geometry geometry.fit geometry.drawing geometry.solid "
+    "robot.arm",
+    "design.workshop": "design scene skin skin.diagnosis geometry geometry.drawing geometry.solid",
     "commands": "physics calibration commissioning design doctor monitor scene session replay runs studio view "
     "view.stage geometry geometry.fit geometry.drawing skin skin.field skin.firmware skin.detection skin.sources "
     "robot.arm robot.driver robot.guard robot.sim commands.arguments",

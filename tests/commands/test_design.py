@@ -48,11 +48,12 @@ def test_a_cylinder_from_numbers_to_files(tmp_path, capsys):
     out = tmp_path / "new" / "skin"
     assert design(*CYLINDER, "-o", str(out)) == 0
     assert sorted(path.name for path in (out / "cut").iterdir()) == sorted(
-        f"{layer}.{kind}" for layer in LAYERS for kind in ("dxf", "svg", "pdf")
+        f"{layer}.{kind}" for layer in (*LAYERS, "0-test-piece") for kind in ("dxf", "svg", "pdf")
     )
     assert sorted(path.name for path in out.iterdir()) == [
         "cut",
         "design.json",
+        "jig",
         "materials.csv",
         "nested",
         "report.md",

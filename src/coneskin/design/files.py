@@ -23,6 +23,7 @@ from coneskin.geometry.drawing.dxf import ArcStyle, to_dxf
 from coneskin.geometry.drawing.nesting import MaterialBed
 from coneskin.geometry.drawing.pdf import PageSize, to_pdf
 from coneskin.geometry.drawing.svg import to_svg
+from coneskin.geometry.drawing.test_piece import make_test_piece
 
 from .sheets import SheetDesign
 from .summary import material_rows, sensor_toml
@@ -186,6 +187,8 @@ def write_sheets(
         write(place / "sensor.toml", sensor_toml(design, index, str(data["frame"])))
         for cut in design.cuts:
             _write_drawing(write, place / "cut" / cut.slug, (cut,), f"{design.name}, {cut.name}", options)
+        piece = make_test_piece("every material")
+        _write_drawing(write, place / "cut" / piece.slug, (piece,), f"{design.name}, test piece", options)
         _write_drawing(write, place / "cut" / "all", nest_sheets(design.cuts), design.name, options)
     for bed in beds:
         progress(f"writing {bed.slug}")

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.geometry.drawing.nesting import nest_on_beds
+from coneskin.geometry.drawing.test_piece import make_test_piece
+from coneskin.geometry.solid.closed_surface import to_stl
 from coneskin.terminal_text import printable
 
-from .files import FileOptions, new_folder, write_sheets
+from .files import FileOptions, new_folder, sheet_folder, write_sheets
 from .report import report_text
 from .sheets import SheetDesign
 from .summary import design_summary
@@ -19,7 +21,9 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.mesh import Mesh
 
-__all__ = ["write_design"]
+    from .workshop.jig import Collar
+
+__all__ = ["write_design", "write_jig"]
 
 
 def write_design(
@@ -62,7 +66,7 @@ def write_design(
     """
     sheets = tuple(designs)
     title, source, frame, *notes = map(printable, (title, source, frame, *notes))  # a file's name may be no text
-    figures = [measure_build(design, index, frame, mesh) for index, design in enumerate(sheets)]
+    figures = [measure_build(design, index, frame, mesh, sheets[:index]) for index, design in enumerate(sheets)]
     data: dict[str, Any] = {"link": source or title, "frame": frame, "notes": list(notes)}
     data["sheets"] = [
         design_summary(design) | item.as_data(design) for design, item in zip(sheets, figures, strict=True)
@@ -71,7 +75,9 @@ def write_design(
         data["bare"] = [{"start_mm": 1e3 * b.start, "end_mm": 1e3 * b.end, "reason": b.reason} for b in fit.bare]
         data["bare_areas"] = [{"share": round(b.share, 4), "reason": b.reason} for b in fit.bare_areas]
     options = options or FileOptions()
-    beds, larger = nest_on_beds([cut for design in sheets for cut in design.cuts], *options.bed, options.bed_gap)
+    cuts = [cut for design in sheets for cut in design.cuts]
+    pieces = [make_test_piece(material) for material in dict.fromkeys(cut.material for cut in cuts)]
+    beds, larger = nest_on_beds([*cuts, *pieces], *options.bed, options.bed_gap)
     for sentence in larger:
         progress(sentence)
     data["beds"] = [
@@ -88,6 +94,30 @@ def write_design(
         text = report_text(sheets, figures, title, (*notes, *larger, f"Frame of all poses: {frame}"), fit, drawn, beds)
         (draft / "report.md").write_text(text, encoding="utf-8")
         written = ["report.md", *(file for _, file in drawn)]
+        for index, (design, item) in enumerate(zip(sheets, figures, strict=True)):
+            if item.collars:
+                progress(f"{design.name}: writing the jig")
+                written += write_jig(draft, sheet_folder(sheets, index), design, item.collars)
         write_sheets(draft, sheets, data, options, progress, beds, written)
         progress(f"{sum(1 for path in draft.rglob('*') if path.is_file())} files in {folder}")
     return data
+
+
+def write_jig(draft: Path, place: Path, design: SheetDesign, collars: Sequence[Collar]) -> list[str]:
+    """Write the parts of a jig as STL files; return their paths in the folder.
+
+    Args:
+        draft: the folder of the design.
+        place: folder of the sheet, in it.
+        design: the sheet.
+        collars: its jig.
+    """
+    (draft / place / "jig").mkdir(parents=True)
+    written = []
+    for collar in collars:
+        for part in collar.parts:
+            name = place / "jig" / f"{collar.slug(part)}.stl"
+            title = f"{design.options.link} {design.name} {collar.slug(part)}".strip()
+            (draft / name).write_bytes(to_stl(part.surface, title))
+            written.append(name.as_posix())
+    return written

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.errors import MissingExtra
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 
+from .jig_picture import draw_jig
 from .layout_picture import FOIL_COLOUR, INK_COLOUR, draw_layout
 from .parts_picture import draw_parts
 from .sheets import SheetDesign
@@ -90,6 +91,11 @@ def draw_pictures(
         figure = Figure(figsize=(9, 11), layout="constrained")
         draw_parts(figure, design)
         save(figure, f"{name}-parts.png", f"{title}: its parts as they are cut, dimensions in mm.")
+        if item.collars:
+            progress(f"{design.name}: drawing the jig")
+            figure = Figure(figsize=(10, 4.5), layout="constrained")
+            draw_jig(figure, item.collars)
+            save(figure, f"{name}-jig.png", f"{title}: parts of its jig as they are printed, a little apart.")
         if mesh is not None and not design.above:
             progress(f"{design.name}: measuring deviations")
             figure = Figure(figsize=(8, 4.2), layout="constrained")

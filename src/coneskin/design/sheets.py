@@ -23,14 +23,17 @@ from coneskin.skin.matched_electronics import GivenElectronics, match_electronic
 from coneskin.skin.sensor import sheet_resistances
 from coneskin.skin.sheet_materials import SheetMaterial, match_sheet_materials
 
+from .jig_plan import JigPlan
+from .sheet_joint import SheetJoint, adjoin, find_joint
+
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.fit.fitted_sheet import FittedSheet
 
-__all__ = ["DesignOptions", "SheetDesign", "SheetJoint", "design_sheets"]
+__all__ = ["DesignOptions", "SheetDesign", "design_sheets"]
 
 _TURN = 2.0 * math.pi
-_UPPER_CONDUCTIVE = 3  # index of the layer in the stack
+_LOWER_CONDUCTIVE, _UPPER_CONDUCTIVE = 1, 3  # indices of the layers in the stack
 _MOST_STRAIN = 0.4  # of a face of a wrapped layer; foam wrinkles or tears beyond
 _STRAIGHT = 0.02  # of the fit's tolerance; a taper below it is noise of the mesh, and the side a cylinder's
 
@@ -57,6 +60,7 @@ class DesignOptions:
         face_up: face that is up in the drawings.
         link: name of the link, on every part.
         connector: distance from the rim of the sheet to the connector in which its wires end.
+        jig: printed collars that hold the sheet at its place on the link.
     """
 
     stack: LayerStack = PAPER_STACK
@@ -74,21 +78,7 @@ class DesignOptions:
     face_up: FaceUp = "work"
     link: str = ""
     connector: float = 0.06
-
-
-@dataclass(frozen=True, slots=True)
-class SheetJoint:
-    """The joint between a sheet and the next one on the axis.
-
-    Attributes:
-        inner: distance along the axis at the faces on the link [m].
-        outer: the same at the outer faces [m].
-        trimmed: length by which both sheets together were shortened along the axis [m].
-    """
-
-    inner: float
-    outer: float
-    trimmed: float
+    jig: JigPlan = field(default_factory=JigPlan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +153,10 @@ def design_sheets(
         links = [_straightened(link, _STRAIGHT * places.tolerance) for link in links]
     if not (math.isfinite(options.sheet_gap) and options.sheet_gap >= 0.0):
         raise GeometryError(f"sheet gap must be finite and not negative, got {options.sheet_gap * 1e3:.4g} mm")
-    joints = [_joint(a, b, options) if _adjoin(a, b) else None for a, b in itertools.pairwise(links)]
+    joints = [
+        find_joint(a, b, options.stack, options.sheet_gap) if adjoin(a, b) else None
+        for a, b in itertools.pairwise(links)
+    ]
     cuts = [0.0, *(0.5 * joint.trimmed if joint else 0.0 for joint in joints), 0.0]
     designs = []
     for i, link in enumerate(links):
@@ -174,18 +167,18 @@ def design_sheets(
             before, after = (i > 0 and joints[i - 1]), (i < len(joints) and joints[i])
             auto: SheetSide = "end2" if before and not after else "end1"
             layout = lay_out_sheet(place.frustum, replace(options.plan, wires=options.wires or auto))
+            active = _active(place, layout, options.stack)
+            squares = sheet_resistances(active.frustum, 1.0, 1.0)[0]
+            conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
             drawn = cut_sheets(
                 layout,
-                options.stack,
+                _with_materials(options.stack, conductive),
                 title=f"{options.link}: {name}" if options.link else name,
                 kerf=options.kerf,
                 overlap=options.overlap,
                 snap=options.snap,
                 face_up=options.face_up,
             )
-            active = _active(place, layout, options.stack)
-            squares = sheet_resistances(active.frustum, 1.0, 1.0)[0]
-            conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
             electronics = match_electronics(*_resistances(active.frustum, conductive), options.electronics)
         except GeometryError as exc:
             raise GeometryError(f"{name}: {exc}") from exc
@@ -206,6 +199,16 @@ def design_sheets(
             )
         )
     return tuple(designs)
+
+
+def _with_materials(stack: LayerStack, conductive: tuple[SheetMaterial, SheetMaterial]) -> LayerStack:
+    """Return the stack with the conductive sheets that were chosen, where the stack names none of its own."""
+    layers = list(stack.layers)
+    for index, sheet in ((_UPPER_CONDUCTIVE, conductive[0]), (_LOWER_CONDUCTIVE, conductive[1])):
+        if layers[index].material == PAPER_STACK.layers[index].material:
+            layers[index] = replace(layers[index], material=sheet.label)
+    a, b, c, d, e = layers
+    return replace(stack, layers=(a, b, c, d, e))
 
 
 def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
@@ -265,29 +268,6 @@ def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
     turn = gap / narrow
     open_side = Frustum(side.radius1, side.radius2, side.height, side.wrap - turn)
     return PlacedFrustum(open_side, link.link_frustum @ Pose.from_xyz_rpy(rpy=(0.0, 0.0, 0.5 * turn)))
-
-
-def _adjoin(one: PlacedFrustum, two: PlacedFrustum) -> bool:
-    """Tell whether two sheets follow each other along one axis, with the same wrap."""
-    turn = one.link_frustum.inverse() @ two.link_frustum
-    x, y, z = turn.translation
-    tilt = math.hypot(turn.rotation[0][2], turn.rotation[1][2])
-    same = abs(one.frustum.wrap - two.frustum.wrap) < 1e-6
-    same &= one.frustum.wrap > _TURN - 1e-6 or turn.rotation[0][0] > 1.0 - 1e-9
-    return same and tilt < 1e-6 and math.hypot(x, y) < 1e-6 and z > 0.5 * one.frustum.height
-
-
-def _joint(one: PlacedFrustum, two: PlacedFrustum, options: DesignOptions) -> SheetJoint:
-    """Return the joint of two neighbours, trimmed so that no layer of one runs into the other.
-
-    A face at the height t above the link is shifted along the axis by -t sin(half angle): at a belt the outer faces
-    separate, at a waist they approach.
-    """
-    start = two.link_frustum.translation
-    apart = one.link_frustum.inverse().apply(start)[2] - one.frustum.height
-    opening = options.stack.thickness * (one.frustum.sin_half_angle - two.frustum.sin_half_angle)
-    trimmed = max(0.0, options.sheet_gap - apart - min(0.0, opening))
-    return SheetJoint(apart + trimmed, apart + trimmed + opening, trimmed)
 
 
 def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> PlacedFrustum:

@@ -24,6 +24,7 @@ from coneskin.scene.sensor_table import SENSOR_KEYS
 from coneskin.skin.matched_electronics import GivenElectronics
 
 from .dimensions import add_dimension_options, add_setting_option, given_dimensions, option_name
+from .jig import add_jig_options, given_jig
 
 __all__ = [
     "EXAMPLES",
@@ -162,6 +163,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="face that is up in the drawings; work: the one on which the next part is glued (default work)",
     )
 
+    add_jig_options(parser)
     add = parser.add_argument_group("electronics").add_argument
     for key in SENSOR_KEYS:
         if key.name in _ELECTRONICS:
@@ -215,6 +217,7 @@ def design_options(args: argparse.Namespace) -> DesignOptions:
         kerf=args.kerf_mm * 1e-3,
         snap=args.cut_tolerance_mm * 1e-3,
         face_up=args.face_up,
+        jig=given_jig(args),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from coneskin.geometry.drawing.surface_shape import ShapeTab, SurfaceShape, draw
 from coneskin.geometry.frustum import Frustum
 
 from .expected_readings import PairReading, expected_frame, pair_readings
+from .jig import Collar, jig_collars
 from .placement import SheetPlacement, find_placement
 from .wiring import CableExit, cable_exit
 
@@ -29,12 +31,16 @@ class BuildFigures:
         pairs: what a multimeter should read between A and B, and between C and D.
         frame: counts of the untouched sensor, by field of a frame.
         placement: where it belongs on the link.
+        collars: of its jig.
+        no_collar: a sentence for each end that has none.
     """
 
     cable: CableExit
     pairs: tuple[PairReading, PairReading]
     frame: dict[str, int]
     placement: SheetPlacement
+    collars: tuple[Collar, ...] = ()
+    no_collar: tuple[str, ...] = ()
 
     def as_data(self, design: SheetDesign) -> dict[str, Any]:
         """Return the figures and the coordinates of holes and electrodes as plain data, in mm and degrees."""
@@ -75,10 +81,36 @@ class BuildFigures:
                     "at_end": feature.end,
                 },
             },
+            "jig": [
+                {
+                    "end": collar.end,
+                    "lip_mm": _mm(collar.lip),
+                    "flush": collar.flush,
+                    "stopped": collar.stopped,
+                    "keyed": collar.keyed,
+                    "parts": [
+                        {
+                            "file": f"jig/{collar.slug(part)}.stl",
+                            "from_deg": round(math.degrees(part.start), 3) + 0.0,
+                            "to_deg": round(math.degrees(part.end), 3) + 0.0,
+                            "size_mm": [_mm(length) for length in part.surface.size],
+                            "volume_cm3": round(1e6 * part.surface.volume, 2),
+                        }
+                        for part in collar.parts
+                    ],
+                }
+                for collar in self.collars
+            ],
         }
 
 
-def measure_build(design: SheetDesign, index: int, frame: str = "mesh", mesh: Mesh | None = None) -> BuildFigures:
+def measure_build(
+    design: SheetDesign,
+    index: int,
+    frame: str = "mesh",
+    mesh: Mesh | None = None,
+    others: Sequence[SheetDesign] = (),
+) -> BuildFigures:
     """Work out the figures for building one sheet.
 
     Args:
@@ -86,6 +118,7 @@ def measure_build(design: SheetDesign, index: int, frame: str = "mesh", mesh: Me
         index: its sensor number in the wire format.
         frame: frame of the poses, in words.
         mesh: of the link; None where it is known by its dimensions only.
+        others: sheets that are on the link already when this one is put on.
 
     Raises:
         GeometryError: a scene would refuse its sensor, or the connector is out of range.
@@ -95,6 +128,7 @@ def measure_build(design: SheetDesign, index: int, frame: str = "mesh", mesh: Me
         pair_readings(design),
         expected_frame(design, index, frame),
         find_placement(design.place, mesh),
+        *jig_collars(design, mesh, others),
     )
 
 

@@ -1,0 +1,79 @@
+"""Last steps of the build guide: the cable, and the tests of the sheet that is built."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coneskin.design.sheets import SheetDesign
+
+from .build_figures import BuildFigures
+from .guide_words import SPREAD, in_mm, in_ohms, side_name, tie_place
+
+__all__ = ["cable_steps", "reading_lines", "test_steps"]
+
+
+def cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
+    """Yield the steps from the tabs to the connector."""
+    cable, plan = figures.cable, design.layout.plan
+    if plan.tab:
+        yield f"Fold the tabs over {side_name(plan.wires)} outwards along the green lines, away from the link."
+    if plan.wires == "end2" and design.next_joint is not None:
+        yield "The tabs would run into the next sheet there: bend them up before that sheet is wrapped."
+    if plan.wires.startswith("edge"):
+        yield "The tabs leave at the seam: lead them out between the edges before you close the wrap."
+    yield (
+        f"Glue the cable-tie mount on the link {in_mm(cable.tie)} beyond {side_name(cable.side)}, at "
+        f"{tie_place(design, figures)}. "
+        "Lead the four wires to it flat on the link, leave a loop of 20 mm so that no pull reaches a tab, and tie them "
+        f"down. Crimp the connector {in_mm(cable.connector)} beyond the rim: pin 1 A (red), pin 2 B "
+        "(black), pin 3 C (yellow), pin 4 D (green). *Check:* pull each wire as hard as 3 N behind the tie: nothing "
+        "moves before it; and move the joint of the arm through its whole range by hand (freedrive): nothing is "
+        "pinched or stretched."
+    )
+
+
+def test_steps(figures: BuildFigures) -> Iterator[str]:
+    """Yield the steps that test the sheet that is built."""
+    ab, cd = figures.pairs
+    yield (
+        f"Measure at the connector: pins 1-2 {in_ohms(ab.ohms)}, pins 3-4 {in_ohms(cd.ohms)}; pins 1-3 above 10 Mohm "
+        "while nothing touches the sensor, and far less while a thumb presses its middle; again above 10 Mohm once it "
+        "is lifted."
+    )
+    yield (
+        "Write the measured sheets into `sensor.toml`: `upper_sheet_ohm` = reading 1-2 divided by "
+        f"{ab.squares:.4f}, `lower_sheet_ohm` = reading 3-4 divided by {cd.squares:.4f}. *Check:* they are within "
+        f"{SPREAD:.0%} of those on the strip."
+    )
+    yield (
+        "Plug it into the board (`coneskin firmware` writes sketch, wiring and parts) and run `coneskin monitor "
+        "PORT`: the "
+        "untouched frame must read as in the table below, within 3 % once the measured sheets are in the sensor file."
+    )
+    yield (
+        "Write the scene (`coneskin init`), and let `coneskin commission` read where a person touches the nine marks: "
+        "it finds a turned, mirrored or exchanged sheet. Until then the arm only stops at a touch, and does not "
+        "retreat."
+    )
+
+
+def reading_lines(figures: BuildFigures) -> Iterator[str]:
+    """Yield the tables of what a multimeter and ``coneskin monitor`` should read."""
+    yield "| between | multimeter | for a material of |"
+    yield "|---|---|---|"
+    for pair in figures.pairs:
+        yield f"| {pair.pair} | {in_ohms(pair.ohms)} | {pair.sheet_ohms:g} ohm per square |"
+    yield "| A or B to C or D | above 10 Mohm, untouched | |"
+    yield ""
+    yield "Untouched frame, in counts, as `coneskin monitor` shows it with the sensor file of this design:"
+    yield ""
+    yield "| phase | " + " | ".join(name for name in figures.frame) + " |"
+    yield "|---" * (len(figures.frame) + 1) + "|"
+    yield "| counts | " + " | ".join(str(count) for count in figures.frame.values()) + " |"
+    ab, cd = figures.pairs
+    radial, angular = ab.ohms / (ab.squares * ab.sheet_ohms), cd.ohms / (cd.squares * cd.sheet_ohms)
+    yield ""
+    yield (
+        "The model of the sensor ends at its electrodes, the sheets do not: until the measured sheets are in the file, "
+        f"radial_current reads {1.0 / radial - 1.0:+.0%} and angular_current {1.0 / angular - 1.0:+.0%} of these."
+    )

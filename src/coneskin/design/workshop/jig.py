@@ -1,0 +1,275 @@
+"""Printed jig of a sheet: collars that hold its ends at their places on the link while the adhesive sets.
+
+A collar has two zones. Its lip lies on the bare link beyond the end of the sheet: the negative of the mesh, or of the
+cone where there is no mesh. Then a step as high as the sheet, against which the end of the sheet is pushed; then a
+sleeve over the sheet. Towards the joint of the link the lip ends flush with the outermost face of the link if that is
+near, otherwise at its own length; where a part of the link stands out, its edge keeps clear of that part, which fixes
+its azimuth as well. A collar is split into parts that are put on from the side, so none of them has an undercut.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.design.sheets import SheetDesign
+from coneskin.geometry.drawing.layer_stack import parallel_frustum
+from coneskin.geometry.drawing.surface_shape import ShapeTab
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.ray_casting import RayCaster
+from coneskin.geometry.solid.closed_surface import ClosedSurface, shell_surface
+from coneskin.geometry.solid.radial_profile import widest_nearby, without_undercut
+
+from .jig_surroundings import meets_neighbour, with_sheets
+
+__all__ = ["Collar", "CollarPart", "jig_collars"]
+
+Floats = NDArray[np.float64]
+
+_TURN = 2.0 * math.pi
+_COLUMN = math.radians(2.0)  # step around the axis; an arc of 100 mm then lies 0.015 mm beside its chord
+_ROW = 2e-3  # m; step along the axis where the lip follows a mesh
+_FLUSH = 40e-3  # m; an outermost face nearer than this is the datum of the lip
+_RISE = 8e-3  # m; what stands out further from the cone is not gripped: the lip ends before it
+_SHORTEST = 4e-3  # m; a lip that is shorter everywhere holds nothing
+_SLOT = 4e-3  # m; between the parts, so that the seam is seen and a strap pulls them tight
+_CHANNEL = 8e-3  # m; height of the way out for tabs with their wires
+_BESIDE = 3e-3  # m; on both sides of the tabs
+_SEAT, _RIM = 2e-3, 1.5e-3  # m; width of the rims that keep a strap on its seat, and their height
+_NOTCH = 1e-3  # m; depth of the grooves that number a part
+_LEAST_RADIUS = 4e-3  # m
+_KEY = 3e-3  # m; a lip whose length differs by less fits at every azimuth
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CollarPart:
+    """One printed part of a collar.
+
+    Attributes:
+        number: of the part, from 1, anticlockwise from edge 0 as seen from end 2; as many grooves are on its outside.
+        start: azimuth of its first side, from edge 0 [rad].
+        end: azimuth of its other side [rad].
+        surface: standing on its wide face as it is printed; the axis of the sheet is z.
+    """
+
+    number: int
+    start: float
+    end: float
+    surface: ClosedSurface
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Collar:
+    """The collar at one end of a sheet.
+
+    Attributes:
+        end: 1 or 2.
+        parts: to be printed.
+        lip: greatest length of the lip on the link [m].
+        flush: the lip ends flush with the outermost face of the link.
+        stopped: the edge of the lip lies against a part of the link that stands out.
+        keyed: it does so at some azimuths only, which fixes its own.
+        before: from the outermost face of the link to the edge of the lip, along the axis [m]; None without a mesh.
+    """
+
+    end: int
+    parts: tuple[CollarPart, ...]
+    lip: float
+    flush: bool
+    stopped: bool
+    keyed: bool
+    before: float | None
+
+    def slug(self, part: CollarPart) -> str:
+        """Return the name of the file of a part."""
+        return f"end-{self.end}-part-{part.number}"
+
+
+def jig_collars(
+    design: SheetDesign, mesh: Mesh | None = None, others: Sequence[SheetDesign] = ()
+) -> tuple[tuple[Collar, ...], tuple[str, ...]]:
+    """Make the collars of a sheet.
+
+    Args:
+        design: the sheet.
+        mesh: of the link, in the frame of the sheets; None where it is known by its dimensions only.
+        others: sheets that are on the link already when this one is put on.
+
+    Returns:
+        the collars, and a sentence for each end that has none.
+    """
+    plan = design.options.jig
+    if plan.surface == "none":
+        return (), ()
+    if design.above:
+        return (), (f"{design.name} lies on {design.above}, whose ends and seam show its place",)
+    collars: list[Collar] = []
+    without: list[str] = []
+    body = None if mesh is None or plan.surface == "cone" else with_sheets(mesh, others)
+    for end in (1, 2):
+        if meets_neighbour(design, others, end):
+            without.append(f"at end {end} it meets the sheet beside it: push it against that")
+            continue
+        try:
+            collars.append(_Builder(design, mesh, body, end).collar())
+        except _NoRoomError as exc:
+            without.append(str(exc))
+    return tuple(collars), tuple(without)
+
+
+class _NoRoomError(Exception):
+    """There is no room for a lip."""
+
+
+class _Builder:
+    """One collar in the making, in the frame of the sheet; ``s`` runs outwards along the axis from the sheet's end."""
+
+    def __init__(self, design: SheetDesign, mesh: Mesh | None, body: Mesh | None, end: int) -> None:
+        self.design, self.plan, self.end = design, design.options.jig, end
+        self.side = design.place.frustum
+        self.body = None if body is None else body.moved(design.place.link_frustum.inverse())
+        self.rays = None if self.body is None else RayCaster(self.body)
+        thickness = design.options.stack.thickness
+        self.outer = parallel_frustum(self.side, thickness)
+        lift = thickness * self.side.sin_half_angle  # the outer face is moved by it towards end 1
+        self.sign = -1.0 if end == 1 else 1.0
+        sheet_end = min(0.0, -lift) if end == 1 else self.side.height + max(0.0, -lift)
+        self.step = sheet_end + self.sign * self.plan.clearance
+        self.room: float | None = None
+        if mesh is not None:
+            z = design.place.link_frustum.inverse().apply_all(mesh.vertices)[:, 2]
+            self.room = float(self.step - z.min() if end == 1 else z.max() - self.step)
+
+    def collar(self) -> Collar:
+        """Return the collar.
+
+        Raises:
+            _NoRoomError: the link stands out, or ends, where the lip would be.
+        """
+        wanted = self.plan.grip
+        flush = self.room is not None and _SHORTEST <= self.room <= _FLUSH
+        if flush and self.room is not None:
+            wanted = self.room
+        taper = self.sign * (self.side.radius2 - self.side.radius1) / self.side.height
+        if taper < 0.0:  # the cone ends at its apex
+            wanted = min(wanted, (float(self._cone(self.step)) - _LEAST_RADIUS) / -taper)
+        if self.room is not None:
+            wanted = min(wanted, self.room)
+        if wanted < _SHORTEST:
+            raise _NoRoomError(f"end {self.end} lies where the link ends: keep the sheet flush with its rim")
+        spans = self._spans()
+        free = [self._lip_lengths(np.linspace(*span), wanted) for span in spans]
+        longest = max(float(lengths.max()) for lengths in free)
+        if longest < _SHORTEST:
+            raise _NoRoomError(f"the link stands out right at end {self.end}: push the sheet against it there")
+        shortest = min(float(lengths.min()) for lengths in free)
+        stopped, keyed = shortest < wanted - 1e-9, shortest < longest - _KEY
+        parts = []
+        for number, ((start, stop, _), lengths) in enumerate(zip(spans, free, strict=True), 1):
+            phi = np.linspace(start, stop, len(lengths))
+            parts.append(CollarPart(number, start, stop, self._part(phi, lengths, number)))
+        reached = flush and longest > wanted - 1e-9
+        before = None if self.room is None else self.room - longest
+        return Collar(self.end, tuple(parts), longest, reached, stopped, keyed, before)
+
+    def _spans(self) -> list[tuple[float, float, int]]:
+        """Return start, end and number of columns of each part."""
+        wrap, radius = self.side.wrap, min(self.outer.radius1, self.outer.radius2)
+        if wrap > _TURN - 0.5:
+            middle, count, whole = 0.5 * (wrap - _TURN), self.plan.parts, _TURN  # of the seam
+        else:
+            middle, count, whole = 0.0, max(1, math.ceil(wrap / math.pi - 1e-9)), wrap
+            count = max(count, self.plan.parts if wrap > math.pi else 1)
+        half = 0.5 * _SLOT / radius
+        spans = []
+        for k in range(count):
+            start, stop = middle + k * whole / count, middle + (k + 1) * whole / count
+            start += half if k or whole == _TURN else 0.0
+            stop -= half if k < count - 1 or whole == _TURN else 0.0
+            spans.append((start, stop, max(4, math.ceil((stop - start) / _COLUMN)) + 1))
+        return spans
+
+    def _cone(self, z: float | Floats) -> Floats:
+        """Return the radius of the cone of the link, extended [m]."""
+        slope = (self.side.radius2 - self.side.radius1) / self.side.height
+        return np.asarray(np.maximum(_LEAST_RADIUS, self.side.radius1 + slope * np.asarray(z, float)))
+
+    def _link(self, z: Floats, phi: Floats) -> Floats:
+        """Return the radius of the outermost surface of the link at heights and azimuths of one shape [m]."""
+        cone = self._cone(z)
+        if self.rays is None or self.body is None:
+            return cone
+        radial = np.stack([np.cos(phi), np.sin(phi), np.zeros_like(phi)], axis=-1)
+        far = float(np.hypot(*self.body.vertices[:, :2].T).max()) + 0.01
+        origins = far * radial
+        origins[..., 2] = z
+        depth, _ = self.rays.cast(origins.reshape(-1, 3), -radial.reshape(-1, 3))
+        radius = (far - depth).reshape(phi.shape)
+        # beyond the link, or through an open end of the mesh, there is nothing to lie on
+        return np.where(np.isfinite(radius) & (radius > 0.5 * cone), radius, cone)
+
+    def _lip_lengths(self, phi: Floats, wanted: float) -> Floats:
+        """Return the length of the lip at each azimuth [m]."""
+        s = np.linspace(0.0, wanted, max(2, math.ceil(wanted / _ROW)) + 1)
+        if self.rays is None:
+            return np.full(len(phi), wanted)
+        z = self.step + self.sign * s[:, None] + np.zeros(len(phi))
+        standing = self._link(z, phi + np.zeros_like(z)) > self._cone(z) + _RISE
+        first = np.where(standing.any(axis=0), standing.argmax(axis=0), len(s))
+        free = np.where(first < len(s), s[np.clip(first - 1, 0, len(s) - 1)] - self.plan.clearance, wanted)
+        return np.asarray(np.maximum(0.0, widest_nearby(-free[None], 0, 2)[0] * -1.0))
+
+    def _part(self, phi: Floats, lengths: Floats, number: int) -> ClosedSurface:
+        """Return the shell of one part."""
+        plan = self.plan
+        count = max(2, math.ceil(float(lengths.max()) / _ROW)) + 1
+        share = np.linspace(1.0, 0.0, count)[:, None]
+        lip_z = self.step + self.sign * share * lengths
+        columns = phi + np.zeros_like(lip_z)
+        cone = self._cone(lip_z)
+        lip = cone + widest_nearby(self._link(lip_z, columns) - cone, 1, 1) + plan.clearance
+        lip = np.minimum(lip, cone + _RISE + plan.wall)  # where there is no lip, no wall either
+        lip = np.where(self._above_tabs(phi), np.maximum(lip, cone + _CHANNEL), lip)
+        into = np.array([0.0, _SEAT, _SEAT, plan.reach - _SEAT, plan.reach - _SEAT, plan.reach])[:, None]
+        sleeve_z = self.step - self.sign * into + np.zeros(len(phi))
+        slope = (self.outer.radius2 - self.outer.radius1) / self.outer.height
+        lifted = sleeve_z + self.design.options.stack.thickness * self.side.sin_half_angle
+        sleeve = self.outer.radius1 + slope * lifted + plan.clearance
+        z, inside = np.concatenate([lip_z, sleeve_z]), np.concatenate([lip, sleeve])
+        inside = without_undercut(inside, phi)
+        near = np.abs(z[:, None] - z[None]) <= plan.wall
+        outside = np.where(near, inside[None], 0.0).max(axis=1)
+        outside = widest_nearby(outside, 0, max(1, math.ceil(plan.wall / (float(inside.min()) * _COLUMN)))) + plan.wall
+        seat = max(float(outside[-6:].max()), float((sleeve + plan.wall).max()))
+        outside[-6:] = seat
+        outside[[-6, -5, -2, -1]] += _RIM
+        notched = np.zeros(len(phi), bool)
+        for k in range(number):
+            notched[2 + 3 * k : 4 + 3 * k] = len(phi) > 4 + 3 * k + 2
+        outside = np.where(notched, outside - _NOTCH, outside)
+        z = self.sign * (z - self.step)
+        z = z - z.min()
+        flip = self.sign  # end 1 is turned over, so that both kinds stand on their sleeve
+        inner, outer = (
+            np.stack([radius * np.cos(phi), flip * radius * np.sin(phi), z], axis=-1) for radius in (inside, outside)
+        )
+        return shell_surface(inner, outer)
+
+    def _above_tabs(self, phi: Floats) -> NDArray[np.bool_]:
+        """Tell at which azimuths tabs leave under the lip."""
+        radius = self.side.radius1 if self.end == 1 else self.side.radius2
+        tabs = [
+            tab
+            for foil in self.design.layout.foils.values()
+            for tab in foil
+            if isinstance(tab, ShapeTab) and tab.side == f"end{self.end}"
+        ]
+        near = np.zeros(len(phi), bool)
+        for tab in tabs:
+            away = np.abs((phi - tab.phi + math.pi) % _TURN - math.pi)
+            near |= away < (0.5 * tab.width + _BESIDE) / radius + _COLUMN
+        return near

@@ -1,0 +1,175 @@
+"""Jig: closed printable parts that keep clear of link and sheet, reach the datum, and come off without an undercut."""
+
+import io
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+from coneskin.design.jig_plan import JigPlan
+from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.workshop.build_figures import measure_build
+from coneskin.design.workshop.jig import Collar, CollarPart, jig_collars
+from coneskin.errors import GeometryError
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.mesh import Mesh, make_mesh
+from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
+from coneskin.geometry.pose import Pose
+from coneskin.geometry.solid.closed_surface import to_stl
+
+POSE = Pose.from_xyz_rpy((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
+
+
+def sheet(frustum: Frustum, pose: Pose | None = None, **options: object) -> SheetDesign:
+    (design,) = design_sheets([PlacedFrustum(frustum, pose or Pose())], DesignOptions(**options))  # type: ignore[arg-type]
+    return design
+
+
+def read_back(part: CollarPart) -> trimesh.Trimesh:
+    """The part as a printing program reads it: from the bytes of its STL file, in millimetres."""
+    return trimesh.load(io.BytesIO(to_stl(part.surface, "test")), file_type="stl")
+
+
+def in_part_frame(design: SheetDesign, collar: Collar, points: np.ndarray) -> np.ndarray:
+    """Points of the link's frame [m] where the part stands on the printer: axis z, sleeve down."""
+    side, plan = design.place.frustum, design.options.jig
+    lift = design.options.stack.thickness * side.sin_half_angle
+    sign = -1.0 if collar.end == 1 else 1.0
+    step = (min(0.0, -lift) if collar.end == 1 else side.height + max(0.0, -lift)) + sign * plan.clearance
+    x, y, z = design.place.link_frustum.inverse().apply_all(points).T
+    return np.column_stack([x, sign * y, sign * (z - step) + plan.reach])
+
+
+def tube(bump: float | None = None) -> Mesh:
+    """A tube of 50 mm about z from -0.03 to 0.25; beyond 0.207 a block of 40 deg stands out at an azimuth."""
+    phi = np.linspace(0, 2 * math.pi, 361)[:-1]
+    z = np.array([-0.03, 0.0, 0.1, 0.2069, 0.207, 0.25])
+    radius = np.full((6, 360), 0.05)
+    if bump is not None:
+        radius[4:, np.abs((phi - bump + math.pi) % (2 * math.pi) - math.pi) < math.radians(20)] = 0.08
+    corners = np.stack([radius * np.cos(phi), radius * np.sin(phi), z[:, None] + 0.0 * phi], axis=-1)
+    index = np.arange(6 * 360).reshape(6, 360)
+    a, b = index[:-1], np.roll(index, -1, axis=1)[:-1]
+    d, c = index[1:], np.roll(index, -1, axis=1)[1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    return make_mesh(corners.reshape(-1, 3), faces)
+
+
+@pytest.mark.parametrize(
+    "frustum",
+    [
+        Frustum(0.054, 0.054, 0.2),
+        Frustum(0.04, 0.07, 0.15, math.radians(270)),
+        Frustum(0.07, 0.03, 0.1, math.radians(160)),
+        Frustum(0.05, 0.048, 0.03),
+    ],
+)
+@pytest.mark.parametrize("parts", [2, 3])
+def test_every_part_is_a_watertight_solid(frustum: Frustum, parts: int) -> None:
+    design = sheet(frustum, jig=JigPlan(parts=parts, reach=0.01))
+    collars, without = jig_collars(design)
+    assert [collar.end for collar in collars] == [1, 2]
+    assert without == ()
+    for collar in collars:
+        for part in collar.parts:
+            solid = read_back(part)
+            assert solid.is_watertight
+            assert solid.is_winding_consistent
+            assert solid.body_count == 1
+            assert solid.volume == pytest.approx(1e9 * part.surface.volume, rel=1e-4)
+            assert solid.extents == pytest.approx(1e3 * np.array(part.surface.size), abs=1e-3)
+        assert len(collar.parts) == (1 if frustum.wrap < math.pi else parts)
+
+
+@pytest.mark.parametrize("frustum", [Frustum(0.05, 0.05, 0.2), Frustum(0.04, 0.06, 0.15)])
+def test_the_gap_to_cone_and_sheet_is_the_clearance(frustum: Frustum) -> None:
+    """Measured square to both, on the printed facets; on a cone radially, so by 1 / cos more than the normal."""
+    design = sheet(frustum, jig=JigPlan(clearance=0.5e-3))
+    side, stack = design.place.frustum, design.options.stack
+    for collar in jig_collars(design)[0]:
+        for part in collar.parts:
+            x, y, z = part.surface.vertices.T
+            reach = design.options.jig.reach
+            z = (z - reach) * (-1 if collar.end == 1 else 1)
+            step = in_part_frame(design, collar, np.zeros((1, 3)))[0, 2] - reach
+            height = z - step if collar.end == 2 else z + step
+            slope = (side.radius2 - side.radius1) / side.height
+            gap = (np.hypot(x, y) - side.radius1 - slope * height) * side.cos_half_angle
+            inside = part.surface.vertices[:, 2] > reach + 1e-6
+            assert gap[inside].min() == pytest.approx(0.5e-3 * side.cos_half_angle, abs=2e-6)
+            assert gap[~inside].min() > 0.0
+            sleeve = gap[part.surface.vertices[:, 2] < reach - 1e-6]
+            assert sleeve.min() == pytest.approx(stack.thickness + 0.5e-3 * side.cos_half_angle, abs=2e-6)
+
+
+def test_the_lip_ends_at_the_datum_and_clear_of_what_stands_out() -> None:
+    mesh = tube(bump=1.0)
+    design = sheet(Frustum(0.05, 0.05, 0.2), POSE)
+    one, two = jig_collars(design, mesh.moved(POSE))[0]
+    assert one.flush
+    assert one.before == pytest.approx(0.0, abs=1e-9)
+    assert one.lip == pytest.approx(0.03 - design.options.jig.clearance)
+    assert two.stopped
+    assert two.keyed, "the block fixes its azimuth"
+    assert not one.keyed
+    points = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).sample(20000, seed=1)
+    for collar in (one, two):
+        local = in_part_frame(design, collar, POSE.apply_all(points))
+        for part in collar.parts:
+            solid = trimesh.Trimesh(part.surface.vertices, part.surface.faces, process=False)
+            assert solid.is_volume
+            assert not solid.contains(local).any(), "no point of the link is in the plastic"
+
+
+def test_no_part_has_an_undercut() -> None:
+    """Pulled off away from the link along its middle, a part never meets the link."""
+    design = sheet(Frustum(0.05, 0.05, 0.2))
+    bumpy = tube(bump=0.6)
+    for collar in jig_collars(design, bumpy)[0]:
+        for part in collar.parts:
+            away = np.arctan2(part.surface.vertices[:, 1], part.surface.vertices[:, 0])
+            middle = 0.5 * (part.start + part.end) * (-1 if collar.end == 1 else 1)
+            off = (away - middle + math.pi) % (2 * math.pi) - math.pi
+            assert np.abs(off).max() < 0.5 * math.pi, "each part spans less than half a turn"
+    from coneskin.geometry.solid.radial_profile import without_undercut
+
+    phi = np.linspace(-1.5, 1.5, 61)
+    bump = np.where(np.abs(phi - 0.5) < 0.2, 1.5, 1.0)[None]
+    opened = without_undercut(bump, phi)[0]
+    assert (opened >= bump[0]).all()
+    width = opened * np.abs(np.sin(phi))
+    assert (np.diff(width[phi >= 0.0]) >= -1e-12).all()
+    assert (np.diff(width[phi <= 0.0]) <= 1e-12).all()
+
+
+def test_sheets_that_meet_have_collars_at_their_free_ends_only() -> None:
+    one, two = design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15))
+    first, said = jig_collars(one, None, ())
+    assert [collar.end for collar in first] == [1]
+    assert "at end 2 it meets the sheet beside it" in said[0]
+    second, said = jig_collars(two, None, (one,))
+    assert [collar.end for collar in second] == [2]
+    assert "at end 1 it meets the sheet beside it" in said[0]
+
+
+def test_a_link_that_ends_with_its_sheet_has_no_lip() -> None:
+    design = sheet(Frustum(0.05, 0.05, 0.279), Pose(translation=(0.0, 0.0, -0.03)))
+    collars, said = jig_collars(design, tube())
+    assert collars == ()
+    assert "end 1 lies where the link ends: keep the sheet flush with its rim" in said
+
+
+def test_no_jig_and_wrong_dimensions() -> None:
+    assert jig_collars(sheet(Frustum(0.05, 0.05, 0.2), jig=JigPlan("none"))) == ((), ())
+    with pytest.raises(GeometryError, match=r"wall of the jig must be 1\.5 to 20 mm, got 1 mm"):
+        JigPlan(wall=1e-3)
+    with pytest.raises(GeometryError, match="split into 2 to 8 parts, got 1"):
+        JigPlan(parts=1)
+
+
+def test_the_file_of_the_design_names_the_parts() -> None:
+    design = sheet(Frustum(0.05, 0.05, 0.2))
+    data = measure_build(design, 0).as_data(design)["jig"]
+    assert [part["file"] for part in data[0]["parts"]] == ["jig/end-1-part-1.stl", "jig/end-1-part-2.stl"]
+    assert all(part["volume_cm3"] > 5.0 for collar in data for part in collar["parts"])
