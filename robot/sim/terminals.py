@@ -31,6 +31,8 @@ class Terminals:
         output_bits: boolean registers that programs write, as one word of 128 bits.
         flags: of programs, as one word of bits.
         tool_voltage: supply of the tool: 0, 12 or 24 [V].
+        tool_output_mode: of the tool's digital outputs: 0 two outputs, 1 a supply of both pins together.
+        tool_drive_modes: how each of them drives: 1 sinking, 2 sourcing, 3 both.
     """
 
     def __init__(self) -> None:
@@ -42,6 +44,8 @@ class Terminals:
         self.output_bits = 0
         self.flags = 0
         self.tool_voltage = 0
+        self.tool_output_mode = 0
+        self.tool_drive_modes = [1, 1]
 
     def apply_digital(self, index: int, on: bool) -> int:
         """Switch a digital input, as what is wired to it does; return the word of all.

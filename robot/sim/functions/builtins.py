@@ -32,6 +32,7 @@ from coneskin.robot.sim.urscript.values import (
 )
 
 from .force_functions import ForceFunctions
+from .installation_functions import InstallationFunctions
 from .io_functions import IoFunctions, index_of
 from .moves import MoveFunctions, Wait
 from .socket_functions import SocketFunctions
@@ -41,7 +42,15 @@ __all__ = ["Builtins"]
 NAN6 = (math.nan,) * 6  #: value of what is not simulated, for six joints
 
 
-class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ForceFunctions, StringFunctions, MathFunctions):
+class Builtins(
+    MoveFunctions,
+    IoFunctions,
+    InstallationFunctions,
+    SocketFunctions,
+    ForceFunctions,
+    StringFunctions,
+    MathFunctions,
+):
     """All URScript functions, bound to one program of one controller."""
 
     @classmethod
@@ -95,7 +104,7 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ForceFunctions, Stri
         """Return the tool pose."""
         return values_of(self._arm.tcp_pose())
 
-    get_target_tcp_pose = get_actual_tcp_pose
+    get_target_tcp_pose = get_target_tcp_pose_along_path = get_actual_tcp_pose  # no path has an offset
 
     def get_actual_tool_flange_pose(self) -> PoseValue:
         """Return the flange pose."""
@@ -105,7 +114,7 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ForceFunctions, Stri
         """Return the velocity of the tool [m/s, rad/s]."""
         return Array(self._arm.twist())
 
-    get_target_tcp_speed = get_actual_tcp_speed
+    get_target_tcp_speed = get_target_tcp_speed_along_path = get_actual_tcp_speed
 
     def get_actual_joint_positions(self) -> Array:
         """Return the joint positions [rad]."""

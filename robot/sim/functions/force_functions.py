@@ -103,6 +103,7 @@ class ForceFunctions:
     def teach_mode(self) -> None:
         """Let the arm be moved by hand: nobody does, and it holds."""
 
+    freedrive_mode_no_incorrect_payload_check = teach_mode
     end_teach_mode = end_freedrive_mode
 
     def get_freedrive_status(self) -> int:

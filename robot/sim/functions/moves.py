@@ -214,6 +214,20 @@ class MoveFunctions:
             self._arm.motion = None
             self._host.log("motion", kind="StopTool", program=self._program.name, a=a, moving=False)
 
+    def set_pos(self, q: Any) -> None:
+        """Put a simulated arm that stands at joint positions, without a motion."""
+        q = numbers(q, 6, "joint positions")
+        self._program.drive()
+        model = self._arm.model
+        if self._arm.moving:
+            raise ScriptError("set_pos puts an arm that stands, and this one moves")
+        if not all(
+            low <= angle <= high for low, angle, high in zip(model.joint_lower, q, model.joint_upper, strict=True)
+        ):
+            raise ScriptError(f"set_pos: {show(Array(q))} is beyond the joints' limits [rad]")
+        self._arm.motion, self._arm.q = None, q
+        self._host.log("put", program=self._program.name, q=q)
+
     def get_inverse_kin(self, x: Any, qnear: Any = None, *_: Any) -> Array:
         """Return joint positions of a tool pose, nearest to qnear or to the present ones."""
         try:

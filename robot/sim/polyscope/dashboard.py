@@ -17,7 +17,7 @@ from coneskin.robot.sim.urscript.values import ScriptError
 
 from .user_interface import NO_MODE, SERIAL_NUMBER, UserInterface
 
-__all__ = ["WELCOME", "Dashboard"]
+__all__ = ["WELCOME", "Dashboard", "available"]
 
 #: line that the server sends when a client connects
 WELCOME = "Connected: Universal Robots Dashboard Server"
@@ -97,6 +97,11 @@ class Dashboard:
         for name in POWER_COMMANDS:
             self._commands[name] = lambda _, command=name: power(self._c, command)  # type: ignore[misc]
 
+    @property
+    def commands(self) -> list[str]:
+        """All commands, those of other versions too."""
+        return sorted(self._commands, key=str.lower)
+
     def answer(self, line: str) -> str:
         """Act on one line of the client, without its newline; return the reply, likewise."""
         command = line.strip()
@@ -104,7 +109,7 @@ class Dashboard:
         words = command.split(" ")
         for count in range(min(4, len(words)), 0, -1):  # the longest command that the line begins with
             name = " ".join(words[:count])
-            if name in self._commands and _available(name, self._c.options.version):
+            if name in self._commands and available(name, self._c.options.version):
                 return self._commands[name](" ".join(words[count:]).strip())
         return f"could not understand: '{command}'"
 
@@ -198,7 +203,7 @@ class Dashboard:
         return "Shutting down"
 
 
-def _available(command: str, version: Version) -> bool:
+def available(command: str, version: Version) -> bool:
     """Return whether a version of the software has a command."""
     e_series, cb3 = _SINCE.get(command, (0, 0))
     first = cb3 if version[0] == 3 else e_series

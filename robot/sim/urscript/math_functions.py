@@ -17,6 +17,7 @@ from .values import (
     PoseValue,
     ScriptError,
     interpolate,
+    numbers,
     pose_of,
     rotation_of,
     rotvec_between,
@@ -87,6 +88,15 @@ class MathFunctions:
         a, b = first.translation, last.translation
         shift = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
         return values_of(interpolate(first, shift, rotvec_between(first, last), float(alpha)))
+
+    def wrench_trans(self, T_from_to: Any, w_from: Any) -> Array:
+        """Return force [N] and torque [N m] as another frame has them, whose pose in the first one is given."""
+        pose, wrench = pose_of(T_from_to), numbers(w_from, 6, "a wrench")
+        (x, y, z), (fx, fy, fz) = pose.translation, wrench[:3]
+        about = (fy * z - fz * y, fz * x - fx * z, fx * y - fy * x)  # force x place: what the way to the frame adds
+        back = Pose(pose.rotation).inverse()
+        torque = [a + b for a, b in zip(wrench[3:], about, strict=True)]
+        return Array((*back.rotate((fx, fy, fz)), *back.rotate((torque[0], torque[1], torque[2]))))
 
     def rotvec2rpy(self, rotation_vector: Any) -> Array:
         """Return roll, pitch and yaw [rad] of a rotation vector: about x, then y, then z, all fixed axes."""

@@ -9,31 +9,26 @@ __all__ = ["NOT_SIMULATED"]
 
 _BY_SUBJECT = {
     "field buses": """modbus_add_rw_signal modbus_add_signal modbus_delete_signal modbus_get_error
-        modbus_get_signal_status modbus_get_time_since_signal_invalid modbus_reset_connection modbus_send_custom_command
-        modbus_set_digital_input_action modbus_set_output_register modbus_set_output_signal
+        modbus_get_signal_status modbus_get_time_since_signal_invalid modbus_reset_connection
+        modbus_send_custom_command modbus_set_digital_input_action modbus_set_output_register modbus_set_output_signal
         modbus_set_runstate_dependent_choice modbus_set_signal_update_frequency modbus_set_signal_watchdog
         read_port_bit read_port_register write_port_bit write_port_register get_euromap_input get_euromap_output
         set_euromap_output set_euromap_runstate_dependent_choice get_rtde_value rpc_factory
         request_boolean_from_primary_client request_float_from_primary_client request_integer_from_primary_client
         request_string_from_primary_client""",
-    "actions of inputs and outputs": """set_configurable_digital_input_action set_gp_boolean_input_action
-        set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
-        set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
-        set_runstate_tool_digital_output_to_value set_standard_digital_input_action set_tool_digital_input_action
-        set_tool_communication set_tool_digital_output_mode set_tool_output_mode""",
+    "outputs that follow the state of a program": """set_runstate_configurable_digital_output_to_value
+        set_runstate_gp_boolean_output_to_value set_runstate_standard_analog_output_to_value
+        set_runstate_standard_digital_output_to_value set_runstate_tool_digital_output_to_value""",
     "conveyors": """conveyor_pulse_decode encoder_enable_pulse_decode encoder_enable_set_tick_count
         encoder_get_tick_count encoder_set_tick_count encoder_unwind_delta_tick_count get_conveyor_tick_count
-        get_target_tcp_pose_along_path get_target_tcp_speed_along_path set_conveyor_tick_count stop_conveyor_tracking
-        track_conveyor_circular track_conveyor_linear""",
+        set_conveyor_tick_count stop_conveyor_tracking track_conveyor_circular track_conveyor_linear""",
     "offsets of paths": """path_offset_disable path_offset_enable path_offset_get path_offset_set
         path_offset_set_alpha_filter path_offset_set_max_offset""",
     "motion that this arm has not": """jerk_gain_scaling_get jerk_gain_scaling_set motion_version_get
-        motion_version_set pause_on_error_code position_deviation_warning reset_revolution_counter set_pos
-        set_safety_mode_transition_hardness tool_wrench_limit_disable tool_wrench_limit_set screw_driving
-        end_screw_driving freedrive_mode_no_incorrect_payload_check""",
+        motion_version_set pause_on_error_code position_deviation_warning reset_revolution_counter
+        tool_wrench_limit_disable tool_wrench_limit_set screw_driving end_screw_driving""",
     "the rest": """estimate_payload get_base_acceleration set_base_acceleration high_holding_torque_disable
-        high_holding_torque_enable powerdown set_baselight_iec set_baselight_off set_baselight_solid time
-        wrench_trans""",
+        high_holding_torque_enable powerdown set_baselight_iec set_baselight_off set_baselight_solid time""",
 }
 
 #: name of each function -> its subject

@@ -9,6 +9,7 @@ import pytest
 from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.functions.builtins import Builtins
 from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
 from coneskin.robot.sim.urscript.published_functions import NOT_SIMULATED
 from coneskin.robot.sim.urscript.translator import translate
 from coneskin.robot.sim.urscript.values import ScriptError
@@ -61,6 +62,13 @@ def test_what_is_not_simulated_is_refused_by_name_and_line(name: str) -> None:
         ("set_tool_voltage(13)", "0, 12 or 24 V"),
         ("set_standard_analog_out(0, 1.5)", "from 0 to 1"),
         ("optimovej([0, 0, 0, 0, 0, 0], a=2)", "shares"),
+        ("set_tool_communication(False, 1200, 0, 1, 1.5, 3.5)", "a baud rate of the tool"),
+        ("set_tool_communication(False, 9600, 0, 1, 0.5, 3.5)", "rx_idle_chars is from 1 to 40"),
+        ("set_tool_digital_output_mode(0, 4)", "one of 1, 2, 3"),
+        ('set_standard_digital_input_action(8, "default")', "from 0 to 7"),
+        ('set_standard_digital_input_action(0, "backdrive")', "the action of an input"),
+        ("set_pos([0, 0, 4, 0, 0, 0])", "beyond the joints' limits"),
+        ("speedj([0.1, 0, 0, 0, 0, 0], 40)\nset_pos([0, 0, 0, 0, 0, 0])", "this one moves"),
         ("movec(p[0,0,0,0,0,0], p[0,0,0,0,0,0], mode=3)", "mode of movec"),
     ],
 )
@@ -69,7 +77,7 @@ def test_what_no_controller_takes_ends_the_program(example: str, words: str) -> 
     failed: list[str] = []
     controller.fail = lambda _, problem: failed.append(str(problem))  # type: ignore[method-assign]
     controller.load(translate(f"def p():\n{example}\nend\n", Builtins.names(), Builtins.blocking()))
-    for _ in range(3):
+    for _ in range(6):
         controller.step()
     assert words in failed[0]
     assert controller.program is None
@@ -87,6 +95,47 @@ def test_a_force_that_would_move_the_arm_is_told_once_and_moves_nothing(call: st
         controller.step()
     assert ["not simulated" in str(notice) for notice in controller.notices].count(True) == 1
     assert not controller.arm.moving
+
+
+def test_what_polyscope_writes_before_a_program_is_taken_and_clients_are_told_the_tools_modes() -> None:
+    controller = Controller(Options(start_delay=0.0))
+    text = """def cell():
+  global _hidden_verificationVariable=0
+  set_tool_communication(False, 115200, 0, 1, 1.5, 3.5)
+  set_tool_output_mode(1)
+  set_tool_digital_output_mode(0, 2)
+  set_tool_digital_output_mode(1, 3)
+  step_count_1 = 0.0
+  thread Step_Counter_Thread_1():
+    while (True):
+      step_count_1 = step_count_1 + 1.0
+      sync()
+    end
+  end
+  run Step_Counter_Thread_1()
+  set_standard_analog_input_domain(0, 1)
+  set_tool_analog_input_domain(0, 1)
+  set_analog_outputdomain(0, 0)
+  set_input_actions_to_default()
+  set_tool_voltage(0)
+  set_gravity([0.0, 0.0, 9.82])
+  set_safety_mode_transition_hardness(1)
+  set_tcp(p[0.0,0.0,0.1,0.0,0.0,0.0])
+  set_payload(0.5)
+  while (True):
+    $ 1 "Robot Program"
+    $ 2 "Wait: 0.02"
+    sleep(0.02)
+  end
+end
+"""
+    controller.load(translate(text, Builtins.names(), Builtins.blocking()))
+    for _ in range(30):
+        controller.step()
+    assert controller.program is not None
+    outputs = RtdeOutputs(controller)
+    names = ("tool_output_mode", "tool_digital_output0_mode", "tool_digital_output1_mode")
+    assert [outputs.getter(name)() for name in names] == [1, 2, 3]
 
 
 def page_table() -> str:

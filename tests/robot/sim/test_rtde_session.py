@@ -175,7 +175,14 @@ def page_table() -> str:
 def test_the_page_lists_every_variable() -> None:
     text = (Path(__file__).parents[3] / "docs" / "sim-ur.md").read_text(encoding="utf-8")
     shown = text.split("<!-- variables -->")[1].split("<!-- end of variables -->")[0]
-    assert shown.strip() == page_table()
+    assert shown.strip() == page_table(), "python -m tests.robot.sim.test_rtde_session prints the table anew"
+
+
+def test_every_published_input_is_taken_with_its_type() -> None:
+    assert {name for name in VARIABLES if name.startswith("input_")} <= INPUTS <= VARIABLES.keys()
+    for name in sorted(INPUTS):
+        answer = ask(session(Controller(Options())), pack_inputs_request((name,)))
+        assert answer[1:].decode() == VARIABLES[name], name
 
 
 @pytest.mark.parametrize("name", ["actual_q", "timestamp", "output_int_register_0", "payload", "joint_mode"])
@@ -186,3 +193,7 @@ def test_an_output_is_no_input(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(name for name in INPUTS if not name.startswith("input_")))
 def test_an_input_that_is_no_register_is_no_output(name: str) -> None:
     assert ask(session(Controller(Options())), pack_outputs_request((name,))) == b"\x00NOT_FOUND"
+
+
+if __name__ == "__main__":
+    print(page_table())

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from coneskin.robot.sim.polyscope.dashboard import available
 from tests.robot.sim.polyscope.console import WAIT, Console, packed
 
 
@@ -158,3 +159,36 @@ def test_windows_and_versions_are_answered(console: Console) -> None:
     assert console.say("PolyscopeVersion") == "URSoftware 5.25.0.1 (Jan 01 2026)"
     assert console.say("version") == "5.25.0.1"
     assert console.say("loading") == "could not understand: 'loading'"
+
+
+PAGE = Path(__file__).parents[4] / "docs" / "sim-ur.md"
+
+
+def first_version(command: str, major: int) -> str:
+    """The first version of a generation that has a command; empty where none has."""
+    return next((f"{major}.{minor}" for minor in range(40) if available(command, (major, minor))), "")
+
+
+def page_table() -> str:
+    """The page's list of commands, each with the first version of e-Series and of CB3 that has it."""
+    lines = ["| dashboard command | e-Series since | CB3 since |", "|---|---|---|"]
+    for command in Console().dashboard.commands:
+        lines.append(f"| `{command}` | {first_version(command, 5) or '-'} | {first_version(command, 3) or '-'} |")
+    return "\n".join(lines)
+
+
+def test_the_page_lists_every_command() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    shown = text.split("<!-- dashboard -->")[1].split("<!-- end of dashboard -->")[0]
+    assert shown.strip() == page_table(), "python -m tests.robot.sim.polyscope.test_dashboard prints the table anew"
+
+
+def test_every_command_of_the_page_is_understood_by_a_version_that_has_it() -> None:
+    for version in ((5, 25), (3, 15)):
+        for command in Console(version=version).dashboard.commands:
+            said = Console(version=version).say(command)
+            assert said.startswith("could not understand") is not available(command, version), (command, version, said)
+
+
+if __name__ == "__main__":
+    print(page_table())
