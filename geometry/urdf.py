@@ -14,19 +14,31 @@ from coneskin.errors import MeshError
 
 from .mesh import Mesh, load_mesh, make_mesh, refuse_entities
 from .pose import Pose, Vector
+from .xacro import expand_xacro
 
 __all__ = ["load_urdf_link", "urdf_links"]
 
 MAX_SIZE = 10_000_000  # bytes of a URDF
 
 
-def urdf_links(path: str | Path) -> tuple[str, ...]:
+def urdf_links(
+    path: str | Path,
+    packages: Mapping[str, str | Path] | None = None,
+    arguments: Mapping[str, str] | None = None,
+) -> tuple[str, ...]:
     """Return the names of the links of a URDF that have a mesh, visual or collision.
+
+    Args:
+        path: a URDF, or a xacro file (``expand_xacro``).
+        packages: folders of the ROS packages that a xacro file names.
+        arguments: of a xacro file.
 
     Raises:
         MeshError: no such file, or not a URDF.
+        MissingExtra: xacrodoc is not installed, and the file is a xacro file.
     """
-    return tuple(link.get("name", "") for link in _robot(Path(path)).iter("link") if link.find(".//mesh") is not None)
+    robot = _robot(Path(path), packages, arguments)
+    return tuple(link.get("name", "") for link in robot.iter("link") if link.find(".//mesh") is not None)
 
 
 def load_urdf_link(
@@ -35,30 +47,33 @@ def load_urdf_link(
     geometry: str = "visual",
     packages: Mapping[str, str | Path] | None = None,
     up_axis: str = "ignore",
+    arguments: Mapping[str, str] | None = None,
 ) -> Mesh:
     """Read the meshes of a link, scaled and placed as the URDF says, as one mesh.
 
     Args:
-        path: the URDF; a xacro file has to be expanded first.
+        path: the URDF, or a xacro file, which is expanded (``expand_xacro``).
         link: name of the link.
         geometry: "visual" or "collision". Collision bodies are often convex hulls that have lost the tube.
         packages: folders of the ROS packages in package:// paths; others are searched for at and beside the folders
             above the URDF.
         up_axis: what to do with COLLADA's up_axis tag, see ``load_mesh``.
+        arguments: of a xacro file.
 
     Returns:
         the mesh in the frame of the link [m].
 
     Raises:
         MeshError: no such file, link, package or mesh, or a mesh that cannot be read.
+        MissingExtra: xacrodoc is not installed, and the file is a xacro file.
     """
     path = Path(path)
     if geometry not in ("visual", "collision"):
         raise MeshError(f"geometry must be 'visual' or 'collision', got {geometry!r}")
-    robot = _robot(path)
+    robot = _robot(path, packages, arguments)
     found = next((item for item in robot.iter("link") if item.get("name") == link), None)
     if found is None:
-        names = ", ".join(urdf_links(path)) or "none with a mesh"
+        names = ", ".join(urdf_links(path, packages, arguments)) or "none with a mesh"
         raise MeshError(f"{path}: no link {link!r}; there are: {names}")
     parts: list[Mesh] = []
     shapes: list[str] = []
@@ -89,19 +104,24 @@ def load_urdf_link(
     return make_mesh(np.concatenate([part.vertices for part in parts]), faces, source, parts[0].unit, notes)
 
 
-def _robot(path: Path) -> ElementTree.Element:
+def _robot(
+    path: Path, packages: Mapping[str, str | Path] | None, arguments: Mapping[str, str] | None
+) -> ElementTree.Element:
+    """Return the root of a URDF; a xacro file is expanded first."""
     try:
         data = read_file(path, MAX_SIZE)
         refuse_entities(data, path)
         root = ElementTree.fromstring(data)
+        if root.tag == "robot" and any("xacro" in str(item.tag) for item in root.iter()):
+            root = ElementTree.fromstring(expand_xacro(path, arguments, packages))
+    except MeshError:  # a ValueError as well
+        raise
     except OSError as error:
         raise MeshError(f"{path}: {error.strerror or error}") from error
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # malformed, or of an unknown encoding
         raise MeshError(f"{path}: malformed XML: {error}") from error
     if root.tag != "robot":
         raise MeshError(f"{path}: a URDF begins with <robot>, this file with <{root.tag}>")
-    if any("xacro" in str(item.tag) for item in root.iter()):
-        raise MeshError(f"{path}: a xacro file must be expanded first (xacro {path.name} > expanded.urdf)")
     return root
 
 

@@ -87,6 +87,7 @@ HOMES = {
     "trimesh": ("geometry/mesh.py",),
     "embreex": ("geometry/mesh.py",),
     "collada": ("geometry/mesh.py",),
+    "xacrodoc": ("geometry/xacro.py",),
     "ezdxf": ("geometry/drawing/dxf.py",),
     "rpack": ("geometry/drawing/nesting.py",),
     "pyarrow": ("src/coneskin/runs/parquet_file.py",),

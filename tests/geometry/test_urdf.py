@@ -119,7 +119,6 @@ def test_what_is_missing_is_named(tmp_path: Path, body: str, link: str, words: s
     [
         ("<robot><link", "malformed XML"),
         ("<sdf/>", "begins with <robot>, this file with <sdf>"),
-        ('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arm/></robot>', "a xacro file must be expanded first"),
     ],
 )
 def test_what_is_no_urdf(tmp_path: Path, text: str, words: str) -> None:

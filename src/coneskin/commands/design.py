@@ -21,14 +21,14 @@ from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.skin.matched_electronics import shunt_ohms
 
-from .arguments.design import (
-    add_arguments,
-    design_options,
+from .arguments.design import add_arguments, design_options
+from .arguments.link import (
     links_from_dimensions,
     package_folders,
     refuse_dimensions,
     requested_wrap,
     seam_direction,
+    xacro_arguments,
 )
 from .ending_signals import ending_signals
 
@@ -111,6 +111,7 @@ def _load_and_fit(args: argparse.Namespace, say: Callable[[str], None]) -> tuple
         args.up_axis,
         package_folders(args),
         say,
+        xacro_arguments(args),
         tolerance=args.tolerance_mm * 1e-3,
         max_sheets=args.max_sheets,
         wrap=requested_wrap(args),

@@ -41,14 +41,16 @@ def load_link(
     unit: str | None = None,
     up_axis: str = "ignore",
     packages: Mapping[str, str | Path] | None = None,
+    arguments: Mapping[str, str] | None = None,
 ) -> Iterator[LinkMesh]:
     """Load the meshes of a LINK.
 
     Args:
-        link: a mesh file, or FILE.urdf#LINK.
+        link: a mesh file, or FILE.urdf#LINK; a xacro file is expanded.
         unit: of a mesh file; None to guess.
         up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
         packages: folders of the ROS packages in a URDF's package:// paths (``load_urdf_link``).
+        arguments: of a xacro file (``expand_xacro``).
 
     Yields:
         the meshes of the link, the best first: the visual mesh of a URDF is closer to the real surface than its
@@ -68,11 +70,12 @@ def load_link(
     from coneskin.geometry.urdf import load_urdf_link, urdf_links
 
     if not name:
-        raise MeshError(f"{path}: name a link as {Path(path).name}#LINK; its links are: {', '.join(urdf_links(path))}")
+        names = ", ".join(urdf_links(path, packages, arguments))
+        raise MeshError(f"{path}: name a link as {Path(path).name}#LINK; its links are: {names}")
     errors: list[MeshError] = []
     for kind in ("visual", "collision"):
         try:
-            mesh = load_urdf_link(path, name, kind, packages, up_axis)
+            mesh = load_urdf_link(path, name, kind, packages, up_axis, arguments)
         except MeshError as exc:
             errors.append(exc)
             continue
@@ -89,16 +92,18 @@ def fit_link(
     up_axis: str = "ignore",
     packages: Mapping[str, str | Path] | None = None,
     progress: Callable[[str], None] = lambda _: None,
+    arguments: Mapping[str, str] | None = None,
     **search: Any,
 ) -> tuple[LinkMesh, LinkFit]:
     """Return the first mesh of a link in which cones are found, with its fit; else the first mesh.
 
     Args:
-        link: a mesh file, or FILE.urdf#LINK.
+        link: a mesh file, or FILE.urdf#LINK; a xacro file is expanded.
         unit: of a mesh file; None to guess.
         up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
         packages: folders of the ROS packages in a URDF's package:// paths.
         progress: called with the name of each step.
+        arguments: of a xacro file.
         search: keyword arguments of ``find_cones``.
 
     Raises:
@@ -109,7 +114,7 @@ def fit_link(
 
     tries: list[tuple[LinkMesh, LinkFit]] = []
     progress(f"reading {link}")
-    for source in load_link(link, unit, up_axis, packages):
+    for source in load_link(link, unit, up_axis, packages, arguments):
         progress(f"{source.name}: {len(source.mesh.faces)} faces")
         fit = find_cones(source.mesh, progress=progress, **search)
         if fit.sheets:

@@ -56,6 +56,7 @@ def design_link(
     unit: str | None = None,
     up_axis: str = "ignore",
     packages: Mapping[str, str | Path] | None = None,
+    arguments: Mapping[str, str] | None = None,
     files: FileOptions | None = None,
     pictures: bool = True,
     replace_design: bool = False,
@@ -71,6 +72,7 @@ def design_link(
         unit: of a mesh file, a key of ``UNITS``; None to guess.
         up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
         packages: folders of the ROS packages that a URDF names.
+        arguments: of a xacro file (``expand_xacro``).
         files: options of the drawings.
         pictures: True to draw pictures too, which needs the extra ``pictures``.
         replace_design: True to allow an earlier design in the folder; files that are not of that design stay.
@@ -103,7 +105,7 @@ def design_link(
     if isinstance(link, Frustum):
         places = (PlacedFrustum(link),)
     elif isinstance(link, str | Path):
-        source, fit = fit_link(str(link), unit, up_axis, packages, progress, **search)
+        source, fit = fit_link(str(link), unit, up_axis, packages, progress, arguments, **search)
         places, origin = fit, str(link)
     elif isinstance(link, Mesh):
         source, fit = fit_mesh(link, progress, **search)

@@ -3,38 +3,29 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 from coneskin.design.sheets import DesignOptions
-from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.cut_sheet import FaceUp
 from coneskin.geometry.drawing.dxf import ArcStyle
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK, AssemblyMode, LayerStack
 from coneskin.geometry.drawing.pdf import PageSize
 from coneskin.geometry.drawing.surface_shape import SheetSide
-from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.scene.cone_keys import DOUBLE_CONE_KEYS
 from coneskin.scene.sensor_table import SENSOR_KEYS
 from coneskin.skin.matched_electronics import GivenElectronics
 
-from .dimensions import add_dimension_options, add_setting_option, given_dimensions, option_name
+from .dimensions import add_dimension_options, add_setting_option
 from .jig import add_jig_options, given_jig
 
 __all__ = [
     "EXAMPLES",
     "add_arguments",
     "design_options",
-    "links_from_dimensions",
-    "package_folders",
-    "refuse_dimensions",
-    "requested_wrap",
-    "seam_direction",
 ]
 
 EXAMPLES = """\
@@ -101,6 +92,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME=DIR",
         help="folder of a ROS package that a URDF names (package://NAME/...); may be repeated",
+    )
+    add(
+        "--xacro-arg",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="argument of a xacro file, which is expanded (extra xacro); may be repeated",
     )
     _add_quantity(add, "tolerance-mm", 1.0, "largest distance between sheet and mesh")
     add("--max-sheets", type=int, default=2, metavar="N", help="largest number of sheets (default 2)")
@@ -219,82 +217,3 @@ def design_options(args: argparse.Namespace) -> DesignOptions:
         face_up=args.face_up,
         jig=given_jig(args),
     )
-
-
-def package_folders(args: argparse.Namespace) -> dict[str, str]:
-    """Return the folders of ROS packages that were named.
-
-    Raises:
-        GeometryError: one is not NAME=DIR.
-    """
-    folders = {}
-    for text in args.package:
-        name, equals, folder = text.partition("=")
-        if not (name and equals and folder):
-            raise GeometryError(f"--package takes NAME=DIR, as in --package ur_description=src/ur_description: {text}")
-        folders[name] = folder
-    return folders
-
-
-def requested_wrap(args: argparse.Namespace) -> float | None:
-    """Return the wrap angle asked for [rad]; None for the widest that fits."""
-    return given_dimensions(args, [key for key in DOUBLE_CONE_KEYS if key.plain == "wrap"]).get("wrap")
-
-
-def seam_direction(args: argparse.Namespace) -> tuple[float, float, float]:
-    """Return the direction in which the seam of a full wrap faces.
-
-    Raises:
-        GeometryError: it was given twice.
-    """
-    if args.seam is not None and args.touch_side is not None:
-        raise GeometryError("--seam and --touch-side cannot go together: the seam faces away from the touch side")
-    for option, way in (("--seam", args.seam), ("--touch-side", args.touch_side)):
-        if way is not None and not 0.0 < math.hypot(*way) < math.inf:
-            raise GeometryError(
-                f"{option} takes a direction X Y Z, finite and not 0 0 0, got {' '.join(map(str, way))}"
-            )
-    x, y, z = args.seam or (1.0, 0.0, 0.0)
-    if args.touch_side is not None:
-        x, y, z = (-value for value in args.touch_side)
-    return x, y, z
-
-
-def links_from_dimensions(args: argparse.Namespace) -> tuple[PlacedFrustum, ...]:
-    """Return the one or two places on a link that its radii and heights describe, in order along the axis.
-
-    Raises:
-        GeometryError: a dimension is missing or out of range.
-    """
-    values = given_dimensions(args, DOUBLE_CONE_KEYS)
-    for option in ("seam", "touch_side"):
-        if getattr(args, option) is not None:
-            raise GeometryError(
-                f"--{option.replace('_', '-')} is for a mesh: by its dimensions a link has no directions, and its seam "
-                "is at phi = 0"
-            )
-    if args.weights is not None or args.exposure:
-        option = "--exposure" if args.exposure else "--weights"
-        raise GeometryError(f"{option} is for a mesh: a link by its dimensions is covered whole")
-    if not {"radius1", "height"} <= values.keys():
-        raise GeometryError("name a mesh file, or give --radius1-mm and --height-mm")
-    if ("radius3" in values) != ("height2" in values):
-        raise GeometryError("a second cone needs both --radius3-mm and --height2-mm")
-    values = {"radius2": values["radius1"], **values}
-    if "radius3" not in values:
-        return (PlacedFrustum(Frustum(**values)),)
-    wrap = values.get("wrap", 2.0 * math.pi)
-    return double_cone(
-        values["radius1"], values["radius2"], values["radius3"], values["height"], values["height2"], wrap
-    )
-
-
-def refuse_dimensions(args: argparse.Namespace) -> None:
-    """Refuse radii and heights beside a mesh.
-
-    Raises:
-        GeometryError: one was given.
-    """
-    for key in DOUBLE_CONE_KEYS:
-        if key.plain != "wrap" and getattr(args, key.name) is not None:
-            raise GeometryError(f"a mesh and {option_name(key)} cannot go together: the radii are found in the mesh")
