@@ -57,6 +57,7 @@ MAY_IMPORT: dict[str, str] = {
     "doctor": "commissioning scene skin skin.detection skin.diagnosis skin.sources skin.virtual robot.arm robot.driver",
     "session": "code_version scene recording_file robot.arm robot.driver robot.guard robot.stop skin "
     "skin.diagnosis skin.sources skin.virtual",
+    "permissible_speed": "scene robot.arm skin geometry",
     "physics": "scene testing robot.arm robot.driver robot.guard skin skin.virtual geometry",
     "replay": "code_version scene recording_file robot.arm robot.driver robot.guard skin skin.detection",
     "runs": "code_version replay scene recording_file geometry robot.arm robot.driver robot.guard robot.sim skin "
@@ -68,9 +69,9 @@ MAY_IMPORT: dict[str, str] = {
     "design": "design.workshop scene skin skin.firmware geometry geometry.fit geometry.drawing geometry.solid "
     "robot.arm",
     "design.workshop": "design scene skin skin.diagnosis geometry geometry.drawing geometry.solid",
-    "commands": "physics calibration commissioning design doctor monitor scene session replay runs studio view "
-    "view.stage geometry geometry.fit geometry.drawing skin skin.field skin.firmware skin.detection skin.sources "
-    "robot.arm robot.driver robot.guard robot.sim commands.arguments",
+    "commands": "physics permissible_speed calibration commissioning design doctor monitor scene session replay runs "
+    "studio view view.stage geometry geometry.fit geometry.drawing skin skin.field skin.firmware skin.detection "
+    "skin.sources robot.arm robot.driver robot.guard robot.sim commands.arguments",
     "commands.arguments": "design geometry geometry.drawing scene skin",
     "testing": "scene robot.arm robot.driver robot.guard robot.reaction robot.stop robot.ur skin skin.detection "
     "skin.sources skin.virtual geometry",
@@ -98,7 +99,11 @@ HOMES = {
     "matplotlib": ("skin/field/pictures.py", "src/coneskin/picture_file.py", "src/coneskin/*/*picture*.py"),
     "viser": ("src/coneskin/view/page_server.py",),
     "pinocchio": ("src/coneskin/testing/pinocchio_arm.py",),
-    "tomli_w": ("src/coneskin/scene/link_tables.py", "src/coneskin/scene/setting_overrides.py"),
+    "tomli_w": (
+        "src/coneskin/permissible_speed/speed_map_file.py",
+        "src/coneskin/scene/link_tables.py",
+        "src/coneskin/scene/setting_overrides.py",
+    ),
     "scipy": (
         "geometry/fit/*.py",
         "geometry/hole_bridging.py",

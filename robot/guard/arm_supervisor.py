@@ -42,6 +42,7 @@ from .touch_record import TouchRecord
 if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .controller_heartbeat import ControllerHeartbeat
     from .reaction_motion import ReactionPlanner
+    from .speed_limit import SpeedLimit
 
 __all__ = ["ArmSupervisor"]
 
@@ -59,6 +60,7 @@ class ArmSupervisor:
         rules: reactions with conditions.
         planner: of motions away from a touch; None where no reaction moves the arm.
         heartbeat: supervision of the program that moves the arm; None where that is the driver process.
+        speed_limit: of the skins' surfaces; None where nothing limits them.
 
     Attributes:
         phase: where it is.
@@ -84,6 +86,7 @@ class ArmSupervisor:
         rules: tuple[Rule, ...] = (),
         planner: ReactionPlanner | None = None,
         heartbeat: ControllerHeartbeat | None = None,
+        speed_limit: SpeedLimit | None = None,
     ) -> None:
         self.phase = Phase.STARTING
         self.state: ControllerState | None = None
@@ -95,6 +98,7 @@ class ArmSupervisor:
         self._rules = RuleSet(reaction, rules)
         self._plain = not rules and reaction.kind in ("stop", "retreat")
         self._touches = TouchRecord(self._rules)
+        self._speed_limit = speed_limit
         self.speed_reduction = SpeedReduction(model, self.needs_slider)
         if planner is None and self._rules.move:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
@@ -110,8 +114,8 @@ class ArmSupervisor:
 
     @property
     def needs_slider(self) -> bool:
-        """True where a reaction may use the controller's speed slider."""
-        return "slow" in self._rules.kinds
+        """True where a reaction, or the limit of the speed, may use the controller's speed slider."""
+        return "slow" in self._rules.kinds or self._speed_limit is not None
 
     @property
     def stops_by_slider(self) -> bool:
@@ -136,6 +140,8 @@ class ArmSupervisor:
         """React from now on; the program may move the arm."""
         self.phase, self._reaction = Phase.ACTIVE, self._rules.default
         self._watch.forget()
+        if self._speed_limit is not None:
+            self._speed_limit.forget()
         self.speed_reduction.release(out)
 
     def touch(self, now: float, contact: Contact, began: bool, out: Outputs) -> None:
@@ -207,6 +213,10 @@ class ArmSupervisor:
             self._follow(state, measured_at, out)
         elif self._away.under_way:
             self._move(state, out)
+        elif self._speed_limit is not None and self.phase is Phase.ACTIVE:
+            slider = self.speed_reduction.slider if self.speed_reduction.knows(state.time) else None
+            if why := self._speed_limit.sample(state, slider, out):
+                self._stop_now(state.time, why, False, out)
         elif self.phase is Phase.SLOWED:
             self.speed_reduction.sample(state, self._touches.contacts)
         elif self._watch.moved(state, bool(self._touches.contacts)):
@@ -240,7 +250,7 @@ class ArmSupervisor:
         """
         at_work = self._stops.under_way or self._away.under_way or self._watch.under_way
         heard = self.heartbeat is None or self.heartbeat.silent
-        if self.phase is not Phase.ACTIVE or at_work or not heard:
+        if self.phase is not Phase.ACTIVE or at_work or not heard or self._speed_limit is not None:
             return -math.inf
         return self._fresh + self._limits.arm_silence
 

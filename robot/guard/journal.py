@@ -75,6 +75,7 @@ class EventName(StrEnum):
     MOTION_LIMITED = "motion_limited"  #: that motion is slower than set; ``by`` lists the limits
     RETREATED = "retreated"  #: that motion is over
     SPEED_REDUCED = "speed_reduced"  #: the speed slider was lowered because of a touch
+    SPEED_LIMITED = "speed_limited"  #: the speed slider was set so that surfaces keep their permissible speeds
     RESUMED = "resumed"  #: the speed slider is back where it was
     LATCHED = "latched"  #: the arm stands and waits for a manual reset
     REFUSED = "refused"  #: a reset was refused; ``reasons`` lists why

@@ -33,6 +33,7 @@ COMMANDS = {
     "monitor": ("coneskin.commands.monitor", "what arrives on a line, and what is wrong with it; no arm, no scene"),
     "guard": ("coneskin.commands.guard", "guard the arm of a scene"),
     "impact": ("coneskin.commands.impact", "the forces with which a scene's arm meets its bodies, in physics"),
+    "permissible": ("coneskin.commands.permissible", "how fast which part of a skinned arm may move, by your limits"),
     "heartbeat": (
         "coneskin.commands.heartbeat",
         "lines with which a program on the controller ends if the guard is gone",

@@ -38,6 +38,10 @@ LINES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "retreating": ({}, "retreating"),
     "speed_reduced": ({"slider": 0.2, "before": 1.0}, "speed reduced: slider from 100 % to 20 %"),
+    "speed_limited": (
+        {"slider": 0.4, "before": 1.0, "sensor": "front", "ratio": 2.25},
+        "speed limited: slider from 100 % to 40 %; front would move at 225 % of its permissible speed",
+    ),
     "resumed": ({"slider": 1.0}, "no touch any more: speed slider back to 100 %"),
     "motion_limited": (
         {"by": ["joint speed", "singularity"]},

@@ -11,7 +11,15 @@ import pytest
 
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.scene import body_table, link_tables, reaction_table, schema, sensor_table, source_table
+from coneskin.scene import (
+    body_table,
+    link_tables,
+    reaction_table,
+    schema,
+    sensor_table,
+    source_table,
+    speed_limit_table,
+)
 from coneskin.scene import reader as scene_reader
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.schema import Key
@@ -35,12 +43,14 @@ SECTIONS: dict[str, tuple[Key, ...]] = {
     "[commissioning]": scene_reader._COMMISSIONING,
     "[[body]]": body_table.BODY_KEYS,
     "[padding]": body_table.PADDING_KEYS,
+    "[speed_limit]": speed_limit_table.SPEED_LIMIT_KEYS,
 }
 #: what the document says in words, because the code says None, nothing, or works it out
 IN_WORDS = {
     ("[recording]", "max_mb"): "none",
     ("[recording]", "keep"): "all",
     ("[arm]", "table_z_mm"): "none",
+    ("[arm]", "speed_limit_from"): "none",
     ("[reaction]", "rule"): "none",
     ("[commissioning]", "max_age_days"): "none",
     **{

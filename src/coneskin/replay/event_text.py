@@ -91,6 +91,10 @@ def _words(event: GuardEvent) -> str:
         case EventName.MOTION_LIMITED:
             what = "giving way" if _PUSH & set(d["by"]) else "retreat"
             text = f"{what} slower than set, because of {', '.join(d['by'])}"
+        case EventName.SPEED_LIMITED:
+            slider = f"slider from {100.0 * d['before']:.0f} % to {100.0 * d['slider']:.0f} %"
+            why = f"{d['sensor']} would move at {100.0 * d['ratio']:.0f} % of its permissible speed"
+            text = f"speed limited: {slider}; {why}" if d["sensor"] else f"speed less limited: {slider}"
         case EventName.SPEED_REDUCED:
             text = f"speed reduced: slider from {100.0 * d['before']:.0f} % to {100.0 * d['slider']:.0f} %"
         case EventName.RESUMED:

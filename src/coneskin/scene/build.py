@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import KinematicsError, SceneError
@@ -21,8 +23,10 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.guard.core import GuardCore
     from coneskin.robot.guard.reaction_motion import ReactionPlanner
+    from coneskin.robot.guard.speed_limit import SpeedLimit
 
     from .scene import Scene
+    from .speed_limit import SpeedLimitScene
 
 __all__ = ["SensorOnArm", "build_core", "place_on_arm", "withheld_motion"]
 
@@ -97,9 +101,39 @@ def _arm(scene: Scene) -> ArmSupervisor:
         from coneskin.robot.guard.controller_heartbeat import ControllerHeartbeat
 
         heartbeat = ControllerHeartbeat(scene.arm.controller_heartbeat == "required")
+    limit = None if scene.speed_limit is None else _speed_limit(scene, scene.speed_limit, arm)
     return ArmSupervisor(
-        arm, load_driver(arm.family), rules.default, scene.monitoring_limits, paths, rules.rules, planner, heartbeat
+        arm,
+        load_driver(arm.family),
+        rules.default,
+        scene.monitoring_limits,
+        paths,
+        rules.rules,
+        planner,
+        heartbeat,
+        limit,
     )
+
+
+def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLimit:
+    """Build the limit of the speed; a place between two patches is faster than they are by at most a little."""
+    from coneskin.robot.guard.speed_limit import PermissiblePatch, PermissibleSpeeds, SpeedLimit
+
+    # on the frusta, not on the meshes below: a mesh file must not be needed, and the speed of either is the same
+    bare = replace(scene, links=tuple(replace(link, mesh=None) for link in scene.links))
+    places = {item.name: item for item in place_on_arm(bare)}
+    patches = []
+    for patch in limit.patches:
+        at = places[patch.sensor]
+        curve, any_curve = limit.curves[patch.curve], limit.curves[patch.any_curve]
+        patches.append(PermissiblePatch(patch.sensor, at.link, *at.place(patch.u, patch.phi), curve, any_curve))
+    widest = 0.0  # angle between two patches, in the middle of which the speed along the normal may be greatest
+    for name in places:
+        around = sorted({patch.phi for patch in limit.patches if patch.sensor == name})
+        widest = max([widest, *(b - a for a, b in pairwise(around))])
+    between = 1.0 / max(0.1, math.cos(0.5 * widest))
+    speeds = PermissibleSpeeds(limit.levers, tuple(patches), limit.lowest, limit.highest, between)
+    return SpeedLimit(arm, speeds)
 
 
 def _planner(scene: Scene, arm: ArmModel) -> ReactionPlanner:

@@ -29,7 +29,7 @@ LINK_KEYS = (
 
 
 def inline_sensor_files(
-    tables: dict[str, Any], folder: Path | None, problems: list[str], calibrated: bool = True
+    tables: dict[str, Any], folder: Path | None, problems: list[str], calibrated: bool = True, changed: bool = False
 ) -> str:
     """Copy the keys of sensor files and calibrations into the sensors' tables.
 
@@ -38,11 +38,12 @@ def inline_sensor_files(
         folder: folder to which paths are relative; None where no file may be opened.
         problems: every mistake is added here.
         calibrated: False to leave calibrations out.
+        changed: True where the tables are others than the text's already.
 
     Returns:
-        the text of the scene with those keys; empty where no sensor has a file.
+        the text of the scene with those keys; empty where no sensor has a file, and nothing is changed.
     """
-    any_file = False
+    any_file = changed
     for link, table in _link_tables(tables):
         for number, (sensor, item) in enumerate(_sensor_tables(link, table)):
             any_file = any_file or "file" in item

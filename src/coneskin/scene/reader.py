@@ -28,7 +28,19 @@ if TYPE_CHECKING:
 __all__ = ["TABLES", "load_scene", "parse_scene"]
 
 #: that a scene may have
-TABLES = ("arm", "link", "source", "reaction", "monitoring", "recording", "motion", "commissioning", "body", "padding")
+TABLES = (
+    "arm",
+    "link",
+    "source",
+    "reaction",
+    "monitoring",
+    "recording",
+    "motion",
+    "commissioning",
+    "body",
+    "padding",
+    "speed_limit",
+)
 _ARM = (
     Key("model", str),
     Key("host", str),
@@ -36,6 +48,7 @@ _ARM = (
     Key("control", str, "internal", choices=("internal", "external")),
     Key("table_z_mm", float, None, low=-5000.0, high=5000.0),
     Key("slider_stop", bool, True),
+    Key("speed_limit_from", str, None),
     Key("controller_heartbeat", str, "optional", choices=("required", "optional")),
 )
 _TOUCH = (
@@ -139,7 +152,8 @@ def parse_scene(
         if table in tables and not isinstance(tables[table], dict) and not several:
             problems.append(f"{table} must be one table: write [{table}], once, got {type(tables[table]).__name__}")
             del tables[table]
-    text = inline_sensor_files(tables, None if recorded else folder, problems, calibrated) or text
+    limited = "speed_limit_from" in text and _inline_speed_limit(tables, None if recorded else folder, problems)
+    text = inline_sensor_files(tables, None if recorded else folder, problems, calibrated, limited) or text
     reaction, rules = read_reaction(tables["reaction"], problems) if "reaction" in tables else (None, ())
     scene = s.Scene(
         name=name,
@@ -156,9 +170,14 @@ def parse_scene(
         commissioning_max_age=_max_age(tables, problems),
         commissioning=commissioning,
         **_physics(tables, problems),
+        **_speed_limit(tables, problems),
     )
     scene = replace(scene, source=_source(scene, tables, problems))
     _check_together(scene, named, tables, problems)
+    if scene.speed_limit is not None:
+        from .speed_limit_table import check_speed_limit
+
+        check_speed_limit(scene, recorded, problems)
     if problems:
         raise SceneError(problems, name)
     return scene
@@ -196,6 +215,7 @@ def _arm(tables: Mapping[str, Any], problems: list[str]) -> s.ArmScene | None:
         problems.append("arm.host must name the controller, got an empty text")
     if len(values) < len(_ARM):
         return None
+    del values["speed_limit_from"]  # the table stands in place of it
     return s.ArmScene(watchdog_hz=values.pop("watchdog"), **values)
 
 
@@ -287,6 +307,21 @@ def _physics(tables: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
     from .body_table import read_bodies, read_padding
 
     return {"bodies": read_bodies(tables, problems), "padding": read_padding(tables, problems)}
+
+
+def _inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: list[str]) -> bool:
+    from .speed_limit_table import inline_speed_limit
+
+    return inline_speed_limit(tables, folder, problems)
+
+
+def _speed_limit(tables: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
+    """Return what only a limit of the speed asks for."""
+    if "speed_limit" not in tables:
+        return {}
+    from .speed_limit_table import read_speed_limit
+
+    return {"speed_limit": read_speed_limit(tables, problems)}
 
 
 def _max_age(tables: Mapping[str, Any], problems: list[str]) -> float | None:

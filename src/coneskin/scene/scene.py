@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
     from .body import BodyScene
+    from .speed_limit import SpeedLimitScene
 
 __all__ = [
     "ArmScene",
@@ -179,6 +180,7 @@ class Scene:
             program that knows better says so with ``dataclasses.replace``.
         bodies: that the arm may run into, in the physics engine.
         padding: of the skins, for the physics engine; None where the file names none.
+        speed_limit: how fast its skins may move towards what they could strike; None where nothing limits them.
     """
 
     name: str
@@ -196,6 +198,7 @@ class Scene:
     commissioning: Commissioning | None = None
     bodies: tuple[BodyScene, ...] = ()
     padding: Padding | None = None
+    speed_limit: SpeedLimitScene | None = None
 
     @property
     def sensors(self) -> tuple[PlacedSensor, ...]:

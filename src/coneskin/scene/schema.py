@@ -19,6 +19,8 @@ MAX_SIZE = 256_000  #: bytes of a scene file or a sensor file; a scene of 100 se
 _DEGREE = math.pi / 180.0  # rad
 _UNITS: Mapping[str, tuple[float, str]] = {
     "_n_per_mm": (1e3, "N/mm"),
+    "_n_per_cm2": (1e4, "N/cm2"),
+    "_cm2": (1e-4, "cm2"),
     "_kg": (1.0, "kg"),
     "_mm_s": (1e-3, "mm/s"),
     "_deg_s2": (_DEGREE, "deg/s2"),

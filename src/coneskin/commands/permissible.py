@@ -1,0 +1,114 @@
+"""``coneskin permissible``: how fast which part of a skinned arm may move, by the limits of whoever uses it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.errors import SceneError
+
+if TYPE_CHECKING:
+    from coneskin.permissible_speed.speed_map import SpeedMap
+
+__all__ = ["add_arguments", "run"]
+
+_EXAMPLE = """\
+example:
+  coneskin permissible scene.toml --limits limits.toml -o impact.toml --picture impact.png
+
+The scene needs an [arm], skins and their [padding]; with a [motion] the speeds are those of its joint positions. The
+limits are yours: docs/permissible-speed.md lists the keys. A scene whose [arm] has speed_limit_from = "impact.toml"
+lets the guard keep the speeds. A model with assumed servos; no safety assessment.
+
+exit code: 0; 1 where no speed keeps the limits, or a file has a mistake."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.epilog = _EXAMPLE
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("scene", type=Path, help="scene file")
+    parser.add_argument(
+        "--limits", type=Path, required=True, metavar="FILE", help="limits of the force, and how the arm stops"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write the speeds as TOML for speed_limit_from"
+    )
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw them (png, svg, pdf; extra pictures)")
+    parser.add_argument(
+        "--any-position", action="store_true", help="let the arm be anywhere, also where the scene has a [motion]"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute, print and write the speeds."""
+    from coneskin.permissible_speed.limits_file import read_limits
+    from coneskin.permissible_speed.speed_map import map_speeds
+    from coneskin.permissible_speed.speed_map_file import write_map
+    from coneskin.scene.reader import load_scene
+
+    limits = read_limits(args.limits)
+    scene = load_scene(args.scene)
+    if args.output is not None and not args.output.absolute().parent.is_dir():
+        raise SceneError(
+            [f"{args.output} cannot be written: there is no folder {args.output.parent}"], args.output.name
+        )
+
+    def note(text: str) -> None:
+        if sys.stderr.isatty():
+            print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
+
+    found = map_speeds(scene, limits, any_position=args.any_position, note=note)
+    note("")
+    if args.output is not None:
+        write_map(found, args.output)
+    if args.picture is not None:
+        from coneskin.permissible_speed.map_picture import draw_map
+
+        draw_map(scene, limits, found, args.picture)
+    if args.json:
+        print(json.dumps(_plain(found)))
+    else:
+        _print(found, args)
+    return 0
+
+
+def _plain(found: SpeedMap) -> dict[str, Any]:
+    """Return a map for JSON: the table of the file, with the heaviest mass at each patch."""
+    from coneskin.permissible_speed.speed_map_file import map_table
+
+    table: dict[str, Any] = map_table(found)["speed_limit"]
+    for row, patch, mass in zip(table["patch"], found.patches, found.masses, strict=True):
+        row["link"] = patch.link
+        row["mass_kg"] = None if math.isinf(mass) else mass
+        row["point_mm"] = [1e3 * value for value in patch.point]
+        row["normal"] = list(patch.normal)
+    return table
+
+
+def _print(found: SpeedMap, args: argparse.Namespace) -> None:
+    table = found.table
+    print(f"limits: {table.edition}; transcribed by {table.transcribed_by}, verified by {table.verified_by}")
+    print(
+        f"the arm brakes {1e3 * table.reaction:g} ms after the layers close, with {table.deceleration:g} rad/s2 "
+        f"({table.measured_by})"
+    )
+    where = "in the positions of the motion" if table.lowest else "in any position"
+    print(f"permissible speed of a surface along its normal [m/s], {where}, over its lever [m/rad]:")
+    print(f"{'sensor':20}{'limited by':>16}" + "".join(f"{lever:>8g}" for lever in table.levers))
+    for name in dict.fromkeys(patch.sensor for patch in table.patches):
+        numbers = {patch.curve for patch in table.patches if patch.sensor == name}
+        slowest = min(numbers, key=lambda number: found.curves[number].speeds)
+        fastest = max(numbers, key=lambda number: found.curves[number].speeds)
+        for what, number in (("slowest", slowest), ("fastest", fastest))[: 1 + (fastest != slowest)]:
+            curve = found.curves[number]
+            cells = "".join(f"{speed:>8.3f}" for speed in curve.speeds)
+            print(f"{f'{name}, {what}':20}{curve.region[:15]:>16}{cells}")
+    if args.output is not None:
+        print(f'{args.output}: name it in the [arm] of the scene: speed_limit_from = "{args.output.name}"')
+    print("A model with assumed servos and your values: measure on the real arm. No safety assessment.")
