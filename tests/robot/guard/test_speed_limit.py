@@ -106,6 +106,7 @@ def test_without_a_known_slider_too_fast_an_arm_is_stopped_at_once() -> None:
     assert loop.top <= 1.0  # foreseen
 
 
+@pytest.mark.long
 def test_the_slider_goes_up_again_after_a_while_of_slower_motion_but_not_beyond_a_persons_setting() -> None:
     loop = Loop().run(1.0, speed=1.0)
     low = loop.arm.slider
