@@ -62,7 +62,9 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
     check_target(args.output, args.force)
     options = design_options(args)
     bed = (args.bed_mm[0] * 1e-3, args.bed_mm[1] * 1e-3)
-    file_options = FileOptions(args.arcs, args.cut_tolerance_mm * 1e-3, args.page, bed, args.bed_gap_mm * 1e-3)
+    file_options = FileOptions(
+        args.arcs, args.cut_tolerance_mm * 1e-3, args.page, bed, args.bed_gap_mm * 1e-3, args.step
+    )
     source: LinkMesh | None = None
     fit: LinkFit | None = None
     notes: tuple[str, ...] = ()

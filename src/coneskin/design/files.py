@@ -46,6 +46,7 @@ class FileOptions:
         page: paper size of the PDF files.
         bed: width and depth of the cutter's bed [m], on which the parts of each material are nested.
         bed_gap: between nested parts [m].
+        step: True for a STEP file of the layers of each sheet as they lie on the link, which needs the extra ``cad``.
     """
 
     arcs: ArcStyle = "bulge"
@@ -53,6 +54,7 @@ class FileOptions:
     page: PageSize = "A4"
     bed: tuple[float, float] = (0.6, 0.4)
     bed_gap: float = 3e-3
+    step: bool = False
 
     def __post_init__(self) -> None:
         if not 0.999 * _FINEST <= self.tolerance <= 1.001 * _COARSEST:  # millimetres in SI are not exact

@@ -6,9 +6,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.nesting import nest_on_beds
 from coneskin.geometry.drawing.test_piece import make_test_piece
+from coneskin.geometry.pose import Pose
 from coneskin.geometry.solid.closed_surface import to_stl
+from coneskin.geometry.solid.step import WrappedLayer, write_step
 from coneskin.terminal_text import printable
 
 from .files import FileOptions, new_folder, sheet_folder, write_sheets
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
 
     from .workshop.jig import Collar
 
-__all__ = ["write_design", "write_jig"]
+__all__ = ["write_design"]
 
 
 def write_design(
@@ -97,13 +100,39 @@ def write_design(
         for index, (design, item) in enumerate(zip(sheets, figures, strict=True)):
             if item.collars:
                 progress(f"{design.name}: writing the jig")
-                written += write_jig(draft, sheet_folder(sheets, index), design, item.collars)
+                written += _write_jig(draft, sheet_folder(sheets, index), design, item.collars)
+            if options.step:
+                progress(f"{design.name}: writing the wrapped layers")
+                written.append(_write_wrapped(draft, sheet_folder(sheets, index), design))
         write_sheets(draft, sheets, data, options, progress, beds, written)
         progress(f"{sum(1 for path in draft.rglob('*') if path.is_file())} files in {folder}")
     return data
 
 
-def write_jig(draft: Path, place: Path, design: SheetDesign, collars: Sequence[Collar]) -> list[str]:
+def _write_wrapped(draft: Path, place: Path, design: SheetDesign) -> str:
+    """Write the layers of a sheet as they lie on the link as a STEP file; return its path in the folder.
+
+    Args:
+        draft: the folder of the design.
+        place: folder of the sheet, in it.
+        design: the sheet.
+
+    Raises:
+        MissingExtra: cadquery-ocp is not installed.
+    """
+    stack, side = design.options.stack, design.place.frustum
+    layers = []
+    for index, layer in enumerate(stack.layers):
+        height = stack.face_offset(index)
+        pose = design.place.link_frustum @ Pose(translation=(0.0, 0.0, -height * side.sin_half_angle))
+        name = f"{design.name} {layer.name}"
+        layers.append(WrappedLayer(name, parallel_frustum(side, height), layer.thickness, pose))
+    (draft / place).mkdir(parents=True, exist_ok=True)
+    write_step(draft / place / "wrapped.step", layers)
+    return (place / "wrapped.step").as_posix()
+
+
+def _write_jig(draft: Path, place: Path, design: SheetDesign, collars: Sequence[Collar]) -> list[str]:
     """Write the parts of a jig as STL files; return their paths in the folder.
 
     Args:

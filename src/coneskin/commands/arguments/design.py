@@ -151,6 +151,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     size = {"nargs": 2, "metavar": ("WIDTH", "DEPTH"), "default": (600.0, 400.0)}
     add("--bed-mm", type=float, help="bed of the cutter, on which parts are nested (default 600 400)", **size)  # type: ignore[arg-type]
     _add_quantity(add, "bed-gap-mm", 3.0, "gap between nested parts")
+    add("--step", action="store_true", help="write the wrapped layers as a STEP file too (extra cad)")
     add("--arcs", choices=get_args(ArcStyle), default="bulge", help="style of arcs in DXF files (default bulge)")
     _add_quantity(add, "cut-tolerance-mm", 0.01, "tolerance of flattened arcs, and of patterns cut as rectangles")
     add("--page", choices=get_args(PageSize), default="A4", help="paper size of the PDF files (default A4)")
