@@ -41,6 +41,7 @@ class Controller:
 
     Attributes:
         cycle: number of control cycles since power-on.
+        making_up: this cycle is late and another one follows at once, so that nobody outside has time to answer.
         inputs: what clients write.
         program: main program; None while none is loaded.
         secondary: ``sec`` programs that run beside it.
@@ -63,6 +64,7 @@ class Controller:
         self.output_doubles = [0.0] * 48
         self.digital_outputs = 0
         self.terminals = Terminals()
+        self.making_up = False
         self.beyond = False  # programs may connect to other computers
         self.slider = 1.0
         self.resistance = [0.0] * 6  # current that each motor takes beyond the model of the arm [A]

@@ -181,7 +181,8 @@ class Server:
             self._poll(0.0)
             if wait < -MAX_LATENESS:
                 due = time.monotonic()
-            while due <= time.monotonic():
+            while due <= (now := time.monotonic()):
+                self.controller.making_up = due + CYCLE <= now
                 self._cycle()
                 due += CYCLE
             self._publish()

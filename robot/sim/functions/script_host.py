@@ -43,6 +43,7 @@ class ScriptHost(Protocol):
     output_doubles: list[float]
     digital_outputs: int
     terminals: Terminals
+    making_up: bool
     beyond: bool
     gravity: tuple[float, ...]
     payload: float

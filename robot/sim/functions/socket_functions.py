@@ -204,7 +204,7 @@ class SocketFunctions:
                 if take(connection):
                     return
             yield
-            waited += 1
+            waited += not self._host.making_up  # the server has had no time for a cycle that is made up for
             if connection is None or connection.ended or (limit > 0.0 and waited >= cycles):
                 return
 

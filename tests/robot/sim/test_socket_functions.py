@@ -113,6 +113,22 @@ def test_a_read_ends_at_its_timeout_and_when_the_server_has_gone(peer: Peer) -> 
     assert peer.controller.output_ints[:2] == [10, 10]
 
 
+def test_cycles_that_are_made_up_for_leave_the_server_its_time(peer: Peer) -> None:
+    server = peer.run(
+        'a = socket_read_binary_integer(1, "peer", 0.02)\nwrite_output_integer_register(0, a[0] + 10)\n'
+        'a = socket_read_binary_integer(1, "peer", 0.02)\nwrite_output_integer_register(1, a[0] + 10)'
+    )
+    peer.controller.making_up = True
+    peer.step(40)
+    assert peer.controller.output_ints[0] == 0
+    server.sendall(bytes(4))
+    peer.step(1)
+    assert peer.controller.output_ints[0] == 11
+    peer.controller.making_up = False
+    peer.step(12)
+    assert peer.controller.output_ints[1] == 10
+
+
 def test_a_program_that_reads_for_ever_from_nobody_gives_way(peer: Peer) -> None:
     server = peer.run('while True:\nsocket_read_string("peer", "", "", False, 0)\nend')
     server.close()
