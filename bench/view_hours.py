@@ -1,0 +1,152 @@
+"""Page that stays open: memory of its server and of the browser, while an hour of touches goes by.
+
+    python bench/view_hours.py [--hours 1] [--rate 2] [--looks 8]
+
+The collision of tests/data is written again and again into a recording that grows, with its times shifted, `--rate`
+times as fast as it was; `coneskin view` follows it, and a browser has the page open. A look collects the browser's
+garbage first. Needs the extra `view`, playwright and chromium.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from report import head
+from view import FLAGS, page_of, resident
+
+from coneskin.recording import END, Block
+from coneskin.recording_file.recorder import Recorder
+from coneskin.replay.run import read_run
+from coneskin.robot.guard.journal import BlockKind
+
+RUN = Path(__file__).parents[1] / "tests" / "data" / "collision.rec"
+STEP = 0.05  # s of the run that are written together: the recorder's own
+TYPES = ("renderer", "gpu-process")
+
+
+class Writer(threading.Thread):
+    """Writer of a recording in which a collision comes again and again.
+
+    Attributes:
+        shown: how much of it was written [s].
+        collisions: how often.
+    """
+
+    def __init__(self, recorder: Recorder, rate: float) -> None:
+        super().__init__(daemon=True)
+        run = read_run(RUN)
+        self._recorder, self._rate = recorder, rate
+        self._blocks = [block for block in run.blocks if block.kind not in (BlockKind.HEADER, END)]
+        self._begin = self._blocks[0].time
+        self._length = self._blocks[-1].time - self._begin + 0.1
+        self.shown, self.collisions, self.over = 0.0, 0, threading.Event()
+        recorder.write(Block(BlockKind.HEADER, self._begin, json.dumps(run.header).encode()), flush=True)
+
+    def run(self) -> None:
+        """Write until it is over."""
+        began = time.monotonic()
+        at = 0
+        while not self.over.wait(STEP / self._rate):
+            until = self._rate * (time.monotonic() - began)
+            found = []
+            while True:
+                block = self._blocks[at]
+                when = self.collisions * self._length + block.time - self._begin
+                if when > until:
+                    break
+                found.append(self._again(block, self._begin + when))
+                at += 1
+                if at == len(self._blocks):
+                    at, self.collisions = 0, self.collisions + 1
+            self._recorder.write(*found, flush=True)
+            self.shown = until
+
+    def _again(self, block: Block, when: float) -> Block:
+        """Return a block at another time; the touches of each collision have numbers of their own."""
+        payload = block.payload
+        if block.kind == BlockKind.EVENT:
+            name, details = json.loads(payload)
+            if isinstance(details.get("number"), int):
+                details["number"] += 1000 * self.collisions
+            payload = json.dumps([name, details]).encode()
+        return Block(block.kind, when, payload)
+
+
+def children_of(pid: int) -> dict[str, int]:
+    """Memory of the browser's processes below a process, by their types [kB]."""
+    listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
+    rows = [line.split(None, 2) for line in listing.splitlines()[1:]]
+    below, found = {pid}, dict.fromkeys(TYPES, 0)
+    while True:
+        more = {int(row[0]) for row in rows if int(row[1]) in below} - below
+        if not more:
+            break
+        below |= more
+    for row in rows:
+        for kind in TYPES:
+            if int(row[0]) in below and f"--type={kind}" in row[2]:
+                found[kind] += resident(int(row[0]))
+    return found
+
+
+def main() -> None:
+    """Measure and print."""
+    from playwright.sync_api import sync_playwright
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--hours", type=float, default=1.0, help="of the run")
+    parser.add_argument("--rate", type=float, default=2.0, help="times as fast as it was recorded")
+    parser.add_argument("--looks", type=int, default=8)
+    args = parser.parse_args()
+    print(head("viser", "playwright"), flush=True)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Recorder(Path(folder) / "run.rec") as recorder,
+        sync_playwright() as driver,
+    ):
+        writer = Writer(recorder, args.rate)
+        writer.start()
+        child, url, _ = page_of(Path(folder) / "run.rec")
+        browser = driver.chromium.launch(executable_path="/usr/bin/chromium", args=[*FLAGS, "--js-flags=--expose-gc"])
+        page = browser.new_page(viewport={"width": 480, "height": 320})
+        page.set_default_timeout(300_000)
+        page.goto(url)
+        page.wait_for_selector(".coneskin-phase")
+        tools = page.context.new_cdp_session(page)
+        tools.send("Performance.enable")
+        began, since = time.monotonic(), writer.shown
+        print("run [min]  wall [min]  collisions  server [MB]  heap [MB]  nodes  renderer [MB]  gpu [MB]", flush=True)
+        for look in range(args.looks + 1):
+            due = 3600.0 * args.hours * look / args.looks
+            while writer.shown - since < due:
+                time.sleep(1.0)
+            print(row(writer, tools, child.pid, since, began), flush=True)
+        writer.over.set()
+        writer.join()
+        browser.close()
+        child.terminate()
+        child.wait(20)
+
+
+def row(writer: Writer, tools: Any, server: int, since: float, began: float) -> str:
+    """One line of the table."""
+    tools.send("HeapProfiler.collectGarbage")
+    numbers = {item["name"]: item["value"] for item in tools.send("Performance.getMetrics")["metrics"]}
+    memory = children_of(os.getpid())
+    return (
+        f"{(writer.shown - since) / 60.0:9.1f}  {(time.monotonic() - began) / 60.0:10.1f}  {writer.collisions:10d}  "
+        f"{resident(server) / 1e3:11.1f}  {numbers['JSHeapUsedSize'] / 1e6:9.1f}  {numbers['Nodes']:5.0f}  "
+        f"{memory['renderer'] / 1e3:13.1f}  {memory['gpu-process'] / 1e3:8.1f}"
+    )
+
+
+if __name__ == "__main__":
+    main()
