@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from coneskin.view.connection_gate import ConnectionGate, refusal_of
+from coneskin.view.connection_gate import ConnectionGate, is_value, refusal_of
 
 HOSTS = frozenset({"127.0.0.1", "localhost"})
 
@@ -46,7 +46,7 @@ def test_a_server_for_a_network_answers_to_any_name() -> None:
 def decode(data: bytes) -> Any:
     if data == b"garbage":
         raise ValueError("no message")
-    return {"type": data.decode()}
+    return {"type": data.decode(), "updates": {"value": 1.0}}
 
 
 @pytest.mark.parametrize("kind", [["GuiUpdateMessage"], {}, None, 5, "Else"])
@@ -108,3 +108,40 @@ def test_too_many_viewers_are_refused_and_the_page_is_still_given() -> None:
     assert arguments["process_request"](Connection(), socket) is None
     assert asked == [plain, socket]
     assert gate.refused == 1
+
+
+@pytest.mark.parametrize("value", [0, 1.5, True, None, "1x", "", [0.1, 2.0], ("a", "b")])
+def test_a_control_may_have_a_value(value: Any) -> None:
+    assert is_value(value)
+
+
+@pytest.mark.parametrize(
+    "value", [float("nan"), float("inf"), "x" * 1001, [0.0] * 9, [[1.0]], {"a": 1}, b"bytes", [{}], [float("nan")]]
+)
+def test_a_control_may_not_have_any_value(value: Any) -> None:
+    assert not is_value(value)
+
+
+@pytest.mark.parametrize(
+    "updates", [None, [], {}, {"visible": False}, {"value": 1.0, "removed": True}, {"update_cb": []}, {"value": {}}]
+)
+def test_a_message_sets_no_property_but_a_value(updates: Any) -> None:
+    """viser sets what a message names, its lists of callbacks among them."""
+    gate = ConnectionGate(lambda _: {"type": "GuiUpdateMessage", "updates": updates}, HOSTS)
+    assert not gate.lets_in(b"message")
+    assert gate.refused == 1
+
+
+def test_a_viewer_who_sends_more_than_a_person_can_has_to_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As long as it takes for 200 a second, beyond the first 400; here no time passes."""
+    slept: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        slept.append(seconds)
+
+    monkeypatch.setattr("coneskin.view.connection_gate.monotonic", lambda: 5.0)
+    monkeypatch.setattr("coneskin.view.connection_gate.asyncio.sleep", sleep)
+    got, gate = received(*[b"GuiUpdateMessage"] * 500)
+    assert len(got) == 500
+    assert gate.refused == 0
+    assert slept == pytest.approx([k / 200.0 for k in range(1, 101)])

@@ -1,25 +1,42 @@
 """Gate in front of a page's server: who may connect, which file may be asked for, and which messages get in.
 
 The library that serves the page hands out any file that a path with ``..`` leads to, opens a tunnel to the internet
-when a message asks for it, and lets pages of other origins connect. A page here only shows: what comes from a browser
-is its camera, and the controls of its own panel.
+when a message asks for it, lets pages of other origins connect, and sets any property of a control that a message
+names. A page here only shows: what comes from a browser is its camera, and the values of its own panel's controls.
 """
 
 from __future__ import annotations
 
+import asyncio
+import math
 from collections.abc import Awaitable, Callable
 from http import HTTPStatus
+from time import monotonic
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-__all__ = ["ALLOWED", "UPLOADS", "ConnectionGate", "refusal_of"]
+__all__ = ["ALLOWED", "UPLOADS", "ConnectionGate", "is_value", "refusal_of"]
 
 #: types of message that a page may send
 ALLOWED = frozenset({"ViewerCameraMessage", "GuiUpdateMessage"})
 #: and those with which a file is dropped onto it
 UPLOADS = frozenset({"FileTransferStartUpload", "FileTransferPart"})
+_UPDATE = "GuiUpdateMessage"
 _LARGEST = 1 << 16  # bytes of a message that is no part of a file
 _VIEWERS = 32  # that are served at once
+_RATE = 200.0  # messages a second of a viewer, who drags a handle or the camera at 60; more have to wait
+_BURST = 400  # messages that may come at once, before they have to wait
+_WORDS = 1000  # letters of a value
+_ITEMS = 8  # of a value that is a list
+
+
+def is_value(value: Any, depth: int = 1) -> bool:
+    """Tell whether a value may be that of a control: a finite number, a few words, yes or no, or a few of them."""
+    if isinstance(value, list | tuple):
+        return depth > 0 and len(value) <= _ITEMS and all(is_value(item, depth - 1) for item in value)
+    if isinstance(value, str):
+        return len(value) <= _WORDS
+    return value is None or (isinstance(value, int | float) and math.isfinite(value))
 
 
 def refusal_of(path: str, host: str, origin: str | None, hosts: frozenset[str] | None) -> str:
@@ -103,24 +120,42 @@ class ConnectionGate:
             message = self._decode(data) if isinstance(data, bytes) else None
             kind = message.get("type") if isinstance(message, dict) else None
         except ValueError:
-            kind = None
-        if isinstance(kind, str) and kind in self._allowed:
+            message = kind = None
+        if isinstance(kind, str) and kind in self._allowed and (kind != _UPDATE or _sets_a_value(message)):
             return True
         self.refused += 1
         return False
 
 
+def _sets_a_value(message: Any) -> bool:
+    """Tell whether an update sets the value of a control, and nothing else of it."""
+    updates = message.get("updates")
+    return isinstance(updates, dict) and set(updates) == {"value"} and is_value(updates["value"])
+
+
 class _Sieve:
-    """Connection of which only the messages that the gate lets in are received."""
+    """Connection of which only the messages that the gate lets in are received, and no more than a person makes.
+
+    What comes faster waits in the connection, and then at its sender.
+    """
 
     def __init__(self, connection: Any, gate: ConnectionGate) -> None:
         self._connection, self._gate = connection, gate
+        self._spare, self._then = float(_BURST), monotonic()
 
     async def recv(self) -> bytes:
         while True:
             data = await self._connection.recv()
+            await self._wait_its_turn()
             if self._gate.lets_in(data):
                 return bytes(data)
+
+    async def _wait_its_turn(self) -> None:
+        now = monotonic()
+        self._spare = min(float(_BURST), self._spare + _RATE * (now - self._then)) - 1.0
+        self._then = now
+        if self._spare < 0.0:
+            await asyncio.sleep(-self._spare / _RATE)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._connection, name)

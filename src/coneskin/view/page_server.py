@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import io
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
@@ -81,6 +82,8 @@ class PageServer:
         shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
         self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{self._server.get_port()}"
         self._wake_from_its_own_thread()
+        # what is drawn for a viewer who has just gone is nobody's mistake
+        warnings.filterwarnings("ignore", message="Queued a .* on a closed connection", category=UserWarning)
         self.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         self.gui.main_panel.dock_right()
 

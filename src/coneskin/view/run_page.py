@@ -27,6 +27,7 @@ __all__ = ["show_runs"]
 
 _PERIOD = 1.0 / 30.0  # s between two pictures
 _TEXT_PERIOD = 0.1  # s between two changes of the text
+_SPEEDS = {f"{speed:g}x": speed for speed in SPEEDS}
 _IMPORTANT = frozenset(
     {EventName.CONTACT, EventName.STOPPING, EventName.STANDSTILL, EventName.RETREATING, EventName.RETREATED}
     | {EventName.LATCHED, EventName.FAULT, EventName.ACTIVATED, EventName.SPEED_REDUCED, EventName.STOP_FAILED}
@@ -89,7 +90,7 @@ class _Player:
             "time [s]", min=playback.since, max=playback.until, step=step, initial_value=playback.since
         )
         self._buttons = gui.add_button_group("", ("play", "pause", "|<", "<", ">"))
-        self._speed = gui.add_dropdown("speed", [f"{speed:g}x" for speed in SPEEDS], initial_value="1x")
+        self._speed = gui.add_dropdown("speed", list(_SPEEDS), initial_value="1x")
         choices = ["jump to an event", *(self._choice(index) for index in self._jumps[:500])]
         self._levels = gui.add_html("")
         self._field = FieldChoice(
@@ -124,8 +125,9 @@ class _Player:
             self._do(actions[what])
 
     def _speeded(self, _event: Any) -> None:
-        speed = float(str(self._speed.value).removesuffix("x"))
-        self._do(lambda playback: setattr(playback, "speed", speed))
+        speed = _SPEEDS.get(str(self._speed.value))
+        if speed is not None:  # a browser may send any words
+            self._do(lambda playback: setattr(playback, "speed", speed))
 
     def _jumped(self, event: Any) -> None:
         head = str(self._jump.value).partition(":")[0]

@@ -27,7 +27,7 @@ class TracePlot:
 
     def __init__(self, gui: Any, strands: Sequence[Strand], since: float, until: float, fixed: bool = False) -> None:
         self._gui, self._strands, self._since, self._until = gui, strands, since, until
-        names = trace_names(strands)
+        names = self._names = trace_names(strands)
         self._folder = gui.add_folder("traces")
         self._shown = names[0]
         with self._folder:
@@ -47,6 +47,8 @@ class TracePlot:
         self._folder.remove()
 
     def _change(self, what: str) -> None:
+        if what not in self._names or what == self._shown:
+            return
         old, self._shown = self._plot, what
         with self._folder:
             self._plot = self._make()
