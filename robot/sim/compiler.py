@@ -14,6 +14,8 @@ import struct
 import subprocess
 import sys
 import threading
+import time
+from collections import deque
 from queue import SimpleQueue
 from typing import IO
 
@@ -29,6 +31,8 @@ __all__ = ["Compiler"]
 TRANSLATION_TIME = 10.0  #: s; a translation that takes longer is ended, and the program refused
 MOST_KNOWN = 100  #: programs whose translation is kept
 IN_PLACE_LIMIT = 4000  #: characters; a shorter program is translated in place, in about a millisecond
+IN_PLACE_TIME = 0.0005  #: s of the processor in one cycle, beyond which no further one is begun in place
+MOST_WAITING = 5000  #: programs that have come and are not translated yet; a packet holds fewer
 _LENGTH_PREFIX = struct.Struct(">I")  #: bytes that follow, before each message of the translating process
 
 #: number of a program, and its translation or what is wrong with it
@@ -36,13 +40,18 @@ Result = tuple[int, Translation | ScriptError]
 
 
 class Compiler:
-    """Translator that never delays a control cycle. Use it in a ``with``: it has a process and a thread."""
+    """Translator that never delays a control cycle. Use it in a ``with``: it has a process and a thread.
+
+    A program that another has overtaken before its turn came is not translated: it would never run.
+    """
 
     def __init__(self, quirks: str) -> None:
         self._fix_quirks = quirks == "fixed"
         self._known: dict[str, Translation] = {}
-        self._todo: SimpleQueue[tuple[int, str] | None] = SimpleQueue()
+        self._todo: SimpleQueue[tuple[int, str, bool] | None] = SimpleQueue()
         self._done: SimpleQueue[Result] = SimpleQueue()
+        self._waiting: deque[tuple[int, str, bool]] = deque()
+        self._newest = 0  # number of the last program that is not a secondary one
         self._thread = threading.Thread(target=self._translate_long_ones, daemon=True)
 
     def __enter__(self) -> Compiler:
@@ -53,8 +62,25 @@ class Compiler:
         self._todo.put(None)
         self._thread.join()
 
-    def submit(self, number: int, text: str) -> None:
-        """Translate a program; `results` returns it with its number, at once if it was translated before."""
+    def submit(self, number: int, text: str, *, secondary: bool = False) -> None:
+        """Translate a program; `results` returns it with its number, soon if it is short or was translated before.
+
+        Args:
+            number: of the program; one with a higher number overtakes it.
+            text: of the program.
+            secondary: it runs beside another, and neither overtakes nor is overtaken.
+        """
+        if len(self._waiting) >= MOST_WAITING:
+            self._done.put((number, ScriptError(f"{MOST_WAITING} programs wait already")))
+            return
+        if not secondary:
+            self._newest = number
+        self._waiting.append((number, text, secondary))
+
+    def _begin(self, number: int, text: str, secondary: bool) -> None:
+        """Translate a program that waits, or hand it to the translating process."""
+        if not secondary and number < self._newest:
+            return
         if text in self._known:
             self._done.put((number, self._known[text]))
         elif len(text) <= IN_PLACE_LIMIT:
@@ -63,7 +89,7 @@ class Compiler:
             except ScriptError as exc:
                 self._done.put((number, exc))
         else:
-            self._todo.put((number, text))
+            self._todo.put((number, text, secondary))
 
     def check(self, text: str) -> None:
         """Translate a program that is short enough to be translated in place, and forget the result.
@@ -75,7 +101,10 @@ class Compiler:
             _translate(text, self._fix_quirks)
 
     def results(self) -> list[Result]:
-        """Return what has been translated since the last call."""
+        """Return what has been translated since the last call; once in each control cycle."""
+        end = time.thread_time() + IN_PLACE_TIME
+        while self._waiting and time.thread_time() < end:
+            self._begin(*self._waiting.popleft())
         ready = []
         while not self._done.empty():
             ready.append(self._done.get())
@@ -85,7 +114,9 @@ class Compiler:
         worker = _start_worker()
         try:
             while (job := self._todo.get()) is not None:
-                number, text = job
+                number, text, secondary = job
+                if not secondary and number < self._newest:
+                    continue
                 try:
                     made = _ask(worker, text, self._fix_quirks)
                 except (OSError, struct.error, EOFError, pickle.UnpicklingError) as exc:  # it has died of this program

@@ -148,7 +148,9 @@ class Controller:
     def _start(self, translation: Translation) -> None:
         self._due = None
         if not self.ready:
-            self.log("refused", program=translation.name, reason=f"{self.robot_mode.name}, {self.safety.name}")
+            reason = f"{self.robot_mode.name}, {self.safety.name}"
+            self.log("refused", program=translation.name, reason=reason)
+            self.tell(ProgramFailed(f"{translation.name} does not start: {reason}"))
             return
         self.stop_program("replaced by another")
         self.program = Program(self, translation)

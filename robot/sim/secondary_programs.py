@@ -6,7 +6,7 @@ from coneskin.robot.sim.urscript.translator import Translation
 from coneskin.robot.sim.urscript.values import ScriptError
 
 from .functions.script_host import ScriptHost
-from .notices import ProgramNotice
+from .notices import ProgramFailed, ProgramNotice
 from .program import Program
 
 __all__ = ["MAX_SECONDARY", "SecondaryPrograms"]
@@ -29,6 +29,7 @@ class SecondaryPrograms:
         if len(self._running) >= MAX_SECONDARY:
             reason = f"{MAX_SECONDARY} sec programs run already"
             self._host.log("refused", program=translation.name, reason=reason)
+            self._host.tell(ProgramFailed(f"{translation.name} does not start: {reason}"))
             return
         self._running.append(Program(self._host, translation))
         self._host.tell(ProgramNotice(translation.name, "STARTED"))

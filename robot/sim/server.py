@@ -22,7 +22,7 @@ from .controller import Controller
 from .fault_injection import FaultInjector
 from .motion.arm import CYCLE
 from .polyscope.user_interface import UserInterface
-from .ports.client import Client
+from .ports.client import MAX_MESSAGES, Client
 from .ports.publisher import Publisher
 from .services import SCRIPT_PORTS, PortServices
 
@@ -35,17 +35,10 @@ MAX_LATENESS = 0.05  #: s; later cycles are skipped, not made up for: the proces
 _LOOPBACK = "127."  # of every address that no other computer can reach
 _BACKLOG = 16  # connections that wait to be accepted
 MAX_CLIENTS = 50  #: of each service
-#: option of a connection -> s of silence before the first question whether the other side lives, s between, questions
-_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
+#: bytes of one client that are read at a time. What a client has sent whose connection it resets, as ur_rtde does
+#: after each upload, is lost unless it is read at once; lines of the dashboard are dear, and their clients wait
+READ, READ_OF_DASHBOARD = 65536, 4096
 UNREAD_TIMEOUT = 10.0  #: s; a client that reads nothing for so long is dropped
-
-
-def _notice_half_open(sock: socket.socket) -> None:
-    """Let the operating system close a connection whose other side is gone without a word, and keep its place free."""
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    for name, value in _KEEPALIVE.items():
-        if (option := getattr(socket, name, None)) is not None:  # not every system has them
-            sock.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 def is_loopback(host: str) -> bool:
@@ -209,9 +202,10 @@ class Server:
 
     def _publish(self) -> None:
         listening = frozenset(name for name in SCRIPT_PORTS if self._clients[name])
-        for name, data in self._publisher.due(listening).items():
+        for name, (state, messages) in self._publisher.due(listening).items():
             for client in list(self._clients[name]) if name not in self._cut else ():
-                self._send(name, client, b"" if client.unsent else data)  # one that does not read misses it
+                late = len(client.unsent)  # one that does not read misses states, and in the end messages too
+                self._send(name, client, (b"" if late else state) + (messages if late < MAX_MESSAGES else b""))
         if self.faults.rtde_silent or "RTDE" in self._cut:
             return
         now = time.monotonic()
@@ -236,9 +230,6 @@ class Server:
         if len(self._clients[name]) >= MAX_CLIENTS:
             sock.close()
             return
-        sock.setblocking(False)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        _notice_half_open(sock)
         client = self._services.client(name, sock)
         self._clients[name].append(client)
         self._selector.register(sock, selectors.EVENT_READ, (name, client))
@@ -248,7 +239,7 @@ class Server:
         if client not in self._clients[name] or name in self._cut:
             return  # dropped, or cut, while this batch of events was handled
         try:
-            data = client.socket.recv(65536)
+            data = client.socket.recv(READ_OF_DASHBOARD if name == "dashboard" else READ)
         except BlockingIOError:
             return
         except OSError:
@@ -292,7 +283,8 @@ class Server:
     def _program(self, text: str) -> None:
         first = text.lstrip().partition("\n")[0].strip()
         self.controller.log("script", first_line=first, size=len(text))
-        if not first.startswith("sec "):
+        secondary = first.startswith("sec ")
+        if not secondary:
             self._programs += 1
             self.controller.program_arrived()
-        self._compiler.submit(self._programs, text)
+        self._compiler.submit(self._programs, text, secondary=secondary)

@@ -48,7 +48,8 @@ class PortServices:
             return Client(sock, RequestReader(self._api.answer))
         if name == "faults":
             return Client(sock, LineReader(self._faults.answer))
-        return Client(sock, ScriptPort(self._controller, self._interface.run))
+        port = ScriptPort(self._controller, self._interface.run, messages=name == "primary")
+        return Client(sock, port, left=lambda: port.left)
 
     def greeting(self, name: str) -> bytes:
         """Return what a new client of a service gets first."""

@@ -9,6 +9,7 @@ by its own table of names and so only understands the true ones.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Sequence
 from enum import IntEnum
@@ -80,13 +81,15 @@ def pack(kind: int, payload: bytes = b"") -> bytes:
 
 
 _KINDS = {int(kind): kind for kind in PacketKind}
+_KIND = re.compile(b"[" + bytes(_KINDS) + b"]")
 
 
 def split(buffer: bytes) -> tuple[list[Packet], bytes]:
     """Cut what has arrived into packets; never raises, whatever the bytes are.
 
     TCP does not lose bytes, so a header that cannot be (size below 3, unknown kind) means that the peer is not speaking
-    RTDE; such bytes are skipped one at a time. How the stream was chopped makes no difference to the packets.
+    RTDE; such bytes are skipped up to where a header may be. How the stream was chopped makes no difference to the
+    packets.
 
     Args:
         buffer: the rest of the last call followed by the bytes that came since.
@@ -100,7 +103,8 @@ def split(buffer: bytes) -> tuple[list[Packet], bytes]:
         size, code = HEADER.unpack_from(buffer, position)
         kind = _KINDS.get(code)
         if size < HEADER.size or kind is None:
-            position += 1
+            found = _KIND.search(buffer, position + HEADER.size)
+            position = found.start() - HEADER.size + 1 if found else end - HEADER.size + 1
             continue
         if position + size > end:
             break

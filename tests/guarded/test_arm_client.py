@@ -166,7 +166,7 @@ def fast_enough(controller):
 
 
 STREAMS = {
-    "servo_j": lambda arm: arm.servo_j([START[0] + 1.0, *START[1:]], 0.2),
+    "servo_j": lambda arm: arm.servo_j([START[0] + 0.3, *START[1:]], 0.2),
     "servo_l": lambda arm: arm.servo_l(ahead(-0.1), 0.1, gain=100),
     "speedL of ur_rtde": lambda arm: arm.speedL([-0.2, 0, 0, 0, 0, 0], 3.0),
 }

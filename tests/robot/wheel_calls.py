@@ -156,7 +156,7 @@ def stops(host: str) -> dict[str, Any]:
 
     def servo() -> None:
         q = receive.getActualQ()
-        control.servoJ([q[0] + 1.5, *q[1:]], 0.0, 0.0, 0.002, 0.2, 100)
+        control.servoJ([q[0] + 0.9, *q[1:]], 0.0, 0.0, 0.002, 0.2, 100)
 
     def tool_is_fast() -> bool:
         return abs(receive.getActualTCPSpeed()[1] - twist[1]) < 1e-3

@@ -6,10 +6,13 @@ import socket
 import time
 from collections.abc import Callable
 
-__all__ = ["MAX_LINE", "MAX_UNSENT", "Client", "LineReader"]
+__all__ = ["MAX_LINE", "MAX_MESSAGES", "MAX_UNSENT", "Client", "LineReader"]
 
 MAX_LINE = 10_000  #: bytes of a line to the dashboard
 MAX_UNSENT = 1_000_000  #: bytes that a client may leave unread
+MAX_MESSAGES = 100_000  #: bytes that a client may leave unread and still be sent messages
+#: option of a connection -> s of silence before the first question whether the other side lives, s between, questions
+_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 
 
 def _release_nothing() -> None:
@@ -48,6 +51,16 @@ class Client:
         self.socket, self.receive, self.closed, self.outputs, self.left = sock, receive, closed, outputs, left
         self.unsent = b""
         self.stuck_since = 0.0
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._notice_half_open()
+
+    def _notice_half_open(self) -> None:
+        """Let the operating system close the connection where the other side is gone without a word."""
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for name, value in _KEEPALIVE.items():
+            if (option := getattr(socket, name, None)) is not None:  # not every system has them
+                self.socket.setsockopt(socket.IPPROTO_TCP, option, value)
 
     def send(self, data: bytes) -> None:
         """Send as much as the client takes, after what it has not taken yet.

@@ -29,20 +29,24 @@ class Publisher:
             return b""
         return encode_version(c.timestamp, c.options.version) + encode_first_state(c)
 
-    def due(self, listening: frozenset[str]) -> dict[str, bytes]:
-        """Return what is due in this cycle: port -> bytes for each of its clients.
+    def due(self, listening: frozenset[str]) -> dict[str, tuple[bytes, bytes]]:
+        """Return what is due in this cycle: port -> state and messages for each of its clients.
+
+        A state is worth nothing once there is a newer one; a message is sent once.
 
         Args:
             listening: ports that have clients; for the others nothing is made.
         """
-        c, made = self._controller, {}
+        c = self._controller
+        states: dict[str, bytes] = {}
         notices = [c.notices.popleft() for _ in range(len(c.notices))]
-        if "primary" in listening and notices:
-            made["primary"] = b"".join([encode_notice(c.timestamp, notice) for notice in notices])
         changed = any(isinstance(notice, SafetyNotice) for notice in notices)  # whose state comes no later
         if (changed or c.cycle % _STATE_CYCLES == 0) and listening & {"primary", "secondary"}:
-            state = encode_state(c)
-            made |= {name: state + made.get(name, b"") for name in listening & {"primary", "secondary"}}
+            states |= dict.fromkeys(listening & {"primary", "secondary"}, encode_state(c))
         if "realtime" in listening and c.cycle % self._realtime_cycles == 0:
-            made["realtime"] = encode_realtime(c)
-        return made
+            states["realtime"] = encode_realtime(c)
+        due = {name: (state, b"") for name, state in states.items()}
+        if "primary" in listening and notices:
+            messages = b"".join([encode_notice(c.timestamp, notice) for notice in notices])
+            due["primary"] = (states.get("primary", b""), messages)
+        return due

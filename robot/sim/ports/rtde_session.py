@@ -108,7 +108,7 @@ class RtdeSession:
                 (self._outputs.getter(name), kind.startswith("VECTOR")) for name, kind in zip(names, types, strict=True)
             ]
             self._every = max(1, round(500.0 / max(frequency, _MIN_FREQUENCY))) if frequency > 0.0 else 1
-        return bytes([self._recipe is not None]) + ",".join(types).encode()
+        return bytes([self._recipe is not None]) + _list(types)
 
     def _set_inputs(self, payload: bytes) -> bytes:
         names, owners = split_names(payload), self._c.inputs.owners
@@ -120,10 +120,10 @@ class RtdeSession:
                 types.append(VARIABLES[name] if owners.get(name, self) is self else IN_USE)
         full = len(names) > _MAX_NAMES or len(self._inputs) == _MAX_RECIPES
         if not names or full or NOT_FOUND in types or IN_USE in types:
-            return b"\x00" + ",".join(types).encode()
+            return b"\x00" + _list(types)
         owners.update(dict.fromkeys(names, self))
         self._inputs.append(Recipe(names, ident=len(self._inputs) + 1))
-        return bytes([len(self._inputs)]) + ",".join(types).encode()
+        return bytes([len(self._inputs)]) + _list(types)
 
     def _data(self, payload: bytes) -> None:
         number = payload[0] if payload else 0
@@ -137,3 +137,8 @@ class RtdeSession:
                 return
             payload = payload[: recipe.size]
         self._c.write_inputs(dict(zip(recipe.names, recipe.unpack(payload), strict=True)))
+
+
+def _list(types: list[str]) -> bytes:
+    """Return the types of a reply; of a recipe that is too long those that fit into a packet."""
+    return ",".join(types[:_MAX_NAMES]).encode()

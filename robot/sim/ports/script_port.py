@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.notices import ProgramFailed
 from coneskin.robot.sim.power import power
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs
-from coneskin.robot.sim.urscript.values import ScriptError
+
+from .client_messages import encode_notice
 
 __all__ = ["ScriptPort"]
 
@@ -33,22 +35,34 @@ class ScriptPort:
     Args:
         controller: takes the commands.
         run: takes the text of a program.
+        messages: whether the client reads messages: on the primary interface alone.
+
+    Attributes:
+        left: its connection has to end: what comes is no program.
     """
 
-    def __init__(self, controller: Controller, run: Callable[[str], None]) -> None:
-        self._controller, self._run = controller, run
+    def __init__(self, controller: Controller, run: Callable[[str], None], *, messages: bool = False) -> None:
+        self._controller, self._run, self._messages = controller, run, messages
         self._rest = ""
+        self.left = False
 
     def __call__(self, data: bytes) -> bytes:
-        """Take bytes; nothing is answered.
-
-        Raises:
-            ScriptError: a program is too long.
-        """
+        """Take bytes; nothing is answered, but to a program that is too long."""
         programs, self._rest = complete_programs(self._rest + data.decode("utf-8", "replace"))
         if len(self._rest) > MAX_LENGTH:
-            raise ScriptError(f"a program has at most {MAX_LENGTH} characters")
-        for text in programs:
+            self._rest, self.left = "", True
+            problem = f"a program has at most {MAX_LENGTH} characters"
+            self._controller.log("dropped", reason=problem)
+            return encode_notice(self._controller.timestamp, ProgramFailed(problem)) if self._messages else b""
+        last = True  # of two that move the arm in one batch the first would never start
+        kept = []
+        for text in reversed(programs):
+            if text.strip() in _COMMANDS or text.lstrip().startswith("sec "):
+                kept.append(text)
+            elif last:
+                kept.append(text)
+                last = False
+        for text in reversed(kept):
             command = _COMMANDS.get(text.strip())
             if command is None:
                 self._run(text)

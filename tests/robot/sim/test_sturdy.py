@@ -1,0 +1,289 @@
+"""Clients that hold up, flood or leave the simulated controller, while others go on being served at their rate."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import socket
+import struct
+from collections.abc import Iterator
+
+import pytest
+
+from coneskin.robot.sim import compiler
+from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
+from coneskin.robot.sim.ports.rtde_session import RtdeSession
+from coneskin.robot.sim.process import free_host
+from coneskin.robot.sim.server import PORTS, Server
+from coneskin.robot.sim.urscript.translator import MAX_LENGTH, Translation
+from coneskin.robot.ur.rtde_codec import (
+    PacketKind,
+    pack,
+    pack_inputs_request,
+    pack_outputs_request,
+    pack_start_request,
+    split,
+)
+from coneskin.testing.malformed_packets import SERVICES, malformed_packet
+
+NAMES = ("timestamp", "actual_q")
+SLOW_READER = 4096  # bytes that the operating system keeps for one that does not read
+
+
+class Reader:
+    """Client of RTDE that counts the packets of data that it is sent."""
+
+    def __init__(self, server: Server, names: tuple[str, ...] = NAMES) -> None:
+        self.socket = socket.create_connection((server.host, PORTS["RTDE"]), 5.0)
+        self.socket.sendall(pack_outputs_request(names) + pack_start_request())
+        self.socket.setblocking(False)
+        self.count, self._rest = 0, b""
+
+    def read(self) -> int:
+        """Return how many packets have come since the last call."""
+        before = self.count
+        with contextlib.suppress(BlockingIOError):
+            while data := self.socket.recv(65536):
+                packets, self._rest = split(self._rest + data)
+                self.count += sum(packet.kind is PacketKind.DATA for packet in packets)
+        return self.count - before
+
+
+@pytest.fixture(scope="module")
+def started() -> Iterator[Server]:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    options = Options(version=(10, 12), robot_api_port=port, start_delay=0.002)
+    with Server(Controller(options), free_host()) as made:
+        made.ports = {**PORTS, "robot API": port}  # type: ignore[attr-defined]
+        yield made
+
+
+@pytest.fixture
+def server(started: Server) -> Iterator[Server]:
+    """The server without clients and programs, as each test finds it."""
+    yield started
+    for name in SERVICES:
+        started.drop_all(name)
+    started.controller.stop_program("test")
+    started.controller.unlock(early=True)
+    turn(started, 50)
+
+
+def turn(server: Server, cycles: int = 1) -> None:
+    for _ in range(cycles):
+        server._poll(0.0)
+        server._cycle()
+        server._publish()
+
+
+def connect(server: Server, name: str) -> socket.socket:
+    made = socket.create_connection((server.host, server.ports[name]), 5.0)  # type: ignore[attr-defined]
+    made.setblocking(False)
+    return made
+
+
+@pytest.fixture
+def reader(server: Server) -> Iterator[Reader]:
+    made = Reader(server)
+    turn(server, 20)
+    made.read()
+    assert made.count
+    yield made
+    made.socket.close()
+
+
+@pytest.mark.parametrize("kind", [PacketKind.OUTPUTS, PacketKind.INPUTS])
+@pytest.mark.parametrize("names", [b"x" * 400, b",".join([b"x" * 400] * 160), b"a," * 7000, b"\xff" * 400])
+def test_names_that_are_long_or_many_are_answered_not_found(kind: PacketKind, names: bytes) -> None:
+    controller = Controller(Options())
+    session = RtdeSession(controller, RtdeOutputs(controller))
+    ((answered, payload),), rest = split(
+        session.receive(pack(kind, (struct.pack(">d", 500.0) if kind is PacketKind.OUTPUTS else b"") + names))
+    )
+    assert (answered, rest, payload[0]) == (kind, b"", 0)
+    assert set(payload[1:].split(b",")) == {b"NOT_FOUND"}
+    assert session.receive(pack(PacketKind.PROTOCOL_VERSION, b"\0\2"))  # it goes on
+
+
+def test_of_three_thousand_programs_in_one_go_the_last_runs_and_no_cycle_waits(
+    server: Server, reader: Reader, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    translated: list[str] = []
+    translate = compiler._translate
+
+    def counted(text: str, fix: bool) -> Translation:
+        translated.append(text)
+        return translate(text, fix)
+
+    monkeypatch.setattr(compiler, "_translate", counted)
+    with connect(server, "secondary") as client:
+        data = b"".join(b"def p%d():\n while True:\n  sync()\n end\nend\n" % i for i in range(3000))
+        cycles = 0
+        while data or cycles < 50:
+            with contextlib.suppress(BlockingIOError):
+                data = data[client.send(data) :] if data else data
+            turn(server)
+            cycles += 1
+            assert reader.read() >= 1
+            assert cycles < 2000
+    assert server.controller.program is not None
+    assert server.controller.program.name == "p2999"
+    assert len(translated) <= cycles  # one of each batch, not all
+
+
+def test_secondary_programs_share_the_time_of_many_cycles(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+
+    def translate(text: str, fix: bool) -> Translation:
+        clock[0] += 0.0003
+        return make(text, fix)
+
+    make = compiler._translate
+    monkeypatch.setattr(compiler, "_translate", translate)
+    monkeypatch.setattr(compiler.time, "thread_time", lambda: clock[0])
+    for _ in range(100):
+        server._program("sec s():\n  textmsg(1)\nend\n")
+    done = [len(server._compiler.results()) for _ in range(60)]
+    assert max(done) == 2  # 0.3 ms each, and none is begun after 0.5 ms
+    assert sum(done) == 100
+
+
+def test_a_client_that_lags_for_a_moment_misses_states_but_no_message(server: Server) -> None:
+    with socket.socket() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SLOW_READER)
+        client.connect((server.host, PORTS["primary"]))
+        server._poll(1.0)
+        (seen,) = server._clients["primary"]
+        seen.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SLOW_READER)
+        since = None
+        while not seen.unsent or seen.stuck_since != since:  # until the system takes nothing more
+            since = seen.stuck_since
+            turn(server, 400)
+        client.sendall(b"def bad():\n  no_such()\nend\n")
+        turn(server, 200)
+        assert len(seen.unsent) < 10_000  # four states were due, and it has not read the one before
+        client.setblocking(False)
+        got = b""
+        for _ in range(200):
+            turn(server)
+            with contextlib.suppress(BlockingIOError):
+                got += client.recv(65536)
+        assert b"compile_error_name_not_found:no_such:" in got
+
+
+def test_what_is_written_for_one_that_never_reads_has_a_bound(server: Server, reader: Reader) -> None:
+    with socket.socket() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SLOW_READER)
+        client.connect((server.host, PORTS["primary"]))
+        server._poll(1.0)
+        (deaf,) = server._clients["primary"]
+        deaf.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SLOW_READER)
+        server._program('def chat():\n  while True:\n    textmsg("' + "x" * 900 + '")\n    sync()\n  end\nend\n')
+        for _ in range(1000):
+            turn(server)
+            assert reader.read() >= 1
+        assert 50_000 < len(deaf.unsent) < 150_000
+        assert server._clients["primary"] == [deaf]
+
+
+def test_a_program_that_does_not_start_is_told_to_its_sender(server: Server) -> None:
+    with connect(server, "primary") as client:
+        turn(server, 5)
+        server.controller.protective_stop("test")
+        client.sendall(b"def late():\n  sync()\nend\n")
+        turn(server, 20)
+        assert b"late does not start: RUNNING, PROTECTIVE_STOP" in client.recv(65536)
+
+
+def test_a_program_that_is_too_long_is_told_to_its_sender_whose_connection_ends(server: Server) -> None:
+    with connect(server, "primary") as client:
+        data, got = b"x" * (MAX_LENGTH + 10), b""
+        with contextlib.suppress(ConnectionError):
+            for _ in range(500):
+                with contextlib.suppress(BlockingIOError):
+                    data = data[client.send(data) :] if data else data
+                with contextlib.suppress(BlockingIOError):
+                    got += client.recv(65536)
+                turn(server)
+        assert b"a program has at most 256000 characters" in got
+        assert server._clients["primary"] == []
+
+
+def test_ten_clients_of_rtde_are_all_served_in_each_cycle_beside_one_that_does_not_read(server: Server) -> None:
+    with socket.socket() as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SLOW_READER)
+        deaf.connect((server.host, PORTS["RTDE"]))
+        deaf.sendall(pack_outputs_request([f"output_double_register_{i}" for i in range(48)]) + pack_start_request())
+        readers = [Reader(server) for _ in range(10)]
+        others = [connect(server, name) for name in SERVICES if name != "RTDE" for _ in range(10)]
+        turn(server, 80)
+        for one in readers:
+            one.read()
+        for _ in range(200):
+            turn(server)
+            assert [one.read() for one in readers] == [1] * 10
+        assert all(len(server._clients[name]) == 10 for name in SERVICES if name != "RTDE")
+        for sock in (*others, *(one.socket for one in readers)):
+            sock.close()
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_one_that_is_gone_without_a_word_makes_room(server: Server, reader: Reader, service: str) -> None:
+    """As a computer does that is switched off and on: its system answers for nothing that was before (RST)."""
+    gone = connect(server, service)
+    if service == "RTDE":
+        gone.sendall(pack_inputs_request(("input_int_register_0",)))
+    turn(server, 5)
+    before = len(server._clients[service])
+    gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    gone.close()
+    turn(server, 5)
+    assert len(server._clients[service]) == before - 1
+    assert server.controller.inputs.owners == {}
+    assert reader.read() >= 5
+
+
+def flood(server: Server, reader: Reader, service: str, number: int, seed: int) -> None:
+    """Send malformed packets, anew where the connection is ended; the reader has its packet in each cycle."""
+    dice, left, waiting = random.Random(seed), number, b""
+    client = connect(server, service)
+    while left or waiting:
+        try:
+            while left and len(waiting) < 2000:
+                waiting += malformed_packet(service, dice)
+                left -= 1
+            with contextlib.suppress(BlockingIOError):
+                waiting = waiting[client.send(waiting) :]
+            with contextlib.suppress(BlockingIOError):
+                if not client.recv(65536):
+                    raise ConnectionError
+        except ConnectionError:
+            client.close()
+            client, waiting = connect(server, service), b""
+        turn(server)
+        assert reader.read() >= 1
+    client.close()
+    turn(server, 5)
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_malformed_packets_change_nothing_for_another_client(server: Server, reader: Reader, service: str) -> None:
+    flood(server, reader, service, 300, 16)
+    assert server._clients["RTDE"]  # the reader is still there
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("service", SERVICES)
+def test_many_malformed_packets_change_nothing_for_another_client(server: Server, reader: Reader, service: str) -> None:
+    """A tenth of what bench/sim_ur_sturdy.py sends to a controller in a process of its own."""
+    flood(server, reader, service, 10_000, 17)
+    server.controller.stop_program("test")
+    server.controller.unlock(early=True)
+    with connect(server, "secondary") as client:
+        client.sendall(b"sec good():\n write_output_integer_register(7, 42)\nend\n")
+        turn(server, 50)
+    assert server.controller.output_ints[7] == 42
