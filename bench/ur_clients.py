@@ -13,9 +13,8 @@ UniversalRobots/Universal_Robots_Client_Library) with ``-DBUILDING_TESTS=ON -DIN
 | ``--wheels``, UR_RTDE_WHEELS | folder of ur_rtde's wheels, from ``pip download --no-deps ur-rtde==1.5.8 -d FOLDER`` |
 
 Nothing of these is fetched here, and what is not given is skipped, with the reason. The installed ur_rtde needs no
-path and runs always. A test that fails is repeated
-by itself, with a controller of its own. The exit
-code is 0 where ur_clients_faults.py explains each failure by what is not the controller's fault.
+path and runs always. A test that fails is tried again by itself, with a controller of its own, and its row says so. The
+exit code is 0 where ur_clients_faults.py explains each failure by what is not the controller's fault.
 
 Some tests expect that nothing answers at 192.168.56.100 and .123, and port 80 must be free: where ``unshare``
 (util-linux) can make one, all runs in a network of its own that has nothing but its loopback.

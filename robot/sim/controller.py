@@ -7,7 +7,7 @@ watchdog is checked; every thread of the program takes its turn; the arm moves f
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import IO, Any
 
 from coneskin.errors import RobotRefused
@@ -41,7 +41,7 @@ class Controller:
 
     Attributes:
         cycle: number of control cycles since power-on.
-        making_up: this cycle is late and another one follows at once, so that nobody outside has time to answer.
+        outside_time: returns the time of those outside [s]; late cycles are made up for in less of it.
         inputs: what clients write.
         program: main program; None while none is loaded.
         secondary: ``sec`` programs that run beside it.
@@ -64,7 +64,7 @@ class Controller:
         self.output_doubles = [0.0] * 48
         self.digital_outputs = 0
         self.terminals = Terminals()
-        self.making_up = False
+        self.outside_time: Callable[[], float] = lambda: self.timestamp
         self.beyond = False  # programs may connect to other computers
         self.slider = 1.0
         self.resistance = [0.0] * 6  # current that each motor takes beyond the model of the arm [A]

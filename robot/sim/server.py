@@ -162,6 +162,7 @@ class Server:
 
     def run(self, alive: Callable[[], bool] = lambda: True) -> None:
         """Run the control cycle until `stop`, or until alive(), called five times a second, returns False."""
+        self.controller.outside_time = time.monotonic
         gc.collect()
         gc.freeze()  # what exists now stays: the garbage collector need not look at it again within a cycle
         asked = 0
@@ -174,8 +175,7 @@ class Server:
             self._poll(0.0)
             if wait < -MAX_LATENESS:
                 due = time.monotonic()
-            while due <= (now := time.monotonic()):
-                self.controller.making_up = due + CYCLE <= now
+            while due <= time.monotonic():
                 self._cycle()
                 due += CYCLE
             self._publish()

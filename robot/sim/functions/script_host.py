@@ -5,7 +5,7 @@ The functions are below both: the controller runs the programs, and the programs
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from coneskin.robot.sim.client_inputs import ClientInputs
@@ -43,7 +43,7 @@ class ScriptHost(Protocol):
     output_doubles: list[float]
     digital_outputs: int
     terminals: Terminals
-    making_up: bool
+    outside_time: Callable[[], float]
     beyond: bool
     gravity: tuple[float, ...]
     payload: float

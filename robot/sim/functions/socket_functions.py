@@ -193,7 +193,7 @@ class SocketFunctions:
         """Wait until something could be taken, the timeout [s] is over, or the server has gone."""
         limit = number(timeout, "a timeout")
         cycles = round(limit / CYCLE) if limit > 0.0 else 0
-        waited = 0
+        begin, waited = self._host.outside_time(), 0
         while True:
             connection = self._program.sockets.get(str(name))
             if connection is not None:
@@ -204,8 +204,9 @@ class SocketFunctions:
                 if take(connection):
                     return
             yield
-            waited += not self._host.making_up  # the server has had no time for a cycle that is made up for
-            if connection is None or connection.ended or (limit > 0.0 and waited >= cycles):
+            waited += 1
+            late = waited >= cycles and self._host.outside_time() - begin > limit - 0.5 * CYCLE  # the server's time too
+            if connection is None or connection.ended or (limit > 0.0 and late):
                 return
 
 

@@ -114,18 +114,21 @@ def test_a_read_ends_at_its_timeout_and_when_the_server_has_gone(peer: Peer) -> 
 
 
 def test_cycles_that_are_made_up_for_leave_the_server_its_time(peer: Peer) -> None:
-    server = peer.run(
+    peer.run(
         'a = socket_read_binary_integer(1, "peer", 0.02)\nwrite_output_integer_register(0, a[0] + 10)\n'
         'a = socket_read_binary_integer(1, "peer", 0.02)\nwrite_output_integer_register(1, a[0] + 10)'
     )
-    peer.controller.making_up = True
+    now = 5.0
+    peer.controller.outside_time = lambda: now
     peer.step(40)
-    assert peer.controller.output_ints[0] == 0
-    server.sendall(bytes(4))
+    assert peer.controller.output_ints[0] == 10  # its time began before
+    peer.step(40)
+    assert peer.controller.output_ints[1] == 0
+    now = 5.018
     peer.step(1)
-    assert peer.controller.output_ints[0] == 11
-    peer.controller.making_up = False
-    peer.step(12)
+    assert peer.controller.output_ints[1] == 0
+    now = 5.020
+    peer.step(1)
     assert peer.controller.output_ints[1] == 10
 
 
