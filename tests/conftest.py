@@ -16,7 +16,7 @@ _TASKS = Path("/proc/self/task")  # Linux; elsewhere only threads are looked at
 _HERE = Path(__file__).parent
 _WITH_PROCESSES = (  # tests that run one at a time; below this folder
     *("guarded", "commands/test_guard.py", "robot/sim/test_command.py", "robot/sim/test_wheel.py", "robot/ur"),
-    *("test_demos.py", "test_measure_controller.py"),
+    *("physics/test_live_plant.py", "test_demos.py", "test_measure_controller.py"),
 )
 _TRIES = 5  # of a test with processes, as long as the computer holds it up
 _SHORT = "not long"  # the marker expression of the short run, as in pyproject.toml

@@ -58,7 +58,7 @@ MAY_IMPORT: dict[str, str] = {
     "session": "code_version scene recording_file robot.arm robot.driver robot.guard robot.stop skin "
     "skin.diagnosis skin.sources skin.virtual",
     "permissible_speed": "scene robot.arm skin geometry",
-    "physics": "scene testing robot.arm robot.driver robot.guard skin skin.virtual geometry",
+    "physics": "scene testing robot.arm robot.driver robot.guard robot.sim.motion skin skin.virtual geometry",
     "replay": "code_version scene recording_file robot.arm robot.driver robot.guard skin skin.detection",
     "runs": "code_version replay scene recording_file geometry robot.arm robot.driver robot.guard robot.sim skin "
     "skin.detection skin.virtual",

@@ -131,6 +131,18 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
             "coneskin.robot.ur.ur_rtde",
         },
     ),
+    "a simulated arm that meets nothing": (
+        _STOP.replace("192.168.1.10", "127.83.12.7"),
+        _LOAD + "; from coneskin.commands.simulated_arm import simulated_arm; simulated_arm(scene, True).__enter__()",
+        {"coneskin.robot.sim.process"},
+        HEAVY | VIRTUAL | FIELD,
+    ),
+    "the process of the simulated arm": (
+        "",
+        "import coneskin.robot.sim.command",
+        {"coneskin.robot.sim.controller", "coneskin.robot.sim.motion.remote_plant"},
+        HEAVY | VIRTUAL | FIELD,
+    ),
     "the driver of ur_rtde": (
         "",
         "import coneskin.robot.ur.driver_process",

@@ -7,17 +7,20 @@ import json
 import math
 import os
 import signal
+import socket
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from coneskin.bounded_file import read_file
+from coneskin.channel import Channel
 from coneskin.errors import ConeSkinError, RobotRefused
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 
 from .controller import Controller
 from .memory_bound import SIMULATOR, bounded_memory
+from .motion.remote_plant import RemotePlant
 from .options import DEFAULT_MODEL, START_Q, Options, Version
 from .server import PORTS, Server, is_loopback
 
@@ -96,6 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help="serve the robot API of PolyScope X too, which its clients ask at port 80 (off)",
     )
+    add("--plant-descriptor", type=int, help=argparse.SUPPRESS)  # of a line to a plant, inherited: `RemotePlant`
     add("--log", type=Path, metavar="FILE", help="write a JSON line for each command and event")
     add(
         "--faults", action="store_true", help="open a port, to this computer alone, that takes faults (--json names it)"
@@ -144,7 +148,8 @@ def _serve(args: argparse.Namespace) -> int:
     except OSError as exc:
         raise RobotRefused(f"--log {args.log} cannot be written: {exc.strerror}") from exc
     try:
-        controller = Controller(options, log)
+        plant = None if args.plant_descriptor is None else _plant(args.plant_descriptor, options)
+        controller = Controller(options, log, plant)
         with Server(controller, args.host, faults=args.faults) as server, bounded_memory(SIMULATOR):
             for number in (signal.SIGTERM, signal.SIGINT):
                 signal.signal(number, lambda *_: server.stop())
@@ -209,6 +214,13 @@ def _version(text: str) -> Version:
     if not (major.isdigit() and minor.isdigit()):
         raise RobotRefused(f"--version must be MAJOR.MINOR such as 5.25, got {text!r}")
     return int(major), int(minor)
+
+
+def _plant(descriptor: int, options: Options) -> RemotePlant:
+    try:
+        return RemotePlant(Channel(socket.socket(fileno=descriptor)), options.start_q)
+    except OSError as exc:
+        raise RobotRefused(f"--plant-descriptor {descriptor} is no line to a plant: {exc.strerror}") from exc
 
 
 def _folder(path: Path) -> Path:

@@ -1,7 +1,8 @@
 """Simulated controller: registers, programs, safety system, and the control cycle that joins them. No sockets.
 
 Order of a cycle: the registers hold what clients have written since the last one; a program that is due starts; the
-watchdog is checked; every thread of the program takes its turn; the arm moves for 2 ms; clients are sent the new state.
+watchdog is checked; every thread of the program takes its turn; the targets of the arm move for 2 ms, and the plant
+follows them; clients are sent the new state.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from coneskin.robot.ur.rtde_codec import Value
 from .client_inputs import ClientInputs, InputWatchdog
 from .event_log import write_event
 from .motion.arm import CYCLE, SimulatedArm
+from .motion.plant import KinematicPlant, Plant, PlantLost
 from .motion.stop_cause import TRIGGERED, StopCause
 from .notices import Notice, ProgramFailed, ProgramNotice
 from .options import Options
@@ -39,6 +41,11 @@ _AT_STANDSTILL = {Runtime.STOPPING: Runtime.STOPPED, Runtime.PAUSING: Runtime.PA
 class Controller:
     """Controller of one arm.
 
+    Args:
+        options: its kind.
+        log: file for a JSON line for each event.
+        plant: what its targets move; by default the arm follows them exactly.
+
     Attributes:
         cycle: number of control cycles since power-on.
         outside_time: returns the time of those outside [s]; late cycles are made up for in less of it.
@@ -47,10 +54,11 @@ class Controller:
         secondary: ``sec`` programs that run beside it.
         safety_system: what may stop the arm whatever the program does.
         notices: what clients are still to be told.
-        history: joint positions of the last cycles, oldest first [rad].
+        history: measured joint positions of the last cycles, oldest first [rad].
+        plant_lost: why the plant does not count any more; empty while it does.
     """
 
-    def __init__(self, options: Options, log: IO[str] | None = None) -> None:
+    def __init__(self, options: Options, log: IO[str] | None = None, plant: Plant | None = None) -> None:
         self.options = options
         self.arm = SimulatedArm(arm_model(options.model), options.start_q)
         for i, (low, q, high) in enumerate(
@@ -58,6 +66,8 @@ class Controller:
         ):
             if not low <= q <= high:
                 raise RobotRefused(f"start position of joint {i} must be in [{low:.3f}, {high:.3f}] rad, got {q:.3f}")
+        self.plant: Plant = KinematicPlant() if plant is None else plant
+        self.plant_lost = ""
         self.cycle = 0
         self.inputs = ClientInputs(self.arm, options.quirks == "fixed", self.log)
         self.output_ints = [0] * 48
@@ -103,17 +113,31 @@ class Controller:
         for watchdog in list(self.inputs.watchdogs.values()):
             self._check_watchdog(watchdog)
         self._turn_programs()
-        was_moving = self.arm.moving
+        was_turning = self.arm.turning
         held = self.runtime.paused or self.safety not in MOVING
         fault = self.arm.step(self.speed_scaling, hold=held)
-        if was_moving and not self.arm.moving:
-            self.log("standstill", q=self.arm.q)
+        self._advance_plant()
+        if was_turning and not self.arm.turning:
+            self.log("standstill", q=self.arm.measured.q)
         if not self.arm.moving:
             self.runtime = _AT_STANDSTILL.get(self.runtime, self.runtime)
         if fault is not None:
             self.protective_stop(str(fault), fault.cause)
             self.stop_program("ended by the safety system")
-        self.history.append(self.arm.q)
+        self.history.append(list(self.arm.measured.q))
+
+    def _advance_plant(self) -> None:
+        """Let the plant follow the targets. Without it the arm has no power, and shows what was measured last."""
+        if self.plant_lost:
+            return
+        try:
+            self.arm.measured = self.plant.advance(self.arm.q, self.arm.qd)
+        except PlantLost as exc:
+            self.plant_lost = str(exc)
+            self.plant.close()
+            self.safety_system.lose_plant(self.plant_lost)
+            self.robot_mode = RobotMode.POWER_OFF
+            self.stop_program("the plant is lost")
 
     def _turn_programs(self) -> None:
         self.secondary.turn()
@@ -283,13 +307,20 @@ class Controller:
         self.resistance[joint] = current
         return self.resistance
 
+    @property
+    def currents(self) -> list[float]:
+        """Current that each motor takes beyond the model of the arm [A]: what the plant measures, and a fault line."""
+        return [a + b for a, b in zip(self.resistance, self.arm.measured.current, strict=True)]
+
     def describe(self) -> dict[str, Any]:
         """Return the state, for a person or a test."""
         return {
             "cycle": self.cycle,
-            "q": list(self.arm.q),
-            "qd": list(self.arm.qd),
-            "tcp": list(values_of(self.arm.tcp_pose())),
+            "q": list(self.arm.measured.q),
+            "qd": list(self.arm.measured.qd),
+            "turning": self.arm.turning,
+            "plant_lost": self.plant_lost,
+            "tcp": list(values_of(self.arm.tcp_pose(self.arm.measured.q))),
             "program": self.program.name if self.program is not None else "",
             "runtime": self.runtime.name,
             "robot_mode": self.robot_mode.name,

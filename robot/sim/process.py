@@ -73,6 +73,8 @@ class SimulatedController:
         external_control: HOST:PORT at which such a program asks for the script of its External Control node.
         remote_control: whether the robot says that it is under remote control.
         robot_api_port: on which the robot API of PolyScope X is served; 0 where it is not.
+        plant: line to what its targets move, closed here on entry (``motion/remote_plant.py``); without one the arm
+            follows them exactly. POSIX only.
         ready_within: time allowed until it listens [s].
 
     Raises:
@@ -97,12 +99,14 @@ class SimulatedController:
         external_control: str = "127.0.0.1:50002",
         remote_control: bool = True,
         robot_api_port: int = 0,
+        plant: socket.socket | None = None,
         ready_within: float = 15.0,
     ) -> None:
         self.host = host
         self.log = log
         self.ready_within = ready_within
         self.facts: dict[str, Any] = {}
+        self._plant = plant
         self._process: subprocess.Popen[str] | None = None
         self._arguments = [
             *("--host", host, "--model", model, "--version", version, "--quirks", quirks),
@@ -123,13 +127,17 @@ class SimulatedController:
 
     def __enter__(self) -> SimulatedController:
         command = [sys.executable, "-m", "coneskin.robot.sim.command", "--json", "--faults", "--exit-with-parent"]
+        lines_to_plant = () if self._plant is None else (self._plant.fileno(),)
         self._process = process = subprocess.Popen(
-            [*command, *self._arguments],
+            [*command, *self._arguments, *(f"--plant-descriptor={number}" for number in lines_to_plant)],
+            pass_fds=lines_to_plant,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,  # Ctrl-C is for the program, which ends this process once the arm stands
         )
+        if self._plant is not None:
+            self._plant.close()
         lines: queue.SimpleQueue[str] = queue.SimpleQueue()
         threading.Thread(target=lambda: lines.put(_first_line(process)), daemon=True).start()
         try:
@@ -208,7 +216,7 @@ class SimulatedController:
             RobotTimeout: the arm still moves after the timeout [s].
         """
         deadline = time.monotonic() + timeout
-        while any((state := self.state())["qd"]):
+        while (state := self.state())["turning"]:
             if time.monotonic() > deadline:
                 raise RobotTimeout(f"the simulated arm still moves after {timeout:g} s")
             time.sleep(0.005)

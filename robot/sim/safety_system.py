@@ -14,6 +14,8 @@ from .safety import MOVING, SafetyMode
 
 __all__ = ["SafetySystem"]
 
+_PLANT_LOST = 50  # number in the log; that of a real controller which loses its arm depends on the joint
+
 
 class SafetySystem:
     """Safety system of one controller.
@@ -77,9 +79,15 @@ class SafetySystem:
         self._log("emergency_stop")
         self._enter(SafetyMode.ROBOT_EMERGENCY_STOP)
 
+    def lose_plant(self, reason: str) -> None:
+        """Begin a fault, because the arm is not there any more; nothing ends it."""
+        self._log("plant_lost", reason=reason)
+        self._enter(SafetyMode.FAULT)
+        self._tell(ErrorNotice(_PLANT_LOST, 0, Report.FAULT, reason))
+
     def restart(self) -> bool:
         """End an emergency stop; return whether there was one."""
-        if self.mode in (*MOVING, SafetyMode.PROTECTIVE_STOP):
+        if self.mode in (*MOVING, SafetyMode.PROTECTIVE_STOP, SafetyMode.FAULT):
             return False
         self.mode = SafetyMode.NORMAL
         return True

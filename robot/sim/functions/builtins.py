@@ -102,31 +102,45 @@ class Builtins(
 
     def get_actual_tcp_pose(self) -> PoseValue:
         """Return the tool pose."""
+        return values_of(self._arm.tcp_pose(self._arm.measured.q))
+
+    def get_target_tcp_pose(self) -> PoseValue:
+        """Return the tool pose that is commanded."""
         return values_of(self._arm.tcp_pose())
 
-    get_target_tcp_pose = get_target_tcp_pose_along_path = get_actual_tcp_pose  # no path has an offset
+    get_target_tcp_pose_along_path = get_target_tcp_pose  # no path has an offset
 
     def get_actual_tool_flange_pose(self) -> PoseValue:
         """Return the flange pose."""
-        return values_of(forward(self._arm.model, self._arm.q))
+        return values_of(forward(self._arm.model, self._arm.measured.q))
 
     def get_actual_tcp_speed(self) -> Array:
         """Return the velocity of the tool [m/s, rad/s]."""
+        return Array(self._arm.measured_twist())
+
+    def get_target_tcp_speed(self) -> Array:
+        """Return the velocity of the tool that is commanded [m/s, rad/s]."""
         return Array(self._arm.twist())
 
-    get_target_tcp_speed = get_target_tcp_speed_along_path = get_actual_tcp_speed
+    get_target_tcp_speed_along_path = get_target_tcp_speed
 
     def get_actual_joint_positions(self) -> Array:
         """Return the joint positions [rad]."""
-        return Array(self._arm.q)
+        return Array(self._arm.measured.q)
 
-    get_target_joint_positions = get_joint_positions = get_actual_joint_positions
+    get_joint_positions = get_actual_joint_positions
+
+    def get_target_joint_positions(self) -> Array:
+        """Return the joint positions that are commanded [rad]."""
+        return Array(self._arm.q)
 
     def get_actual_joint_speeds(self) -> Array:
         """Return the joint speeds [rad/s]."""
-        return Array(self._arm.qd)
+        return Array(self._arm.measured.qd)
 
-    get_target_joint_speeds = get_actual_joint_speeds
+    def get_target_joint_speeds(self) -> Array:
+        """Return the joint speeds that are commanded [rad/s]."""
+        return Array(self._arm.qd)
 
     def get_target_joint_accelerations(self) -> Array:
         """Return the joint accelerations [rad/s^2]."""
@@ -137,7 +151,7 @@ class Builtins(
     def get_actual_joint_positions_history(self, steps: int = 0) -> Array:
         """Return the joint positions of some cycles ago [rad]."""
         history = self._host.history
-        return Array(history[max(0, len(history) - 1 - int(steps))] if history else self._arm.q)
+        return Array(history[max(0, len(history) - 1 - int(steps))] if history else self._arm.measured.q)
 
     def get_target_waypoint(self) -> PoseValue:
         """Return the tool pose at which the present motion ends; the present pose if nothing moves the arm."""
@@ -178,7 +192,7 @@ class Builtins(
 
     def is_steady(self) -> bool:
         """Return whether the arm stands."""
-        return not self._arm.moving
+        return not self._arm.turning
 
     def is_within_safety_limits(self, where: Any) -> bool:
         """Return whether joint positions are within their limits, or such positions reach a tool pose."""

@@ -1,8 +1,9 @@
 """Simulated arm: positions, speeds, its tool, and the checks of its safety system.
 
-The model is ideal tracking: the arm does what the trajectory generator commands, so measured and commanded speeds are
-equal. No friction, no vibration, no payload. What the motors cannot do is not done: a motion that takes more torque
-than they have ends in a protective stop. Stops are not held to that: each is a ramp of joint speeds to zero.
+Positions and speeds are those that the trajectory generator commands; what the plant makes of them is ``measured``. The
+default one tracks ideally: no friction, no vibration, no payload. What the motors cannot do is not done: a motion that
+takes more torque than they have ends in a protective stop. Stops are not held to that: each is a ramp of joint speeds
+to zero.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from coneskin.robot.arm.kinematics import flange_jacobian, forward
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 from coneskin.robot.arm.ur_inertias import arm_inertia
 
+from .plant import KinematicPlant, PlantState
 from .stop_cause import (
     CLOSE_TO_JOINT_LIMITS,
     IN_SINGULARITY,
@@ -45,6 +47,7 @@ CYCLE = 0.002  #: control cycle of an e-Series controller [s]
 DEFAULT_DECELERATION = 10.0  #: of the leading joint where the command gives none [rad/s^2]; an assumption
 JOINT_ACCELERATION = 40.0  #: highest acceleration of a joint, as a UR5e reports it in its configuration [rad/s^2]
 MAX_ACCELERATION = 100.0  #: of a joint; a step of speed beyond it is a trajectory fault [rad/s^2]
+_STANDS = 1e-3  # rad/s; measured speeds up to it count as none: a plant with dynamics never rests entirely
 SPEED_MARGIN = 1.01  #: share of its highest speed at which the safety system stops a joint
 _EASY_ACCELERATION = 5.0  # rad/s^2, of every joint; what no arm's motors lack the torque for: it is not worked out
 
@@ -86,9 +89,10 @@ class SimulatedArm:
     """State of the arm, and the motion that drives it.
 
     Attributes:
-        q: joint positions [rad].
-        qd: joint speeds [rad/s].
-        qdd: joint accelerations [rad/s^2].
+        q: commanded joint positions [rad].
+        qd: commanded joint speeds [rad/s].
+        qdd: commanded joint accelerations [rad/s^2].
+        measured: what the plant has made of them.
         tcp: tool centre point in the flange frame.
         motion: command that moves the arm; None where the arm brakes or stands.
     """
@@ -99,6 +103,7 @@ class SimulatedArm:
         self.q = [float(angle) for angle in q]
         self.qd = [0.0] * 6
         self.qdd = [0.0] * 6
+        self.measured: PlantState = KinematicPlant().advance(self.q, self.qd)
         self.tcp = Pose()
         self.motion: Motion | None = None
 
@@ -128,8 +133,13 @@ class SimulatedArm:
 
     @property
     def moving(self) -> bool:
-        """True while any joint turns."""
+        """True while any joint is commanded to turn."""
         return any(self.qd)
+
+    @property
+    def turning(self) -> bool:
+        """True while any joint turns, as measured, or is commanded to."""
+        return self.moving or max_abs(self.measured.qd) > _STANDS
 
     @property
     def blends(self) -> bool:
@@ -184,10 +194,11 @@ class SimulatedArm:
         """Return the pose of the tool centre point in the base frame, by default at the present position."""
         return forward(self.model, self.q if q is None else q) @ self.tcp
 
-    def jacobian(self) -> list[list[float]]:
+    def jacobian(self, q: Sequence[float] | None = None) -> list[list[float]]:
         """Return the Jacobian of the tool centre point: three rows of velocity [m/rad], three of angular velocity."""
-        rows = [list(row) for row in flange_jacobian(self.model, self.q)]
-        x, y, z = forward(self.model, self.q).rotate(self.tcp.translation)
+        at = self.q if q is None else q
+        rows = [list(row) for row in flange_jacobian(self.model, at)]
+        x, y, z = forward(self.model, at).rotate(self.tcp.translation)
         for i in range(6):
             wx, wy, wz = rows[3][i], rows[4][i], rows[5][i]
             rows[0][i] += wy * z - wz * y
@@ -196,10 +207,17 @@ class SimulatedArm:
         return rows
 
     def twist(self) -> list[float]:
-        """Return velocity [m/s] and angular velocity [rad/s] of the tool centre point."""
-        if not any(self.qd):
+        """Return the commanded velocity [m/s] and angular velocity [rad/s] of the tool centre point."""
+        return self._twist(self.q, self.qd)
+
+    def measured_twist(self) -> list[float]:
+        """Return velocity [m/s] and angular velocity [rad/s] of the tool centre point as measured."""
+        return self._twist(self.measured.q, self.measured.qd)
+
+    def _twist(self, q: Sequence[float], qd: Sequence[float]) -> list[float]:
+        if not any(qd):
             return [0.0] * 6
-        return [sum(a * b for a, b in zip(row, self.qd, strict=True)) for row in self.jacobian()]
+        return [sum(a * b for a, b in zip(row, qd, strict=True)) for row in self.jacobian(q)]
 
     def joint_speeds(self, twist: Sequence[float]) -> list[float]:
         """Return the joint speeds [rad/s] that give the tool centre point a velocity and an angular velocity.

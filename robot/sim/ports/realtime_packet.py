@@ -31,13 +31,15 @@ def realtime_size(version: Version) -> int:
 def encode_realtime(c: Controller) -> bytes:
     """Return the packet of the present cycle."""
     arm = c.arm
-    pose, twist, powered = values_of(arm.tcp_pose()), arm.twist(), c.robot_mode is not RobotMode.POWER_OFF
+    measured, powered = arm.measured, c.robot_mode is not RobotMode.POWER_OFF
+    pose, twist = values_of(arm.tcp_pose(measured.q)), arm.measured_twist()
+    target_pose, target_twist = values_of(arm.tcp_pose()), arm.twist()
     modes = (253.0 if c.robot_mode is RobotMode.RUNNING else 255.0,) * 6
     volts = 48.0 * powered
     values = (
         *(c.timestamp, *arm.q, *arm.qd, *arm.qdd, *_ZEROS6, *_ZEROS6),  # targets: q, qd, qdd, current, torque
-        *(*arm.q, *arm.qd, *c.resistance, *_ZEROS6),  # measured: q, qd, current; control current
-        *(*pose, *twist, *_ZEROS6, *pose, *twist),  # tool: pose, speed and force, then both targets
+        *(*measured.q, *measured.qd, *c.currents, *_ZEROS6),  # measured: q, qd, current; control current
+        *(*pose, *twist, *_ZEROS6, *target_pose, *target_twist),  # tool: pose, speed and force, then both targets
         *(0.0, *((30.0,) * 6), 0.0, 0.0, float(c.robot_mode), *modes, float(c.safety)),  # inputs, temperatures, states
         *(*_ZEROS6, 0.0, 0.0, -9.81, *_ZEROS6),  # tool accelerometer between what is for internal use
         *(0.0 if c.safety != 1 else c.slider, 0.0, 0.0, 0.0),  # speed scaling, momentum

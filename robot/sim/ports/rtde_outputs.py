@@ -76,16 +76,16 @@ class RtdeOutputs:
         self._getters: dict[str, Callable[[], Value | Sequence[float]]] = {
             "timestamp": lambda: c.timestamp,
             "control_step": lambda: c.cycle,
-            "actual_q": lambda: arm.q,
+            "actual_q": lambda: arm.measured.q,
             "target_q": lambda: arm.q,
-            "actual_qd": lambda: arm.qd,
+            "actual_qd": lambda: arm.measured.qd,
             "target_qd": lambda: arm.qd,
             "target_qdd": lambda: arm.qdd,
-            "actual_current": lambda: c.resistance,
+            "actual_current": lambda: c.currents,
             "actual_TCP_pose": self._tcp_pose,
-            "target_TCP_pose": self._tcp_pose,
+            "target_TCP_pose": self._target_tcp_pose,
             "actual_TCP_speed": self._tcp_speed,
-            "target_TCP_speed": self._tcp_speed,
+            "target_TCP_speed": self._target_tcp_speed,
             "tcp_offset": lambda: tuple(values_of(arm.tcp)),
             "runtime_state": lambda: int(c.runtime),
             "robot_mode": lambda: int(c.robot_mode),
@@ -113,7 +113,7 @@ class RtdeOutputs:
             "output_bit_registers32_to_63": lambda: c.terminals.output_bits >> 32 & 0xFFFFFFFF,
             "joint_mode": lambda: (_JOINT_MODES.get(c.robot_mode, _JOINT_OFF),) * 6,
             "tool_mode": lambda: _JOINT_MODES.get(c.robot_mode, _JOINT_OFF),
-            "elbow_position": lambda: link_pose(arm.model, arm.q, _ELBOW).translation,
+            "elbow_position": lambda: link_pose(arm.model, arm.measured.q, _ELBOW).translation,
             "elbow_velocity": lambda: elbow_velocity(arm),
             "actual_TCP_force": c.inputs.wrench,
             "tcp_force_scalar": lambda: math.hypot(*c.inputs.wrench()[:3]),
@@ -150,20 +150,30 @@ class RtdeOutputs:
 
     def _tcp_pose(self) -> Value:
         arm = self._c.arm
-        if self._pose_at[0] is not arm.q or self._pose_at[1] is not arm.tcp:  # a moving arm makes a new list
-            self._pose = tuple(values_of(arm.tcp_pose()))
-            self._pose_at = (arm.q, arm.tcp)
+        q = arm.measured.q
+        if self._pose_at[0] is not q or self._pose_at[1] is not arm.tcp:  # a moving arm makes a new list
+            self._pose = tuple(values_of(arm.tcp_pose(q)))
+            self._pose_at = (q, arm.tcp)
         return self._pose
 
     def _tcp_speed(self) -> Value:
         if self._twist_at != self._c.cycle:
-            self._twist = tuple(self._c.arm.twist())
+            self._twist = tuple(self._c.arm.measured_twist())
             self._twist_at = self._c.cycle
         return self._twist
 
+    def _target_tcp_pose(self) -> Value:
+        arm = self._c.arm
+        return self._tcp_pose() if arm.measured.q is arm.q else tuple(values_of(arm.tcp_pose()))
+
+    def _target_tcp_speed(self) -> Value:
+        arm = self._c.arm
+        return self._tcp_speed() if arm.measured.qd is arm.qd else tuple(arm.twist())
+
 
 def elbow_velocity(arm: SimulatedArm) -> Vector:
-    """Return the velocity of the elbow in the base frame [m/s]."""
-    rows = point_jacobian(arm.model, arm.q, _ELBOW)
-    x, y, z = (sum(a * b for a, b in zip(row, arm.qd, strict=False)) for row in rows)
+    """Return the measured velocity of the elbow in the base frame [m/s]."""
+    q, qd, _ = arm.measured
+    rows = point_jacobian(arm.model, q, _ELBOW)
+    x, y, z = (sum(a * b for a, b in zip(row, qd, strict=False)) for row in rows)
     return x, y, z

@@ -1,5 +1,6 @@
-"""``coneskin demo``: a simulated arm moves, its virtual skin is touched, and the arm stops and retreats. No hardware.
+"""``coneskin demo``: a simulated arm runs into something soft, and its skin makes it stop and retreat. No hardware.
 
+The force comes from the physics engine, in real time; where that is not installed, a script touches the skin.
 Everything between the two ends is the real thing: bytes through a pseudo-terminal and pyserial, the guard in its own
 process, the unmodified ur_rtde wheel against a controller in another process, a recording, and its replay.
 """
@@ -7,6 +8,7 @@ process, the unmodified ur_rtde wheel against a controller in another process, a
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
 import sys
@@ -15,15 +17,18 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import Collision, MissingExtra, RobotRefused
+from coneskin.errors import Collision, MissingExtra, RobotConnectionError, RobotRefused
 from coneskin.robot.guard.journal import EventName, describe_way
+from coneskin.scene.required_packages import has_physics_engine
 
 if TYPE_CHECKING:
+    import socket
     from collections.abc import Callable
 
     from coneskin.replay.run import Run
     from coneskin.robot.guard.journal import GuardEvent
     from coneskin.scene.scene import Scene
+    from coneskin.session.session import Session
 
 __all__ = ["SCENE", "add_arguments", "run"]
 
@@ -65,7 +70,19 @@ distance_mm = 20              # and back what it moved while it stopped: the who
 skin_silence_ms = 250
 skin_late_ms = 250
 arm_silence_ms = 250
+{more}"""
+#: with physics: servos follow 10 ms late, and what they do comes from one more process
+_PATIENCE = "escalate_ms = 100"
+#: what it runs into, half way; as heavy as a hand (ISO/TS 15066, table A.3), and much softer
+_BODY = """
+[[body]]
+kind = "hand"
+xyz_mm = [{x:.1f}, {y:.1f}, {z:.1f}]
+radius_mm = {radius_mm:g}
+mass_kg = 0.6
+stiffness_n_per_mm = 2
 """
+_RADIUS = 0.03  # m of that
 _FROM_DEG = (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)  # joint positions at the start
 _TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)  # joint positions at the end
 _SPEED = 1.0  # rad/s, of the leading joint
@@ -102,23 +119,45 @@ def run(args: argparse.Namespace) -> int:
     except OSError as exc:
         raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
     host = args.host or free_host()
-    text = SCENE.format(host=host, reaction=args.reaction)
-    (folder / "scene.toml").write_text(text, encoding="utf-8")
+    soft = has_physics_engine()
+    text = SCENE.format(host=host, reaction=args.reaction, more=_PATIENCE if soft else "")
     scene = parse_scene(text, "scene.toml", folder)
+    if soft:
+        text += _body_in_the_way(scene)
+        scene = parse_scene(text, "scene.toml", folder)
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
 
     def say(line: str) -> None:
         if not args.json:
             print(line, flush=True)
 
     say("coneskin demo: a simulated UR5e with a virtual skin on its forearm. Not a safety-rated device.")
+    if not soft:
+        say("a script touches it: to let it run into something soft, pip install 'coneskin[physics]'")
+    if scene.moves_away:
+        _commission(scene, say)
     start_q = [math.radians(q) for q in _FROM_DEG]
-    with SimulatedController(model="UR5e", host=host, start_q=start_q):
-        if scene.moves_away:
-            _commission(scene, say)
-        touched = _collide(scene, folder, say)
+    with contextlib.ExitStack() as stack:
+        plant = None
+        if soft:
+            from coneskin.physics.live_plant import LivePlant
+
+            plant = stack.enter_context(LivePlant(scene, start_q))
+        line = None if plant is None else plant.controller
+        controller = stack.enter_context(SimulatedController("UR5e", host, start_q, plant=line))
+        if plant is None:
+            touched, force = _touch_by_script(scene, folder, say), None
+        else:
+            _collide(scene, folder, say, lambda _: None, plant.skin)
+            if lost := controller.state()["plant_lost"]:
+                raise RobotConnectionError(f"the simulated arm was lost: {lost}")
+            force, touched = plant.outcome()
+            if math.isnan(touched):
+                raise RobotRefused("the arm met nothing, though there is a body in its way")
     recorded = read_run(folder)
     again = replay(recorded)
     facts = _facts(recorded, touched)
+    facts["peak_n"], facts["clamp_n"] = (None, None) if force is None else (round(force.peak, 1), round(force.clamp, 1))
     facts["same_in_replay"] = again.same
     facts["picture"] = _draw(recorded, folder, say)
     (folder / "summary.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
@@ -176,28 +215,71 @@ def _commission(scene: Scene, say: Callable[[str], None]) -> None:
         raise RobotRefused(f"the virtual skin has not passed its commissioning: {record.cause}")
 
 
-def _collide(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
-    """Move, touch the arm meanwhile, and print what the guard does; return when the touch began [s]."""
+def _collide(
+    scene: Scene,
+    folder: Path,
+    say: Callable[[str], None],
+    meanwhile: Callable[[Session], None],
+    pressed_by: socket.socket | None = None,
+) -> None:
+    """Move, and print what the guard does.
+
+    Args:
+        scene: of the demo.
+        folder: of the run.
+        say: prints a line.
+        meanwhile: is called as the motion begins.
+        pressed_by: line from the physics.
+    """
     from coneskin.session.session import guard
 
-    touches: list[float] = []
     transcript = _Transcript(say, lambda: guarded.began)
-    guarded = guard(scene, recording=folder / "run.rec", on_event=transcript.event)
+    guarded = guard(scene, recording=folder / "run.rec", on_event=transcript.event, pressed_by=pressed_by)
     with guarded as session:
         transcript.line("the arm moves", after="activated")
-        phi = _leading_side(scene)
-        timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(session.touch(_U, phi, duration=0.15)))
-        timer.start()
+        meanwhile(session)
         try:
             session.arm.move_j([math.radians(q) for q in _TO_DEG], _SPEED, _ACCELERATION)
             print("coneskin demo: the arm arrived although it was touched", file=sys.stderr)
         except Collision as exc:
             transcript.line(f"the program gets Collision: {exc}", after="latched")
-        finally:
+
+
+def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
+    """Touch the arm while it moves; return when the touch began [s]."""
+    touches: list[float] = []
+    phi = _leading_side(scene)
+    timers: list[threading.Timer] = []
+
+    def touch_later(session: Session) -> None:
+        timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(session.touch(_U, phi, duration=0.15)))
+        timer.start()
+        timers.append(timer)
+
+    try:
+        _collide(scene, folder, say, touch_later)
+    finally:
+        for timer in timers:
             timer.join()
     if not touches:
         raise RobotRefused("the virtual skin was not touched: its process did not answer")
     return touches[0]
+
+
+def _body_in_the_way(scene: Scene) -> str:
+    """Return the table of a body that the sensor's leading side meets half way."""
+    from coneskin.robot.arm.kinematics import link_pose
+    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.scene.build import place_on_arm
+
+    (placed,) = place_on_arm(scene)
+    assert scene.arm is not None
+    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+    point, normal = placed.place(_U, _leading_side(scene))
+    pose = link_pose(arm_model(scene.arm.model), middle, placed.link)
+    out = pose.rotate(normal)
+    x, y, z = (1e3 * (p + _RADIUS * n) for p, n in zip(pose.apply(point), out, strict=True))
+    return _BODY.format(x=x, y=y, z=z, radius_mm=1e3 * _RADIUS)
 
 
 def _leading_side(scene: Scene) -> float:
@@ -272,6 +354,8 @@ def _report(facts: dict[str, Any], folder: Path, missing: str) -> None:
     ):
         value = facts[key]
         print(f"  {'never' if value is None else f'{value:8.2f} ms'}  {words}")
+    if facts["peak_n"] is not None:
+        print(f"  {facts['peak_n']:8.1f} N   peak force on the body; {facts['clamp_n']:.1f} N at most 0.5 s later")
     if facts["retreat_mm"] is not None:
         print(f"  {facts['way']}, along the normal")
     if facts["cut_short"] is not None:

@@ -53,7 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
     parser.add_argument("--check", action="store_true", help="list what is in the scene, and start nothing")
     parser.add_argument(
-        "--simulated", action="store_true", help="start a simulated controller at the scene's host, on this computer"
+        "--simulated",
+        action="store_true",
+        help="start a simulated controller at the scene's host, on this computer; its arm meets the scene's bodies",
     )
     parser.add_argument(
         "--publish",
@@ -110,7 +112,8 @@ def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPub
     session = guard(scene, on_event=show, start_timeout=start_timeout)
     work = _Work(session, math.inf if args.duration_s is None else args.duration_s, args.once)
     try:
-        with simulated_arm(scene) if args.simulated else contextlib.nullcontext(), session:
+        arm = simulated_arm(scene, bodies=True) if args.simulated else contextlib.nullcontext()
+        with arm as session.pressed_by, session:
             if session.recording and not args.json:
                 print(f"recording to {session.recording}", flush=True)
             work.run()

@@ -19,10 +19,10 @@ from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, force_block
 from coneskin.robot.guard.phase import Phase
 from coneskin.scene.body import BodyScene
-from coneskin.scene.build import build_core, place_on_arm
+from coneskin.scene.build import build_core
 from coneskin.scene.scene import Scene
 from coneskin.skin.padding import Padding
-from coneskin.skin.virtual.pressed_skin import Press, PressedSkin
+from coneskin.skin.virtual.pressed_skin import PressedSkin
 from coneskin.testing.companion_processes import CompanionProcesses
 from coneskin.testing.guard_rig import SLIDER
 from coneskin.testing.mock_arm import MockArm
@@ -31,9 +31,9 @@ from .force_limit import ForceLimit
 from .impact_outcome import ImpactMeter, ImpactOutcome
 from .joint_program import JointProgram
 from .mujoco_plant import MujocoPlant
-from .scene_description import SheetOnLink
+from .scene_plant import currents_of, presses_of, sheets_of
 
-__all__ = ["PROTECTIONS", "CollisionRun", "sheets_of"]
+__all__ = ["PROTECTIONS", "CollisionRun"]
 
 #: what protects the bodies: the scene's guard, the controller's own force limit, nothing
 PROTECTIONS = ("guard", "force limit", "nothing")
@@ -43,12 +43,6 @@ _LATE = 5  # steps from a command to the control cycle that obeys it
 _LIMIT_LATE = 4  # steps from the force limit's decision to that cycle; assumed
 _ACTIVATION = 10.0  # s within which the guard must become active
 _AFTER = 0.01  # s for which a run goes on after the clamping force was taken
-_AMPERE = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)  # N m of a joint for each ampere of its motor, as the guard assumes
-
-
-def sheets_of(scene: Scene) -> list[SheetOnLink]:
-    """Return the skins of a scene on its arm."""
-    return [SheetOnLink(item.name, item.link, item.frustum) for item in place_on_arm(scene)]
 
 
 class CollisionRun:
@@ -191,7 +185,7 @@ class CollisionRun:
         """Show the guard what skin, controller and processes send in this step."""
         for block in list(self._companions.blocks(self.now)):
             self._take(block)
-        self._device.press(self._presses(), _STEP)
+        self._device.press(presses_of(self.plant, self._skins), _STEP)
         if self._unread:
             self._feed(BlockKind.SKIN, self._unread)
         self._unread = b"".join([next(self._packets)[1] for _ in self._device.sensors])
@@ -199,19 +193,8 @@ class CollisionRun:
         if not first:
             if self._steps % 20 == 0 and self._core.needs_slider:
                 self._feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
-            current = [-torque / kt for torque, kt in zip(self.plant.external, _AMPERE, strict=True)]
-            self._feed(BlockKind.ARM, self.arm.packet(self.plant.q, self.plant.qd, current))
+            self._feed(BlockKind.ARM, self.arm.packet(self.plant.q, self.plant.qd, currents_of(self.plant)))
         self._feed(BlockKind.TICK)
-
-    def _presses(self) -> dict[tuple[int, int], Press]:
-        """Return what the skins feel: contacts within their active area."""
-        found = {}
-        for contact in self.plant.contacts:
-            skin = self._skins[contact.sheet]
-            cone = skin.cone.frustum
-            if 0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap:
-                found[contact.sheet, contact.part] = Press(skin.name, contact.u, contact.phi, contact.force)
-        return found
 
     def _feed(self, kind: BlockKind, payload: bytes = b"") -> None:
         self._take(Block(kind, self.now, payload))

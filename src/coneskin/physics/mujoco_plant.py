@@ -7,7 +7,7 @@ the padding's. It acts on the skin and on the body, equal and opposite, along th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from .arm_description import body_link
 from .held_body import HeldPart
 from .scene_description import SheetOnLink, describe_scene, parts_of
 
-__all__ = ["STEP", "BodyContact", "MujocoPlant"]
+__all__ = ["STEP", "BodyContact", "MujocoPlant", "Touch"]
 
 STEP = 2e-4  #: s of the integration; the stiffest contact, 1e6 N/m against 0.3 kg, swings with 1800 rad/s
 _ARM = 6  # degrees of freedom of the arm, the first ones
@@ -44,7 +44,7 @@ class BodyContact(NamedTuple):
     point: Vector  #: in the base frame [m]
 
 
-class _Touch(NamedTuple):
+class Touch(NamedTuple):
     """Contact as one step of the integration needs it; fields as of `BodyContact`."""
 
     sheet: int
@@ -166,6 +166,13 @@ class MujocoPlant:
         stored = sum(self._padding.energy(contact.depth) for contact in self.contacts)
         return float(self._d.energy[0] + self._d.energy[1]) + stored
 
+    @property
+    def diverged(self) -> bool:
+        """True once the integration has met what is not a number; MuJoCo then starts anew without a word."""
+        kinds = self._mj.mjtWarning
+        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+        return any(self._d.warning[int(kind)].number for kind in bad)
+
     def mass_matrix(self) -> NDArray[np.float64]:
         """Return the mass matrix of the arm at its present position [kg m^2], 6 x 6."""
         columns = np.zeros((_ARM, self._m.nv))
@@ -217,7 +224,11 @@ class MujocoPlant:
             step2(m, d)
             target += moved
             self.time += step
-        self._mj.mj_fwdPosition(m, d)
+        self._look()
+
+    def _look(self) -> None:
+        """Look where skins and bodies touch now."""
+        self._mj.mj_fwdPosition(self._m, self._d)
         self.contacts = tuple(self._contact(touch) for touch in self._find())
 
     def _press(self) -> None:
@@ -225,7 +236,7 @@ class MujocoPlant:
         d, step, padding = self._d, self._step, self._padding
         applied = d.qfrc_applied
         applied[:] = 0.0
-        felt: dict[int, _Touch] = {}
+        felt: dict[int, Touch] = {}
         for touch in self._find():
             push = touch.force * touch.normal
             applied[:_ARM] -= push @ touch.jacobian
@@ -241,6 +252,11 @@ class MujocoPlant:
         for number, at in self._moving:
             speed = d.qvel[at : at + 3].tolist()
             self.lost += self._damping[number] * (speed[0] ** 2 + speed[1] ** 2 + speed[2] ** 2) * step
+        self._let_people_act(felt)
+
+    def _let_people_act(self, felt: Mapping[int, Touch]) -> None:
+        """Let people move what holds the bodies, for one step, by the firmest touch of each part."""
+        for number, at in self._moving:
             part = self.parts[number]
             if not part.acts:
                 continue
@@ -248,21 +264,21 @@ class MujocoPlant:
             since = -1.0 if began is None else self.time - began
             by = felt.get(number)
             away = None if by is None else tuple(by.normal.tolist())
-            if part.advance(since, by.force if by else 0.0, away, step):
+            if part.advance(since, by.force if by else 0.0, away, self._step):
                 self._m.qpos_spring[at : at + 3] = part.rest
 
-    def _find(self) -> list[_Touch]:
-        """Return what touches: one contact for each skin and part, its place in the middle of MuJoCo's points."""
+    def _find(self, near: float = 0.0) -> list[Touch]:
+        """Return what touches, or is nearer than that [m]: one contact for each skin and part, amid MuJoCo's points."""
         d = self._d
         if not d.ncon:
             return []
         contact = d.contact
         distances = contact.dist.tolist()
-        if min(distances) >= 0.0:
+        if min(distances) >= near:
             return []
         points: dict[tuple[int, int], list[tuple[float, int, float]]] = {}
         for index, ((first, second), distance) in enumerate(zip(contact.geom.tolist(), distances, strict=True)):
-            if distance < 0.0:
+            if distance < near:
                 swapped = first not in self._sheet_of
                 pair = (second, first) if swapped else (first, second)
                 key = self._sheet_of[pair[0]], self._part_of[pair[1]]
@@ -277,9 +293,10 @@ class MujocoPlant:
         found: list[tuple[float, int, float]],
         frames: NDArray[np.float64],
         places: NDArray[np.float64],
-    ) -> _Touch:
+    ) -> Touch:
         depth, index, sign = max(found)
         normal, point = sign * frames[index, :3], places[index]
+        found = [item for item in found if item[0] > 0.0]
         if len(found) > 1:
             whole = math.fsum(item[0] for item in found)
             point = sum((item[0] / whole * places[item[1]] for item in found), np.zeros(3))
@@ -290,9 +307,9 @@ class MujocoPlant:
         if (at := self._address[part]) is not None:
             speed -= self._d.qvel[at : at + 3]
         rate = float(speed @ normal)
-        return _Touch(sheet, part, depth, rate, self._padding.force(depth, rate), normal, point, jacobian)
+        return Touch(sheet, part, depth, rate, self._padding.force(depth, rate), normal, point, jacobian)
 
-    def _contact(self, touch: _Touch) -> BodyContact:
+    def _contact(self, touch: Touch) -> BodyContact:
         link = self._links[touch.sheet]
         axes = self._d.xmat[link].reshape(3, 3)
         x, y, z = (axes.T @ (touch.point - self._d.xpos[link])).tolist()

@@ -18,6 +18,8 @@ from coneskin.skin.sources.kinds import is_simulated
 from .fallback_stop import stop_settings
 
 if TYPE_CHECKING:
+    import socket
+
     from coneskin.scene.scene import Scene
 
     from .skin_client import SkinClient
@@ -50,13 +52,20 @@ class ChildProcesses:
         self.skin: SkinClient | None = None
         self._lifelines: list[Channel] = []  # to the children besides the guard, which end with them
 
-    def start(self, scene: Scene, start: dict[str, Any], note_truth: Callable[[dict[str, Any]], None]) -> Channel:
+    def start(
+        self,
+        scene: Scene,
+        start: dict[str, Any],
+        note_truth: Callable[[dict[str, Any]], None],
+        pressed_by: socket.socket | None = None,
+    ) -> Channel:
         """Start the processes that a scene needs, all at once, and return the channel to the guard.
 
         Args:
             scene: with a source, and perhaps an arm.
             start: the scene's text, name and folder, which the children read it from.
             note_truth: is told with what a virtual skin is touched; see ``SkinClient``.
+            pressed_by: line from what presses the virtual skin.
 
         Raises:
             RobotConnectionError: a process cannot be started.
@@ -66,7 +75,7 @@ class ChildProcesses:
         if is_simulated(scene.source.kind):
             from .skin_client import SkinClient
 
-            self.skin = SkinClient(start, [item.sensor for item in scene.sensors], note_truth)
+            self.skin = SkinClient(start, [item.sensor for item in scene.sensors], note_truth, pressed_by)
             self.children["skin"] = self.skin.process
             self._lifelines.append(self.skin.channel)
         ours, theirs = pair()

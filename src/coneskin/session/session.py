@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
 from coneskin.robot.arm.ur_models import arm_model
@@ -41,6 +41,9 @@ from .outcome import (
 )
 from .program_heartbeat import ProgramHeartbeat
 
+if TYPE_CHECKING:
+    import socket
+
 __all__ = ["Session", "guard"]
 
 _START_TIMEOUT = 20.0  # s for the children to start and the guard to become active
@@ -53,6 +56,7 @@ def guard(
     recording: Path | str | None = None,
     on_event: Callable[[GuardEvent], None] | None = None,
     start_timeout: float = _START_TIMEOUT,
+    pressed_by: socket.socket | None = None,
 ) -> Session:
     """Guard an arm, or watch a skin, while a ``with`` lasts.
 
@@ -61,6 +65,7 @@ def guard(
         recording: file to record to; by default a new one in the folder that the scene names, if it names one.
         on_event: called for each event, from the thread that records.
         start_timeout: how long the guard may take to become active [s].
+        pressed_by: line from physics that presses the scene's virtual skin: ``LivePlant.skin``; closed on entering.
 
     Raises:
         SceneError: the scene has mistakes, or nothing to guard with.
@@ -73,6 +78,7 @@ def guard(
         None if recording is None else Path(recording),
         on_event,
         start_timeout,
+        pressed_by,
     )
 
 
@@ -82,6 +88,7 @@ class Session:
     Attributes:
         scene: of the run.
         recording: the file that is recorded to, or None.
+        pressed_by: line from what presses the virtual skin, or None; it may be set until the session is entered.
     """
 
     def __init__(
@@ -90,6 +97,7 @@ class Session:
         recording: Path | None,
         on_event: Callable[[GuardEvent], None] | None,
         start_timeout: float,
+        pressed_by: socket.socket | None = None,
     ) -> None:
         if missing := missing_parts(scene):
             raise SceneError(missing, scene.name)
@@ -98,6 +106,7 @@ class Session:
         self._made = False  # the recording's folder
         self._on_event = on_event
         self._start_timeout = start_timeout
+        self.pressed_by = pressed_by
         self._log = EventLog()
         self._monitor: GuardMonitor | None = None
         self._heartbeat: ProgramHeartbeat | None = None
@@ -294,7 +303,7 @@ class Session:
         virtual = scene.source is not None and scene.source.kind == "virtual"
         self._log = EventLog(self.recording, self._take_event if virtual else self._on_event, scene.recording)
         self._log.open({**start, "resolved": resolved_settings(scene)})
-        channel = self._processes.start(scene, start, self._log.note_truth)
+        channel = self._processes.start(scene, start, self._log.note_truth, self.pressed_by)
         program = self._processes.program
         fallback = None
         if scene.arm is not None and program is not None:

@@ -12,6 +12,8 @@ from coneskin.errors import SensorError, SkinConnectionError
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
 if TYPE_CHECKING:
+    import socket
+
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["SkinClient"]
@@ -28,6 +30,7 @@ class SkinClient:
         note_truth: is told each touch: ``touches``, a list of their ``sensor``, ``start``, ``end`` [s, host clock; None
             for one without an end], ``u`` [m], ``phi`` [rad], ``force`` [N] and ``radius`` [m]; or ``released``, when
             all that touches was taken away [s].
+        pressed_by: line from what presses the skin, closed here; None where only touches do.
 
     Attributes:
         process: the skin's; it ends when the channel does.
@@ -39,9 +42,11 @@ class SkinClient:
         start: dict[str, Any],
         sensors: Sequence[Sensor],
         note_truth: Callable[[dict[str, Any]], None] = lambda _: None,
+        pressed_by: socket.socket | None = None,
     ) -> None:
         ours, theirs = pair()
-        self.process = spawn("coneskin.session.skin_process", theirs)
+        ends = [theirs] if pressed_by is None else [theirs, pressed_by]
+        self.process = spawn("coneskin.session.skin_process", *ends)
         self.channel = Channel(ours)
         self.channel.send(encode_json(start))
         self._sensors = sensors

@@ -1,6 +1,8 @@
 """Skin process: the virtual skin of a scene on a pseudo-terminal. Started by ``coneskin.session.skin_client``.
 
-It plays the scene's script and takes further touches while it runs, so that a program can touch a moving arm.
+It plays the scene's script and takes further touches while it runs, so that a program can touch a moving arm. With a
+second channel, bodies in the physics engine press on it as well; the skin goes away when that channel ends, because a
+skin that nothing can press must not look like one that nothing touches.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ import math
 import os
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,12 +29,14 @@ __all__ = ["main", "virtual_skin"]
 _TOUCH_DELAY = 0.002  # s from a request to its touch, so that it begins on a frame that is not measured yet
 
 
-def virtual_skin(scene: Scene, script: bool = True) -> VirtualSkin:
-    """Return the virtual skin that a scene's source describes, with its script of touches or without."""
+def virtual_skin(scene: Scene, script: bool = True, pressed: bool = False) -> VirtualSkin:
+    """Return the virtual skin that a scene's source describes, with its script or without, perhaps one to press."""
+    from coneskin.skin.virtual.pressed_skin import PressedSkin
     from coneskin.skin.virtual.skin import VirtualSkin
 
     assert scene.source is not None
-    return VirtualSkin(
+    make = partial(PressedSkin, coarse=True) if pressed else VirtualSkin
+    return make(
         [item.sensor for item in scene.sensors],
         scene.source.touches if script else (),
         rate_hz=scene.source.settings["rate"],
@@ -44,7 +49,7 @@ def virtual_skin(scene: Scene, script: bool = True) -> VirtualSkin:
 
 def main(arguments: list[str]) -> int:
     """Take the channel and the scene, report the port, and play until the channel ends."""
-    _, (channel,) = inherit(arguments)  # it ends with the program at once: nothing depends on it then
+    _, (channel, *presses) = inherit(arguments)  # it ends with the program at once: nothing depends on it then
     from coneskin.scene.reader import parse_scene
     from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, play, wait_for_reader, write_all
 
@@ -56,15 +61,18 @@ def main(arguments: list[str]) -> int:
     scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
     master, slave, path = open_raw_terminal()
     channel.send(encode_json({"port": path}))  # the guard opens it, and the arm, while the field is loaded here
-    skin = virtual_skin(scene, start.get("script", True))
+    skin = virtual_skin(scene, start.get("script", True), bool(presses))
 
     began = time.monotonic()
 
     def wait(duration: float) -> bool:
         end = time.monotonic() + duration
-        while wait_readable([channel], max(end - time.monotonic(), 0.0)):
-            _serve(channel, skin, began)
-            if channel.closed:
+        while ready := wait_readable([channel, *presses], max(end - time.monotonic(), 0.0)):
+            if channel in ready:
+                _serve(channel, skin, began)
+            for line in presses:
+                _press(line, skin)
+            if channel.closed or any(line.closed for line in presses):
                 return True
         return False
 
@@ -96,6 +104,18 @@ def _serve(channel: Channel, skin: VirtualSkin, began: float) -> None:
             channel.send(encode_json({"refused": str(exc)}))
         else:
             channel.send(encode_json({"touched": _told(touch, began)}))
+
+
+def _press(line: Channel, skin: VirtualSkin) -> None:
+    """Let the bodies press as the physics engine says."""
+    from coneskin.skin.virtual.pressed_skin import Press, PressedSkin
+
+    assert isinstance(skin, PressedSkin)
+    for message in line.receive():
+        told = decode_json(message)
+        skin.press({(sheet, part): Press(*press) for sheet, part, *press in told["presses"]}, told["step"])
+    if line.closed:
+        print("coneskin: the physics that presses the virtual skin has ended; so does the skin", file=sys.stderr)
 
 
 def _told(touch: ScriptedTouch, began: float, first: str = "") -> dict[str, Any]:

@@ -1,0 +1,84 @@
+"""Physics process: the plant of a scene in real time. Started by ``coneskin.physics.live_plant``.
+
+It is driven by the control cycles of a simulated controller: each targets that come let 2 ms pass, what is measured
+goes back, and what presses on the skins goes to the virtual skin's process. It makes up for nothing and leaves nothing
+out, so a computer that is too slow shows as answers that come late, which the controller judges.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import sys
+import time
+from pathlib import Path
+
+from coneskin.channel import Channel, decode_json, encode_json, wait_readable
+from coneskin.child_process import inherit
+from coneskin.errors import ConeSkinError, MissingExtra
+
+__all__ = ["main"]
+
+_PATIENCE = 1.0  # s between two looks at whether anybody is left
+
+
+def main(arguments: list[str]) -> int:
+    """Take the channels and the scene, and follow the controller until it ends, or the program does."""
+    _, (program, controller, skin) = inherit(arguments)  # it ends with the program at once
+    from coneskin.robot.sim.motion.arm import CYCLE
+    from coneskin.robot.sim.motion.plant import PlantLost
+    from coneskin.robot.sim.motion.remote_plant import decode_targets, encode_state
+    from coneskin.scene.reader import parse_scene
+
+    from .impact_outcome import ImpactMeter
+    from .scene_plant import ScenePlant
+
+    while not (hello := program.receive()) and not program.closed:
+        wait_readable([program], _PATIENCE)
+    if not hello:
+        return 1
+    start = decode_json(hello[0])
+    try:
+        scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
+        plant = ScenePlant(scene, start["q"])
+        plant.advance(start["q"], (0.0,) * 6)  # what is loaded on first use is loaded now
+    except (ConeSkinError, PlantLost) as exc:
+        program.send(encode_json({"refused": str(exc), "missing": isinstance(exc, MissingExtra)}))
+        return 1
+    program.send(encode_json({"ready": True}))
+    gc.collect()
+    gc.freeze()
+    meter = ImpactMeter()
+    while not controller.closed and not program.closed:
+        wait_readable([program, controller], _PATIENCE)
+        for message in controller.receive():
+            try:
+                state = plant.advance(*decode_targets(message))
+            except (PlantLost, ValueError) as exc:
+                print(f"coneskin physics: {exc}", file=sys.stderr, flush=True)
+                return 1
+            controller.send(encode_state(state))
+            presses = [[*key, *press] for key, press in plant.presses().items()]
+            skin.send(encode_json({"step": CYCLE, "presses": presses}))
+            physics = plant.physics
+            rate = max((contact.rate for contact in physics.contacts), default=0.0)
+            speed = max(map(abs, state.qd))
+            meter.take(time.monotonic(), physics.force, rate, physics.peak, physics.deepest, physics.impulse, speed)
+        _report(program, meter)
+    return 0
+
+
+def _report(program: Channel, meter: object) -> None:
+    """Answer the program, which asks what has come of it so far."""
+    from .impact_outcome import ImpactMeter
+
+    assert isinstance(meter, ImpactMeter)
+    for _ in program.receive():
+        outcome = meter.outcome
+        values = {name: getattr(outcome, name) for name in outcome.__slots__}
+        values["began"] = meter.began
+        program.send(encode_json({name: None if math.isnan(value) else value for name, value in values.items()}))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

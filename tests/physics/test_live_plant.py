@@ -1,0 +1,124 @@
+"""Physics in real time: force -> skin -> bytes -> decode -> stop -> force, with every process its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from coneskin.errors import Collision, MissingExtra, RobotRefused
+from coneskin.replay.replay import read_run, replay
+from coneskin.robot.guard.journal import EventName
+from coneskin.scene.reader import parse_scene
+from coneskin.scene.scene import Scene
+from coneskin.session.session import guard
+from coneskin.testing.forearm import forearm_scene, start_with
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
+pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
+pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
+
+from coneskin.physics.live_plant import LivePlant  # noqa: E402
+from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
+
+START, GOAL = start_with(-10.0), start_with(60.0)
+#: in the way of the forearm's leading side, which meets it at 0.21 m/s after 0.3 s
+_HAND = """
+[[body]]
+kind = "hand"
+xyz_mm = [-192, -120, 587.5]
+mass_kg = 0.6
+stiffness_n_per_mm = 2
+"""
+_PATIENT = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 500\nescalate_ms = 200"
+
+
+def scene_at(host: str) -> Scene:
+    text = forearm_scene(host, limits=_PATIENT).replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 500')
+    return parse_scene(text + _HAND)
+
+
+@pytest.fixture
+def live() -> Iterator[tuple[Scene, LivePlant, SimulatedController]]:
+    host = free_host()
+    scene = scene_at(host)
+    with (
+        LivePlant(scene, START) as plant,
+        SimulatedController("UR5e", host, START, plant=plant.controller) as controller,
+    ):
+        yield scene, plant, controller
+
+
+def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(live, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    scene, plant, controller = live
+    with guard(scene, recording=tmp_path / "run.rec", pressed_by=plant.skin) as session:
+        with pytest.raises(Collision):
+            session.arm.move_j(GOAL, speed=1.0, acceleration=8.0)
+        events = session.events
+        rest = controller.wait_for_standstill()
+    assert rest["plant_lost"] == ""
+    outcome, began = plant.outcome()
+    contact, stood = (next(e for e in events if e.name == name) for name in (EventName.CONTACT, EventName.STANDSTILL))
+    assert began < contact.time < stood.time
+    assert 5.0 < outcome.peak < 300.0  # 2 and 10 N/mm in series, 10 to 30 mm on: as far as it comes on a busy computer
+    assert outcome.approach == pytest.approx(0.21, abs=0.03)
+    assert outcome.impulse > 0.0
+    assert START[0] + 0.1 < rest["q"][0] < GOAL[0] - 0.5  # on its way, and far from its goal
+    assert rest["q"][0] != rest["tcp"][0]
+    located = next(e for e in events if e.name == EventName.CONTACT_LOCATED)
+    assert located.details["u"] == pytest.approx(0.13, abs=0.01)
+    assert replay(read_run(tmp_path / "run.rec")).same
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("harm", "said"), [("kill", "has ended"), ("freeze", "behind real time")])
+def test_physics_that_dies_or_falls_behind_is_said_and_stops_everything(live, harm: str, said: str) -> None:  # type: ignore[no-untyped-def]
+    scene, plant, controller = live
+    with guard(scene, pressed_by=plant.skin) as session:
+        timer = threading.Timer(0.1, getattr(plant, harm))
+        timer.start()
+        with pytest.raises(RobotRefused, match=r"safety system|fault|NOT confirmed"):
+            session.arm.move_j(GOAL, speed=0.2, acceleration=1.0)
+        timer.join()
+        assert said in controller.state()["plant_lost"]
+        assert controller.state()["safety"] == "FAULT"
+        assert not any(event.name == EventName.STANDSTILL for event in session.events)  # nobody has measured one
+        with pytest.raises(RobotRefused):
+            session.reset()
+
+
+def test_a_scene_without_an_arm_has_no_physics() -> None:
+    with pytest.raises(RobotRefused, match=r"needs an \[arm\]"), LivePlant(parse_scene(""), START):
+        pass
+
+
+def without_engine(folder: Path) -> dict[str, str]:
+    """An environment in which MuJoCo cannot be imported."""
+    (folder / "mujoco.py").write_text("raise ImportError('not here')")
+    return {**os.environ, "PYTHONPATH": str(folder)}
+
+
+def test_without_the_engine_the_pip_line_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in without_engine(tmp_path).items():
+        monkeypatch.setenv(name, value)
+    with (
+        pytest.raises(MissingExtra, match=r"pip install 'coneskin\[physics\]'"),
+        LivePlant(scene_at("127.0.0.1"), START),
+    ):
+        pass
+
+
+@pytest.mark.long
+def test_the_command_refuses_bodies_without_the_engine(tmp_path: Path) -> None:
+    host = free_host()
+    (tmp_path / "scene.toml").write_text(scene_at(host).text)
+    words = [sys.executable, "-m", "coneskin", "guard", str(tmp_path / "scene.toml"), "--simulated", "--once"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, env=without_engine(tmp_path))
+    assert done.returncode == 1
+    assert "pip install 'coneskin[physics]'" in done.stderr
+    assert "Traceback" not in done.stderr

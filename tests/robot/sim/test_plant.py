@@ -1,0 +1,143 @@
+"""A plant that is lost, and measurements that are not the targets: what the controller makes of them."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+
+import pytest
+
+from coneskin.channel import Channel, pair
+from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.motion.arm import CYCLE
+from coneskin.robot.sim.motion.motion import SpeedJoints
+from coneskin.robot.sim.motion.plant import PlantLost, PlantState
+from coneskin.robot.sim.motion.remote_plant import LONGEST_BEHIND, RemotePlant, decode_targets, encode_state
+from coneskin.robot.sim.options import START_Q, Options
+from coneskin.robot.sim.ports.realtime_packet import encode_realtime
+from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
+from coneskin.robot.sim.safety import RobotMode, SafetyMode
+
+ELSEWHERE = PlantState(
+    (0.1, -1.0, 1.0, -1.0, -1.0, 0.2), (0.3, 0.0, 0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)
+)
+QD = [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+class OddPlant:
+    """Plant that measures the same whatever is commanded, until it is lost."""
+
+    def __init__(self) -> None:
+        self.lost = False
+        self.closed = 0
+
+    def advance(self, q, qd):  # type: ignore[no-untyped-def]
+        if self.lost:
+            raise PlantLost("it fell off")
+        return ELSEWHERE
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+@pytest.fixture
+def moving() -> tuple[Controller, OddPlant, io.StringIO]:
+    plant, log = OddPlant(), io.StringIO()
+    controller = Controller(Options("UR5e"), log, plant)
+    controller.arm.motion = SpeedJoints(QD, 10.0)
+    for _ in range(20):
+        controller.step()
+        controller.arm.motion = SpeedJoints(QD, 10.0)
+    return controller, plant, log
+
+
+def test_what_is_measured_is_the_plant_and_what_is_the_target_is_not(moving) -> None:  # type: ignore[no-untyped-def]
+    controller, _, _ = moving
+    outputs = RtdeOutputs(controller)
+    assert outputs.getter("actual_q")() == ELSEWHERE.q
+    assert outputs.getter("actual_qd")() == ELSEWHERE.qd
+    assert outputs.getter("target_q")() == controller.arm.q
+    assert controller.arm.q[0] != ELSEWHERE.q[0]
+    controller.resist(0, 0.5)
+    assert list(outputs.getter("actual_current")()) == [1.5, 2.0, 3.0, 0.0, 0.0, 0.0]
+    assert outputs.getter("actual_TCP_pose")() != outputs.getter("target_TCP_pose")()
+    assert outputs.getter("actual_TCP_speed")() != outputs.getter("target_TCP_speed")()
+    packet = struct.unpack_from(">6d", encode_realtime(controller), 4 + 8 * 31)  # q actual: the 32nd double
+    assert packet == ELSEWHERE.q
+    assert controller.describe()["q"] == list(ELSEWHERE.q)
+    assert controller.describe()["turning"]
+
+
+def test_without_its_plant_the_arm_has_no_power_and_nothing_says_that_it_stands(moving) -> None:  # type: ignore[no-untyped-def]
+    controller, plant, log = moving
+    plant.lost = True
+    for _ in range(200):
+        controller.step()
+    assert controller.safety is SafetyMode.FAULT
+    assert controller.robot_mode is RobotMode.POWER_OFF
+    assert controller.program is None
+    assert plant.closed == 1  # it is not asked again
+    assert controller.describe()["plant_lost"] == "it fell off"
+    assert controller.describe()["qd"] == list(ELSEWHERE.qd)  # the last that was measured: no standstill is made up
+    assert controller.describe()["turning"]
+    events = [json.loads(line)["event"] for line in log.getvalue().splitlines()]
+    assert "plant_lost" in events
+    assert "standstill" not in events
+    assert not controller.unlock() or controller.safety is SafetyMode.FAULT
+
+
+@pytest.fixture
+def remote():  # type: ignore[no-untyped-def]
+    ours, theirs = pair()
+    other = Channel(theirs)
+    plant = RemotePlant(Channel(ours), START_Q)
+    yield plant, other
+    plant.close()
+    other.close()
+
+
+def test_targets_arrive_and_the_answer_is_measured_in_the_next_cycle(remote) -> None:  # type: ignore[no-untyped-def]
+    plant, other = remote
+    assert plant.advance(START_Q, QD).q == START_Q
+    (message,) = other.receive()
+    assert decode_targets(message) == (START_Q, tuple(QD))
+    other.send(encode_state(ELSEWHERE))
+    assert plant.advance(START_Q, QD) == ELSEWHERE
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (b"too short", "9 bytes"),
+        (encode_state(ELSEWHERE._replace(qd=(float("nan"),) * 6)), "not a number"),
+        (None, "has ended"),
+    ],
+    ids=["nonsense", "not a number", "gone"],
+)
+def test_a_plant_that_is_gone_or_says_nonsense_is_lost(remote, answer, said) -> None:  # type: ignore[no-untyped-def]
+    plant, other = remote
+    if answer is None:
+        other.close()
+    else:
+        other.send(answer)
+    with pytest.raises(PlantLost, match=said):
+        plant.advance(START_Q, QD)
+
+
+def test_a_plant_that_falls_behind_is_lost_and_one_that_catches_up_is_not(remote) -> None:  # type: ignore[no-untyped-def]
+    plant, other = remote
+    most = round(LONGEST_BEHIND / CYCLE)
+    for _ in range(most):
+        plant.advance(START_Q, QD)
+    for _ in range(most):
+        other.send(encode_state(ELSEWHERE))
+    for _ in range(most):
+        assert plant.advance(START_Q, QD) == ELSEWHERE
+    with pytest.raises(PlantLost, match="250 ms behind real time: end what else"):
+        plant.advance(START_Q, QD)
+
+
+def test_targets_of_another_length_are_refused() -> None:
+    with pytest.raises(ValueError, match="must be 96 bytes, got 3"):
+        decode_targets(b"abc")
