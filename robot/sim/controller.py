@@ -67,6 +67,7 @@ class Controller:
             if not low <= q <= high:
                 raise RobotRefused(f"start position of joint {i} must be in [{low:.3f}, {high:.3f}] rad, got {q:.3f}")
         self.plant: Plant = KinematicPlant() if plant is None else plant
+        self.arm.kinematic = plant is None
         self.plant_lost = ""
         self.cycle = 0
         self.inputs = ClientInputs(self.arm, options.quirks == "fixed", self.log)

@@ -225,7 +225,10 @@ class MoveFunctions:
             low <= angle <= high for low, angle, high in zip(model.joint_lower, q, model.joint_upper, strict=True)
         ):
             raise ScriptError(f"set_pos: {show(Array(q))} is beyond the joints' limits [rad]")
-        self._arm.motion, self._arm.q = None, q
+        if not self._arm.kinematic:
+            raise ScriptError("set_pos puts an arm without dynamics, and the plant of this one has some")
+        self._arm.motion = None
+        self._arm.put(q)
         self._host.log("put", program=self._program.name, q=q)
 
     def get_inverse_kin(self, x: Any, qnear: Any = None, *_: Any) -> Array:

@@ -93,6 +93,7 @@ class SimulatedArm:
         qd: commanded joint speeds [rad/s].
         qdd: commanded joint accelerations [rad/s^2].
         measured: what the plant has made of them.
+        kinematic: True where the plant does exactly what is commanded.
         tcp: tool centre point in the flange frame.
         motion: command that moves the arm; None where the arm brakes or stands.
     """
@@ -104,6 +105,7 @@ class SimulatedArm:
         self.qd = [0.0] * 6
         self.qdd = [0.0] * 6
         self.measured: PlantState = KinematicPlant().advance(self.q, self.qd)
+        self.kinematic = True
         self.tcp = Pose()
         self.motion: Motion | None = None
 
@@ -130,6 +132,11 @@ class SimulatedArm:
         self.qdd = [(new - old) / CYCLE for new, old in zip(qd, self.qd, strict=True)]
         self.q, self.qd = q, qd
         return fault
+
+    def put(self, q: Sequence[float]) -> None:
+        """Put an arm that stands at joint positions [rad], without a motion."""
+        self.q = [float(angle) for angle in q]
+        self.measured = KinematicPlant().advance(self.q, self.qd)
 
     @property
     def moving(self) -> bool:

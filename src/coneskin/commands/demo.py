@@ -64,6 +64,7 @@ rate_hz = 500
 
 [reaction]
 kind = "{reaction}"
+deceleration_rad_s2 = 40      # this arm's motors can, folded as it is here: docs/safety.md
 distance_mm = 20              # and back what it moved while it stopped: the whole arm may go 100 mm
 
 [monitoring]                  # defaults: 50 ms each; a pseudo-terminal on a busy machine can stall for longer

@@ -36,7 +36,8 @@ _EXAMPLE = """\
 example:
   coneskin guard scene.toml              until Ctrl-C; type "reset" and Enter after a collision
   coneskin guard scene.toml --check      read the scene, list what is in it, start nothing
-  coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm
+  coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm;
+                                         where the scene has bodies, the arm runs into them (extra physics)
 
 The scene's keys: docs/scene.md. Exit code: 0 nothing has happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
 SIGTERM do not change it. With --check: 0 a guard can start with this scene, 1 it has mistakes or lacks something.

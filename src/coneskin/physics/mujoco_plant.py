@@ -98,6 +98,7 @@ class MujocoPlant:
         except ImportError as exc:
             raise MissingExtra("mujoco", "physics in the loop", "physics") from exc
         self._mj: Any = mujoco
+        mujoco.set_mju_user_warning(lambda _: None)  # it would write a file into the current folder: see `diverged`
         inertia = arm_inertia(model)
         self._m: Any = mujoco.MjModel.from_xml_string(describe_scene(model, inertia, q, sheets, bodies, step))
         self._d: Any = mujoco.MjData(self._m)
