@@ -166,7 +166,8 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({**facts, "folder": str(folder)}))
     else:
         _report(facts, folder, recorded.missing)
-    return 0 if facts["standstill_ms"] is not None and again.same and facts["contacts"] == 1 else 1
+    alone = facts["contacts"] == 1 or (soft and facts["contacts"] > 1)  # what is soft may swing back
+    return 0 if facts["standstill_ms"] is not None and again.same and alone else 1
 
 
 class _Transcript:
