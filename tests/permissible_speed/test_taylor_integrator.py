@@ -163,3 +163,18 @@ def test_the_stiffest_contacts_stay_finite(speed: float, body: float, arm: float
     assert math.isfinite(course.peak)
     assert course.peak <= speed * math.sqrt(1e7 / (1.0 / arm + 1.0 / body)) * (1.0 + 0.3 * speed) + 1e-12
     assert course.impulse >= 0.0
+
+
+def test_a_contact_so_slow_that_its_layers_close_later_rests_as_one_that_closes_them_in_time() -> None:
+    """Otherwise the slowest of all would count as one that nothing stops."""
+    body = StruckBody(0.6, support=1e3, damping=20.0)
+    contact = TwoMassContact(DrivenArm(1e-4, 8.0, 72e3, 1500.0, 0.01, 5.0), body)
+    assert math.isinf(integrate(contact).closed)
+    assert integrate(contact).rest == pytest.approx(0.5, abs=0.01)
+    assert integrate(contact, 8.0).closed == pytest.approx(contact.way_to_close / 1e-4, rel=0.01)
+
+
+def test_a_free_body_that_is_pushed_along_has_no_force_at_rest() -> None:
+    course = integrate(TwoMassContact(DrivenArm(1e-3, 8.0, 72e3, 1500.0, 0.01, 5.0), StruckBody(1.0)))
+    assert math.isinf(course.closed)
+    assert course.rest == 0.0

@@ -234,14 +234,15 @@ class _Integration:
     def _outcome(self) -> ContactCourse:
         arm = self.model.arm
         distance = math.inf if arm.speed > 0.0 else 0.0
+        braking = arm.speed * arm.reaction + arm.speed**2 / (2.0 * arm.deceleration)
         if self.drive == 0.0:
             distance = self.way
         elif math.isfinite(self.braked):
             before = max(0.0, self.braked - self.time) * self.drive
             distance = self.way + before + self.drive**2 / (2.0 * arm.deceleration)
-        rest = self.model.static(distance)[0] if math.isfinite(distance) else math.inf
-        if math.isinf(distance) and (arm.stiffness == 0.0 and self.arm_mobility):
-            rest = 0.0  # nothing drives it
+        elif math.isfinite(self.model.way_to_close):  # so slow a contact closes the layers later, as if at rest
+            distance = self.model.way_to_close + braking
+        rest = self.model.static(distance)[0]
         return ContactCourse(
             peak=self.peak,
             peak_time=self.peak_time,

@@ -158,17 +158,27 @@ class TwoMassContact:
         _check("closing_force", self.closing_force, "N", least=0.0)
         object.__setattr__(self, "law", CompressionLaw.of(self.padding, self.body.tissue))
 
+    @property
+    def yielding(self) -> float:
+        """What arm and body give way at rest [m/N], beside the compression; infinite where one of them is free."""
+        arm, body = self.arm, self.body
+        found = 0.0 if math.isinf(arm.mass) else 1.0 / arm.stiffness if arm.stiffness > 0.0 else math.inf
+        if not math.isinf(body.mass):
+            found += 1.0 / body.support if body.support > 0.0 else math.inf
+        return found
+
+    @property
+    def way_to_close(self) -> float:
+        """How far a slow arm goes until its layers close [m]; infinite where they never do."""
+        return self.law.under(self.closing_force) + (self.closing_force * self.yielding if self.closing_force else 0.0)
+
     def static(self, way: float) -> tuple[float, float]:
         """Return force [N] and compression [m] once all is at rest, with the controller's surface at a place [m]."""
-        arm, body = self.arm, self.body
         if way <= 0.0:
             return 0.0, min(0.0, way)
-        yielding = 0.0 if math.isinf(arm.mass) else 1.0 / arm.stiffness if arm.stiffness > 0.0 else math.inf
-        if not math.isinf(body.mass):
-            yielding += 1.0 / body.support if body.support > 0.0 else math.inf
+        law, yielding = self.law, self.yielding
         if math.isinf(yielding):
             return 0.0, 0.0
-        law = self.law
         force = way / (1.0 / law.soft + yielding)
         if force > law.end_force:
             force = (way - law.end + law.end_force / law.hard) / (1.0 / law.hard + yielding)

@@ -63,6 +63,12 @@ def summarize(scene: Scene) -> dict[str, Any]:
             found["commissioning"] = note if valid else f"NOT VALID: the arm only stops; {note}"
     for number, rule in enumerate(scene.rules, 1):
         found[f"rule {number}"] = f"{_reaction(rule.reaction)}, {_conditions(rule)}"
+    if limit := scene.speed_limit:
+        where = "in the positions of a motion" if limit.lowest else "in any position"
+        found["permissible speeds"] = (
+            f"by {limit.edition}, verified by {limit.verified_by}, computed {limit.date[:10]} {where}; at most "
+            f"{max(map(max, limit.curves)):.2f} m/s along a normal, kept by the speed slider"
+        )
     if scene.source:
         found["monitoring"] = _monitoring(scene.monitoring_limits, scene.arm is not None)
     if scene.source and scene.source.touches:
