@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from coneskin.errors import MeshError
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
+    from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
 
 __all__ = ["LinkMesh", "fit_link", "fit_mesh", "load_link"]
@@ -104,7 +105,8 @@ def fit_link(
         packages: folders of the ROS packages in a URDF's package:// paths.
         progress: called with the name of each step.
         arguments: of a xacro file.
-        search: keyword arguments of ``find_cones``.
+        search: keyword arguments of ``find_cones``. Without ``seam_direction`` the seams are put where the link shields
+            them most (``place_seams``).
 
     Raises:
         MeshError: the file, the link or its mesh cannot be found or read.
@@ -112,13 +114,14 @@ def fit_link(
     """
     from coneskin.geometry.fit.cones import find_cones
 
+    facing = search.pop("seam_direction", None)
     tries: list[tuple[LinkMesh, LinkFit]] = []
     progress(f"reading {link}")
     for source in load_link(link, unit, up_axis, packages, arguments):
         progress(f"{source.name}: {len(source.mesh.faces)} faces")
-        fit = find_cones(source.mesh, progress=progress, **search)
+        fit = find_cones(source.mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
         if fit.sheets:
-            return source, fit
+            return (source, fit) if facing else _with_seams(source, fit, progress, search.get("weights"))
         tries.append((source, fit))
     return tries[0]
 
@@ -129,7 +132,21 @@ def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **sea
 
     name = Path(mesh.source).stem
     source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", (*_terms(mesh.source), *mesh.notes))
-    return source, find_cones(mesh, progress=progress, **search)
+    facing = search.pop("seam_direction", None)
+    fit = find_cones(mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
+    return (source, fit) if facing or not fit.sheets else _with_seams(source, fit, progress, search.get("weights"))
+
+
+def _with_seams(
+    source: LinkMesh, fit: LinkFit, progress: Callable[[str], None], weights: TouchWeights | None
+) -> tuple[LinkMesh, LinkFit]:
+    """Return a link with its seams at the places that it shields, and with a note of each reason."""
+    from coneskin.geometry.fit.seam_place import place_seams
+
+    fit, places = place_seams(fit, source.mesh, weights)
+    for place in places:
+        progress(place.reason)
+    return replace(source, notes=(*source.notes, *(place.reason for place in places))), fit
 
 
 def _terms(name: str) -> tuple[str, ...]:

@@ -107,7 +107,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_quantity(add, "min-wrap-deg", 150.0, "smallest partial wrap")
     _add_quantity(add, "max-bridge-mm", 10.0, "widest hole or groove that a sheet spans")
     seam = {"nargs": 3, "metavar": ("X", "Y", "Z")}
-    add("--seam", type=float, help="direction in which the seam faces, as the cable (default 1 0 0)", **seam)  # type: ignore[arg-type]
+    text = "direction in which the seam faces, as the cable (default: where the link shields it most)"
+    add("--seam", type=float, help=text, **seam)  # type: ignore[arg-type]
     add("--touch-side", type=float, help="side on which touches are likely: the seam faces away from it", **seam)  # type: ignore[arg-type]
     add("--weights", type=Path, metavar="FILE", help="cover what counts: CSV with x_mm,y_mm,z_mm,weight of places")
     add("--exposure", action="store_true", help="cover what can be touched: areas count by the free space above them")

@@ -55,8 +55,8 @@ def requested_wrap(args: argparse.Namespace) -> float | None:
     return given_dimensions(args, [key for key in DOUBLE_CONE_KEYS if key.plain == "wrap"]).get("wrap")
 
 
-def seam_direction(args: argparse.Namespace) -> tuple[float, float, float]:
-    """Return the direction in which the seam of a full wrap faces.
+def seam_direction(args: argparse.Namespace) -> tuple[float, float, float] | None:
+    """Return the direction in which the seam of a full wrap faces; None for where the link shields it most.
 
     Raises:
         GeometryError: it was given twice.
@@ -68,9 +68,9 @@ def seam_direction(args: argparse.Namespace) -> tuple[float, float, float]:
             raise GeometryError(
                 f"{option} takes a direction X Y Z, finite and not 0 0 0, got {' '.join(map(str, way))}"
             )
-    x, y, z = args.seam or (1.0, 0.0, 0.0)
-    if args.touch_side is not None:
-        x, y, z = (-value for value in args.touch_side)
+    if args.seam is None and args.touch_side is None:
+        return None
+    x, y, z = args.seam or (-value for value in args.touch_side)
     return x, y, z
 
 

@@ -1,0 +1,111 @@
+"""Place of the blind seam around an axis: where the link itself keeps touches away most.
+
+A seam can face any way around a full wrap, and the cable leaves beside it. What stands out from the link beyond the
+ends of the tube (a joint, a flange) shields one side of it; a hand comes from the other sides. So the seam, its
+electrodes and the cable lie where the least of the half-space above them is free.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.pose import Pose
+from coneskin.geometry.ray_casting import RayCaster
+
+from .cones import LinkFit
+from .surface_samples import SurfaceSamples
+from .touch_weights import TouchWeights, exposure_weights
+
+__all__ = ["SeamPlace", "place_seams"]
+
+Floats = NDArray[np.float64]
+
+TURN = 2.0 * math.pi
+_AZIMUTHS = 36
+_ROWS = 21  # along a sheet; most of what shields a tube stands beyond its ends
+_NEAR = 1  # azimuths on both sides that count too: a blind seam is 20 to 35 deg wide
+_SHIELDED = 0.005  # of the half-space; a smaller difference between the sides is the error of the rays
+
+
+class SeamPlace(NamedTuple):
+    """Where the seam about one axis was put."""
+
+    axis: int  #: number of the axis
+    direction: tuple[float, float, float]  #: in which it faces, in the frame of the link
+    shielded: float  #: share of the half-space above it that the link shields
+    least: float  #: the same on the most exposed side
+    reason: str  #: a sentence for a person
+
+
+def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -> tuple[LinkFit, tuple[SeamPlace, ...]]:
+    """Turn the full wraps of a fit until their seams lie where the link shields them most.
+
+    Sheets about one axis are turned together, so that their cables run side by side. Partial wraps stay: they have no
+    choice. Where nothing shields any side, the seams stay as well.
+
+    Args:
+        fit: of a link.
+        mesh: the link.
+        weights: where touches are likely; the free space of a place counts as much as its weight.
+    """
+    rays = RayCaster(mesh)
+    sheets = list(fit.sheets)
+    places: list[SeamPlace] = []
+    for axis in dict.fromkeys(sheet.axis for sheet in sheets):
+        full = [i for i, sheet in enumerate(sheets) if sheet.axis == axis and sheet.frustum.wrap == TURN]
+        if not full:
+            continue
+        parts = [_touches_around(sheets[i].placed, rays, weights) for i in full]
+        area = np.array([sheets[i].frustum.area for i in full])
+        exposed = np.average(parts, axis=0, weights=area)
+        wide = np.mean([np.roll(exposed, k) for k in range(-_NEAR, _NEAR + 1)], axis=0)
+        best = int(wide.argmin())
+        shielded, least = 1.0 - float(wide[best]), 1.0 - float(wide.max())
+        turn = 0.0 if shielded - least < _SHIELDED else best * TURN / _AZIMUTHS
+        spin = Pose.from_xyz_rpy(rpy=(0.0, 0.0, turn))
+        for i in full:
+            placed = sheets[i].placed
+            sheets[i] = replace(
+                sheets[i],
+                placed=PlacedFrustum(placed.frustum, placed.link_frustum @ spin),
+                start_azimuth=(sheets[i].start_azimuth + turn) % TURN,
+            )
+        direction = sheets[full[0]].placed.link_frustum.rotate((1.0, 0.0, 0.0))
+        names = " and ".join(str(i + 1) for i in full)
+        places.append(SeamPlace(axis, direction, shielded, least, _reason(names, direction, shielded, least, weights)))
+    return replace(fit, sheets=tuple(sheets)), tuple(places)
+
+
+def _touches_around(placed: PlacedFrustum, rays: RayCaster, weights: TouchWeights | None) -> Floats:
+    """Return the share of the half-space that is free, weighted, at evenly spaced azimuths, shape (azimuths,)."""
+    side = placed.frustum
+    u = (np.arange(_ROWS) + 0.5) * side.slant / _ROWS
+    phi = np.arange(_AZIMUTHS) * TURN / _AZIMUTHS
+    points, normals = placed.place(u[:, None], phi[None, :])
+    count = _ROWS * _AZIMUTHS
+    samples = SurfaceSamples(points.reshape(-1, 3), normals.reshape(-1, 3), np.full(count, -1), side.area / count)
+    free = exposure_weights(samples, rays).weights * (1.0 if weights is None else weights.at(samples.points))
+    return np.asarray(free.reshape(_ROWS, _AZIMUTHS).mean(axis=0))
+
+
+def _reason(
+    names: str, direction: tuple[float, float, float], shielded: float, least: float, weights: TouchWeights | None
+) -> str:
+    x, y, z = (f"{value:z.2f}" for value in direction)
+    where = f"the seam of sheet {names} faces ({x}, {y}, {z})"
+    other = "--seam or --touch-side put it elsewhere"
+    if shielded - least < _SHIELDED:
+        return f"{where}: the link shields no side of it more than another, so it is any side; {other}"
+    if weights is not None:
+        return f"{where}, where touches count least by {weights.name}; the cable leaves beside it; {other}"
+    return (
+        f"{where}, where the link itself shields {shielded:.1%} of the space above it, and {least:.1%} on the most "
+        f"exposed side; the cable leaves beside it; {other}"
+    )

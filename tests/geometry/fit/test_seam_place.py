@@ -1,0 +1,73 @@
+"""Place of the seam: behind what stands out from the link; anywhere where nothing does, and always the same."""
+
+import math
+
+import numpy as np
+import pytest
+
+from coneskin.geometry.fit.cones import LinkFit, find_cones
+from coneskin.geometry.fit.seam_place import place_seams
+from coneskin.geometry.fit.touch_weights import TouchWeights
+from coneskin.geometry.mesh import Mesh, make_mesh
+
+from ..synthetic import TILTED, frustum, joined, placed
+
+
+def tube_with_wing(azimuth: float | None) -> Mesh:
+    """A tube of 50 mm, 0.2 m long, and beyond its end a block that stands out far at an azimuth."""
+    corners, faces = frustum(0.05, 0.05, 0.2)
+    if azimuth is None:
+        return placed((corners, faces))
+    low, high = np.array([0.0, -0.07, -0.10]), np.array([0.20, 0.07, -0.002])
+    box = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    flat = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    return placed(joined((corners, faces), (box @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), flat)))
+
+
+def fitted(mesh: Mesh) -> LinkFit:
+    return find_cones(mesh, max_sheets=1, wrap=2 * math.pi)
+
+
+@pytest.mark.parametrize("azimuth", [0.7, 3.0])
+def test_the_seam_lies_behind_what_stands_out(azimuth: float) -> None:
+    mesh = tube_with_wing(azimuth)
+    before = fitted(mesh)
+    after, (place,) = place_seams(before, mesh)
+    placed_sheet = after.sheets[0].placed
+    wing = TILTED.rotate((math.cos(azimuth), math.sin(azimuth), 0.0))
+    cosine = sum(a * b for a, b in zip(wing, place.direction, strict=True))
+    assert math.degrees(math.acos(min(1.0, cosine))) < 10.5, "to a step of the search"
+    assert place.shielded > place.least + 0.02
+    assert "the link itself shields" in place.reason
+    old, new = before.sheets[0].placed.link_frustum, placed_sheet.link_frustum
+    assert new.translation == pytest.approx(old.translation), "the cone itself stays"
+    assert new.rotate((0.0, 0.0, 1.0)) == pytest.approx(old.rotate((0.0, 0.0, 1.0)))
+
+
+def test_a_map_of_touches_turns_the_seam_away_from_them() -> None:
+    mesh = tube_with_wing(None)
+    before = fitted(mesh)
+    sheet = before.sheets[0].placed
+    busy, quiet = (sheet.point(0.1, phi) for phi in (0.0, math.pi))
+    after, (place,) = place_seams(before, mesh, TouchWeights(np.array([busy, quiet]), np.array([1.0, 0.1]), "map.csv"))
+    _, phi, _ = after.sheets[0].placed.locate(quiet)
+    assert abs(math.remainder(phi, 2 * math.pi)) < 0.5 * math.pi
+    assert "touches count least by map.csv" in place.reason
+
+
+def test_a_bare_tube_keeps_its_seam() -> None:
+    mesh = tube_with_wing(None)
+    before = fitted(mesh)
+    after, (place,) = place_seams(before, mesh)
+    assert after.sheets[0].placed == before.sheets[0].placed
+    assert "shields no side of it more than another" in place.reason
+
+
+def test_partial_wraps_have_no_choice() -> None:
+    mesh = make_mesh(*frustum(0.05, 0.05, 0.2))
+    before = find_cones(mesh, max_sheets=1, wrap=math.pi)
+    after, places = place_seams(before, mesh)
+    assert places == ()
+    assert after.sheets == before.sheets
