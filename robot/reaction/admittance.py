@@ -102,7 +102,9 @@ def admittance_step(
     if speed < _MIN_SPEED or not placed or against:
         still = replace(now, time=state.time, speed=speed, progress=progress, plan=None)
         clipped_by = ("opposed" if against else "level" if placed else "place",)
-        return still, JointVelocity(ZERO_VELOCITY, reaction.acceleration, 0.0, progress, clipped_by)
+        # what is not known, or on the other side, may be pressed now: brake as a stop does, not as a push ends
+        rate = reaction.acceleration if placed and not against else max(reaction.acceleration, reaction.deceleration)
+        return still, JointVelocity(ZERO_VELOCITY, rate, 0.0, progress, clipped_by)
     setting = replace(reaction, speed=speed, distance=reaction.distance - progress)
     plan = plan_retreat(now.model, state, contacts, setting, now.space, now.sweep)
     step = plan if isinstance(plan, Done) else retreat_step(plan, state)

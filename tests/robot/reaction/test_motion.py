@@ -1,6 +1,7 @@
 """Ways to leave: with the push, back along the path, above the table; the kinematics judge."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -130,6 +131,22 @@ def test_a_push_whose_place_is_not_known_holds_the_arm():
     assert step.qd == ZERO_VELOCITY
     assert step.clipped_by == ("place",)
     assert after.plan is None
+
+
+def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_where_a_push_ends():
+    """In a grip, giving way to one hand met the other, and braked into that with 4 rad/s2."""
+    reaction = Reaction(kind="comply", acceleration=4.0, deceleration=12.0)
+    moving = replace(begin_admittance(ARM, ArmState(0.0, Q), reaction), speed=0.1)
+    lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
+    _, step = admittance_step(moving, ArmState(0.002, Q), [lost])
+    assert (step.qd, step.acceleration) == (ZERO_VELOCITY, 12.0)
+    x, y, z = FOREARM.normal
+    other = replace(FOREARM, normal=(-x, -y, -z), level=0.9, number=2)
+    _, step = admittance_step(moving, ArmState(0.002, Q), [FOREARM, other])
+    assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 12.0, ("opposed",))
+    at_rest = replace(moving, speed=0.0)
+    _, step = admittance_step(at_rest, ArmState(0.002, Q), [replace(FOREARM, level=0.1, threshold=0.1)])
+    assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 4.0, ("level",))
 
 
 # ---- back along the path
