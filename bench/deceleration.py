@@ -76,9 +76,7 @@ def main() -> None:
         print("\n".join(json.dumps(line) for line in lines))
         return
     print(head())
-    print(
-        f"{args.positions} random positions; rad/s2, and the share of positions in which 10, 20, 40 rad/s2 are possible\n"
-    )
+    print(f"{args.positions} random positions; rad/s2, and the share of them in which 10, 20, 40 rad/s2 are possible\n")
     print(
         f"{'arm, payload, joint':28}{'stretched':>10}{'UR, cat. 0':>11}{'least':>8}{'p5':>8}{'median':>8}"
         + f"{'10':>7}{'20':>7}{'40':>7}"

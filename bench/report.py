@@ -11,7 +11,13 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-__all__ = ["head", "quantile"]
+__all__ = ["commit", "head", "quantile"]
+
+
+def commit() -> str:
+    """Return the commit that is checked out, with "-dirty" where a file of it has changed."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
 
 
 def head(*packages: str) -> str:
@@ -22,12 +28,10 @@ def head(*packages: str) -> str:
     """
     python = f"Python {platform.python_version()}"
     versions = ", ".join([python, *(f"{name} {found}" for name in packages if (found := _version(name)))])
-    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
-    commit = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
     load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
     return (
         f"{_processor()}, {os.cpu_count()} cores, {platform.system()}, {versions}\n"
-        f"commit {commit}, {datetime.now(UTC):%F %R} UTC{load}"
+        f"commit {commit()}, {datetime.now(UTC):%F %R} UTC{load}"
     )
 
 
