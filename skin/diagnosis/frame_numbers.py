@@ -21,6 +21,7 @@ _CLOCK_TOLERANCE = 0.015  # of its speed; a ceramic resonator is off by 0.005
 _HELD_BACK = 0.012  # s from one group of frames to the next, where the frames themselves are closer
 _LOST = 0.02  # share of frames
 _TURNS = 3
+_PARTS = 6  # of the time, in each of which some frame is quick
 _MIN_TIME = 0.25  # s over which the clocks can be compared
 
 
@@ -101,7 +102,7 @@ def find_wrong_numbers(frames: Sequence[Frame], times: Sequence[float], sensors:
     return (
         _find_repeats(frames)
         or _find_sequence(frames, sensors)
-        or _find_clock(frames, numbers)
+        or _find_clock(frames, times, numbers)
         or _find_rate(frames, times, numbers)
     )
 
@@ -140,7 +141,7 @@ def _listing(frames: Sequence[Frame]) -> str:
     return ", ".join(str(frame.sequence) for frame in frames[-4:])
 
 
-def _find_clock(frames: Sequence[Frame], numbers: FrameNumbers) -> Diagnosis | None:
+def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Diagnosis | None:
     ticks = _clock_steps(frames)
     if not any(ticks):
         return Diagnosis(Cause.CLOCK_STANDS, f"the device's clock stands at {frames[-1].clock_us}")
@@ -161,11 +162,35 @@ def _find_clock(frames: Sequence[Frame], numbers: FrameNumbers) -> Diagnosis | N
         if 0.9 * factor < ratio < 1.1 * factor:
             return Diagnosis(cause, f"the device's clock counts {unit}")
     if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
+        ratio = _steady_ratio(ticks, times, ratio)
+    if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
         return Diagnosis(Cause.CLOCK_RATIO, f"the device's clock runs {ratio:.3f} times as fast as the computer's")
     uneven = sum(abs(tick - 1e6 * numbers.period) > 5e5 * numbers.period + 2e3 for tick in ticks)
     if uneven > 0.1 * len(ticks):
         return Diagnosis(Cause.CLOCK_JUMPS, f"the device's clock jumps in {uneven} of {len(ticks)} frames")
     return None
+
+
+def _steady_ratio(ticks: Sequence[int], times: Sequence[float], ratio: float) -> float:
+    """Return the ratio of the clocks without what a computer adds that was held up for a while.
+
+    Such a computer reads frames late: they fall behind at once, and stay or come back. Clocks of two speeds move apart
+    all the time: the quickest frames of most parts of the time fall behind by the same step.
+
+    Args:
+        ticks: steps of the device's clock [us].
+        times: when each frame came, host clock [s].
+        ratio: over the whole time; returned where most parts agree with it.
+    """
+    if len(times) < _PARTS * _MIN_FRAMES:
+        return ratio
+    clocks = itertools.accumulate(ticks, initial=0)
+    lag = [time - 1e-6 * clock for time, clock in zip(times, clocks, strict=True)]
+    edges = [len(lag) * part // _PARTS for part in range(_PARTS + 1)]
+    quickest = [min(range(a, b), key=lag.__getitem__) for a, b in itertools.pairwise(edges)]
+    speeds = sorted((lag[b] - lag[a]) / max(times[b] - times[a], 1e-6) for a, b in itertools.pairwise(quickest))
+    middle = speeds[len(speeds) // 2]
+    return ratio if 0.5 < middle / (1.0 - ratio) < 2.0 else 1.0 - middle
 
 
 def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Diagnosis | None:

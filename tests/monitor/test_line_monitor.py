@@ -72,6 +72,25 @@ def test_loss_wrong_checksums_and_a_fast_clock_are_counted() -> None:
     assert sensor.numbers.clock_ratio == pytest.approx(1.5, rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("begins", "ends", "late"), [(0.4, 9.0, 0.06), (0.3, 0.6, 0.15), (0.6, 9.0, 0.03), (0.0, 0.3, 0.08)]
+)
+@pytest.mark.parametrize(("ratio", "cause"), [(1.0, Cause.NONE), (1.1, Cause.CLOCK_RATIO), (0.5, Cause.CLOCK_RATIO)])
+def test_a_computer_that_is_held_up_is_not_the_fault_of_the_board(
+    begins: float, ends: float, late: float, ratio: float, cause: Cause
+) -> None:
+    """From one time to another every byte is read late; the clock is blamed where it is wrong, and only there."""
+    monitor = LineMonitor(0.0, (), 921600)
+    now = 0.0
+    for time, data in a_skin(imperfections=Imperfections(clock_ratio=ratio)).packets():
+        if time > 0.9:
+            break
+        now = max(now, time + (late if begins <= time < ends else 0.0))
+        monitor.feed(data, now)
+    found = monitor.report(now).diagnosis
+    assert (found.cause is Cause.CLOCK_RATIO) == (cause is Cause.CLOCK_RATIO), found.line
+
+
 def test_a_line_says_the_diagnosis_first_and_an_object_everything() -> None:
     report = heard(a_skin(), 0.5)
     assert describe_line(report).startswith("frames come as they should (device 0, sensor 0: ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -72,10 +73,13 @@ def find_line(target: str, baud: int) -> Line:
 
     Raises:
         SceneError: the scene has mistakes, or no source.
+        SkinConnectionError: the word means a folder without a run, or the file of a sensor.
     """
     path = Path(target)
     if (path / "run.rec").is_file():
         path /= "run.rec"
+    if path.is_dir():
+        raise SkinConnectionError(f"{target}: {_folder_advice(path)}")
     if not path.is_file():
         return Line(target, open_source("serial", {"port": target, "baud": baud}), baud=baud)
     if path.suffix == ".toml":
@@ -87,9 +91,32 @@ def find_line(target: str, baud: int) -> Line:
     return Line(target, path=path, recorded=head == MAGIC or path.suffix == ".rec")
 
 
+def _folder_advice(path: Path) -> str:
+    """Return what to name instead of a folder in which there is no run."""
+    if (path / "scene.toml").is_file():
+        return f"a folder has no line; its scene has one: coneskin monitor {path / 'scene.toml'}"
+    if (path / "design.json").is_file():
+        return "this is the folder of a design, which has no line: name the port, or write its scene (coneskin init)"
+    return "a folder without a recorded run (run.rec) has no line: name a port, a scene, a run or a file of bytes"
+
+
+def _refuse_sensor(path: Path) -> None:
+    """Refuse the file of a sensor, which says nothing of a port."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return  # the reader of scenes says it better
+    if "radius1_mm" in table and not {"source", "link", "arm"} & table.keys():
+        raise SkinConnectionError(
+            f"{path}: this is the file of a sensor, which has no line: name the port to which its board is connected, "
+            "or the scene that refers to it"
+        )
+
+
 def _line_of_scene(path: Path) -> Line:
     from coneskin.scene.reader import load_scene
 
+    _refuse_sensor(path)
     scene = load_scene(path)
     if scene.source is None:
         raise SceneError(["there is no [source], so there is no line to listen to"], scene.name)
