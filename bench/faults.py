@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack
@@ -34,18 +35,20 @@ from faults_kind import FaultKind
 from faults_kinds import KINDS
 from faults_setup import CLOCK, Outcome
 from faults_table import show, show_head, summary
+from faults_trial import EXTERNAL_CONTROL
 from faults_verdict import run_trial
 
 
 def chosen(args: argparse.Namespace) -> list[tuple[FaultKind, str]]:
     words = args.kinds.split(",") if args.kinds else [""]
+    known = [kind for kind in KINDS if EXTERNAL_CONTROL in os.environ or not kind.setup.mover.startswith("driver")]
     controls = (args.control,) if args.control else ("internal", "external")
     if args.quick:
-        kinds = [kind for kind in KINDS if not kind.variant and any(word in kind.name for word in words)]
+        kinds = [kind for kind in known if not kind.variant and any(word in kind.name for word in words)]
         return [(kind, kind.controls[number % len(kind.controls)]) for number, kind in enumerate(kinds)][:: args.every]
     return [
         (kind, control)
-        for kind in KINDS
+        for kind in known
         for control in controls
         if control in kind.controls and any(word == kind.name or word in kind.name for word in words)
     ]
@@ -64,7 +67,17 @@ def main() -> int:
     parser.add_argument("--every", type=int, default=1, metavar="N", help="with --quick, only every Nth of these")
     parser.add_argument("--list", action="store_true", help="name the kinds, and end")
     parser.add_argument("--json", action="store_true", help="a line of JSON for each kind")
+    parser.add_argument(
+        "--external-control",
+        type=Path,
+        metavar="SCRIPT",
+        help="resources/external_control.urscript of Universal Robots' client library: kinds in which it moves the arm",
+    )
     args = parser.parse_args()
+    if args.external_control:
+        if not args.external_control.is_file():
+            parser.error(f"--external-control: there is no file {args.external_control}")
+        os.environ[EXTERNAL_CONTROL] = str(args.external_control.resolve())
     pairs = chosen(args)
     if args.list:
         print("\n".join(f"{kind.name} [{control}]" for kind, control in pairs))

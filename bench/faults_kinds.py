@@ -5,6 +5,7 @@ from __future__ import annotations
 from faults_kind import FaultKind
 from faults_kinds_contact import CONTACT_KINDS
 from faults_kinds_controller import CONTROLLER_KINDS
+from faults_kinds_driver import DRIVER_KINDS
 from faults_kinds_network import NETWORK_KINDS
 from faults_kinds_process import PROCESS_KINDS
 from faults_kinds_program import PROGRAM_KINDS
@@ -19,4 +20,5 @@ KINDS: tuple[FaultKind, ...] = (
     *PROGRAM_KINDS,
     *CONTACT_KINDS,
     *REACTION_KINDS,
+    *DRIVER_KINDS,
 )

@@ -83,7 +83,8 @@ class Setup:
         skins: sensors: on the forearm, and on the upper arm.
         arm: more lines of [arm].
         mover: what moves an externally controlled arm: "" for one program, "heartbeat" for one that ends where the
-            guard is gone, or arguments of bench/faults_restarter.py.
+            guard is gone, "driver servoj" or "driver speedj" for bench/external_control_peer.py, or arguments of
+            bench/faults_restarter.py.
         manners: of the program, words of bench/faults_program.py.
         files: that lie in the program's current folder: name -> text.
     """

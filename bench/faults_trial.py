@@ -33,6 +33,7 @@ from coneskin.testing.commissioned import write_passed_record
 from coneskin.testing.forearm import START, forearm_scene
 
 HERE = Path(__file__).parent
+EXTERNAL_CONTROL = "CONESKIN_EXTERNAL_CONTROL"  # environment variable: path of external_control.urscript
 
 
 class Trial:
@@ -165,8 +166,11 @@ class Trial:
         return at
 
     def signal(self, process: str, number: signal.Signals) -> float:
-        """Send a signal to "guard", "driver", "watchdog", "program" or "skin"."""
-        pid = {"program": self.program.pid, "skin": self.skin.pid, **self.pids}[process]
+        """Send a signal to "guard", "driver", "watchdog", "program", "skin" or "mover"."""
+        pid = {"program": self.program.pid, "skin": self.skin.pid, **self.pids}.get(process)
+        if pid is None:
+            assert self.mover is not None
+            pid = self.mover.pid
         at = CLOCK()
         os.kill(pid, number)
         if number == signal.SIGSTOP:
@@ -213,11 +217,19 @@ class Trial:
             self.send_script(
                 f"def bench_move():\n{self._heartbeat()}\n  movej({GOAL}, a={ACCELERATION}, v={SPEED})\nend\n"
             )
+        elif self.setup.mover.startswith("driver"):
+            how = self.setup.mover.split()[1]
+            script, start = os.environ[EXTERNAL_CONTROL], json.dumps(START)
+            peer = HERE / "external_control_peer.py"
+            self.mover = Child(str(peer), self.host, script, start, json.dumps(GOAL), how)
+            self._stack.callback(self.mover.close)
+            if not self.mover.hear(20.0):
+                raise RuntimeError(f"external control does not begin: {self.mover.errors}")
         elif self.setup.mover:
             words = self.setup.mover.split()
             self.mover = Child(str(HERE / "faults_restarter.py"), self.host, json.dumps(GOAL), *words)
             self._stack.callback(self.mover.close)
-        if self.control == "external" and not self.setup.mover.startswith(("heartbeat", "loop")):
+        if self.control == "external" and not self.setup.mover.startswith(("heartbeat", "loop", "driver")):
             self.send_script(f"def bench_move():\n  movej({GOAL}, a={ACCELERATION}, v={SPEED})\nend\n")
         end = CLOCK() + 10.0
         while abs(self.simulated.state()["qd"][0]) < 0.95 * SPEED:
