@@ -11,6 +11,8 @@
 #include <string>
 #include <thread>
 
+#include <unistd.h>
+
 #include <ur_client_library/log.h>
 #include <ur_client_library/ur/ur_driver.h>
 
@@ -23,10 +25,21 @@ static bool waitUntilRunning()
   return running;
 }
 
+// A bench that is killed says nothing, and the library waits for ever for a controller that died with it.
+static void endWithParent()
+{
+  std::thread([parent = getppid()] {
+    while (getppid() == parent)
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    _exit(1);
+  }).detach();
+}
+
 int main(int argc, char* argv[])
 {
   if (argc < 3)
     return 2;
+  endWithParent();
   urcl::setLogLevel(urcl::LogLevel::FATAL);
   urcl::UrDriverConfiguration config;
   config.robot_ip = argv[1];
