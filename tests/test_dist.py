@@ -3,7 +3,9 @@
 pip fetches the tools and the dependencies of these environments, so these tests need a package index.
 """
 
+import json
 import shutil
+import socket
 import subprocess
 import sys
 import tarfile
@@ -114,13 +116,44 @@ def test_the_sdist_holds_no_tests(built: Path) -> None:
     assert not tops & {"tests", "bench", "demos"}
 
 
-def test_the_installed_wheel_runs_without_the_tree(wheel: Path, tmp_path: Path) -> None:
-    programs = environment(tmp_path / "venv", wheel)
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory, wheel: Path) -> Path:
+    """Folder of the programs of an environment in which the wheel is, without any extra."""
+    return environment(tmp_path_factory.mktemp("user") / "venv", wheel)
+
+
+def test_the_installed_wheel_runs_without_the_tree(installed: Path, tmp_path: Path) -> None:
+    programs = installed
     assert run(programs / "coneskin", "--version", cwd=tmp_path) == f"coneskin {coneskin.__version__}\n"
     cone = ("--radius1-mm", "40", "--radius2-mm", "70", "--height-mm", "150")
     assert "203.960781 mm" in run(programs / "coneskin", "unroll", *cone, cwd=tmp_path)  # as in demos/01_unroll.py
     if sys.platform != "win32":  # the demo's virtual skin needs a pseudo-terminal
         assert "bit by bit" in run(programs / "coneskin", "demo", cwd=tmp_path)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere 127.0.0.1 is the only such address")
+def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tmp_path: Path) -> None:
+    """It answers on each of its ports, and none of the extras' packages is there."""
+    extras = ["ezdxf", "matplotlib", "mujoco", "viser", "pyarrow"]
+    code = f"import importlib.util as u; print([name for name in {extras} if u.find_spec(name)])"
+    assert run(installed / "python", "-c", code, cwd=tmp_path) == "[]\n"
+    command = [installed / "coneskin", "sim-ur", "--host", "127.0.77.3", "--json"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            facts = json.loads(process.stdout.readline())
+            said = {}
+            for name, port in facts["ports"].items():
+                with socket.create_connection((facts["host"], port), 5.0) as sock:
+                    sock.sendall(b"\0\5V\0\2" if name == "RTDE" else b"")  # the request for protocol version 2
+                    said[name] = sock.recv(4)
+        finally:
+            process.terminate()
+    assert process.returncode == 0
+    assert said.pop("RTDE") == b"\0\4V\1"
+    assert said.pop("dashboard") == b"Conn"
+    assert set(said) == {"primary", "secondary", "realtime"}
+    assert all(len(data) == 4 for data in said.values())
 
 
 def test_type_checkers_see_an_editable_install(tmp_path: Path) -> None:
