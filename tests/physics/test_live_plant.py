@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.errors import Collision, MissingExtra, RobotRefused
-from coneskin.replay.replay import read_run, replay
+from coneskin.replay.run import read_run, replay
 from coneskin.robot.guard.journal import EventName
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.scene import Scene
