@@ -58,7 +58,8 @@ class DisplacementMap:
         if self.placed.frustum.wrap == TURN and not np.array_equal(heights[:, 0], heights[:, -1]):
             raise GeometryError("heights of a full wrap must end with the column they begin with")
         object.__setattr__(self, "heights", heights)
-        object.__setattr__(self, "_point", _compiled(self.placed, heights.tolist()))
+        compiled = _compiled if type(self.placed) is PlacedFrustum else _bent
+        object.__setattr__(self, "_point", compiled(self.placed, heights.tolist()))
 
     def point(self, u: float, phi: float) -> Vector:
         """Return the point of the mesh at (u [m], phi [rad]), in the link's frame [m].
@@ -97,6 +98,9 @@ class DisplacementMap:
         us, phis = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
         if us.ndim != 1:
             raise GeometryError(f"u and phi must have shape (n,), got {us.shape}")
+        if type(self.placed) is not PlacedFrustum:
+            points, normals = self.placed.place(us, phis)
+            return points + self.height(us, phis)[:, None] * normals
         f, pose = self.placed.frustum, self.placed.link_frustum
         sa, ca = f.sin_half_angle, f.cos_half_angle
         turn, shift = np.array(pose.rotation).T, np.array(pose.translation)
@@ -111,18 +115,14 @@ class DisplacementMap:
         return result
 
 
-def _compiled(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], Vector]:
-    """Return ``point`` with every constant bound: plain floats, no attribute looked up."""
-    f, pose = placed.frustum, placed.link_frustum
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = pose.rotation
-    ox, oy, oz = pose.translation
-    radius, sa, ca = f.radius1, f.sin_half_angle, f.cos_half_angle
+def _heights(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], float]:
+    """Return the height [m] at (u, phi) by plain floats."""
+    f = placed.frustum
     last_row, last_column = len(heights) - 2, len(heights[0]) - 2
     per_u, per_phi = (last_row + 1) / f.slant, (last_column + 1) / f.wrap
     full = f.wrap == TURN
-    cos, sin = math.cos, math.sin
 
-    def point(u: float, phi: float) -> Vector:
+    def height(u: float, phi: float) -> float:
         y = phi * per_phi
         if full:
             y %= last_column + 1
@@ -139,7 +139,33 @@ def _compiled(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[fl
         near, far = heights[i], heights[i + 1]
         a, b = near[j], far[j]
         a += (near[j + 1] - a) * y
-        height = a + (b + (far[j + 1] - b) * y - a) * x
+        return a + (b + (far[j + 1] - b) * y - a) * x
+
+    return height
+
+
+def _bent(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], Vector]:
+    """Return ``point`` of a side that is no cone."""
+    height_at = _heights(placed, heights)
+
+    def point(u: float, phi: float) -> Vector:
+        (x, y, z), (nx, ny, nz), height = placed.point(u, phi), placed.normal(phi), height_at(u, phi)
+        return x + height * nx, y + height * ny, z + height * nz
+
+    return point
+
+
+def _compiled(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], Vector]:
+    """Return ``point`` of a cone with every constant bound: plain floats, no attribute looked up."""
+    f, pose = placed.frustum, placed.link_frustum
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = pose.rotation
+    ox, oy, oz = pose.translation
+    radius, sa, ca = f.radius1, f.sin_half_angle, f.cos_half_angle
+    height_at = _heights(placed, heights)
+    cos, sin = math.cos, math.sin
+
+    def point(u: float, phi: float) -> Vector:
+        height = height_at(u, phi)
         rho = radius + u * sa + height * ca
         px, py, pz = rho * cos(phi), rho * sin(phi), u * ca - height * sa
         return xx * px + xy * py + xz * pz + ox, yx * px + yy * py + yz * pz + oy, zx * px + zy * py + zz * pz + oz

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+    from .developable import Bend
+
 __all__ = ["PlacedFrustum", "double_cone"]
 
 
@@ -93,6 +95,58 @@ class PlacedFrustum:
         rows = [self.frustum.locate(*back.apply((x, y, z))) for x, y, z in points.reshape(-1, 3).tolist()]
         u, phi, distance = np.array(rows, float).reshape(-1, 3).T.reshape(3, *points.shape[:-1])
         return u, phi, distance
+
+    @property
+    def bends(self) -> tuple[Bend, ...]:
+        """Strips of a side that is not round; none of a cone."""
+        return ()
+
+    @property
+    def growth(self) -> float:
+        """Growth of the mean radius per height above the side."""
+        return self.frustum.cos_half_angle
+
+    def mismatch(self, height: float) -> float:
+        """Return how far the parallel side at a height [m] is from being a sector [m]: 0 of a cone."""
+        del height
+        return 0.0
+
+    @property
+    def closing_gap(self) -> float:
+        """Distance between the ends of the arc of end 1 of a full wrap [m]."""
+        return 0.0
+
+    @property
+    def sharpest_bend(self) -> float:
+        """Largest turn of the normal per azimuth; cos a all around a cone."""
+        return self.frustum.cos_half_angle
+
+    def moved(self, frame: Pose) -> PlacedFrustum:
+        """Return the side in another frame, in which ``frame`` is the pose of the link's."""
+        return PlacedFrustum(self.frustum, frame @ self.link_frustum)
+
+    def turned(self, turn: float) -> PlacedFrustum:
+        """Return a full wrap whose seam lies at the azimuth that was ``turn`` [rad]."""
+        return PlacedFrustum(self.frustum, self.link_frustum @ Pose.from_xyz_rpy(rpy=(0.0, 0.0, turn)))
+
+    def parallel(self, height: float) -> PlacedFrustum:
+        """Return the parallel side at a height [m] above this one: same half angle, slant and theta0."""
+        f = self.frustum
+        grow = height * f.cos_half_angle
+        shape = Frustum(f.radius1 + grow, f.radius2 + grow, f.height, f.wrap)
+        return PlacedFrustum(shape, self.link_frustum @ Pose(translation=(0.0, 0.0, -height * f.sin_half_angle)))
+
+    def azimuth_above(self, height: float, phi: float) -> float:
+        """Return the azimuth [rad] on the parallel side at a height [m] of the ruling that has the azimuth phi here."""
+        del height  # a cone grows evenly
+        return phi
+
+    def part(self, u1: float, u2: float, phi1: float, phi2: float) -> PlacedFrustum:
+        """Return the part between two arcs u [m] and two azimuths phi [rad]."""
+        f = self.frustum
+        shape = Frustum(f.radius_at(u1), f.radius_at(u2), (u2 - u1) * f.cos_half_angle, phi2 - phi1)
+        shift = Pose.from_xyz_rpy((0.0, 0.0, u1 * f.cos_half_angle), (0.0, 0.0, phi1))
+        return PlacedFrustum(shape, self.link_frustum @ shift)
 
 
 def double_cone(

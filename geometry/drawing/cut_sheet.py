@@ -14,8 +14,10 @@ from typing import Literal
 
 from coneskin.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
 
 from .electrode_layout import SheetLayout, edge_room
+from .layer_layout import layout_above
 from .layer_stack import LayerStack, snap_to_cylinder
 from .outline import Outline
 from .part_labels import PartLabel, ascii_text, part_labels, strip_label
@@ -136,6 +138,7 @@ class CutSheet:
 def cut_sheets(
     layout: SheetLayout,
     stack: LayerStack,
+    place: PlacedFrustum | None = None,
     *,
     title: str = "sheet",
     kerf: float = 0.0,
@@ -148,6 +151,7 @@ def cut_sheets(
     Args:
         layout: electrodes, leads, tabs and holes.
         stack: the layers.
+        place: of the sheet, whose side is that of the layout; None for a cone anywhere.
         title: written on every part.
         kerf: width of the cut [m]; borders grow and holes shrink by half of it.
         overlap: width of a flap that closes the seam, on the upper substrate beyond phi = wrap [m].
@@ -175,10 +179,13 @@ def cut_sheets(
             f"{edge_room(layout.sheet) * 1e3:.4g} mm away: make it narrower"
         )
     plain = ascii_text(title)[:_LONGEST_TITLE]
+    place = place or PlacedFrustum(layout.sheet)
+    flat = layout
 
     def sheet(number: int, name: str, index: int, face: SheetFace, foil: bool = False) -> CutSheet:
         face = face if face_up == "work" else face_up
-        surface = snap_to_cylinder(stack.surface(layout.sheet, index), snap)
+        surface = snap_to_cylinder(stack.surface(place, index), snap)
+        layout = layout_above(flat, place, stack.offset(index))
         layer = stack.layers[index]
         text = (plain, name.upper(), f"{face.upper()} FACE UP")
         material = "aluminium foil" if foil else f"{layer.material} {layer.thickness * 1e3:.2f} mm"

@@ -14,6 +14,7 @@ from typing import Literal, get_args
 
 from coneskin.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
 
 __all__ = ["PAPER_STACK", "AssemblyMode", "LayerStack", "SheetLayer", "parallel_frustum", "snap_to_cylinder"]
 
@@ -102,8 +103,8 @@ class LayerStack:
         heights = [self.face_offset(i) + self.layers[i].neutral_factor * self.layers[i].thickness for i in body]
         return math.fsum(w * y for w, y in zip(weights, heights, strict=True)) / math.fsum(weights)
 
-    def surface(self, link: Frustum, index: int) -> Frustum:
-        """Return the cone for which a layer is cut.
+    def surface(self, link: PlacedFrustum, index: int) -> Frustum:
+        """Return the cone for which a layer is cut, or to which the side is isometric for which it is.
 
         Args:
             link: side of the link under the sheet.
@@ -112,25 +113,26 @@ class LayerStack:
         Raises:
             GeometryError: the layer would need a negative radius.
         """
-        return parallel_frustum(link, self.offset(index))
+        return link.parallel(self.offset(index)).frustum
 
-    def ignored_gap(self, link: Frustum, index: int) -> float:
+    def ignored_gap(self, link: PlacedFrustum, index: int) -> float:
         """Return the gap of the seam of a layer if it is cut for the bare link [m]."""
-        return link.wrap * self.offset(index) * link.cos_half_angle
+        return link.frustum.wrap * self.offset(index) * link.growth
 
-    def strain(self, link: Frustum, index: int) -> tuple[float, float]:
-        """Return the strain of the inner and the outer face of a wrapped layer at the narrow end.
+    def strain(self, link: PlacedFrustum, index: int) -> tuple[float, float]:
+        """Return the strain of the inner and the outer face of a wrapped layer at the narrow end, where it is largest.
 
         Tension is positive.
 
         Raises:
             GeometryError: the sheet reaches an apex, where the strain is infinite.
         """
-        length = min(link.radius1, link.radius2) + self.offset(index) * link.cos_half_angle
+        bend = link.sharpest_bend
+        length = min(link.frustum.radius1, link.frustum.radius2) + self.offset(index) * bend
         if length <= 0.0:
             raise GeometryError("strain is infinite at an apex: end the sheet where the radius is above 0 mm")
         faces = (self.face_offset(index), self.face_offset(index + 1))
-        inner, outer = ((t - self.offset(index)) * link.cos_half_angle / length for t in faces)
+        inner, outer = ((t - self.offset(index)) * bend / length for t in faces)
         return inner, outer
 
 
@@ -139,8 +141,7 @@ def parallel_frustum(frustum: Frustum, distance: float) -> Frustum:
 
     Its end 1 lies at z = -distance * sin(half angle) of the frustum's frame.
     """
-    grow = distance * frustum.cos_half_angle
-    return Frustum(frustum.radius1 + grow, frustum.radius2 + grow, frustum.height, frustum.wrap)
+    return PlacedFrustum(frustum).parallel(distance).frustum
 
 
 def snap_to_cylinder(frustum: Frustum, tolerance: float) -> Frustum:

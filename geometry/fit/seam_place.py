@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cones import LinkFit
@@ -69,12 +68,11 @@ def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -
         best = int(wide.argmin())
         shielded, least = 1.0 - float(wide[best]), 1.0 - float(wide.max())
         turn = 0.0 if shielded - least < _SHIELDED else best * TURN / _AZIMUTHS
-        spin = Pose.from_xyz_rpy(rpy=(0.0, 0.0, turn))
         for i in full:
             placed = sheets[i].placed
             sheets[i] = replace(
                 sheets[i],
-                placed=PlacedFrustum(placed.frustum, placed.link_frustum @ spin),
+                placed=placed.turned(turn),
                 start_azimuth=(sheets[i].start_azimuth + turn) % TURN,
             )
         direction = sheets[full[0]].placed.link_frustum.rotate((1.0, 0.0, 0.0))

@@ -96,7 +96,7 @@ def fit_link(
     arguments: Mapping[str, str] | None = None,
     **search: Any,
 ) -> tuple[LinkMesh, LinkFit]:
-    """Return the first mesh of a link in which cones are found, with its fit; else the first mesh.
+    """Return the first mesh of a link in which sheets are found, with its fit; else the first mesh.
 
     Args:
         link: a mesh file, or FILE.urdf#LINK; a xacro file is expanded.
@@ -105,21 +105,21 @@ def fit_link(
         packages: folders of the ROS packages in a URDF's package:// paths.
         progress: called with the name of each step.
         arguments: of a xacro file.
-        search: keyword arguments of ``find_cones``. Without ``seam_direction`` the seams are put where the link shields
+        search: keyword arguments of ``find_sheets``. Without ``seam_direction`` the seams are put where the link shields
             them most (``place_seams``).
 
     Raises:
         MeshError: the file, the link or its mesh cannot be found or read.
         GeometryError: an argument of the search is out of range.
     """
-    from coneskin.geometry.fit.cones import find_cones
+    from coneskin.geometry.fit.developables import find_sheets
 
     facing = search.pop("seam_direction", None)
     tries: list[tuple[LinkMesh, LinkFit]] = []
     progress(f"reading {link}")
     for source in load_link(link, unit, up_axis, packages, arguments):
         progress(f"{source.name}: {len(source.mesh.faces)} faces")
-        fit = find_cones(source.mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
+        fit = find_sheets(source.mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
         if fit.sheets:
             return (source, fit) if facing else _with_seams(source, fit, progress, search.get("weights"))
         tries.append((source, fit))
@@ -128,12 +128,12 @@ def fit_link(
 
 def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **search: Any) -> tuple[LinkMesh, LinkFit]:
     """Return a mesh with its fit, named by its source; arguments as in ``fit_link``."""
-    from coneskin.geometry.fit.cones import find_cones
+    from coneskin.geometry.fit.developables import find_sheets
 
     name = Path(mesh.source).stem
     source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", (*_terms(mesh.source), *mesh.notes))
     facing = search.pop("seam_direction", None)
-    fit = find_cones(mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
+    fit = find_sheets(mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
     return (source, fit) if facing or not fit.sheets else _with_seams(source, fit, progress, search.get("weights"))
 
 

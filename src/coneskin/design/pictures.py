@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import MissingExtra
-from coneskin.geometry.drawing.layer_stack import parallel_frustum
 
 from .jig_picture import draw_jig
 from .layout_picture import FOIL_COLOUR, INK_COLOUR, draw_layout
@@ -184,10 +183,9 @@ def _outer_face(design: SheetDesign, u: Any, phi: Any) -> Any:
     import numpy as np
 
     thickness, place = design.options.stack.thickness, design.place
-    side = parallel_frustum(place.frustum, thickness)
-    points = side.points(np.asarray(u)[:, None] * side.slant, np.asarray(phi)[None, :] * side.wrap)
-    points[..., 2] -= thickness * side.sin_half_angle
-    return 1e3 * place.link_frustum.apply_all(points)
+    side = place.frustum
+    points, normals = place.place(np.asarray(u)[:, None] * side.slant, np.asarray(phi)[None, :] * side.wrap)
+    return 1e3 * (points + thickness * normals)
 
 
 def _draw_electrodes(axes: Any, design: SheetDesign, view: Any) -> None:
@@ -198,7 +196,6 @@ def _draw_electrodes(axes: Any, design: SheetDesign, view: Any) -> None:
     half = 0.5 * plan.electrode
     turn = half / min(side.radius1, side.radius2)
     along, around = np.linspace(0.0, 1.0, 2), np.linspace(0.0, 1.0, 121)
-    rotation = np.array(design.place.link_frustum.rotation)
     for name, u, phi, colour in (
         ("B", [(box.u1 - half) / side.slant], around, FOIL_COLOUR),
         ("A", [(box.u2 + half) / side.slant], around, FOIL_COLOUR),
@@ -208,7 +205,8 @@ def _draw_electrodes(axes: Any, design: SheetDesign, view: Any) -> None:
         ("", along, [1.0], INK_COLOUR),
     ):
         points = _outer_face(design, u, phi).reshape(-1, 3)
-        facing = side.normals(np.broadcast_to(phi, points.shape[:1]) * side.wrap) @ rotation.T @ view > 0.02
+        azimuths = np.broadcast_to(phi, points.shape[:1]) * side.wrap
+        facing = design.place.place(np.zeros(len(azimuths)), azimuths)[1] @ view > 0.02
         points[~facing] = np.nan
         axes.plot(*points.T, color=colour, lw=2.0 if name else 1.0)
         if facing.any() and name:
@@ -248,13 +246,10 @@ def _covered(design: SheetDesign, triangles: Any) -> Any:
     """Return whether a sheet covers each triangle [m], shape (n,)."""
     import numpy as np
 
-    side, pose = design.place.frustum, design.place.link_frustum
-    x, y, z = ((triangles - np.array(pose.translation)) @ np.array(pose.rotation)).transpose(2, 0, 1)
-    out = np.hypot(x, y) - side.radius1
-    u = out * side.sin_half_angle + z * side.cos_half_angle
-    height = out * side.cos_half_angle - z * side.sin_half_angle
+    side = design.place.frustum
+    u, phi, height = design.place.locate_all(triangles)
     covered = (u >= 0.0) & (u <= side.slant) & (np.abs(height) < design.options.stack.thickness)
-    covered &= np.arctan2(y, x) % (2.0 * math.pi) <= side.wrap
+    covered &= phi % (2.0 * math.pi) <= side.wrap
     return covered.all(axis=1)
 
 

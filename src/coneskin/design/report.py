@@ -130,7 +130,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     table = []
     for i, layer in enumerate(stack.layers):
         surface = surfaces[layer.name]
-        inner, outer = stack.strain(side, i)
+        inner, outer = stack.strain(design.place, i)
         table.append(
             [
                 layer.name,
@@ -138,7 +138,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
                 f"{stack.offset(i) * 1e3:.3f}",
                 f"{surface.radius1 * 1e3:.3f}, {surface.radius2 * 1e3:.3f}",
                 _sector(surface),
-                f"{stack.ignored_gap(side, i) * 1e3:.2f}",
+                f"{stack.ignored_gap(design.place, i) * 1e3:.2f}",
                 f"{inner:+.1%}, {outer:+.1%}",
             ]
         )

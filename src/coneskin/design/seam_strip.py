@@ -8,10 +8,8 @@ from dataclasses import replace
 
 from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.electrode_layout import lay_out_sheet
-from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.pose import Pose
 
 from .sheets import SheetDesign, design_sheets
 
@@ -69,7 +67,8 @@ def _strip_place(design: SheetDesign) -> tuple[PlacedFrustum, float]:
         raise GeometryError(
             f"{design.name}: its wires leave at the seam, where its strip lies: let them leave at an end"
         )
-    outer = parallel_frustum(side, stack.thickness)
+    above = design.place.parallel(stack.thickness)
+    outer = above.frustum
     trial = Frustum(outer.radius1, outer.radius2, outer.height, 0.5 * _TURN)
     inside = lay_out_sheet(trial, plan).active
     before, after = inside.phi1, trial.wrap - inside.phi2
@@ -80,6 +79,4 @@ def _strip_place(design: SheetDesign) -> tuple[PlacedFrustum, float]:
             "electrodes and margins narrower"
         )
     start = design.layout.active.phi2 - before
-    turned = Pose.from_xyz_rpy((0.0, 0.0, -stack.thickness * side.sin_half_angle), (0.0, 0.0, start))
-    strip = Frustum(outer.radius1, outer.radius2, outer.height, wrap)
-    return PlacedFrustum(strip, design.place.link_frustum @ turned), 0.5 * (side.wrap + _TURN) - start
+    return above.part(0.0, outer.slant, start, start + wrap), 0.5 * (side.wrap + _TURN) - start

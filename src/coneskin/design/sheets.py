@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 from coneskin.errors import GeometryError, SensorError
 from coneskin.geometry.drawing.cut_sheet import CutSheet, FaceUp, cut_sheets
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, SheetLayout, lay_out_sheet
-from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack, parallel_frustum
+from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
 from coneskin.geometry.drawing.resolution import AdConverter, ResolutionForecast, forecast_resolution
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.pose import Pose
 from coneskin.scene.sensor_table import with_key_names
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.matched_electronics import GivenElectronics, match_electronics
@@ -172,7 +171,7 @@ def design_sheets(
             conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
             drawn = cut_sheets(
                 layout,
-                _with_materials(options.stack, conductive),
+                place,
                 title=f"{options.link}: {name}" if options.link else name,
                 kerf=options.kerf,
                 overlap=options.overlap,
@@ -215,7 +214,7 @@ def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
     """Refuse layers that are too thick for the link, and a flap where there is no seam to close."""
     if min(link.frustum.radius1, link.frustum.radius2) > 0.0:
         for index, layer in enumerate(options.stack.layers):
-            strain = max(options.stack.strain(link.frustum, index), key=abs)
+            strain = max(options.stack.strain(link, index), key=abs)
             if abs(strain) > _MOST_STRAIN:
                 raise GeometryError(
                     f"{layer.name} is strained by {strain:+.0%} at the narrow end, at most {_MOST_STRAIN:.0%} is "
@@ -229,7 +228,7 @@ def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
 def _straightened(link: PlacedFrustum, tolerance: float) -> PlacedFrustum:
     """Return a cylinder in the place of a cone whose radii differ from their mean by less than a tolerance [m]."""
     side = link.frustum
-    if side.radius1 == side.radius2 or 0.5 * abs(side.radius2 - side.radius1) > tolerance:
+    if link.bends or side.radius1 == side.radius2 or 0.5 * abs(side.radius2 - side.radius1) > tolerance:
         return link
     mean = 0.5 * (side.radius1 + side.radius2)
     return PlacedFrustum(Frustum(mean, mean, side.height, side.wrap), link.link_frustum)
@@ -250,9 +249,7 @@ def _trimmed(link: PlacedFrustum, start: float, end: float) -> PlacedFrustum:
             f"the gap to its neighbours takes {1e3 * (start + end):.4g} mm of a sheet "
             f"{1e3 * side.height:.4g} mm high: reduce the sheet gap"
         )
-    u1, u2 = start / side.cos_half_angle, side.slant - end / side.cos_half_angle
-    shorter = Frustum(side.radius_at(u1), side.radius_at(u2), side.height - start - end, side.wrap)
-    return PlacedFrustum(shorter, link.link_frustum @ Pose(translation=(0.0, 0.0, start)))
+    return link.part(start / side.cos_half_angle, side.slant - end / side.cos_half_angle, 0.0, side.wrap)
 
 
 def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
@@ -266,17 +263,12 @@ def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
     if gap >= _TURN * narrow:
         raise GeometryError(f"seam gap of {gap * 1e3:.4g} mm takes the whole narrow end, {_TURN * narrow * 1e3:.4g} mm")
     turn = gap / narrow
-    open_side = Frustum(side.radius1, side.radius2, side.height, side.wrap - turn)
-    return PlacedFrustum(open_side, link.link_frustum @ Pose.from_xyz_rpy(rpy=(0.0, 0.0, 0.5 * turn)))
+    return link.part(0.0, side.slant, 0.5 * turn, side.wrap - 0.5 * turn)
 
 
 def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> PlacedFrustum:
     """Return the cone between the electrodes, on the middle surface of the wrapped upper conductive layer."""
     height = stack.face_offset(_UPPER_CONDUCTIVE) + 0.5 * stack.layers[_UPPER_CONDUCTIVE].thickness
-    side, box = parallel_frustum(place.frustum, height), layout.field
-    between = Frustum(
-        side.radius_at(box.u1), side.radius_at(box.u2), (box.u2 - box.u1) * side.cos_half_angle, box.phi2 - box.phi1
-    )
-    shift = box.u1 * side.cos_half_angle - height * side.sin_half_angle
-    turned = Pose.from_xyz_rpy((0.0, 0.0, shift), (0.0, 0.0, box.phi1))
-    return PlacedFrustum(between, place.link_frustum @ turned)
+    box = layout.field
+    phi1, phi2 = (place.azimuth_above(height, phi) for phi in (box.phi1, box.phi2))
+    return place.parallel(height).part(box.u1, box.u2, phi1, phi2)

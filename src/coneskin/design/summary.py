@@ -26,6 +26,7 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
         "name": design.name,
         "link_cone": _shape(design.place.frustum) | _pose(design.place),
         "active_cone": _shape(design.active.frustum) | _pose(design.active),
+        **_bends(design),
         "active_share": round(layout.active_share, 6),
         "active_area_cm2": _round(1e4 * layout.active.area(design.place.frustum)),
         "active_patch": _patch(layout.active),
@@ -46,7 +47,7 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
             for cut in design.cuts
         ],
         "ignored_gap_mm": {
-            layer.name: _round(1e3 * stack.ignored_gap(design.place.frustum, i)) for i, layer in enumerate(stack.layers)
+            layer.name: _round(1e3 * stack.ignored_gap(design.place, i)) for i, layer in enumerate(stack.layers)
         },
         "electronics": _electronics(design),
         "forecast": [
@@ -102,6 +103,13 @@ def sensor_toml(design: SheetDesign, index: int, frame: str) -> str:
     height = _round(design.place.frustum.height * 1e3)
     shape = "\n".join(f"{key.name} = {key.in_file_unit(getattr(cone, key.plain))!r}" for key in CONE_KEYS)
     cover = sum(layer.thickness for layer in stack.layers[4:]) + 0.5 * stack.layers[3].thickness
+    bends = "".join(
+        f"{key} = {[math.degrees(getattr(bend, name)) for bend in design.active.bends]!r}\n"
+        for key, name in (("bend_wrap_deg", "width"), ("bend_turn_deg", "turn"))
+        if design.active.bends
+    )
+    if bends:
+        bends = f"\n# the link is not round: shares of the wrap, and the angle by which each turns the normal\n{bends}"
     radius1, radius2 = _round(design.place.frustum.radius1 * 1e3), _round(design.place.frustum.radius2 * 1e3)
     return f"""\
 # Sensor of {design.name}, written by `coneskin design`. A scene refers to it; keys in the scene take precedence.
@@ -110,7 +118,7 @@ def sensor_toml(design: SheetDesign, index: int, frame: str) -> str:
 # A (end 2), D (phi = 0) and C (phi = wrap). The whole sheet covers the link from radius {radius1} to {radius2} mm over
 # a height of {height} mm. The outer face lies {_round(cover * 1e3)} mm above this cone.
 {shape}
-
+{bends}
 # pose of its end 1, p_link = R(rpy) p_active + xyz; frame: {frame}
 xyz_mm = {pose["xyz_mm"]!r}
 rpy_deg = {pose["rpy_deg"]!r}
@@ -133,6 +141,23 @@ current_full_scale_ma = {_round(1e3 * parts.current_full_scale)!r}
 upper_sheet_ohm = {design.conductive[0].ohms!r}
 lower_sheet_ohm = {design.conductive[1].ohms!r}
 """
+
+
+def _bends(design: SheetDesign) -> dict[str, Any]:
+    """Return how a side is bent that is not round, and what its layers then miss of a sector."""
+    place = design.place
+    if not place.bends:
+        return {}
+    stack = design.options.stack
+    height = max(stack.offset(index) for index in range(5))
+    return {
+        "bends": [
+            {"width_deg": _round(math.degrees(bend.width), 6), "turn_deg": _round(math.degrees(bend.turn), 6)}
+            for bend in place.bends
+        ],
+        "sector_error_mm": _round(1e3 * place.mismatch(height)),
+        "closing_gap_mm": _round(1e3 * place.closing_gap) if place.frustum.wrap > 2.0 * math.pi - 1e-9 else None,
+    }
 
 
 def _electronics(design: SheetDesign) -> dict[str, Any]:

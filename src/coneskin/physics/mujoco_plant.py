@@ -104,7 +104,7 @@ class MujocoPlant:
         self._d: Any = mujoco.MjData(self._m)
         self._padding = padding
         self._sheets = tuple(sheets)
-        self._back = [sheet.cone.link_frustum.inverse() @ body_link(model, sheet.link).inverse() for sheet in sheets]
+        self._back = [body_link(model, sheet.link).inverse() for sheet in sheets]
         self._links = [self._m.body(f"link{sheet.link}").id for sheet in sheets]
         self._sheet_of = {self._m.geom(f"sheet{n}").id: n for n in range(len(sheets))}
         self.parts: list[HeldPart] = []
@@ -315,7 +315,7 @@ class MujocoPlant:
         axes = self._d.xmat[link].reshape(3, 3)
         x, y, z = (axes.T @ (touch.point - self._d.xpos[link])).tolist()
         at = self._back[touch.sheet].apply((x, y, z))
-        u, phi, _ = self._sheets[touch.sheet].cone.frustum.locate(*at)
+        u, phi, _ = self._sheets[touch.sheet].cone.locate(at)
         px, py, pz = touch.point.tolist()
         nx, ny, nz = touch.normal.tolist()
         return BodyContact(

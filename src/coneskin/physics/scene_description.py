@@ -102,6 +102,10 @@ def _vertices(model: ArmModel, sheet: SheetOnLink) -> list[float]:
     """
     place = body_link(model, sheet.link)
     cone = sheet.cone.frustum
+    if sheet.cone.bends:
+        azimuths = [cone.wrap * side / _SIDES for side in range(_SIDES)]
+        corners = [sheet.cone.point(u, phi) for u in (0.0, cone.slant) for phi in azimuths]
+        return [value for corner in corners for value in place.apply(corner)]
     grown = 1.0 / math.cos(math.pi / _SIDES) ** 0.5  # half of the facets' error outside, half inside
     found: list[float] = []
     for height, radius in ((0.0, cone.radius1), (cone.height, cone.radius2)):

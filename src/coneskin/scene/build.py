@@ -216,7 +216,6 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, NDArray[np.float64]] | Non
         MeshError: a mesh cannot be read.
         GeometryError: a mesh is not near the sensor on it.
     """
-    from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.pose import Pose
 
     placed = []
@@ -230,7 +229,7 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, NDArray[np.float64]] | Non
             dh_mesh_frame = dh_mesh(arm, link.name)
             frames = {"mesh": dh_mesh_frame, "urdf": dh_link(arm, link.name), "dh": Pose()}
             dh_frame = frames[link.frame]
-        frusta = [PlacedFrustum(item.placed.frustum, dh_frame @ item.placed.link_frustum) for item in link.sensors]
+        frusta = [item.placed.moved(dh_frame) for item in link.sensors]
         on_mesh: Sequence[DisplacementMap | None] = [None] * len(frusta)
         if link.mesh and surfaces is None:
             on_mesh = _measured(link.mesh, dh_mesh_frame, frusta)

@@ -119,6 +119,8 @@ def _facts(item: PlacedSensor) -> Any:
     facts = {**sensor_facts(sensor), "pose": [pose.rotation, pose.translation]}
     if sensor.place_map is not None:
         facts["map"] = [sensor.place_map.along, sensor.place_map.around]
+    if bends := item.placed.bends:
+        facts["bends"] = [[bend.width, bend.turn] for bend in bends]
     return round_facts(facts)
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.bounded_file import read_file
-from coneskin.errors import ConeSkinError, SensorError
+from coneskin.errors import ConeSkinError, GeometryError, SensorError
 
 from .cone_keys import CONE_KEYS
 from .schema import MAX_SIZE, Key, check
@@ -17,6 +17,7 @@ from .schema import MAX_SIZE, Key, check
 if TYPE_CHECKING:
     from coneskin.geometry.frustum import Frustum
     from coneskin.geometry.placed_frustum import PlacedFrustum
+    from coneskin.geometry.pose import Pose
     from coneskin.skin.electronics import Thresholds
     from coneskin.skin.force_table import ForceTable
     from coneskin.skin.place_map import PlaceMap
@@ -34,6 +35,10 @@ __all__ = [
 _PLACE = (
     Key("xyz_mm", list, (0.0, 0.0, 0.0), low=-10_000.0, high=10_000.0, length=3),
     Key("rpy_deg", list, (0.0, 0.0, 0.0), low=-360.0, high=360.0, length=3),
+)
+_BENDS = (
+    Key("bend_wrap_deg", list, (), low=0.0, high=360.0, above=True, meaning="shares of the wrap, evenly bent each"),
+    Key("bend_turn_deg", list, (), low=-360.0, high=360.0, meaning="angle by which each of them turns the normal"),
 )
 _WIRE = (
     Key("id", int, 0, low=0, high=255),
@@ -85,7 +90,7 @@ _MAP = (
     Key("force_levels", list, None, low=0.0, high=1.0, meaning="levels that they gave"),
     Key("force_error", float, 0.0, low=0.0, high=0.99, meaning="standard deviation of a force, of itself"),
 )
-SENSOR_KEYS = (*CONE_KEYS, *_PLACE, *_WIRE, *_POLARITY, *_ELECTRONICS, *_SHEETS, *_THRESHOLDS, *_MAP)
+SENSOR_KEYS = (*CONE_KEYS, *_BENDS, *_PLACE, *_WIRE, *_POLARITY, *_ELECTRONICS, *_SHEETS, *_THRESHOLDS, *_MAP)
 
 
 _NEEDS_CALIBRATION = "touch_force_n"
@@ -164,7 +169,6 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
     if len(problems) > before:
         return None
     from coneskin.geometry.frustum import Frustum
-    from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.pose import Pose
     from coneskin.skin.electronics import LeadOhms, Polarity
     from coneskin.skin.matched_electronics import GivenElectronics, match_electronics
@@ -197,12 +201,29 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
             place_map=_place_map(frustum, values),
             force_table=forces,
         )
-        return sensor, PlacedFrustum(frustum, Pose.from_xyz_rpy(values["xyz"], values["rpy"]))
+        pose = Pose.from_xyz_rpy(values["xyz"], values["rpy"])
+        return sensor, _place(frustum, pose, values["bend_wrap"], values["bend_turn"])
     except ConeSkinError as exc:
         turn = math.degrees(values["wrap"])
         hint = f"; wrap_deg = {turn:g} looks like radians: then write {math.degrees(turn):.4g}" if turn < 6.3 else ""
         problems.append(f"{where}: {with_key_names(str(exc))}{hint}")
         return None
+
+
+def _place(frustum: Frustum, pose: Pose, wraps: Sequence[float], turns: Sequence[float]) -> PlacedFrustum:
+    """Return the place of a sensor: on a cone, or on a general cylinder or cone where bends are given."""
+    from coneskin.geometry.placed_frustum import PlacedFrustum
+
+    if not wraps and not turns:
+        return PlacedFrustum(frustum, pose)
+    from coneskin.geometry.developable import Bend
+    from coneskin.geometry.placed_developable import PlacedDevelopable
+
+    if len(wraps) != len(turns):
+        raise GeometryError(
+            f"bend_wrap_deg and bend_turn_deg must have a number each for every bend, got {len(wraps)} and {len(turns)}"
+        )
+    return PlacedDevelopable(frustum, pose, tuple(Bend(*bend) for bend in zip(wraps, turns, strict=True)))
 
 
 def _place_map(frustum: Frustum, values: Mapping[str, Any]) -> PlaceMap | None:

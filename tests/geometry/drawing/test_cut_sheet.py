@@ -10,6 +10,7 @@ from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, cut_sheets, nest_s
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
 
 from ...sweep import sweep
 from ..planar import box, dense, distance, distances, inside
@@ -24,7 +25,7 @@ def test_a_substrate_has_the_area_of_its_cone(name):
     layout = lay_out_sheet(SHEETS[name])
     for cut in cut_sheets(layout, PAPER_STACK, snap=0.0):
         if cut.name in ("lower substrate", "isolation", "upper substrate"):
-            side = PAPER_STACK.surface(layout.sheet, INDEX[cut.name])
+            side = PAPER_STACK.surface(PlacedFrustum(layout.sheet), INDEX[cut.name])
             holes = 3 * np.pi * 0.25 * layout.plan.hole**2
             assert cut.parts[0].area == pytest.approx(side.area - holes, rel=1e-11)
 

@@ -11,6 +11,7 @@ from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sh
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, draw_hole, draw_shape, drawing_point
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
 
 from ...sweep import sweep
 from ..planar import dense, distance, distances, inside
@@ -25,7 +26,7 @@ SLACK = 5e-5  # m; distances between points 0.25 mm apart on facing lines are to
 def layers(layout):
     """Outline of each conductive sheet with its electrodes, as cut."""
     for sheet, shape, names, index in (("lower", layout.lower, "CD", 1), ("upper", layout.upper, "AB", 3)):
-        cone = PAPER_STACK.surface(layout.sheet, index)
+        cone = PAPER_STACK.surface(PlacedFrustum(layout.sheet), index)
         yield sheet, draw_shape(cone, shape), {name: draw_shape(cone, layout.foils[name]) for name in names}, cone
 
 
@@ -76,7 +77,7 @@ def shifted(cone, point):
 @pytest.mark.parametrize(("name", "side"), sweep(CASES, short=4))
 def test_tabs_of_all_four_stick_out_at_the_chosen_side_and_keep_apart(name, side):
     layout = lay_out_sheet(SHEETS[name], ElectrodePlan(wires=side))
-    cone = PAPER_STACK.surface(layout.sheet, 3)
+    cone = PAPER_STACK.surface(PlacedFrustum(layout.sheet), 3)
     rim = draw_shape(cone, layout.rim)
     tabs = {which: off_sheet(draw_shape(cone, foil), rim) for which, foil in layout.foils.items()}
     for one, two in combinations("ABCD", 2):
@@ -119,7 +120,7 @@ def test_holes_go_through_every_layer_and_disturb_nothing(name, side):
 def test_edge_electrodes_are_wedges_between_rays(name):
     """Their borders point at the apex, so equipotentials are rays; a strip of constant width would miss it by 6 mm."""
     layout = lay_out_sheet(SHEETS[name])
-    cone = PAPER_STACK.surface(layout.sheet, 1)
+    cone = PAPER_STACK.surface(PlacedFrustum(layout.sheet), 1)
     apex = complex(0.0, -cone.radius1 / cone.sin_half_angle)
     for which in "CD":
         for phi in (layout.field.phi1, layout.field.phi2):
@@ -182,7 +183,7 @@ def test_plans_without_tabs_and_holes():
     assert layout.folds == {}
     assert not any(isinstance(step, ShapeTab) for foil in layout.foils.values() for step in foil)
     for foil in layout.foils.values():
-        draw_shape(PAPER_STACK.surface(layout.sheet, 3), foil)
+        draw_shape(PAPER_STACK.surface(PlacedFrustum(layout.sheet), 3), foil)
 
 
 def test_mistakes_are_said():

@@ -11,10 +11,10 @@ from coneskin.geometry.drawing.layer_stack import (
     PAPER_STACK,
     LayerStack,
     SheetLayer,
-    parallel_frustum,
     snap_to_cylinder,
 )
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.sector import unroll
 
 from ..sheet_cases import SHEETS
@@ -35,16 +35,16 @@ def test_published_gaps_of_a_50_mm_link():
     needs = (322.01, 330.18, 333.01, 335.84, 344.00)
     gaps = (7.85, 16.02, 18.85, 21.68, 29.85)
     for i in range(5):
-        cut = PAPER_STACK.surface(LINK, i)
+        cut = PAPER_STACK.surface(PlacedFrustum(LINK), i)
         assert unroll(cut).arc1 * 1e3 == pytest.approx(needs[i], abs=0.005)
-        assert PAPER_STACK.ignored_gap(LINK, i) * 1e3 == pytest.approx(gaps[i], abs=0.005)
+        assert PAPER_STACK.ignored_gap(PlacedFrustum(LINK), i) * 1e3 == pytest.approx(gaps[i], abs=0.005)
 
 
 @pytest.mark.parametrize("name", SHEETS)
 def test_slant_wrap_and_theta0_stay_and_r_grows_by_t_cot_a(name):
     link = SHEETS[name]
     for i in range(5):
-        layer, t = PAPER_STACK.surface(link, i), PAPER_STACK.offset(i)
+        layer, t = PAPER_STACK.surface(PlacedFrustum(link), i), PAPER_STACK.offset(i)
         flat, bare = unroll(layer), unroll(link)
         assert flat.slant == pytest.approx(bare.slant, rel=1e-14)
         assert layer.wrap == link.wrap
@@ -58,10 +58,10 @@ def test_slant_wrap_and_theta0_stay_and_r_grows_by_t_cot_a(name):
 
 def test_the_gap_is_what_a_pattern_for_the_bare_link_lacks_all_along_the_seam():
     link = SHEETS["widening"]
-    layer = PAPER_STACK.surface(link, 4)
+    layer = PAPER_STACK.surface(PlacedFrustum(link), 4)
     for u in (0.0, 0.07, link.slant):
         lacks = link.wrap * (layer.radius_at(u) - link.radius_at(u))
-        assert lacks == pytest.approx(PAPER_STACK.ignored_gap(link, 4), rel=1e-13)
+        assert lacks == pytest.approx(PAPER_STACK.ignored_gap(PlacedFrustum(link), 4), rel=1e-13)
 
 
 @given(lengths, lengths, positive, st.floats(0.0, 0.02), st.floats(0.0, 1.0), st.floats(0.0, 6.0))
@@ -69,7 +69,7 @@ def test_parallel_cone_is_the_normal_moved_outwards(radius1, radius2, height, t,
     if radius1 == radius2:
         height += 0.01
     link = Frustum(radius1, radius2, height)
-    outer, u = parallel_frustum(link, t), fraction * link.slant
+    outer, u = PlacedFrustum(link).parallel(t).frustum, fraction * link.slant
     x, y, z = outer.point(u, phi)
     want = tuple(p + t * n for p, n in zip(link.point(u, phi), link.normal(phi), strict=True))
     assert (x, y, z - t * link.sin_half_angle) == pytest.approx(want, abs=1e-15 + 4e-16)  # roundings of 0.3 m
@@ -78,11 +78,11 @@ def test_parallel_cone_is_the_normal_moved_outwards(radius1, radius2, height, t,
 def test_bonded_layers_share_one_length_and_are_strained():
     bonded = stack("bonded")
     assert bonded.offset(0) == pytest.approx(3.0e-3, rel=1e-14)  # by symmetry the middle of 6 mm
-    assert len({bonded.surface(LINK, i) for i in range(5)}) == 1
-    inner, outer = bonded.strain(LINK, 0)
+    assert len({bonded.surface(PlacedFrustum(LINK), i) for i in range(5)}) == 1
+    inner, outer = bonded.strain(PlacedFrustum(LINK), 0)
     assert (inner + outer) / 2 == pytest.approx(-0.033, abs=5e-4)  # geometry study: -3.3 % in the inner foam
-    assert bonded.strain(LINK, 4)[1] == pytest.approx(0.057, abs=5e-4)  # and +5.7 % at the outer face
-    assert stack().strain(LINK, 0) == pytest.approx((-0.0125 / 0.5125, 0.0125 / 0.5125))
+    assert bonded.strain(PlacedFrustum(LINK), 4)[1] == pytest.approx(0.057, abs=5e-4)  # and +5.7 % at the outer face
+    assert stack().strain(PlacedFrustum(LINK), 0) == pytest.approx((-0.0125 / 0.5125, 0.0125 / 0.5125))
 
 
 def test_neutral_surface_is_the_weighted_mean():
@@ -146,4 +146,4 @@ def test_mistakes_are_said():
     with pytest.raises(GeometryError, match="assembly must be one of loose, pairs, bonded, got 'glued'"):
         LayerStack(PAPER_STACK.layers, "glued")
     with pytest.raises(GeometryError, match="strain is infinite at an apex"):
-        stack("bonded", thickness=(1e-3,) * 5).strain(Frustum(0.0, 0.1, 0.0), 0)
+        stack("bonded", thickness=(1e-3,) * 5).strain(PlacedFrustum(Frustum(0.0, 0.1, 0.0)), 0)

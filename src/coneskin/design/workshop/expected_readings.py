@@ -9,7 +9,6 @@ from coneskin.design.sheets import SheetDesign
 from coneskin.design.summary import sensor_toml
 from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.electrode_layout import SurfaceRectangle
-from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, SurfaceShape
 from coneskin.geometry.frustum import Frustum
 from coneskin.scene.sensor_table import build_sensor
@@ -72,7 +71,7 @@ def _part(design: SheetDesign, index: int, box: SurfaceRectangle) -> Frustum:
     """Return a part of a layer as a cone of its own, on the middle surface of the wrapped layer."""
     stack = design.options.stack
     height = stack.face_offset(index) + 0.5 * stack.layers[index].thickness
-    side = parallel_frustum(design.place.frustum, height)
+    side = design.place.parallel(height).frustum
     rise = (box.u2 - box.u1) * side.cos_half_angle
     return Frustum(side.radius_at(box.u1), side.radius_at(box.u2), rise, box.phi2 - box.phi1)
 

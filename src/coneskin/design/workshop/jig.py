@@ -105,6 +105,8 @@ def jig_collars(
     plan = design.options.jig
     if plan.surface == "none":
         return (), ()
+    if design.place.bends:
+        return (), (f"{design.name} lies on a link that is not round, for which no jig is made: measure its place",)
     if design.above:
         return (), (f"{design.name} lies on {design.above}, whose ends and seam show its place",)
     collars: list[Collar] = []

@@ -1,0 +1,264 @@
+"""One developable sheet: its region on a profile, its side fitted to the hull there, and what the fit is worth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.errors import GeometryError
+from coneskin.geometry.hole_bridging import bridge_holes
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.placed_developable import PlacedDevelopable
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.ray_casting import RayCaster
+
+from .developable_fit import fit_developable
+from .fitted_sheet import FittedSheet
+from .profile import AxisFrame, RadialProfile, measure_profile
+from .ruled_region import RuledRegion, columns_of, ruled_region
+from .ruling_candidates import RulingCandidate
+from .surface_samples import SurfaceSamples
+
+__all__ = ["FoundSheet", "RulingNeeds", "covered_samples", "fit_sheet", "hull_points", "ruled_profile", "widest_region"]
+
+Floats = NDArray[np.float64]
+
+TURN = 2.0 * math.pi
+_FIT_ROWS = 12  # slices whose points are fitted
+_LEAST_POINTS = 100  # of a region, to fit a side to it
+_CHECK_ROWS = 60  # slices by which a fit is judged
+_ALIGNED = 0.9  # cosine between the normals of the hull and of a sheet on it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RulingNeeds:
+    """The arguments of ``find_developables`` that every step needs; lengths in m."""
+
+    tolerance: float
+    wrap: float | None
+    min_length: float
+    min_wrap: float
+    max_bridge: float
+    seam: Floats
+    min_radius: float
+    clear: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundSheet:
+    """A fitted side with what is left of its region after the fit was checked."""
+
+    placed: PlacedDevelopable
+    sheet: FittedSheet
+    covers: NDArray[np.bool_]
+
+
+def ruled_profile(
+    mesh: Mesh, rays: RayCaster, candidate: RulingCandidate, grid: tuple[int, int], needs: RulingNeeds
+) -> RadialProfile:
+    """Measure a profile about a line, of about so many slices and rays, with holes filled up to its section."""
+    frame = AxisFrame.along(candidate.origin, candidate.axis, needs.seam)
+    length = float(np.ptp(frame.local(mesh.vertices)[:, 2]))
+    profile = measure_profile(mesh, rays, frame, max(length / grid[0], 0.0005), grid[1], needs.max_bridge)
+    return _bridged_anew(profile, _apex_height(profile, candidate), needs.max_bridge)
+
+
+def _bridged_anew(profile: RadialProfile, apex: float | None, width: float) -> RadialProfile:
+    """Return a profile whose holes are filled up to its section: the short radii of an oval are no hole."""
+    scale = np.ones(len(profile.z)) if apex is None else np.maximum(1.0 - profile.z / apex, 0.05)
+    shown = np.where(profile.radius > 0.0, profile.radius / scale[:, None], np.nan)
+    present = np.isfinite(shown).any(axis=0)
+    if not present.any():
+        return profile
+    section = np.where(present, np.nanmedian(np.where(present, shown, 1.0), axis=0), 0.0) * scale[:, None]
+    lift = float(section.max())
+    depth = np.where(profile.radius > 0.0, np.maximum(profile.radius - section + lift, 1e-6), 0.0)
+    arc = TURN / len(profile.phi) * float(np.median(section[:, present]))
+    filled = bridge_holes(depth, profile.step, arc, width) - lift + section
+    return replace(profile, bridged=np.maximum(filled, profile.radius))
+
+
+def _apex_height(profile: RadialProfile, candidate: RulingCandidate) -> float | None:
+    if candidate.apex is None:
+        return None
+    return float((candidate.apex - profile.frame.origin) @ profile.frame.axis)
+
+
+def widest_region(profile: RadialProfile, candidate: RulingCandidate, needs: RulingNeeds) -> RuledRegion | None:
+    """Return the region of a profile that one sheet can cover."""
+    columns = math.ceil(needs.min_wrap / TURN * len(profile.phi))
+    rows = max(3, math.ceil(needs.min_length / profile.step))
+    least = np.full(len(profile.z), 0.25 * needs.min_radius)
+    apex = _apex_height(profile, candidate)
+    return ruled_region(profile, apex, needs.tolerance, rows, least, columns, needs.wrap == TURN)
+
+
+def hull_points(profile: RadialProfile, rows: slice = slice(None), columns: NDArray[np.int64] | None = None) -> Floats:
+    """Return the points of the hull below the cells of a profile, floors of holes filled, shape (n, 3) [m]."""
+    chosen = np.arange(len(profile.phi)) if columns is None else columns
+    out = np.stack([np.cos(profile.phi[chosen]), np.sin(profile.phi[chosen])], axis=1) @ profile.frame.columns[:, :2].T
+    radius = profile.bridged[rows][:, chosen]
+    points = profile.frame.origin + profile.z[rows][:, None, None] * profile.frame.axis + radius[..., None] * out
+    return np.asarray(points.reshape(-1, 3))
+
+
+def fit_sheet(
+    mesh: Mesh,
+    profile: RadialProfile,
+    hull: SurfaceSamples,
+    worth: Floats,
+    candidate: RulingCandidate,
+    needs: RulingNeeds,
+    number: int,
+) -> FoundSheet | None:
+    """Return the sheet of a candidate, fitted on a fine profile and checked there."""
+    region = widest_region(profile, candidate, needs)
+    if region is None:
+        return None
+    placed = _side(profile, region, candidate, needs)
+    if placed is None:
+        return None
+    rise = _rise(mesh, placed, needs.tolerance)
+    if rise:
+        placed = placed.parallel(rise)
+    return _checked(profile, region, placed, hull, worth, needs, rise, number)
+
+
+def _side(
+    profile: RadialProfile, region: RuledRegion, candidate: RulingCandidate, needs: RulingNeeds
+) -> PlacedDevelopable | None:
+    """Fit a side to a region."""
+    columns = columns_of(region, len(profile.phi))
+    full = region.columns == len(profile.phi)
+    apex = _apex_height(profile, candidate)
+    scale = np.ones(len(profile.z)) if apex is None else 1.0 - profile.z / apex
+    rows = slice(region.first, region.end)
+    section = np.median(profile.bridged[rows][:, columns] / scale[rows, None], axis=0)
+    turned = profile.phi[columns]
+    out = np.stack([np.cos(turned), np.sin(turned)], axis=1) @ profile.frame.columns[:, :2].T
+    middle = float(profile.z[rows].mean())
+    at = profile.frame.origin + section[:, None] * out
+    if candidate.apex is None:
+        at = at + middle * profile.frame.axis
+        ways = np.broadcast_to(profile.frame.axis, at.shape)
+    else:
+        away = at - candidate.apex
+        away /= np.linalg.norm(away, axis=1)[:, None]
+        assert apex is not None
+        reach = abs(apex - middle) / float(np.median(np.abs(away @ profile.frame.axis)))
+        at = candidate.apex + reach * away
+        ways = away if apex < middle else -away
+    step = max(1, (region.end - region.first) // _FIT_ROWS)
+    points = hull_points(profile, slice(region.first, region.end, step), columns)
+    hit = profile.radius[region.first : region.end : step][:, columns]
+    sound = (profile.bridged[region.first : region.end : step][:, columns] - hit <= needs.tolerance).ravel()
+    if sound.sum() < _LEAST_POINTS:
+        return None
+    try:
+        return fit_developable(at, ways, points[sound], full, candidate.apex is not None, needs.tolerance)
+    except (GeometryError, np.linalg.LinAlgError):
+        return None
+
+
+def _rise(mesh: Mesh, placed: PlacedDevelopable, tolerance: float) -> float:
+    """Return by how much the corners of the facets lie outside the side, which was fitted to the facets [m]."""
+    corners = mesh.vertices if len(mesh.vertices) <= 20_000 else mesh.vertices[:: len(mesh.vertices) // 20_000 + 1]
+    u, phi, off = placed.locate_all(corners)
+    side = placed.frustum
+    near = (np.abs(off) < tolerance) & (u > -tolerance) & (u < side.slant + tolerance)
+    near &= (phi >= 0.0) & (phi <= side.wrap)
+    if near.sum() < 24:
+        return 0.0
+    mean = float(np.median(off[near]))
+    spread = 1.4826 * float(np.median(np.abs(off[near] - mean)))
+    return mean if mean > 0.0 and spread <= 0.3 * mean else 0.0
+
+
+def covered_samples(placed: PlacedFrustum, hull: SurfaceSamples, distance: float) -> NDArray[np.bool_]:
+    """Return whether a sheet lies on each sample of the hull, shape (n,)."""
+    side = placed.frustum
+    u, phi, off = placed.locate_all(hull.points)
+    inside = (np.abs(off) <= distance) & (u >= 0.0) & (u <= side.slant) & (phi >= 0.0) & (phi <= side.wrap)
+    if side.wrap >= TURN - 1e-9:
+        inside = (np.abs(off) <= distance) & (u >= 0.0) & (u <= side.slant)
+    normals = placed.place(np.zeros(len(phi)), phi)[1]
+    return np.asarray(inside & (np.einsum("ij,ij->i", normals, hull.normals) > _ALIGNED))
+
+
+def _checked(
+    profile: RadialProfile,
+    region: RuledRegion,
+    placed: PlacedDevelopable,
+    hull: SurfaceSamples,
+    worth: Floats,
+    needs: RulingNeeds,
+    rise: float,
+    number: int,
+) -> FoundSheet | None:
+    """Return a side cut to the slices in which it is within the tolerance, as a sheet; None where too few are left."""
+    columns = columns_of(region, len(profile.phi))
+    step = max(1, (region.end - region.first) // _CHECK_ROWS)
+    rows = np.arange(region.first, region.end, step)
+    rows = rows if rows[-1] == region.end - 1 else np.append(rows, region.end - 1)
+    shape = (len(rows), len(columns))
+    floor = profile.bridged[rows][:, columns]
+    hole = floor - profile.radius[rows][:, columns] > needs.tolerance
+    out = np.stack([np.cos(profile.phi[columns]), np.sin(profile.phi[columns])], axis=1)
+    base = profile.frame.origin + profile.z[rows][:, None, None] * profile.frame.axis
+    across = (out @ profile.frame.columns[:, :2].T)[None]
+    points = base + profile.radius[rows][:, columns][..., None] * across
+    rims = base + floor[..., None] * across
+    off = placed.locate_all(points.reshape(-1, 3))[2].reshape(shape)
+    rim = placed.locate_all(rims.reshape(-1, 3))[2].reshape(shape) if hole.any() else off
+    within = np.where(hole, rim, off)
+    good = np.asarray((np.abs(within) <= needs.tolerance).all(axis=1))
+    run = _longest(good)
+    if run[1] - run[0] < 2:
+        return None
+    ends = _span(placed, profile, float(profile.z[rows[run[0]]]), float(profile.z[rows[run[1] - 1]]))
+    if ends[1] - ends[0] < needs.min_length:
+        return None
+    placed = placed.part(ends[0], ends[1], 0.0, placed.frustum.wrap)
+    narrow = min(placed.frustum.radius1, placed.frustum.radius2)
+    if narrow < needs.min_radius * max(1.0, placed.sharpest_bend):
+        return None
+    kept = slice(run[0], run[1])
+    seen = off[kept][~hole[kept]]
+    covers = covered_samples(placed, hull, 1.5 * needs.tolerance)
+    full = region.columns == len(profile.phi)
+    sheet = FittedSheet(
+        placed=placed,
+        start_azimuth=0.0 if full else float(profile.phi[region.column]),
+        max_deviation=float(np.abs(seen).max()) if seen.size else math.inf,
+        rms_deviation=math.sqrt(float((seen**2).mean())) if seen.size else math.inf,
+        bridged_share=float(hole[kept].mean()),
+        bridged_depth=float(-off[kept][hole[kept]].min()) if hole[kept].any() else 0.0,
+        length_share=placed.frustum.slant / (profile.step * len(profile.z)),
+        area_share=float(covers.mean()),
+        facet_rise=rise,
+        axis=number,
+        touch_share=float(worth[covers].sum() / worth.sum()),
+    )
+    return FoundSheet(placed, sheet, covers)
+
+
+def _longest(good: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the first and the end of the longest run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
+    if len(edges) == 0:
+        return 0, 0
+    longest = int((edges[1::2] - edges[::2]).argmax())
+    return int(edges[2 * longest]), int(edges[2 * longest + 1])
+
+
+def _span(placed: PlacedDevelopable, profile: RadialProfile, low: float, high: float) -> tuple[float, float]:
+    """Return the arcs between which all rulings lie between two heights of a profile [m]."""
+    phi = np.linspace(0.0, placed.frustum.wrap, 241)
+    base, way, _ = placed.side.rulings(phi * (1.0 - 1e-12))
+    pose = placed.link_frustum
+    z = profile.frame.local(pose.apply_all(base))[:, 2]
+    climb = (way @ np.array(pose.rotation).T) @ profile.frame.axis
+    return float(((low - z) / climb).max()), float(((high - z) / climb).min())

@@ -1,0 +1,195 @@
+"""Candidates for the rulings of a link: directions in which they are parallel, and points in which they meet.
+
+A point p with the normal n lies on a developable with parallel rulings along a only if n a = 0, and on one whose
+rulings meet in x only if n (p - x) = 0, whatever its section is. In homogeneous coordinates both are one linear law.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .candidates import AxisCandidate
+from .surface_samples import SurfaceSamples
+
+__all__ = ["RulingCandidate", "find_ruling_candidates"]
+
+Floats = NDArray[np.float64]
+
+_DRAWS = 1600  # pairs, and triples, of samples
+_VOTERS = 1200  # samples that vote
+_GATE = 0.035  # rad; angle between a ruling and the tangent plane up to which a sample counts
+_LEAST_SHARE = 0.08  # of the hull that must obey a candidate
+_DIRECTIONS = 4  # tried at most
+_APEXES = 2
+_FARTHEST = 30.0  # sizes of the link; rulings that meet further away are parallel
+_SAME = 0.02  # rad; directions closer than this are one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RulingCandidate:
+    """A line inside a link about which its rulings are looked for.
+
+    Attributes:
+        origin: a point of the line [m], shape (3,).
+        axis: unit vector along it, shape (3,).
+        apex: point of the line in which the rulings meet [m], shape (3,); None where they are parallel to it.
+    """
+
+    origin: Floats
+    axis: Floats
+    apex: Floats | None = None
+
+
+def find_ruling_candidates(samples: SurfaceSamples, axes: list[AxisCandidate]) -> list[RulingCandidate]:
+    """Find lines about which a link may have rulings; the same samples give the same lines.
+
+    Args:
+        samples: points and normals of the hull.
+        axes: known candidates for axes of cones, whose directions are tried too.
+    """
+    rng = np.random.default_rng(5)
+    if len(samples) < 24:
+        return []
+    size = float(np.ptp(samples.points, axis=0).max())
+    voters = rng.permutation(len(samples))[:_VOTERS]
+    found: list[RulingCandidate] = []
+    for direction in _directions(samples, voters, rng, axes):
+        obeys = np.abs(samples.normals @ direction) < 2.0 * _GATE
+        middle = _middle(samples.points[obeys], direction)
+        found.append(RulingCandidate(middle, direction))
+        for axis in axes:  # a tube beside another one is not about the middle of both
+            off = axis.origin - middle
+            apart = float(np.linalg.norm(off - (off @ direction) * direction))
+            if abs(axis.axis @ direction) > 1.0 - _SAME**2 and apart > 0.03 * size and len(found) < 8:
+                found.append(RulingCandidate(axis.origin, direction))
+        loose = np.abs(samples.normals @ direction) < 0.3
+        apex = _common_point(samples.points[loose], samples.normals[loose], size, direction)
+        if apex is not None:
+            found.append(_about(samples, apex))
+    for apex in _apexes(samples, voters, rng, size):
+        candidate = _about(samples, apex)
+        known = [other.apex for other in found if other.apex is not None]
+        if all(np.linalg.norm(apex - other) > 0.02 * np.linalg.norm(apex - candidate.origin) for other in known):
+            found.append(candidate)
+    return found
+
+
+def _directions(
+    samples: SurfaceSamples, voters: NDArray[np.int64], rng: np.random.Generator, axes: list[AxisCandidate]
+) -> list[Floats]:
+    """Return the directions to which most tangent planes are parallel, the best first, refined."""
+    i, j = rng.integers(0, len(samples), (2, _DRAWS))
+    drawn = np.cross(samples.normals[i], samples.normals[j])
+    length = np.linalg.norm(drawn, axis=1)
+    drawn = drawn[length > 0.3] / length[length > 0.3, None]
+    trials = np.concatenate([drawn, *(axis.axis[None] for axis in axes)])
+    votes = np.abs(samples.normals[voters] @ trials.T) < _GATE
+    left = np.ones(len(voters))
+    chosen: list[Floats] = []
+    while len(chosen) < _DIRECTIONS:
+        score = left @ votes
+        best = int(score.argmax())
+        if score[best] < _LEAST_SHARE * len(voters):
+            break
+        left[votes[:, best]] *= 0.3  # a flat of a box obeys several directions
+        direction = trials[best]
+        for gate in (2.0 * _GATE, _GATE, 0.5 * _GATE):
+            near = samples.normals[np.abs(samples.normals @ direction) < gate]
+            if len(near) < 12:
+                break
+            direction = np.linalg.eigh(near.T @ near)[1][:, 0]
+        direction = direction * np.sign(direction[int(np.abs(direction).argmax())])
+        if all(abs(direction @ other) < math.cos(_SAME) for other in chosen):
+            chosen.append(direction)
+        votes[:, best] = False
+        if not votes.any():
+            break
+    return chosen
+
+
+def _middle(points: Floats, direction: Floats) -> Floats:
+    """Return a point of the line along a direction through the middle of the shadow of some points."""
+    first = np.linalg.eigh(np.eye(3) - np.outer(direction, direction))[1][:, 1:]
+    shadow = points @ first
+    middle = first @ (0.5 * (np.percentile(shadow, 1.0, axis=0) + np.percentile(shadow, 99.0, axis=0)))
+    return np.asarray(middle + direction * float(np.median(points @ direction)))
+
+
+def _common_point(points: Floats, normals: Floats, size: float, direction: Floats) -> Floats | None:
+    """Return the point in which the tangent planes meet; None where that is nearly infinitely far away."""
+    middle = points.mean(axis=0)
+    rows = np.concatenate([normals, -np.einsum("ij,ij->i", normals, points - middle)[:, None] / size], axis=1)
+    weights = (np.abs(normals @ direction) < 0.15).astype(float)
+    solution = np.zeros(4)
+    for _ in range(25):
+        if weights.sum() < 12.0:
+            return None
+        solution = np.linalg.eigh((rows * weights[:, None]).T @ rows)[1][:, 0]
+        miss = np.abs(rows @ solution) / max(float(np.linalg.norm(solution[:3])), 1e-9)
+        scale = max(4.0 * float(np.median(miss[weights > 0.0])), 0.2 * _GATE)
+        weights = np.where(miss < scale, (1.0 - (miss / scale) ** 2) ** 2, 0.0)
+    if abs(solution[3]) * _FARTHEST < np.linalg.norm(solution[:3]):
+        return None
+    return np.asarray(middle + size * solution[:3] / solution[3])
+
+
+def _apexes(samples: SurfaceSamples, voters: NDArray[np.int64], rng: np.random.Generator, size: float) -> list[Floats]:
+    """Return the points in which most tangent planes meet, the best first, refined."""
+    index = rng.integers(0, len(samples), (_DRAWS, 3))
+    p, n = samples.points[index], samples.normals[index]
+    sound = np.abs(np.linalg.det(n)) > 0.01
+    p, n = p[sound], n[sound]
+    trials = np.linalg.solve(n, np.einsum("hij,hij->hi", n, p)[..., None])[..., 0]
+    middle = samples.points.mean(axis=0)
+    trials = trials[np.linalg.norm(trials - middle, axis=1) < _FARTHEST * size]
+    if len(trials) == 0:
+        return []
+    chosen: list[Floats] = []
+    left = np.ones(len(voters))
+    votes = _votes(samples, voters, trials)
+    while len(chosen) < _APEXES:
+        score = left @ votes
+        best = int(score.argmax())
+        if score[best] < _LEAST_SHARE * len(voters):
+            break
+        left[votes[:, best]] = 0.0
+        apex = trials[best]
+        for gate in (2.0 * _GATE, _GATE, 0.5 * _GATE):
+            way = samples.points - apex
+            near = np.abs(np.einsum("ij,ij->i", samples.normals, way)) < gate * np.linalg.norm(way, axis=1)
+            if near.sum() < 12:
+                break
+            rows = samples.normals[near]
+            apex = np.linalg.lstsq(rows, np.einsum("ij,ij->i", rows, samples.points[near]), rcond=1e-6)[0]
+        chosen.append(np.asarray(apex))
+    return chosen
+
+
+def _votes(samples: SurfaceSamples, voters: NDArray[np.int64], trials: Floats) -> NDArray[np.bool_]:
+    p, n = samples.points[voters], samples.normals[voters]
+    off = np.einsum("ij,ij->i", n, p)[:, None] - n @ trials.T
+    square = (p**2).sum(axis=1)[:, None] - 2.0 * p @ trials.T + (trials**2).sum(axis=1)
+    return np.asarray(np.abs(off) < _GATE * np.sqrt(np.maximum(square, 1e-12)))
+
+
+def _about(samples: SurfaceSamples, apex: Floats) -> RulingCandidate:
+    """Return the line from an apex through the middle of the samples that see it along their tangent planes."""
+    way = samples.points - apex
+    length = np.linalg.norm(way, axis=1)
+    ways = way / np.maximum(length, 1e-9)[:, None]
+    near = np.abs(np.einsum("ij,ij->i", samples.normals, ways)) < 2.0 * _GATE
+    if near.sum() < 12:
+        near[:] = True
+    mean = ways[near].mean(axis=0)
+    axis = mean / max(float(np.linalg.norm(mean)), 1e-9)
+    # the middle of the bundle, not its densest part
+    first = np.linalg.eigh(np.eye(3) - np.outer(axis, axis))[1][:, 1:]
+    shadow = (ways[near] / np.maximum(ways[near] @ axis, 0.1)[:, None]) @ first
+    axis = axis + first @ (0.5 * (np.percentile(shadow, 1.0, axis=0) + np.percentile(shadow, 99.0, axis=0)))
+    axis /= np.linalg.norm(axis)
+    origin = apex + axis * float(np.median((way @ axis)[near]))
+    return RulingCandidate(origin, axis, apex)
