@@ -43,6 +43,11 @@ class PlacedDevelopable(PlacedFrustum):
         return self._side
 
     @property
+    def kind(self) -> str:
+        """Kind of the side, in words."""
+        return f"general {'cone' if self.frustum.sin_half_angle else 'cylinder'}"
+
+    @property
     def growth(self) -> float:
         """Growth of the mean radius per height above the side."""
         return self._side.growth

@@ -102,6 +102,11 @@ class PlacedFrustum:
         return ()
 
     @property
+    def kind(self) -> str:
+        """Kind of the side, in words."""
+        return "cone" if self.frustum.sin_half_angle else "cylinder"
+
+    @property
     def growth(self) -> float:
         """Growth of the mean radius per height above the side."""
         return self.frustum.cos_half_angle

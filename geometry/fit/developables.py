@@ -154,8 +154,12 @@ def find_developables(
     # a bare convex hull has rulings of its own that the link has not
     if sum(sheet.area_share for sheet in best) < _CONVEX_SHARE and hull_note(mesh, search):
         return cones
+    shares = [f"{sum(sheet.area_share for sheet in sheets):.0%}" for sheets in (cones.sheets, best)]
+    kinds = " and ".join(sorted({f"a {sheet.placed.kind}" for sheet in best if sheet.placed.bends}))
+    note = f"the link is not round: cones cover {shares[0]} of its hull, with {kinds} it is {shares[1]}"
     return replace(
         cones,
+        notes=(*cones.notes, note),
         sheets=tuple(best),
         nearest=None,
         bare=(),

@@ -174,6 +174,8 @@ def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
             f"{side.height * 1e3:.2f} mm, half angle {math.degrees(side.half_angle):z.3f} deg, wrap "
             f"{math.degrees(side.wrap):.1f} deg, active {share:.1%}"
         )
+        if design.place.bends:
+            line += f", bent as a {design.place.kind} (radius: arc over wrap)"
         if design.fit is not None:
             worst, rms = design.fit.max_deviation, design.fit.rms_deviation
             line += f", deviation {worst * 1e3:.3f} mm at most, {rms * 1e3:.3f} mm rms"

@@ -105,8 +105,8 @@ def fit_link(
         packages: folders of the ROS packages in a URDF's package:// paths.
         progress: called with the name of each step.
         arguments: of a xacro file.
-        search: keyword arguments of ``find_sheets``. Without ``seam_direction`` the seams are put where the link shields
-            them most (``place_seams``).
+        search: keyword arguments of ``find_sheets``. Without ``seam_direction`` the seams are put where the link
+            shields them most (``place_seams``).
 
     Raises:
         MeshError: the file, the link or its mesh cannot be found or read.
@@ -120,6 +120,7 @@ def fit_link(
     for source in load_link(link, unit, up_axis, packages, arguments):
         progress(f"{source.name}: {len(source.mesh.faces)} faces")
         fit = find_sheets(source.mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
+        source = _with_notes(source, fit)
         if fit.sheets:
             return (source, fit) if facing else _with_seams(source, fit, progress, search.get("weights"))
         tries.append((source, fit))
@@ -134,7 +135,13 @@ def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **sea
     source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", (*_terms(mesh.source), *mesh.notes))
     facing = search.pop("seam_direction", None)
     fit = find_sheets(mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
+    source = _with_notes(source, fit)
     return (source, fit) if facing or not fit.sheets else _with_seams(source, fit, progress, search.get("weights"))
+
+
+def _with_notes(source: LinkMesh, fit: LinkFit) -> LinkMesh:
+    """Return a source with what the search noted beside the notes on its mesh."""
+    return replace(source, notes=(*source.notes, *(note for note in fit.notes if note not in source.mesh.notes)))
 
 
 def _with_seams(

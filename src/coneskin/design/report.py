@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.geometry.drawing.nesting import MaterialBed
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.sector import unroll
 from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
 
@@ -104,6 +105,12 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         ["position of end 1 (frame above)", _vector(data["link_cone"]["xyz_mm"], "mm")],
         ["roll, pitch, yaw of the axis", _vector(data["link_cone"]["rpy_deg"], "deg")],
     ]
+    if design.place.bends:
+        rows.insert(0, ["side", f"{design.place.kind}: the radii are arc over wrap, the half angle that of the sector"])
+        rows.append(["sharpest bend of the link", f"radius {_sharpest(design.place) * 1e3:.2f} mm"])
+        rows.append(["layers beside their flat sector", f"{data['sector_error_mm']:.3f} mm at most"])
+        if data["closing_gap_mm"] is not None:
+            rows.append(["gap with which the bends close", f"{data['closing_gap_mm']:.4f} mm"])
     if "fit" in data:
         fit = data["fit"]
         deviation = f"{fit['max_deviation_mm']:.3f} mm at most, {fit['rms_deviation_mm']:.3f} mm rms"
@@ -211,6 +218,11 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     steps = [[f"{step[key]:.{digits}f}" for key, digits in keys.items()] for step in data["forecast"]]
     columns = ("u of the active area [mm]", "along [mm]", "around [mm]", "azimuth [deg]", "theta [deg]")
     yield from _table(columns, steps)
+
+
+def _sharpest(place: PlacedFrustum) -> float:
+    """Return the smallest radius to which a sheet is bent [m]."""
+    return min(place.frustum.radius1, place.frustum.radius2) / place.sharpest_bend
 
 
 def _sector(cone: Frustum) -> str:

@@ -171,6 +171,7 @@ def design_sheets(
             conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
             drawn = cut_sheets(
                 layout,
+                _with_materials(options.stack, conductive),
                 place,
                 title=f"{options.link}: {name}" if options.link else name,
                 kerf=options.kerf,
