@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.nesting import nest_on_beds
 from coneskin.geometry.drawing.test_piece import make_test_piece
@@ -118,8 +119,14 @@ def _write_wrapped(draft: Path, place: Path, design: SheetDesign) -> str:
         design: the sheet.
 
     Raises:
+        GeometryError: the link is not round.
         MissingExtra: cadquery-ocp is not installed.
     """
+    if design.place.bends:
+        raise GeometryError(
+            f"{design.name} is bent as a {design.place.kind}, of which no STEP file is written: leave --step out, or "
+            "use cones only (--round-only)"
+        )
     stack, side = design.options.stack, design.place.frustum
     layers = []
     for index, layer in enumerate(stack.layers):
