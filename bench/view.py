@@ -4,7 +4,9 @@
 
 One guard, one run: a simulated UR5e, a virtual skin of 1 kHz. It is guarded without a page, then with a page and one
 browser, then with ten viewers. How late a frame is at the guard is its host time less the device's clock, less the
-least such difference of the run. Needs the extra `view`, playwright and chromium, which draws in software here.
+least such difference of the run. What is the browser's part is told by an empty page of viser's, and by a viewer that
+takes all that is sent and draws nothing; what is that of a busy machine, by how long the page's process was ready and
+got no processor. Needs the extra `view`, playwright and chromium, which draws in software here.
 """
 
 from __future__ import annotations
@@ -18,30 +20,25 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from report import head, quantile
+from view_browser import PROCESSES, drawn_pictures, first_picture, resident
 
 from coneskin.errors import ConeSkinError
 from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.robot.guard.journal import BlockKind, EventName
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
 from coneskin.skin.wire import FrameDecoder
 from coneskin.testing.forearm import START, forearm_scene
+from coneskin.view.page_server import PageServer
 
-FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
 LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000"
-#: counts the pictures that the browser draws, and the changes of the page's text
-WATCH = """() => {
-  window.pictures = 0; window.texts = 0;
-  const look = () => { window.pictures += 1; requestAnimationFrame(look); };
-  new MutationObserver(() => { window.texts += 1; }).observe(document.body, { subtree: true, childList: true });
-  look();
-}"""
+MOVED = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # rad, between the two ends of the motion
 
 
 def page_of(recording: Path) -> tuple[subprocess.Popen[str], str, float]:
@@ -53,17 +50,6 @@ def page_of(recording: Path) -> tuple[subprocess.Popen[str], str, float]:
     return child, json.loads(child.stdout.readline())["url"], time.monotonic() - began
 
 
-def first_picture(page: Any, url: str) -> float:
-    """Open the page; time until its phase is said and the arm is drawn [s]."""
-    began = time.monotonic()
-    page.goto(url)
-    page.wait_for_function(
-        "() => document.querySelector('.coneskin-phase') && document.querySelector('canvas')", timeout=60_000
-    )
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    return time.monotonic() - began
-
-
 class Viewer:
     """Viewer that takes all that is sent, as a browser does, and draws nothing.
 
@@ -71,11 +57,14 @@ class Viewer:
         touched: when the words came that the arm stops [s, monotonic]; None until then.
         messages: that came.
         active: the newest words are that the guard is active.
+        pictures: parcels in which a link has turned.
+        waited: how long the page's process had got no processor when the words came [s].
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, pid: int) -> None:
         self.touched: float | None = None
-        self.messages, self.active = 0, False
+        self.messages, self.pictures, self.waited, self.active = 0, 0, 0.0, False
+        self._pid = pid
         self._url, self._over = url, threading.Event()
         self._thread = threading.Thread(target=self._view, daemon=True)
         self._thread.start()
@@ -98,19 +87,28 @@ class Viewer:
                 size, packed = (int.from_bytes(data[at : at + 8], "little") for at in (0, 8))
                 inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], size)
                 self.messages += 1
+                self.pictures += b"SetOrientationMessage" in inner
                 if b"coneskin-phase" in inner:
                     self.active = b">active<" in inner
                     if self.touched is None and (b">stopping<" in inner or b">latched" in inner):
-                        self.touched = came
+                        self.touched, self.waited = came, waited(self._pid)
 
     def end(self) -> None:
         """Leave."""
         self._over.set()
 
 
-def touch_to_viewer(session: Session, viewer: Viewer) -> float:
-    """Touch the skin; time until a viewer is told so [s]; NaN where that takes longer than 10 s."""
-    viewer.touched = None
+class Told(NamedTuple):
+    """Time from a touch to the words at a viewer [s]: all, to the guard's stop, and the page's without a processor."""
+
+    whole: float
+    guard: float
+    waited: float
+
+
+def touch_to_viewer(session: Session, viewer: Viewer, pid: int) -> Told:
+    """Touch the skin, and see when a viewer is told; NaN where that takes longer than 10 s."""
+    viewer.touched, before = None, waited(pid)
     touched = session.touch(u=0.13, phi=1.57, duration=0.1)
     session.wait_for(("none",), 0.6)
     while viewer.touched is None and time.monotonic() < touched + 10.0:
@@ -123,7 +121,31 @@ def touch_to_viewer(session: Session, viewer: Viewer) -> float:
             session.wait_for(("none",), 0.05)
     while not viewer.active and time.monotonic() < touched + 30.0:
         session.wait_for(("none",), 0.1)
-    return float("nan") if viewer.touched is None else viewer.touched - touched
+    stop = max((event.time for event in session.events if event.name == EventName.STOPPING), default=float("nan"))
+    if viewer.touched is None:
+        return Told(float("nan"), stop - touched, float("nan"))
+    return Told(viewer.touched - touched, stop - touched, viewer.waited - before)
+
+
+@contextlib.contextmanager
+def moving(session: Session) -> Iterator[None]:
+    """Let the arm move to and fro."""
+    over = threading.Event()
+
+    def move() -> None:
+        away = [a + b for a, b in zip(START, MOVED, strict=True)]
+        with contextlib.suppress(ConeSkinError):  # touched by nobody, but the session may end
+            while not over.is_set():
+                for goal in (away, START):
+                    session.arm.move_j(goal, speed=0.5, acceleration=2.0)
+
+    mover = threading.Thread(target=move, daemon=True)
+    mover.start()
+    try:
+        yield
+    finally:
+        over.set()
+        mover.join(20.0)
 
 
 def lateness(recording: Path, spans: dict[str, tuple[float, float]]) -> dict[str, list[float]]:
@@ -138,11 +160,6 @@ def lateness(recording: Path, spans: dict[str, tuple[float, float]]) -> dict[str
     }
 
 
-def resident(pid: int) -> int:
-    """Memory of a process [kB]."""
-    return int(next(li for li in Path(f"/proc/{pid}/status").read_text().splitlines() if "VmRSS" in li).split()[1])
-
-
 def processor_time(pid: int) -> float:
     """Time that a process has run [s]."""
     return sum(map(int, Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13])) / os.sysconf(
@@ -150,19 +167,32 @@ def processor_time(pid: int) -> float:
     )
 
 
-def look(url: str, span: Callable[[str], None], seconds: float) -> None:
-    """Look at the page in a browser for a while, and print what it draws."""
+def waited(pid: int) -> float:
+    """How long the threads of a process were ready and got no processor, together [s]."""
+    tasks = Path(f"/proc/{pid}/task").iterdir()
+    return 1e-9 * sum(int((task / "schedstat").read_text().split()[1]) for task in tasks)
+
+
+def look(url: str, span: Callable[[str], None], moving: Callable[[], Any], seconds: float) -> None:
+    """Look at the page in a browser, beside an empty page, and print what it draws."""
     from playwright.sync_api import sync_playwright
 
-    with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path="/usr/bin/chromium", args=list(FLAGS))
-        page = browser.new_page(viewport={"width": 960, "height": 540})
-        print(f"browser: {first_picture(page, url):.2f} s until the first picture", flush=True)
-        page.evaluate(WATCH)
+    with sync_playwright() as driver, PageServer("empty", port=18400) as empty:
+        for name, address in (("an empty page of viser's", empty.url), ("the page", url)):
+            browser, page, took, spent = first_picture(driver, address, phase=address == url)
+            parts = ", ".join(f"{kind} {1e3 * spent[kind]:.0f} ms" for kind in PROCESSES)
+            print(f"browser, {name}: {took:.2f} s until the first picture; processor time: {parts}", flush=True)
+            if address == url:
+                break
+            browser.close()
+        for name, context in (("arm stands", contextlib.nullcontext), ("arm moves", moving)):
+            with context():
+                turns, pictures, spent = drawn_pictures(page, seconds)
+            each = {kind: 1e3 * spent[kind] / max(pictures * seconds, 1.0) for kind in PROCESSES}
+            parts = ", ".join(f"{kind} {each[kind]:.0f} ms" for kind in PROCESSES)
+            rates = f"{turns:.1f} turns, {pictures:.1f} pictures a second"
+            print(f"browser, {name}: {rates}; processor time of each: {parts}", flush=True)
         span("page and browser")
-        pictures, texts = page.evaluate("() => [window.pictures, window.texts]")
-        rates = f"{pictures / seconds:.1f} pictures and {texts / seconds:.1f} changes of the text"
-        print(f"browser, drawing in software: {rates} a second", flush=True)
         browser.close()
 
 
@@ -189,14 +219,23 @@ def main() -> None:
         child, url, started = page_of(recording)
         print(f"page: served {started:.2f} s after its start", flush=True)
         if not args.no_browser:
-            look(url, span, args.seconds)
-        viewer = Viewer(url)
+            look(url, span, lambda: moving(session), args.seconds)
+        viewer = Viewer(url, child.pid)
         session.wait_for(("none",), 1.0)
-        times = [touch_to_viewer(session, viewer) for _ in range(args.touches)]
-        words = ", ".join(f"{1e3 * quantile(times, share):.0f}" for share in (0.0, 0.5, 0.99))
-        print(f"touch to the words at a viewer: {words} ms (least, median, most of {len(times)})", flush=True)
+        told = viewer.pictures
+        with moving(session):
+            session.wait_for(("none",), args.seconds)
+        print(
+            f"a viewer that draws nothing, arm moves: {(viewer.pictures - told) / args.seconds:.1f} pictures a second"
+        )
+        found = [touch_to_viewer(session, viewer, child.pid) for _ in range(args.touches)]
+        for name, times in zip(("touch to the words at a viewer", "... of which until the guard stops",
+                                "... of which the page's process was ready and got no processor"),
+                               zip(*found, strict=True), strict=True):  # fmt: skip
+            words = ", ".join(f"{1e3 * quantile(times, share):.0f}" for share in (0.0, 0.5, 0.99))
+            print(f"{name}: {words} ms (least, median, most of {len(times)})", flush=True)
         before, cpu = resident(child.pid), processor_time(child.pid)
-        crowd = [viewer, *(Viewer(url) for _ in range(9))]
+        crowd = [viewer, *(Viewer(url, child.pid) for _ in range(9))]
         told = sum(one.messages for one in crowd)
         span("ten viewers")
         spent = processor_time(child.pid) - cpu

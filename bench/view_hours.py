@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import subprocess
 import tempfile
 import threading
 import time
@@ -20,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from report import head
-from view import FLAGS, page_of, resident
+from view import page_of
+from view_browser import FLAGS, PROGRAM, memory_of, resident
 
 from coneskin.recording import END, Block
 from coneskin.recording_file.recorder import Recorder
@@ -29,7 +28,6 @@ from coneskin.robot.guard.journal import BlockKind
 
 RUN = Path(__file__).parents[1] / "tests" / "data" / "collision.rec"
 STEP = 0.05  # s of the run that are written together: the recorder's own
-TYPES = ("renderer", "gpu-process")
 
 
 class Writer(threading.Thread):
@@ -80,23 +78,6 @@ class Writer(threading.Thread):
         return Block(block.kind, when, payload)
 
 
-def children_of(pid: int) -> dict[str, int]:
-    """Memory of the browser's processes below a process, by their types [kB]."""
-    listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
-    rows = [line.split(None, 2) for line in listing.splitlines()[1:]]
-    below, found = {pid}, dict.fromkeys(TYPES, 0)
-    while True:
-        more = {int(row[0]) for row in rows if int(row[1]) in below} - below
-        if not more:
-            break
-        below |= more
-    for row in rows:
-        for kind in TYPES:
-            if int(row[0]) in below and f"--type={kind}" in row[2]:
-                found[kind] += resident(int(row[0]))
-    return found
-
-
 def main() -> None:
     """Measure and print."""
     from playwright.sync_api import sync_playwright
@@ -115,7 +96,7 @@ def main() -> None:
         writer = Writer(recorder, args.rate)
         writer.start()
         child, url, _ = page_of(Path(folder) / "run.rec")
-        browser = driver.chromium.launch(executable_path="/usr/bin/chromium", args=[*FLAGS, "--js-flags=--expose-gc"])
+        browser = driver.chromium.launch(executable_path=PROGRAM, args=list(FLAGS))
         page = browser.new_page(viewport={"width": 480, "height": 320})
         page.set_default_timeout(300_000)
         page.goto(url)
@@ -140,7 +121,7 @@ def row(writer: Writer, tools: Any, server: int, since: float, began: float) -> 
     """One line of the table."""
     tools.send("HeapProfiler.collectGarbage")
     numbers = {item["name"]: item["value"] for item in tools.send("Performance.getMetrics")["metrics"]}
-    memory = children_of(os.getpid())
+    memory = memory_of()
     return (
         f"{(writer.shown - since) / 60.0:9.1f}  {(time.monotonic() - began) / 60.0:10.1f}  {writer.collisions:10d}  "
         f"{resident(server) / 1e3:11.1f}  {numbers['JSHeapUsedSize'] / 1e6:9.1f}  {numbers['Nodes']:5.0f}  "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import io
+import math
 import threading
 import warnings
 from collections.abc import Callable, Iterator
@@ -20,6 +21,7 @@ __all__ = ["LOOPBACK", "PageServer", "page_client"]
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 _UPLOAD = 200_000_000  # bytes of a message, where files may be dropped
+_FIELD_OF_VIEW = math.radians(50.0)  # from top to bottom; viser's own 75 deg makes what is far small
 _starting = threading.Lock()
 
 
@@ -118,6 +120,7 @@ class PageServer:
         """Set from where a new viewer looks, and at what [m]."""
         self._server.initial_camera.position = position
         self._server.initial_camera.look_at = at
+        self._server.initial_camera.fov = _FIELD_OF_VIEW
 
     def on_viewer(self, begin: Callable[[Any], Callable[[], None]]) -> None:
         """Call a function for each viewer that connects.

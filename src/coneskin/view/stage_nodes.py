@@ -41,7 +41,7 @@ def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
         count: stages side by side.
     """
     away = 0.5 * reach * (1.0 + 0.5 * (count - 1))
-    server.look_from((away, -away, 0.55 * reach), (0.0, 0.0, 0.28 * reach))
+    server.look_from((-away, -away, 0.6 * reach), (-0.1 * reach, 0.0, 0.3 * reach))  # most arms work to that side
     scene = server.scene
     scene.configure_environment_map(hdri=None)
     scene.configure_default_lights(enabled=False, cast_shadow=False)

@@ -44,8 +44,8 @@ def timeline(strands: Sequence[Strand], since: float, until: float) -> str:
                     f'<rect x="{x0:.2f}" y="{top + _TICK:.1f}" width="{max(x1 - x0, 1.0):.2f}" height="{_BAND}" '
                     f'fill="{change.phase.colour}"><title>{escape(change.phase.text)}</title></rect>'
                 )
-        ticks = [event for event in strand.history.events if event.name in _CONTACT | _WRONG][:_MOST]
-        for event in ticks:
+        shown = [event for event in strand.history.events if since <= event.time - strand.zero <= until]
+        for event in [event for event in shown if event.name in _CONTACT | _WRONG][-_MOST:]:
             x = (event.time - strand.zero - since) * scale
             colour = "#e11d48" if event.name in _CONTACT else "#111827"
             parts.append(f'<rect x="{x - 1.5:.2f}" y="{top:.1f}" width="3" height="{_TICK}" fill="{colour}"/>')
