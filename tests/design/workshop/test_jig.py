@@ -160,6 +160,13 @@ def test_a_link_that_ends_with_its_sheet_has_no_lip() -> None:
     assert "end 1 lies where the link ends: keep the sheet flush with its rim" in said
 
 
+@pytest.mark.parametrize("height", [0.0, 0.02])
+def test_a_disc_has_nothing_to_grip(height: float) -> None:
+    collars, said = jig_collars(sheet(Frustum(0.06, 0.16, height)))
+    assert collars == ()
+    assert "sheet 1 is too flat for collars" in said[0]
+
+
 def test_no_jig_and_wrong_dimensions() -> None:
     assert jig_collars(sheet(Frustum(0.05, 0.05, 0.2), jig=JigPlan("none"))) == ((), ())
     with pytest.raises(GeometryError, match=r"wall of the jig must be 1\.5 to 20 mm, got 1 mm"):

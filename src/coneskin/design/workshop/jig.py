@@ -42,6 +42,7 @@ _BESIDE = 3e-3  # m; on both sides of the tabs
 _SEAT, _RIM = 2e-3, 1.5e-3  # m; width of the rims that keep a strap on its seat, and their height
 _NOTCH = 1e-3  # m; depth of the grooves that number a part
 _LEAST_RADIUS = 4e-3  # m
+_FLATTEST = 0.5  # cosine of the half angle; a collar around a flatter cone has nothing to grip
 _KEY = 3e-3  # m; a lip whose length differs by less fits at every azimuth
 
 
@@ -109,6 +110,8 @@ def jig_collars(
         return (), (f"{design.name} lies on a link that is not round, for which no jig is made: measure its place",)
     if design.above:
         return (), (f"{design.name} lies on {design.above}, whose ends and seam show its place",)
+    if design.place.frustum.cos_half_angle < _FLATTEST:
+        return (), (f"{design.name} is too flat for collars: weigh it down with a board of its shape",)
     collars: list[Collar] = []
     without: list[str] = []
     body = None if mesh is None or plan.surface == "cone" else with_sheets(mesh, others)
