@@ -11,10 +11,9 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import IO, Any
 
-from coneskin.errors import RobotRefused
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.sim.urscript.translator import Translation
-from coneskin.robot.sim.urscript.values import ScriptError, values_of
+from coneskin.robot.sim.urscript.values import ScriptError
 from coneskin.robot.ur.rtde_codec import Value
 
 from .client_inputs import ClientInputs, InputWatchdog
@@ -61,11 +60,6 @@ class Controller:
     def __init__(self, options: Options, log: IO[str] | None = None, plant: Plant | None = None) -> None:
         self.options = options
         self.arm = SimulatedArm(arm_model(options.model), options.start_q)
-        for i, (low, q, high) in enumerate(
-            zip(self.arm.model.joint_lower, self.arm.q, self.arm.model.joint_upper, strict=True), 1
-        ):
-            if not low <= q <= high:
-                raise RobotRefused(f"start position of joint {i} must be in [{low:.3f}, {high:.3f}] rad, got {q:.3f}")
         self.plant: Plant = KinematicPlant() if plant is None else plant
         self.arm.kinematic = plant is None
         self.plant_lost = ""
@@ -299,34 +293,10 @@ class Controller:
 
     def log(self, event: str, **facts: Any) -> None:
         """Write one JSON line: cycle, controller time, this machine's monotonic clock, event and its facts."""
-        if self._log is None:
-            return
-        write_event(self._log, self.cycle, self.timestamp, event, facts)
-
-    def resist(self, joint: int, current: float) -> list[float]:
-        """Let a motor, counted from 0, take so much current beyond the model of the arm [A]; return all of them."""
-        self.resistance[joint] = current
-        return self.resistance
+        if self._log is not None:
+            write_event(self._log, self.cycle, self.timestamp, event, facts)
 
     @property
     def currents(self) -> list[float]:
         """Current that each motor takes beyond the model of the arm [A]: what the plant measures, and a fault line."""
         return [a + b for a, b in zip(self.resistance, self.arm.measured.current, strict=True)]
-
-    def describe(self) -> dict[str, Any]:
-        """Return the state, for a person or a test."""
-        return {
-            "cycle": self.cycle,
-            "q": list(self.arm.measured.q),
-            "qd": list(self.arm.measured.qd),
-            "turning": self.arm.turning,
-            "plant_lost": self.plant_lost,
-            "tcp": list(values_of(self.arm.tcp_pose(self.arm.measured.q))),
-            "program": self.program.name if self.program is not None else "",
-            "runtime": self.runtime.name,
-            "robot_mode": self.robot_mode.name,
-            "safety": self.safety.name,
-            "slider": self.slider,
-            "resistance": list(self.resistance),
-            "digital_outputs": self.digital_outputs,
-        }

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 from coneskin.errors import RobotRefused
 
 from .controller import Controller
+from .controller_state import describe
 
 __all__ = ["FaultInjector", "Services"]
 
@@ -55,7 +56,7 @@ class FaultInjector:
         self.dashboard_silent = False
         self.rtde_silent = False
         self._lines: dict[str, Callable[[], Any]] = {
-            "state": controller.describe,
+            "state": partial(describe, controller),
             "dashboard silent": lambda: self._set("dashboard_silent", True),
             "dashboard normal": lambda: self._set("dashboard_silent", False),
             "rtde silent": lambda: self._set("rtde_silent", True),
@@ -107,7 +108,12 @@ class FaultInjector:
             return None
         if not math.isfinite(current):
             return None
-        return partial(self._c.resist, int(joint) - 1, current)
+        return partial(self._resist, int(joint) - 1, current)
+
+    def _resist(self, joint: int, current: float) -> list[float]:
+        """Let a motor, counted from 0, take so much current beyond the model of the arm [A]; return all of them."""
+        self._c.resistance[joint] = current
+        return self._c.resistance
 
     def _set(self, name: str, value: bool) -> bool:
         setattr(self, name, value)

@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
+from coneskin.errors import RobotRefused
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.inertia import joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
@@ -96,9 +97,17 @@ class SimulatedArm:
         kinematic: True where the plant does exactly what is commanded.
         tcp: tool centre point in the flange frame.
         motion: command that moves the arm; None where the arm brakes or stands.
+
+    Raises:
+        RobotRefused: the first position is outside the limits of a joint.
     """
 
     def __init__(self, model: ArmModel, q: Sequence[float]) -> None:
+        for i, (low, angle, high) in enumerate(zip(model.joint_lower, q, model.joint_upper, strict=True), 1):
+            if not low <= angle <= high:
+                raise RobotRefused(
+                    f"start position of joint {i} must be in [{low:.3f}, {high:.3f}] rad, got {angle:.3f}"
+                )
         self.model = model
         self.inertia = arm_inertia(model)
         self.q = [float(angle) for angle in q]

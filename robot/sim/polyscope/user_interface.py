@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable
 
 from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.controller_state import describe
 from coneskin.robot.sim.urscript.values import ScriptError
 
 from .external_script import ScriptRequest
@@ -139,7 +140,7 @@ class UserInterface:
     def report(self, kind: str) -> int:
         """Keep the present state as a flight report; return its number."""
         self._count += 1
-        facts = {"id": self._count, "type": kind or "system", "state": self.controller.describe()}
+        facts = {"id": self._count, "type": kind or "system", "state": describe(self.controller)}
         self.reports.append(json.dumps(facts))
         return self._count
 

@@ -10,6 +10,7 @@ import pytest
 
 from coneskin.channel import Channel, pair
 from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.controller_state import describe
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
 from coneskin.robot.sim.motion.plant import PlantLost, PlantState
@@ -59,14 +60,14 @@ def test_what_is_measured_is_the_plant_and_what_is_the_target_is_not(moving) -> 
     assert outputs.getter("actual_qd")() == ELSEWHERE.qd
     assert outputs.getter("target_q")() == controller.arm.q
     assert controller.arm.q[0] != ELSEWHERE.q[0]
-    controller.resist(0, 0.5)
+    controller.resistance[0] = 0.5
     assert list(outputs.getter("actual_current")()) == [1.5, 2.0, 3.0, 0.0, 0.0, 0.0]
     assert outputs.getter("actual_TCP_pose")() != outputs.getter("target_TCP_pose")()
     assert outputs.getter("actual_TCP_speed")() != outputs.getter("target_TCP_speed")()
     packet = struct.unpack_from(">6d", encode_realtime(controller), 4 + 8 * 31)  # q actual: the 32nd double
     assert packet == ELSEWHERE.q
-    assert controller.describe()["q"] == list(ELSEWHERE.q)
-    assert controller.describe()["turning"]
+    assert describe(controller)["q"] == list(ELSEWHERE.q)
+    assert describe(controller)["turning"]
 
 
 def test_without_its_plant_the_arm_has_no_power_and_nothing_says_that_it_stands(moving) -> None:  # type: ignore[no-untyped-def]
@@ -78,9 +79,9 @@ def test_without_its_plant_the_arm_has_no_power_and_nothing_says_that_it_stands(
     assert controller.robot_mode is RobotMode.POWER_OFF
     assert controller.program is None
     assert plant.closed == 1  # it is not asked again
-    assert controller.describe()["plant_lost"] == "it fell off"
-    assert controller.describe()["qd"] == list(ELSEWHERE.qd)  # the last that was measured: no standstill is made up
-    assert controller.describe()["turning"]
+    assert describe(controller)["plant_lost"] == "it fell off"
+    assert describe(controller)["qd"] == list(ELSEWHERE.qd)  # the last that was measured: no standstill is made up
+    assert describe(controller)["turning"]
     events = [json.loads(line)["event"] for line in log.getvalue().splitlines()]
     assert "plant_lost" in events
     assert "standstill" not in events
