@@ -17,7 +17,7 @@ from coneskin.view.page_server import PageServer
 from coneskin.view.run_page import show_runs
 from coneskin.view.strand import Strand, read_strands
 
-from .browser import browser_page, look_closely, magenta, pixels, quiet, wait_for_text
+from .browser import browser_page, look_closely, magenta, pixels, quiet, violet, wait_for_text
 
 RUN = Path(__file__).parents[1] / "data" / "collision.rec"
 NOTICE = "No safety display"
@@ -51,6 +51,10 @@ def test_a_recording_is_scrubbed_to_its_touch() -> None:
         wait_for_text(page, "#coneskin-clock", "2.970 s")
         place = look_closely(server, page, point, normal)
         assert magenta(pixels(page, place)) > 5
+        page.get_by_label("potential").first.click()
+        page.get_by_role("option", name="touch phase, lower sheet").click()
+        wait_for_text(page, "#coneskin-potential", " V")
+        assert violet(pixels(page, place, 60)) > 50
         page.get_by_role("button", name="|<", exact=True).click()
         wait_for_text(page, "#coneskin-clock", "1.788 s")
         assert magenta(pixels(page, place)) == 0
