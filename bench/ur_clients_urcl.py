@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from faults_setup import give_precedence
+
 from coneskin.robot.sim.process import SimulatedController, free_host
 
 #: joint positions with which Universal Robots' own simulator starts [rad]
@@ -74,15 +76,15 @@ class Trial(NamedTuple):
     why: str = ""
 
 
-def controller(**options: Any) -> SimulatedController:
-    """Return a controller as the library's tests expect one: the programs that its documents name, a UR5e."""
-    return SimulatedController(
-        "UR5" if options.get("version") == "3.15" else "UR5e",
-        free_host(),
-        START_Q,
-        protective_stop="stop",
-        **options,
-    )
+@contextmanager
+def controller(**options: Any) -> Iterator[SimulatedController]:
+    """Run a controller as the library's tests expect one: a UR5e, before other processes, as hardware does."""
+    model = "UR5" if options.get("version") == "3.15" else "UR5e"
+    with SimulatedController(model, free_host(), START_Q, protective_stop="stop", **options) as simulated:
+        children = Path(f"/proc/{simulated.pid}/task/{simulated.pid}/children")
+        for task in (simulated.pid, *map(int, children.read_text().split() if children.exists() else ())):
+            give_precedence(task)
+        yield simulated
 
 
 def urcl(build: Path, source: Path, only: Sequence[str]) -> Iterator[Trial]:
