@@ -62,7 +62,8 @@ def show(trials: Iterable[Trial]) -> list[str]:
 
 def enter_own_network() -> None:
     """Start this program again in a network that has nothing but its loopback, where that is possible."""
-    inner = ["unshare", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
+    user = ["--map-root-user"] if os.geteuid() else []  # root stays root, and may give the controller its precedence
+    inner = ["unshare", *user, "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
     if os.environ.get(_IN_OWN_NETWORK) or shutil.which("unshare") is None or shutil.which("ip") is None:
         return
     if subprocess.run([*inner, "true"], capture_output=True, check=False).returncode == 0:
