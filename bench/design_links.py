@@ -4,8 +4,8 @@
     python bench/design_links.py --sheets 4 --no-bound LINK ...
 
 The bound: hypotheses of cones from many draws; each is fitted with every gate, and a line of revolution is looked for
-from each. All axes that are left, up to hundreds, are surveyed; packings are grown from sixty starts that lie apart,
-and the best eight are made on fine profiles, as what is found is. So the bound is sheets that exist: the best of them
+from each. All axes that are left, up to hundreds, are surveyed; packings are grown from sixteen starts that lie apart,
+and the best four are made on fine profiles, as what is found is. So the bound is sheets that exist: the best of them
 and of what is found. It shows what the search misses by trying few axes, few starts and few packings; it shares the
 rules of packing, so it does not show what these miss. "area" is that of the sheets over that of the hull, for both.
 
@@ -44,10 +44,10 @@ from coneskin.geometry.mesh import Mesh, load_mesh
 from coneskin.geometry.ray_casting import RayCaster
 
 TOLERANCE = 0.001
-SEEDS = 6
-MAX_AXES = 400  # the most often found
-STARTS = 60  # packings
-FINE = 8  # packings made on fine profiles
+SEEDS = 3
+MAX_AXES = 200  # the most often found
+STARTS = 16  # packings
+FINE = 4  # packings made on fine profiles
 APART = (math.radians(0.5), 0.001)  # rad, m: starts about axes nearer to each other are one
 
 

@@ -15,7 +15,7 @@ from .profile import RadialProfile
 from .side import StraightSide, azimuth_columns, fit_side
 from .touch_weights import TouchWeights
 
-__all__ = ["AxisPlan", "SheetRequirements", "SideLine", "plan_sheets", "side_lines"]
+__all__ = ["AxisPlan", "SheetRequirements", "SideLine", "largest_partial_wrap", "plan_sheets", "side_lines"]
 
 Floats = NDArray[np.float64]
 SideLine = tuple[float, float]  #: radius at z = 0 of the profile's frame [m], and dr/dz
@@ -134,7 +134,7 @@ def plan_sheets(
             held = profile
             for side in sides:
                 held = held.blocked(_neighbourhood(profile, side, requirements.gap))
-            part = _partial_wrap(held, lines, requirements, rows, rise)
+            part = largest_partial_wrap(held, lines, requirements, rows, rise)
             if part is None:
                 break
             sides = [*sides, part]
@@ -169,7 +169,7 @@ def _full_wraps(
     return found
 
 
-def _partial_wrap(
+def largest_partial_wrap(
     profile: RadialProfile, lines: list[SideLine], requirements: SheetRequirements, rows: int, rise: float
 ) -> StraightSide | None:
     """Return the largest side near one of the lines; None where none is large enough."""

@@ -75,7 +75,9 @@ def bare_areas(
         )
     take("flat", _flat(hull))
     least = f"{requirements.min_length * 1e3:g} mm long and {math.degrees(requirements.min_wrap):g} deg wide"
-    take(f"round, but without room for a sheet {least}", _round(surveys, hull, requirements.tolerance))
+    left = np.zeros(len(hull), bool)
+    left[bare] = _round(surveys, hull.subset(bare), requirements.tolerance)
+    take(f"round, but without room for a sheet {least}", left)
     take("curved in two ways, or in a corner", np.ones(len(hull), bool))
     return sorted(found, key=lambda area: -area.share)
 
@@ -96,7 +98,15 @@ def _further_plans(
     further: AxisPlan | None = None
     hindered: AxisPlan | None = None
     least = replace(requirements, least_gain=0.0)
-    for survey in surveys:
+    hopes = [
+        (max((about.area for about in plan_sheets(survey.profile, survey.lines, least, 1)), default=0.0), number)
+        for number, survey in enumerate(surveys)
+    ]
+    for hope, number in sorted(hopes, reverse=True):
+        # what is there already can only take from it
+        if hope <= min(about.area if about is not None else 0.0 for about in (further, hindered)):
+            break
+        survey = surveys[number]
         clear = kept_clear(survey.profile, list(plan.axes), requirements)
         taken = kept_clear(survey.profile, list(plan.axes), replace(requirements, thickness=0.0, gap=0.0))
         for profile, known in ((clear, further), (taken, hindered)):

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 _MAX_DUPLICATE_TILT = 0.002  # rad; angle below which two axes are one
 _MAX_DUPLICATE_SHIFT = 0.0002  # m; distance in the middle of the link below which two axes are one
 _MAX_DUPLICATE_RADIUS = 0.001  # m; difference of radii below which two cones about one axis are one
-_GATES = ((0.002, 0.0005), (0.002,), (0.005,))  # m; from exact tubes to crowned ones
+_GATES = ((0.002, 0.0005), (0.001,), (0.005,))  # m, one after another; from exact tubes to crowned ones
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,14 +64,16 @@ def find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
                 return
         found.append(AxisCandidate(origin, axis, (cone,) if cone else ()))
 
-    starts = cone_hypotheses(samples, max(0.0015, 0.004 * size))
-    for start in starts:
-        wide = max(0.006, 0.06 * start.radius)
-        for gates in _GATES:
-            cone = fit_cone(samples, start, (wide, *gates))
-            if cone is not None:
-                add(cone.origin, cone.axis, cone)
-                break
+    thinned = samples.subset(np.arange(len(samples)) % max(1, len(samples) // 2000) == 0)
+    for seed, distance in enumerate((max(0.0015, 0.004 * size), 0.001), 2):
+        for start in cone_hypotheses(samples, distance, seed=seed):
+            rough = fit_cone(thinned, start, (max(0.006, 0.06 * start.radius),), 0.4, 1e-2)
+            for gates in _GATES if rough is not None else ():
+                cone = rough
+                for gate in gates:
+                    cone = cone and fit_cone(samples, cone, (gate,), precision=1e-3)
+                    if cone is not None:
+                        add(cone.origin, cone.axis, cone)
     centred = samples.points - samples.points.mean(axis=0)
     principal = np.linalg.eigh(centred.T @ centred)[1].T
     begins: list[tuple[Floats, Floats] | None] = [None, (samples.points.mean(axis=0), principal[2])]

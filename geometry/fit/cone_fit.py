@@ -61,10 +61,13 @@ class InfiniteCone:
 
 def perpendicular_vectors(axis: Floats) -> tuple[Floats, Floats]:
     """Return two unit vectors that form a right-handed frame with an axis: (first, second, axis)."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = np.cross(helper, axis)
-    first /= np.linalg.norm(first)
-    return first, np.cross(axis, first)
+    x, y, z = (float(value) for value in axis)
+    # the cross product of the unit vector along the least component; numbers, because numpy is slow with three
+    least = min(abs(x), abs(y), abs(z))
+    a, b, c = (0.0, -z, y) if least == abs(x) else (z, 0.0, -x) if least == abs(y) else (-y, x, 0.0)
+    size = math.sqrt(a * a + b * b + c * c)
+    a, b, c = a / size, b / size, c / size
+    return np.array([a, b, c]), np.array([y * c - z * b, z * a - x * c, x * b - y * a])
 
 
 def distance_jacobian(cone: InfiniteCone, points: Floats) -> Floats:
@@ -90,7 +93,11 @@ def _slopes(local: Floats, rho: Floats, half_angle: float) -> Floats:
 
 
 def fit_cone(
-    samples: SurfaceSamples, start: InfiniteCone, gates: tuple[float, ...], angle: float = 0.2
+    samples: SurfaceSamples,
+    start: InfiniteCone,
+    gates: tuple[float, ...],
+    angle: float = 0.2,
+    precision: float = 1e-4,
 ) -> InfiniteCone | None:
     """Fit a cone to the points that lie near it and whose normals agree with its own.
 
@@ -99,6 +106,7 @@ def fit_cone(
         start: first guess; some points must lie within the first gate of it.
         gates: distances beyond which a point has no weight [m], decreasing; each is kept until the fit converges.
         angle: between the normals, above which a point has no weight [rad]; twice that at the first of several gates.
+        precision: last movement of the side, as a share of the last gate.
 
     Returns:
         the cone, with its origin in the middle of its points; None where too few points are left or the fit diverges.
@@ -114,7 +122,7 @@ def fit_cone(
             if better is None:
                 return None
             cone = better
-            if moved < (1e-4 if last else 1e-2) * gate:
+            if moved < (precision if last else 1e-2) * gate:
                 break
     return cone
 

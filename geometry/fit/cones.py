@@ -18,7 +18,7 @@ from .bare_areas import BareArea, bare_areas
 from .candidates import find_axis_candidates
 from .coverage_notes import bare_lengths, hull_note
 from .fitted_sheet import FittedSheet, fitted_sheet
-from .plan import AxisSurvey, SheetPlan, best_plan, survey_axes
+from .plan import AxisSurvey, SheetPlan, best_plan, better_surveys, survey_axes
 from .surface_samples import SurfaceSamples, sample_surface
 from .touch_weights import TouchWeights, exposure_weights
 
@@ -188,6 +188,7 @@ def find_cones(
     candidates = find_axis_candidates(hull)
     say("measuring profiles")
     surveys = survey_axes(mesh, rays, candidates, requirements)
+    surveys += better_surveys(mesh, rays, surveys, requirements)
     search = _Search(mesh, rays, hull, weighed, surveys, requirements)
     plan, refusal = search.plan(tolerance)
     name = "" if weights is None else weights.name

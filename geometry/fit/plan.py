@@ -16,6 +16,7 @@ from coneskin.geometry.ray_casting import RayCaster
 
 from .axis_plan import AxisPlan, SheetRequirements, SideLine, plan_sheets, side_lines
 from .axis_refinement import refine_axis
+from .axis_search import search_axis
 from .candidates import AxisCandidate
 from .clearance import clashing_cells
 from .cone_fit import InfiniteCone, fit_cone
@@ -23,7 +24,7 @@ from .profile import AxisFrame, RadialProfile, measure_profile
 from .side import covered_points, facet_offset
 from .surface_samples import SurfaceSamples
 
-__all__ = ["AxisSurvey", "SheetPlan", "best_plan", "kept_clear", "survey_axes"]
+__all__ = ["AxisSurvey", "SheetPlan", "best_plan", "better_surveys", "kept_clear", "survey_axes"]
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +32,9 @@ _COARSE_GRID = (120, 53)  # slices, and rays in each; odd, so that the rays do n
 _FINE_GRID = (512, 149)  # slices, and rays in each; odd for the same reason
 _STARTS = 5  # plans about one axis from which packings are grown
 _FINE_PACKINGS = 2  # packings made anew on fine profiles
+_SEARCHED = 5  # axes, no two beside each other, from which a better one is looked for
+_BESIDE = (0.005, 0.0005)  # rad, m
+_NEAR = 1.6  # times the tolerance within which an axis is promising
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +93,43 @@ def survey_axes(
         profile = _profile(mesh, rays, frame, _COARSE_GRID, requirements)
         surveys.append(AxisSurvey(profile, side_lines(profile, candidate.cones)))
     return surveys
+
+
+def better_surveys(
+    mesh: Mesh, rays: RayCaster, surveys: list[AxisSurvey], requirements: SheetRequirements
+) -> list[AxisSurvey]:
+    """Return surveys about axes near the best ones about which a sheet covers more, within a tolerance.
+
+    Args:
+        mesh: the link.
+        rays: a ray caster of the same mesh.
+        surveys: of the axes, as ``survey_axes`` returns them.
+        requirements: on the sheets.
+    """
+    near = replace(requirements, tolerance=_NEAR * requirements.tolerance)
+    alone = [(plan, one) for one in surveys for plan in plan_sheets(one.profile, one.lines, near, 1)]
+    found: list[AxisSurvey] = []
+    kept: list[AxisFrame] = []
+    for plan, one in sorted(alone, key=lambda pair: -pair[0].area):
+        frame = one.profile.frame
+        if len(kept) == _SEARCHED or any(_beside(frame, other) for other in kept):
+            continue
+        kept.append(frame)
+        (side,) = plan.sides
+        better = search_axis(one.profile, side, one.lines, requirements)
+        if better is not None:
+            profile = _profile(mesh, rays, better, _COARSE_GRID, requirements)
+            moved = float((better.origin - frame.origin) @ frame.axis)
+            cone = InfiniteCone(better.origin, better.axis, side.radius + side.slope * moved, math.atan(side.slope))
+            found.append(AxisSurvey(profile, side_lines(profile, (cone,))))
+    return found
+
+
+def _beside(frame: AxisFrame, other: AxisFrame) -> bool:
+    """Tell whether two axes are so near each other that a search from one finds what it finds from the other."""
+    gap = frame.origin - other.origin
+    tilt = float(np.linalg.norm(np.cross(frame.axis, other.axis)))
+    return tilt < _BESIDE[0] and float(np.linalg.norm(gap - (gap @ other.axis) * other.axis)) < _BESIDE[1]
 
 
 def best_plan(

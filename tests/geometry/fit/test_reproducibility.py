@@ -1,0 +1,66 @@
+"""The same mesh gives the same sheets at any number of samples, looser is not worse, and what is advised works."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable
+
+import pytest
+
+from coneskin.geometry.fit.cones import LinkFit, find_cones
+from coneskin.geometry.mesh import Mesh
+
+from ..synthetic import barrel, holed, noisy, placed, rugby, shoulder
+from .test_cones import link
+
+PLANTED: dict[str, Callable[[], Mesh]] = {
+    "rugby": lambda: placed(noisy(rugby(), 2e-4)),
+    "barrel": lambda: placed(barrel()),
+    "shoulder": lambda: placed(shoulder()),
+    "holed": lambda: placed(holed()),
+}
+REAL = {
+    name: (lambda name=name: link(name))  # type: ignore[misc]
+    for name in ("ur/ur10/collision/upperarm.stl", "ur/ur5e/visual/forearm.dae", "xarm/uf850_link4.stl")
+}
+LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("barrel", "shoulder", "holed", *REAL)]
+
+
+def mesh_of(name: str) -> Mesh:
+    return {**PLANTED, **REAL}[name]()
+
+
+def area(fit: LinkFit) -> float:
+    return sum(sheet.frustum.area for sheet in fit.sheets)
+
+
+@pytest.mark.parametrize("name", ["rugby", *LONG])
+def test_the_sheets_do_not_depend_on_the_samples(name: str) -> None:
+    mesh = mesh_of(name)
+    one, *others = (find_cones(mesh, samples=count) for count in (3000, 12_000, 40_000))
+    assert one.sheets
+    for other in others:
+        assert [sheet.placed for sheet in one.sheets] == [sheet.placed for sheet in other.sheets]
+        for a, b in zip(one.sheets, other.sheets, strict=True):
+            assert a.area_share == pytest.approx(b.area_share, abs=0.03)  # three standard deviations of 3000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", REAL)
+def test_a_looser_tolerance_is_never_worse_on_a_real_link(name: str) -> None:
+    mesh = mesh_of(name)
+    areas = [area(find_cones(mesh, tolerance)) for tolerance in (7e-4, 1e-3, 1.4e-3, 2e-3)]
+    assert all(b > 0.99 * a for a, b in itertools.pairwise(areas))
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long) for name in (*PLANTED, *REAL)])
+def test_a_sheet_more_covers_more_where_that_is_advised(name: str) -> None:
+    mesh = mesh_of(name)
+    fit = find_cones(mesh, max_sheets=1)
+    for reason in [bare.reason for bare in fit.bare_areas]:
+        found = re.search(r"allow (\d+) sheets", reason)
+        if found:
+            more = find_cones(mesh, max_sheets=int(found[1]))
+            assert len(more.sheets) == int(found[1])
+            assert area(more) > area(fit)
