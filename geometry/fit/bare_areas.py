@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 _NEIGHBOURS = 8  # samples, half of which must face one way where the hull is flat: beside an edge no more do
 _FLAT_COSINE = math.cos(math.radians(2.0))
 _ROUND_COSINE = 0.985
+_STRAIGHT_SINE = 0.06
+_LEAST_LENGTH = 0.010  # m; a cone touches a dome of 40 mm over less
 _LEAST_SHARE = 0.01  # of the hull; less is not reported
 
 
@@ -138,5 +140,10 @@ def _round(surveys: list[AxisSurvey], hull: SurfaceSamples, tolerance: float) ->
             if radius > 0.0:
                 cone = InfiniteCone(frame.origin, frame.axis, radius, math.atan(slope))
                 near = np.abs(cone.distances(hull.points)) <= tolerance
-                on_cone |= near & (cone.alignment(hull.points, hull.normals) > _ROUND_COSINE)
+                near &= cone.alignment(hull.points, hull.normals) > _ROUND_COSINE
+                # along a straight side the normals keep their angle with the axis; on a dome they turn
+                near &= np.abs(hull.normals @ cone.axis + math.sin(cone.half_angle)) < _STRAIGHT_SINE
+                heights = (hull.points[near] - cone.origin) @ cone.axis
+                if len(heights) and float(np.subtract(*np.percentile(heights, (95, 5)))) >= _LEAST_LENGTH:
+                    on_cone |= near
     return on_cone

@@ -78,7 +78,8 @@ def bare_lengths(
         if reason[first] and k - first > 1:  # a single slice at a rim does not count
             kinds = np.bincount(reason[first:k], minlength=4)
             length = (k - first) * profile.step
-            worst = float(np.median(spread[first:k][np.isfinite(spread[first:k])], axis=0)) if kinds[1:3].any() else 0.0
+            finite = spread[first:k][np.isfinite(spread[first:k])]
+            worst = float(np.median(finite if len(finite) else (high - follows)[first:k]))
             if kinds[1] >= max(kinds[2], kinds[3]):
                 straight = _straight_length(profile, high, low, slice(first, k), tolerance, min_length)
                 if length < min_length:

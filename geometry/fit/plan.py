@@ -31,7 +31,8 @@ Floats = NDArray[np.float64]
 _COARSE_GRID = (120, 53)  # slices, and rays in each; odd, so that the rays do not hit facets in step
 _FINE_GRID = (512, 149)  # slices, and rays in each; odd for the same reason
 _STARTS = 5  # plans about one axis from which packings are grown
-_FINE_PACKINGS = 2  # packings made anew on fine profiles
+_STARTS_APART = 3  # more of them, about axes that are not beside those
+_FINE_PACKINGS = 3  # packings made anew on fine profiles
 _SEARCHED = 5  # axes, no two beside each other, from which a better one is looked for
 _BESIDE = (0.005, 0.0005)  # rad, m
 _NEAR = 1.6  # times the tolerance within which an axis is promising
@@ -162,13 +163,17 @@ def _packings(surveys: list[AxisSurvey], requirements: SheetRequirements) -> lis
     singles = [_Choice(number, plan) for number, plans in enumerate(alone) for plan in plans]
     singles.sort(key=lambda choice: -choice.plan.score(requirements))
     packings: list[list[_Choice]] = []
-    seen: set[tuple[int, ...]] = set()
+    seen: list[_Choice] = []
     for start in singles:
-        if len(seen) >= _STARTS:
+        if len(seen) >= _STARTS + _STARTS_APART:
             break
-        if start.axis in {axes[0] for axes in seen if axes[1] == len(start.plan.sides)}:
+        alike = [other for other in seen if len(other.plan.sides) == len(start.plan.sides)]
+        if any(other.axis == start.axis for other in alike):
             continue
-        seen.add((start.axis, len(start.plan.sides)))
+        frame = start.plan.profile.frame
+        if len(seen) >= _STARTS and any(_beside(frame, other.plan.profile.frame) for other in alike):
+            continue
+        seen.append(start)
         packings.append(_grown([start], surveys, alone, requirements))
     return sorted(packings, key=lambda packing: -sum(choice.plan.score(requirements) for choice in packing))
 
