@@ -1,0 +1,160 @@
+"""What a workshop builds: the jig's distance to real links, STEP read back by another reader, and the blind seam.
+
+python -m pip install -e '.[design,cad,bench]'; python bench/build.py --links FOLDER
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from report import head
+
+import coneskin as cs
+from coneskin.design.seam_strip import blind_angle, cover_seams
+from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.workshop.jig import Collar, jig_collars
+from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
+from coneskin.geometry.drawing.layer_stack import parallel_frustum
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.pose import Pose
+from coneskin.geometry.solid.step import WrappedLayer, write_step
+
+SAMPLES = 40_000  # on each link
+NEAREST = 800  # of them, near a part
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--links", type=Path, help="folder of link meshes")
+    args = parser.parse_args()
+    print(head("trimesh", "cadquery-ocp-novtk", "gmsh"))
+    print("\nblind angle of a full wrap [deg]; strip: its own four wires")
+    seams()
+    print("\nSTEP: distance of the surfaces that gmsh reads from the exact ones [m]")
+    step()
+    if args.links:
+        print("\njig: nearest distance of link and printed part [mm]; clearance 0.3 mm")
+        for path in sorted([*args.links.rglob("*.dae"), *args.links.rglob("*.stl")]):
+            jig(path)
+
+
+def seams() -> None:
+    narrow = ElectrodePlan(margin=4e-3, electrode=3e-3, lead=3e-3, clearance=1e-3, hole=0.0)
+    rows = {"default": DesignOptions(), "narrow electrodes": DesignOptions(plan=narrow)}
+    rows |= {"flap of 10 mm": DesignOptions(overlap=10e-3), "strip": DesignOptions(cover_seam=True)}
+    rows["strip, narrow"] = DesignOptions(plan=narrow, cover_seam=True)
+    for radius in (0.0375, 0.054, 0.075):
+        for name, options in rows.items():
+            sheets = cover_seams(design_sheets([PlacedFrustum(Frustum(radius, radius, 0.2))], options))
+            print(f"  radius {1e3 * radius:5.1f} mm  {name:18} {math.degrees(_blind(sheets)):6.2f}")
+
+
+def _blind(sheets: tuple[SheetDesign, ...], steps: int = 36_000) -> float:
+    """Return the angle at the middle of the link where no sheet locates a touch [rad]: each azimuth is looked at."""
+    phi = np.arange(steps) * 2.0 * math.pi / steps
+    seen = np.zeros(steps, bool)
+    for sheet in sheets:
+        spin = sheets[0].place.link_frustum.inverse() @ sheet.place.link_frustum
+        x, y, _ = spin.rotate((1.0, 0.0, 0.0))
+        local = (phi - math.atan2(y, x)) % (2.0 * math.pi)
+        box = sheet.layout.active
+        seen |= (local >= box.phi1 - 1e-9) & (local <= box.phi2 + 1e-9)
+    assert len(sheets) > 1 or abs(float((~seen).mean()) * 2.0 * math.pi - blind_angle(sheets[0])) < 1e-3
+    return float((~seen).mean()) * 2.0 * math.pi
+
+
+def step() -> None:
+    import gmsh
+
+    pose = Pose.from_xyz_rpy((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
+    for name, side in {
+        "cone": Frustum(0.05, 0.07, 0.15, math.radians(300.0)),
+        "cylinder": Frustum(0.054, 0.054, 0.4),
+        "slender cone": Frustum(0.05, 0.0501, 0.3),
+        "disc": Frustum(0.03, 0.1, 0.005, math.radians(200.0)),
+    }.items():
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "sheet.step"
+            write_step(path, [WrappedLayer(name, side, 2.5e-3, pose)])
+            gmsh.initialize()
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+            gmsh.model.occ.importShapes(str(path))
+            gmsh.model.occ.synchronize()
+            worst = 0.0
+            for _, tag in gmsh.model.getEntities(2):
+                low, high = gmsh.model.getParametrizationBounds(2, tag)
+                a, b = (np.linspace(x, y, 21) for x, y in zip(low, high, strict=True))
+                grid = np.stack(np.meshgrid(a, b), -1).reshape(-1, 2)
+                points = np.array(gmsh.model.getValue(2, tag, grid.ravel())).reshape(-1, 3)
+                worst = max(worst, float(_off(side, 2.5e-3, pose.inverse().apply_all(points)).max()))
+            volume = gmsh.model.occ.getMass(3, gmsh.model.getEntities(3)[0][1])
+            gmsh.finalize()
+        outer = parallel_frustum(side, 2.5e-3)
+        exact = (
+            0.5 * side.wrap * side.slant * 2.5e-3 * 0.5 * (side.radius1 + side.radius2 + outer.radius1 + outer.radius2)
+        )
+        print(f"  {name:13} {worst:.1e}   volume {volume / exact - 1.0:+.1e}")
+
+
+def _off(side: Frustum, thickness: float, points: np.ndarray) -> np.ndarray:
+    """Return the distance of points from the nearest of the six faces of a layer [m]."""
+    x, y, z = points.T
+    radius, phi = np.hypot(x, y), np.arctan2(y, x) % (2.0 * math.pi)
+    along = (radius - side.radius1) * side.sin_half_angle + z * side.cos_half_angle
+    above = (radius - side.radius1) * side.cos_half_angle - z * side.sin_half_angle
+    faces = [np.abs(above), np.abs(above - thickness), np.abs(along), np.abs(along - side.slant)]
+    faces += [np.abs(np.sin(phi)) * radius, np.abs(np.sin(phi - side.wrap)) * radius]
+    return np.min(faces, axis=0)
+
+
+def jig(path: Path) -> None:
+    try:
+        design = cs.design_link(path)
+    except cs.ConeSkinError as exc:
+        print(f"  {path.name}: {str(exc)[:90]}")
+        return
+    assert design.mesh is not None
+    points = trimesh.Trimesh(design.mesh.vertices, design.mesh.faces, process=False).sample(SAMPLES, seed=1)
+    for index, sheet in enumerate(design.sheets):
+        collars, without = jig_collars(sheet, design.mesh, design.sheets[:index])
+        for collar in collars:
+            near = [_nearest(sheet, collar, part.surface, points) for part in collar.parts]
+            print(
+                f"  {path.name} {sheet.name} end {collar.end}: {min(near):.3f}, lip {1e3 * collar.lip:.1f} mm"
+                f"{', flush' if collar.flush else ''}{', keyed' if collar.keyed else ''}"
+            )
+        for sentence in without:
+            print(f"  {path.name} {sheet.name}: {sentence}")
+
+
+def _nearest(sheet: SheetDesign, collar: Collar, surface: Mesh, points: np.ndarray) -> float:
+    """Return the distance of the nearest point of the link to a part [mm]; -1 where one is in the plastic."""
+    plan, side = sheet.options.jig, sheet.place.frustum
+    lift, sign = sheet.options.stack.thickness * side.sin_half_angle, (-1.0 if collar.end == 1 else 1.0)
+    start = (min(0.0, -lift) if collar.end == 1 else side.height + max(0.0, -lift)) + sign * plan.clearance
+    x, y, z = sheet.place.link_frustum.inverse().apply_all(points).T
+    local = np.column_stack([x, sign * y, sign * (z - start) + plan.reach])
+    part = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+    assert part.is_volume
+    low, high = part.bounds
+    close = local[((local > low - 2e-3) & (local < high + 2e-3)).all(axis=1)]
+    if len(close) == 0:
+        return math.inf
+    chosen = close[:: max(1, len(close) // NEAREST)]
+    if part.contains(chosen).any():
+        return -1.0
+    with np.errstate(all="ignore"):
+        distance = trimesh.proximity.closest_point(part, chosen)[1]
+    return 1e3 * float(distance[distance > 0.0].min())  # a sliver has no closest point: trimesh returns nan or 0
+
+
+if __name__ == "__main__":
+    main()
