@@ -1,7 +1,8 @@
 """Integrators of a contact: error against run time, ours and scipy's Radau, BDF and LSODA; and how stable ours is.
 
-    python bench/impact_integrators.py            # tables, about five minutes
-    python bench/impact_integrators.py --quick    # one case
+    python bench/impact_integrators.py              # tables, ten minutes
+    python bench/impact_integrators.py --quick      # one case
+    python bench/impact_integrators.py --stability  # the extremes only
 
 Error: of the peak force and of the force at the end, relative to the peak, against 60 digits (``impact_reference``).
 scipy's are given what the purpose-made one has: they are restarted at each event, which they locate themselves
@@ -228,10 +229,12 @@ def stability() -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="one case only")
+    parser.add_argument("--stability", action="store_true", help="the extremes only")
     args = parser.parse_args()
     print(head("scipy", "mpmath", "numpy"))
     check_reference()
-    for name, (contact, horizon) in list(CASES.items())[: 1 if args.quick else None]:
+    cases = [] if args.stability else list(CASES.items())[: 1 if args.quick else None]
+    for name, (contact, horizon) in cases:
         compare(name, contact, horizon)
     if not args.quick:
         stability()
