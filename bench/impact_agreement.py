@@ -3,8 +3,9 @@
     python bench/impact_agreement.py --contacts 40
 
 In MuJoCo six joints with servos and torque limits move an arm; the model has one mass on one servo. Both get the same
-padding, body, reaction time and deceleration; the guard has no part in it. Where the arm turns by more than a little,
-or a joint's torque saturates, the model does not hold; both are told.
+padding, body, reaction time and deceleration; the guard has no part in it. The model holds for a push along the normal:
+where the speed along the normal changes by more than 10 % because the arm turns, the surface recedes by more than 5 %
+of the compression because it slides past the body, or a joint's torque saturates, it does not.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from coneskin.permissible_speed.taylor_integrator import integrate
 from coneskin.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.physics.mujoco_plant import MujocoPlant
 from coneskin.physics.scene_description import SheetOnLink
-from coneskin.robot.arm.inertia import effective_mass
+from coneskin.robot.arm.inertia import effective_mass, mass_matrix
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.ur_inertias import arm_inertia
@@ -47,12 +48,16 @@ def contact(seed: int) -> tuple[float, float, float, float, bool, bool] | None:
     padding = Padding(loss=chance.choice([0.0, 0.3, 1.0]))
     point, pose = CONE.point(u, phi), link_pose(MODEL, q, LINK)
     normal = np.array(pose.rotate(CONE.normal(phi)))
-    lever = float(normal @ np.array(point_jacobian(MODEL, q, LINK, point))[:, joint])
+    jacobian = np.array(point_jacobian(MODEL, q, LINK, point))
+    levers = normal @ jacobian
+    lever = float(levers[joint])
     speed = rate * abs(lever)
     if speed < 0.02:
         return None
+    diagonal = np.diag(np.array(mass_matrix(MODEL, arm_inertia(MODEL), q)))  # of which the plant makes its servos
+    stiff = float(1.0 / np.sum(levers**2 / (diagonal * SERVO**2)))
     heavy = effective_mass(MODEL, arm_inertia(MODEL), q, LINK, point, tuple(normal))
-    arm = DrivenArm(speed, heavy, heavy * SERVO**2, 2.0 * heavy * SERVO, REACTION, braking * abs(lever))
+    arm = DrivenArm(speed, heavy, stiff, 2.0 * stiff / SERVO, REACTION, braking * abs(lever))
     body = StruckBody(mass, support=stiffness, damping=0.6 * math.sqrt(stiffness * mass))
     course = integrate(TwoMassContact(arm, body, padding), HORIZON)
     ball = tuple(np.array(pose.apply(point)) + RADIUS * normal)
@@ -71,7 +76,14 @@ def contact(seed: int) -> tuple[float, float, float, float, bool, bool] | None:
         now += change
         most = max(most, *(abs(t) / limit for t, limit in zip(plant.torque, limits, strict=True)))
     turned = abs(target[joint] - q[joint])
-    holds = most < 0.99 and turned < 0.15
+    axis = np.array(pose.rotate(CONE.link_frustum.rotate((0.0, 0.0, 1.0))))
+    around = np.cross(axis, normal) @ jacobian[:, joint] * turn
+    aside = abs(around) / speed * min(course.stopping_distance, speed * HORIZON)
+    recedes = aside**2 / (2.0 * (RADIUS + CONE.frustum.radius1))
+    swings = (
+        turned * float(np.linalg.norm(jacobian[:, joint])) / abs(lever)
+    )  # by what the speed along the normal changes
+    holds = most < 0.99 and swings < 0.1 and recedes < 0.05 * course.deepest
     return (
         speed,
         course.peak / plant.peak - 1.0,
@@ -94,9 +106,11 @@ def main() -> None:
         if one is not None:
             found.append(one)
     print(f"{len(found)} contacts of a UR5e's forearm; the model over MuJoCo, less 1")
-    print(f"{'':44}{'count':>6}{'peak: median':>14}{'95 %':>8}{'worst':>8}{'impulse: worst':>16}{'depth: worst':>14}")
+    print(
+        f"{'':44}{'count':>6}{'within 5 %':>12}{'peak: median':>14}{'95 %':>8}{'worst':>8}{'impulse: worst':>16}{'depth: worst':>14}"
+    )
     groups = {
-        "holds: no torque saturates, turned < 8.6 deg": [one for one in found if one[5]],
+        "holds: a push along the normal": [one for one in found if one[5]],
         "... padding does not bottom out": [one for one in found if one[5] and not one[4]],
         "... padding bottoms out": [one for one in found if one[5] and one[4]],
         "does not hold": [one for one in found if not one[5]],
@@ -106,7 +120,7 @@ def main() -> None:
             peaks = [abs(one[1]) for one in rows]
             signed = quantile([one[1] for one in rows], 0.5)
             print(
-                f"{name:44}{len(rows):>6}{signed:>+14.1%}{quantile(peaks, 0.95):>8.1%}{max(peaks):>8.1%}"
+                f"{name:44}{len(rows):>6}{sum(p <= 0.05 for p in peaks):>12}{signed:>+14.1%}{quantile(peaks, 0.95):>8.1%}{max(peaks):>8.1%}"
                 f"{max(abs(one[2]) for one in rows):>16.1%}{max(abs(one[3]) for one in rows):>14.1%}"
             )
 

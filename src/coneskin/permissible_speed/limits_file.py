@@ -34,7 +34,7 @@ _MEASURED = (
     Key("reaction_ms", low=0.0, high=1000.0),
     Key("deceleration_rad_s2", low=0.1, high=100.0),
     Key("by", str),
-    Key("servo_hz", float, 16.0, low=0.1, high=200.0),
+    Key("servo_hz", float, 17.0, low=0.1, high=200.0),
 )
 _REGION = (
     Key("name", str),
@@ -82,7 +82,7 @@ class MeasuredReaction:
     reaction: float
     deceleration: float
     by: str
-    servo: float = 16.0
+    servo: float = 17.0
 
 
 @dataclass(frozen=True, slots=True)
