@@ -247,13 +247,13 @@ def test_one_that_is_gone_without_a_word_makes_room(server: Server, reader: Read
     assert reader.read() >= 5
 
 
-def flood(server: Server, reader: Reader, service: str, number: int, seed: int) -> None:
+def flood(server: Server, reader: Reader, service: str, number: int, seed: int, batch: int = 2000) -> None:
     """Send malformed packets, anew where the connection is ended; the reader has its packet in each cycle."""
     dice, left, waiting = random.Random(seed), number, b""
     client = connect(server, service)
     while left or waiting:
         try:
-            while left and len(waiting) < 2000:
+            while left and len(waiting) < batch:
                 waiting += malformed_packet(service, dice)
                 left -= 1
             with contextlib.suppress(BlockingIOError):
@@ -279,8 +279,8 @@ def test_malformed_packets_change_nothing_for_another_client(server: Server, rea
 @pytest.mark.long
 @pytest.mark.parametrize("service", SERVICES)
 def test_many_malformed_packets_change_nothing_for_another_client(server: Server, reader: Reader, service: str) -> None:
-    """A tenth of what bench/sim_ur_sturdy.py sends to a controller in a process of its own."""
-    flood(server, reader, service, 10_000, 17)
+    """A hundred thousand, in batches; what is left of a batch goes with a connection that is ended."""
+    flood(server, reader, service, 100_000, 17, batch=3_000 if service == "robot API" else 30_000)
     server.controller.stop_program("test")
     server.controller.unlock(early=True)
     with connect(server, "secondary") as client:
