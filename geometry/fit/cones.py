@@ -27,7 +27,7 @@ __all__ = ["BareLength", "LinkFit", "find_cones"]
 Floats = NDArray[np.float64]
 
 TURN = 2.0 * math.pi
-HULL_SHARE = 0.10  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
+HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.05  #: share of the hull that a further sheet must add; a fillet adds less
 SEARCH_SAMPLES = 6000  #: points on the mesh from which the axes are found, whatever ``samples`` is
 _MOST_TOLERANCE = 0.020  # m; a sheet that stands off further does not follow the link
