@@ -15,7 +15,6 @@ from coneskin.view.page_server import PageServer
 
 FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
 SIZE = {"width": 820, "height": 400}
-FIELD_OF_VIEW = math.radians(50.0)  # of the page's camera, from top to bottom
 TIMEOUT = 120_000.0  # ms; a busy machine draws slowly
 
 
@@ -58,22 +57,6 @@ def look_closely(server: PageServer, page: Any, point: Vector, normal: Vector) -
     canvas = max((item.bounding_box() for item in page.query_selector_all("canvas")), key=lambda box: box["width"])
     focal = 0.5 * canvas["height"] / math.tan(0.5 * camera.fov)
     assert z > 0.1
-    return (
-        round(canvas["x"] + 0.5 * canvas["width"] + focal * x / z),
-        round(canvas["y"] + 0.5 * canvas["height"] + focal * y / z),
-    )
-
-
-def project(page: Any, reach: float, point: Vector, count: int = 1) -> tuple[int, int]:
-    """Where on the page a point is to a viewer who has just come: the pinhole camera of ``look_at_stages``."""
-    away = 0.5 * reach * (1.0 + 0.5 * (count - 1))
-    eye, at = np.array((-away, -away, 0.6 * reach)), np.array((-0.1 * reach, 0.0, 0.3 * reach))
-    ahead = (at - eye) / np.linalg.norm(at - eye)
-    right = np.cross(ahead, (0.0, 0.0, 1.0)) / np.linalg.norm(np.cross(ahead, (0.0, 0.0, 1.0)))
-    down = np.cross(ahead, right)
-    x, y, z = (float((np.array(point) - eye) @ axis) for axis in (right, down, ahead))
-    canvas = max((item.bounding_box() for item in page.query_selector_all("canvas")), key=lambda box: box["width"])
-    focal = 0.5 * canvas["height"] / math.tan(0.5 * FIELD_OF_VIEW)
     return (
         round(canvas["x"] + 0.5 * canvas["width"] + focal * x / z),
         round(canvas["y"] + 0.5 * canvas["height"] + focal * y / z),
