@@ -54,7 +54,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "primary_pipeline_calibration_example": (),
     "primary_pipeline_example": ("2",),
     "rtde_client_example": ("2",),
-    "script_command_interface_example": (),
+    "script_command_interface_example": ("2",),
     "script_sender_example": ("2",),
     "send_script": (),
     "spline_example": (),
