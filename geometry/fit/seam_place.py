@@ -22,7 +22,7 @@ from .cones import LinkFit
 from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights, exposure_weights
 
-__all__ = ["SeamPlace", "place_seams"]
+__all__ = ["ChosenSeam", "place_seams"]
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _NEAR = 1  # azimuths on both sides that count too: a blind seam is 20 to 35 deg
 _SHIELDED = 0.005  # of the half-space; a smaller difference between the sides is the error of the rays
 
 
-class SeamPlace(NamedTuple):
+class ChosenSeam(NamedTuple):
     """Where the seam about one axis was put."""
 
     axis: int  #: number of the axis
@@ -43,7 +43,7 @@ class SeamPlace(NamedTuple):
     reason: str  #: a sentence for a person
 
 
-def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -> tuple[LinkFit, tuple[SeamPlace, ...]]:
+def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -> tuple[LinkFit, tuple[ChosenSeam, ...]]:
     """Turn the full wraps of a fit until their seams lie where the link shields them most.
 
     Sheets about one axis are turned together, so that their cables run side by side. Partial wraps stay: they have no
@@ -56,7 +56,7 @@ def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -
     """
     rays = RayCaster(mesh)
     sheets = list(fit.sheets)
-    places: list[SeamPlace] = []
+    places: list[ChosenSeam] = []
     for axis in dict.fromkeys(sheet.axis for sheet in sheets):
         full = [i for i, sheet in enumerate(sheets) if sheet.axis == axis and sheet.frustum.wrap == TURN]
         if not full:
@@ -77,7 +77,7 @@ def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -
             )
         direction = sheets[full[0]].placed.link_frustum.rotate((1.0, 0.0, 0.0))
         names = " and ".join(str(i + 1) for i in full)
-        places.append(SeamPlace(axis, direction, shielded, least, _reason(names, direction, shielded, least, weights)))
+        places.append(ChosenSeam(axis, direction, shielded, least, _reason(names, direction, shielded, least, weights)))
     return replace(fit, sheets=tuple(sheets)), tuple(places)
 
 
