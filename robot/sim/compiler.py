@@ -52,15 +52,17 @@ class Compiler:
         self._done: SimpleQueue[Result] = SimpleQueue()
         self._waiting: deque[tuple[int, str, bool]] = deque()
         self._newest = 0  # number of the last program that is not a secondary one
-        self._thread = threading.Thread(target=self._translate_long_ones, daemon=True)
+        self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Compiler:
+        self._thread = threading.Thread(target=self._translate_long_ones, args=(_start_worker(),), daemon=True)
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._todo.put(None)
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
 
     def submit(self, number: int, text: str, *, secondary: bool = False) -> None:
         """Translate a program; `results` returns it with its number, soon if it is short or was translated before.
@@ -110,8 +112,7 @@ class Compiler:
             ready.append(self._done.get())
         return ready
 
-    def _translate_long_ones(self) -> None:
-        worker = _start_worker()
+    def _translate_long_ones(self, worker: subprocess.Popen[bytes]) -> None:
         try:
             while (job := self._todo.get()) is not None:
                 number, text, secondary = job
