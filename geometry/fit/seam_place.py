@@ -43,7 +43,9 @@ class ChosenSeam(NamedTuple):
     reason: str  #: a sentence for a person
 
 
-def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -> tuple[LinkFit, tuple[ChosenSeam, ...]]:
+def place_seams(
+    fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None
+) -> tuple[LinkFit, tuple[ChosenSeam, ...]]:
     """Turn the full wraps of a fit until their seams lie where the link shields them most.
 
     Sheets about one axis are turned together, so that their cables run side by side. Partial wraps stay: they have no
