@@ -50,14 +50,15 @@ MAY_IMPORT: dict[str, str] = {
     "robot.sim.polyscope": "robot.sim robot.sim.ports robot.sim.urscript",
     "robot.sim.ports": "robot.sim robot.sim.motion robot.sim.urscript robot.arm robot.ur geometry",
     "robot.sim.urscript": "geometry",
-    "scene": "robot.arm robot.driver robot.guard robot.reaction robot.stop skin skin.detection skin.sources "
-    "skin.virtual geometry",
-    "calibration": "commissioning scene session skin skin.detection geometry.drawing",
+    "scene": "scene.tables robot.arm robot.driver robot.guard robot.reaction robot.stop skin skin.detection "
+    "skin.sources skin.virtual geometry",
+    "scene.tables": "scene robot.arm robot.reaction robot.stop skin skin.detection skin.sources skin.virtual geometry",
+    "calibration": "commissioning scene scene.tables session skin skin.detection geometry.drawing",
     "commissioning": "scene session robot.arm robot.driver skin skin.detection skin.sources geometry",
     "doctor": "commissioning scene skin skin.detection skin.diagnosis skin.sources skin.virtual robot.arm robot.driver",
-    "session": "code_version scene recording_file robot.arm robot.driver robot.guard robot.stop skin "
+    "session": "code_version scene scene.tables recording_file robot.arm robot.driver robot.guard robot.stop skin "
     "skin.diagnosis skin.sources skin.virtual",
-    "permissible_speed": "scene robot.arm skin geometry",
+    "permissible_speed": "scene scene.tables robot.arm skin geometry",
     "physics": "scene testing robot.arm robot.driver robot.guard robot.sim.motion skin skin.virtual geometry",
     "replay": "code_version scene recording_file robot.arm robot.driver robot.guard skin skin.detection",
     "runs": "code_version replay scene recording_file geometry robot.arm robot.driver robot.guard robot.sim skin "
@@ -66,13 +67,13 @@ MAY_IMPORT: dict[str, str] = {
     "view.stage": "scene robot.arm skin skin.field geometry",
     "studio": "view design geometry geometry.fit geometry.drawing",
     "view": "view.stage replay scene recording_file robot.arm robot.driver robot.guard skin geometry",
-    "design": "design.workshop scene skin skin.firmware geometry geometry.fit geometry.drawing geometry.solid "
+    "design": "design.workshop scene.tables skin skin.firmware geometry geometry.fit geometry.drawing geometry.solid "
     "robot.arm",
-    "design.workshop": "design scene skin skin.diagnosis geometry geometry.drawing geometry.solid",
-    "commands": "physics permissible_speed calibration commissioning design doctor monitor scene session replay runs "
+    "design.workshop": "design scene.tables skin skin.diagnosis geometry geometry.drawing geometry.solid",
+    "commands": "physics permissible_speed calibration commissioning design doctor monitor scene scene.tables session replay runs "
     "studio view view.stage geometry geometry.fit geometry.drawing skin skin.field skin.firmware skin.detection "
     "skin.sources robot.arm robot.driver robot.guard robot.sim commands.arguments",
-    "commands.arguments": "design geometry geometry.drawing scene skin",
+    "commands.arguments": "design geometry geometry.drawing scene.tables skin",
     "testing": "scene robot.arm robot.driver robot.guard robot.reaction robot.stop robot.ur skin skin.detection "
     "skin.sources skin.virtual geometry",
     "testing.field": "skin.field",
@@ -102,7 +103,7 @@ HOMES = {
     "pinocchio": ("src/coneskin/testing/pinocchio_arm.py",),
     "tomli_w": (
         "src/coneskin/permissible_speed/speed_map_file.py",
-        "src/coneskin/scene/link_tables.py",
+        "src/coneskin/scene/tables/link_tables.py",
         "src/coneskin/scene/setting_overrides.py",
     ),
     "scipy": (

@@ -13,7 +13,7 @@ import pytest
 from coneskin.cli import main
 from coneskin.commands.arguments.design import EXAMPLES
 from coneskin.design import files as design_files
-from coneskin.scene.sensor_table import build_sensor, merge_sensor_file
+from coneskin.scene.tables.sensor_table import build_sensor, merge_sensor_file
 from tests.geometry.synthetic import frustum
 from tests.geometry.test_mesh import write_stl
 

@@ -11,18 +11,21 @@ import pytest
 
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.scene import (
+from coneskin.scene import reader as scene_reader
+from coneskin.scene.reader import parse_scene
+from coneskin.scene.tables import (
+    arm_table,
     body_table,
     link_tables,
+    motion_table,
     reaction_table,
     schema,
     sensor_table,
     source_table,
     speed_limit_table,
+    touch_table,
 )
-from coneskin.scene import reader as scene_reader
-from coneskin.scene.reader import parse_scene
-from coneskin.scene.schema import Key
+from coneskin.scene.tables.schema import Key
 from coneskin.skin.electronics import Polarity, Thresholds
 from coneskin.skin.matched_electronics import match_electronics
 from coneskin.skin.sensor import Sensor
@@ -30,16 +33,16 @@ from coneskin.skin.sensor import Sensor
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml.*?\n(.*?)```", DOCUMENT, re.DOTALL)
 SECTIONS: dict[str, tuple[Key, ...]] = {
-    "[arm]": scene_reader._ARM,
+    "[arm]": arm_table.ARM_KEYS,
     "[[link]]": link_tables.LINK_KEYS,
     "[[link.sensor]]": (Key("file", str, None), Key("calibration", str, None), *sensor_table.SENSOR_KEYS),
     "[source]": source_table.source_keys(),
-    "[[source.touch]]": scene_reader._TOUCH,
+    "[[source.touch]]": touch_table.TOUCH_KEYS,
     "[reaction]": reaction_table.REACTION_KEYS,
     "[[reaction.rule]]": reaction_table.RULE_KEYS,
-    "[monitoring]": scene_reader._MONITORING,
+    "[monitoring]": arm_table.MONITORING_KEYS,
     "[recording]": scene_reader._RECORDING,
-    "[motion]": scene_reader._MOTION,
+    "[motion]": motion_table.MOTION_KEYS,
     "[commissioning]": scene_reader._COMMISSIONING,
     "[[body]]": body_table.BODY_KEYS,
     "[padding]": body_table.PADDING_KEYS,
@@ -139,7 +142,7 @@ def test_unit_range_and_default(section: str, key: Key) -> None:
     elif key.kind is int:
         assert unit == "whole number"
     if key.name == "waypoints_deg":
-        key = scene_reader._WAYPOINT[0]
+        key = motion_table._WAYPOINT[0]
     if key.choices:
         assert bounds == ", ".join(key.choices)
     elif math.isfinite(key.low) and math.isfinite(key.high):

@@ -13,7 +13,7 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.scene import Scene
-from coneskin.scene.speed_limit_table import limit_fingerprint
+from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.testing.forearm import forearm_scene
 
 SCENE = forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n"

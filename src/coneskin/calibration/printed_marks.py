@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.bounded_file import read_file
 from coneskin.commissioning.marks import Mark
 from coneskin.errors import SceneError
-from coneskin.scene.cone_keys import CONE_KEYS
+from coneskin.scene.tables.cone_keys import CONE_KEYS
 
 from .marks import place_words
 

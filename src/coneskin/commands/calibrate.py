@@ -90,8 +90,8 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.calibration.calibrate import Calibrator
     from coneskin.commissioning.commission import check_touchable
     from coneskin.errors import SceneError
-    from coneskin.scene.link_tables import sensor_files
     from coneskin.scene.reader import load_scene
+    from coneskin.scene.tables.link_tables import sensor_files
     from coneskin.skin.sources.kinds import is_simulated
 
     scene = load_scene(args.scene, calibrated=False)
@@ -134,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
 def _write(args: argparse.Namespace, scene: Scene, results: list[CalibrationResult]) -> None:
     """Add the results to the files of their devices, and show them."""
     from coneskin.scene.calibration_file import add_calibration, calibration_path
-    from coneskin.scene.link_tables import named_calibrations
+    from coneskin.scene.tables.link_tables import named_calibrations
 
     named = named_calibrations(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder)
     for result, place in zip(results, named, strict=True):

@@ -14,7 +14,7 @@ from coneskin.bounded_file import read_file
 from coneskin.errors import GeometryError, KinematicsError
 from coneskin.robot.arm.link_frames import LINK_INDEX, link_index
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.scene.sensor_table import build_sensor
+from coneskin.scene.tables.sensor_table import build_sensor
 from coneskin.skin.firmware.board_circuit import value_text
 
 from .files import DESIGN_FILE

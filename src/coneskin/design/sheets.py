@@ -16,7 +16,7 @@ from coneskin.geometry.drawing.resolution import AdConverter, ResolutionForecast
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.scene.sensor_table import with_key_names
+from coneskin.scene.tables.sensor_table import with_key_names
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.matched_electronics import GivenElectronics, match_electronics
 from coneskin.skin.sensor import sheet_resistances

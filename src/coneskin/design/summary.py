@@ -11,7 +11,7 @@ from coneskin.geometry.drawing.touch_marks import touch_marks
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.sector import unroll
-from coneskin.scene.cone_keys import CONE_KEYS
+from coneskin.scene.tables.cone_keys import CONE_KEYS
 from coneskin.skin.matched_electronics import shunt_ohms
 
 from .sheets import SheetDesign

@@ -17,7 +17,7 @@ from typing import Any
 from coneskin.bounded_file import read_file
 from coneskin.errors import ConeSkinError, SceneError
 from coneskin.robot.arm.link_frames import link_index
-from coneskin.scene.schema import MAX_SIZE, Key, check
+from coneskin.scene.tables.schema import MAX_SIZE, Key, check
 
 from .speed_search import ForceLimits
 from .two_mass_contact import StruckBody

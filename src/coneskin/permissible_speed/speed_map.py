@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from coneskin import __version__
 from coneskin.errors import SceneError
 from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
-from coneskin.scene.speed_limit_table import limit_fingerprint
+from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.skin.padding import Padding
 
 from .arm_patches import motion_positions, patches_of, weigh

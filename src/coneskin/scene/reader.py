@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-import math
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from coneskin.bounded_file import read_file
-from coneskin.errors import ConeSkinError, SceneError
+from coneskin.errors import SceneError
 
 from . import scene as s
-from .link_tables import count_sensors, inline_sensor_files, read_links
-from .reaction_table import read_reaction
-from .schema import MAX_SIZE, Key, check
-from .source_table import read_sources
+from .tables.arm_table import read_arm, read_monitoring
+from .tables.link_tables import count_sensors, inline_sensor_files, read_links
+from .tables.motion_table import read_motion
+from .tables.reaction_table import read_reaction
+from .tables.schema import MAX_SIZE, Key, check
+from .tables.source_table import read_sources
+from .tables.touch_table import read_touch
 
 if TYPE_CHECKING:
-    from coneskin.robot.stop.limits import MonitoringLimits
-    from coneskin.skin.sensor import Sensor
-    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+    pass
 
 __all__ = ["TABLES", "load_scene", "parse_scene"]
 
@@ -41,55 +41,16 @@ TABLES = (
     "padding",
     "speed_limit",
 )
-_ARM = (
-    Key("model", str),
-    Key("host", str),
-    Key("watchdog_hz", float, 4.0, low=1.0, high=100.0),
-    Key("control", str, "internal", choices=("internal", "external")),
-    Key("table_z_mm", float, None, low=-5000.0, high=5000.0),
-    Key("slider_stop", bool, True),
-    Key("speed_limit_from", str, None),
-    Key("controller_heartbeat", str, "optional", choices=("required", "optional")),
-)
-_TOUCH = (
-    Key("sensor", int, None, low=0, high=255),
-    Key("start_s", low=0.0),
-    Key("end_s", low=0.0),
-    Key("u_mm", low=0.0, high=10_000.0),
-    Key("phi_deg", low=0.0, high=360.0),
-    Key("force_n", float, 5.0, low=0.0, high=1000.0),
-    Key("radius_mm", float, 0.0, low=0.0, high=500.0),
-    Key("grown_force_n", float, 0.0, low=0.0, high=1000.0),
-    Key("growth_time_s", float, 0.0, low=0.0),
-)
-_MONITORING = (
-    Key("skin_silence_ms", low=2.0, high=1000.0),
-    Key("skin_late_ms", low=2.0, high=1000.0),
-    Key("clock_drift_ppm", low=1.0, high=50_000.0),
-    Key("stuck_frames", int, low=0, high=1_000_000),
-    Key("arm_silence_ms", low=4.0, high=1000.0),
-    Key("escalate_ms", low=4.0, high=500.0),
-    Key("standstill_rad_s", low=1e-4, high=0.1),
-    Key("settle_ms", low=10.0, high=10_000.0),
-    Key("program_silence_ms", low=60.0, high=5000.0),
-)
 _RECORDING = (
     Key("folder", str),
     Key("max_mb", float, None, low=1.0, high=60_000.0),
     Key("keep", int, None, low=1, high=100_000),
-)
-_MOTION = (
-    Key("waypoints_deg", dict, ...),
-    Key("speed_deg_s", float, low=0.1, high=360.0),
-    Key("acceleration_deg_s2", float, low=1.0, high=2000.0),
-    Key("rounds", int, 0, low=0),
 )
 _COMMISSIONING = (Key("max_age_days", float, None, low=0.0, high=10_000.0, above=True),)
 #: tomllib's time for a dotted key grows with the cube of its parts: a key of 20 kB takes minutes
 _MAX_PARTS = 64
 _DOTTED = re.compile(r"[\w\"'-][ \t]*\.")
 _PIECES = re.compile(r"[=,{\n]")
-_WAYPOINT = (Key("q_deg", list, low=-363.0, high=363.0, length=6),)
 
 
 def load_scene(path: Path | str, *, calibrated: bool = True) -> s.Scene:
@@ -159,14 +120,14 @@ def parse_scene(
         name=name,
         text=text,
         folder=folder,
-        arm=_arm(tables, problems),
+        arm=read_arm(tables, problems),
         links=read_links(tables, None if recorded else folder, problems),
         source=None,
         reaction=reaction,
         rules=rules,
-        monitoring=_monitoring(tables, problems),
+        monitoring=read_monitoring(tables, problems),
         recording=_recording(tables, folder, problems),
-        motion=_motion(tables, problems),
+        motion=read_motion(tables, problems),
         commissioning_max_age=_max_age(tables, problems),
         commissioning=commissioning,
         **_physics(tables, problems),
@@ -175,48 +136,12 @@ def parse_scene(
     scene = replace(scene, source=_source(scene, tables, problems))
     _check_together(scene, named, tables, problems)
     if scene.speed_limit is not None:
-        from .speed_limit_table import check_speed_limit
+        from .tables.speed_limit_table import check_speed_limit
 
         check_speed_limit(scene, recorded, problems)
     if problems:
         raise SceneError(problems, name)
     return scene
-
-
-def _settings(keys: tuple[Key, ...], tables: Mapping[str, Any], name: str, problems: list[str]) -> dict[str, Any]:
-    """Return the values that a table sets; missing keys have the defaults of the dataclass that takes them."""
-    required = {key.name for key in keys if key.kind is str}
-    optional = tuple(key if key.name in required else replace(key, default=None) for key in keys)
-    values = check(tables[name], optional, name, problems)
-    return {key: value for key, value in values.items() if value is not None}
-
-
-def _monitoring(tables: Mapping[str, Any], problems: list[str]) -> MonitoringLimits | None:
-    if "monitoring" not in tables:
-        return None
-    from coneskin.robot.stop.limits import MonitoringLimits
-
-    return MonitoringLimits(**_settings(_MONITORING, tables, "monitoring", problems))
-
-
-def _arm(tables: Mapping[str, Any], problems: list[str]) -> s.ArmScene | None:
-    if "arm" not in tables:
-        return None
-    values = check(tables["arm"], _ARM, "arm", problems)
-    if "model" in values:
-        from coneskin.robot.arm.ur_models import arm_model
-
-        try:
-            values["model"] = arm_model(values["model"]).name
-        except ConeSkinError as exc:
-            problems.append(f"arm.model: {exc}")
-            del values["model"]
-    if not values.get("host", "?").strip():
-        problems.append("arm.host must name the controller, got an empty text")
-    if len(values) < len(_ARM):
-        return None
-    del values["speed_limit_from"]  # the table stands in place of it
-    return s.ArmScene(watchdog_hz=values.pop("watchdog"), **values)
 
 
 def _is_array_of_tables(value: Any) -> bool:
@@ -232,40 +157,10 @@ def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s
     touches = [
         touch
         for number, table in enumerate(values.pop("touch", ()), 1)
-        if (touch := _touch(sensors, table, f"source.touch {number}", problems)) is not None
+        if (touch := read_touch(sensors, table, f"source.touch {number}", problems)) is not None
     ]
     kind = values.pop("kind", None)
     return None if kind is None else s.SourceScene(kind, MappingProxyType(values), tuple(touches))
-
-
-def _touch(
-    sensors: Sequence[Sensor | None], table: Mapping[str, Any], where: str, problems: list[str]
-) -> ScriptedTouch | None:
-    """Read a scripted touch; among the sensors, None stands for each that has a mistake."""
-    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-
-    before = len(problems)
-    values = check(table, _TOUCH, where, problems)
-    start, end = values.get("start", -math.inf), values.get("end", math.inf)
-    if not start < end:
-        problems.append(f"{where}: start_s must be before end_s, got {start:g} s and {end:g} s")
-    wanted = values.pop("sensor")
-    known = () if wanted is None and None in sensors else sensors  # the first of them may be one with a mistake
-    sensor = next((one for one in known if one is not None and wanted in (None, one.sensor_id)), None)
-    if sensor is None:
-        if None not in sensors:  # otherwise it may be that one
-            problems.append(f"{where}: there is no sensor {'to touch' if wanted is None else f'with the id {wanted}'}")
-        return None
-    cone = sensor.frustum
-    u, phi = values.get("u", 0.0), values.get("phi", 0.0)
-    if u > cone.slant or phi > cone.wrap:
-        problems.append(
-            f"{where} is off {sensor.name}, whose u_mm ends at {1e3 * cone.slant:g} and phi_deg at "
-            f"{math.degrees(cone.wrap):g}: got {1e3 * u:g} mm and {math.degrees(phi):g} deg"
-        )
-    if values.get("grown_force") and not values.get("growth_time"):
-        problems.append(f"{where}: grown_force_n needs a growth_time_s above 0 s")
-    return ScriptedTouch(**values, sensor=sensor.name) if len(problems) == before else None
 
 
 def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> s.RecordingScene | None:
@@ -280,37 +175,17 @@ def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> 
     return s.RecordingScene(folder / values["folder"], None if size is None else round(size), keep)
 
 
-def _motion(tables: Mapping[str, Any], problems: list[str]) -> s.MotionScene | None:
-    if "motion" not in tables:
-        return None
-    rows = tables["motion"].get("waypoints_deg")
-    points = []
-    if isinstance(rows, list):
-        for number, row in enumerate(rows, 1):
-            where = f"motion.waypoints_deg[{number}]"
-            lines: list[str] = []
-            points.append(check({"q_deg": row}, _WAYPOINT, where, lines).get("q", ()))
-            problems += [line.replace(f"{where}.q_deg", where) for line in lines]
-        if len(rows) < 2:
-            problems.append(f"motion.waypoints_deg needs at least 2 waypoints, got {len(rows)}")
-    table = {key: value for key, value in tables["motion"].items() if key != "waypoints_deg"}
-    values = check(table, _MOTION[1:], "motion", problems)
-    if not isinstance(rows, list):
-        problems.append("motion.waypoints_deg must be a list of lists of 6 joint positions [deg]")
-    return s.MotionScene(tuple(points), **values) if len(values) == len(_MOTION) - 1 else None
-
-
 def _physics(tables: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
     """Return what only the physics engine asks for."""
     if "body" not in tables and "padding" not in tables:
         return {}
-    from .body_table import read_bodies, read_padding
+    from .tables.body_table import read_bodies, read_padding
 
     return {"bodies": read_bodies(tables, problems), "padding": read_padding(tables, problems)}
 
 
 def _inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: list[str]) -> bool:
-    from .speed_limit_table import inline_speed_limit
+    from .tables.speed_limit_table import inline_speed_limit
 
     return inline_speed_limit(tables, folder, problems)
 
@@ -319,7 +194,7 @@ def _speed_limit(tables: Mapping[str, Any], problems: list[str]) -> dict[str, An
     """Return what only a limit of the speed asks for."""
     if "speed_limit" not in tables:
         return {}
-    from .speed_limit_table import read_speed_limit
+    from .tables.speed_limit_table import read_speed_limit
 
     return {"speed_limit": read_speed_limit(tables, problems)}
 

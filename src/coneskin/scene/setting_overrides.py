@@ -10,9 +10,9 @@ from typing import Any
 
 from coneskin.errors import SceneError
 
-from .detector_keys import DETECTOR, detector_settings
-from .link_tables import sensor_tables
 from .reader import TABLES
+from .tables.detector_keys import DETECTOR, detector_settings
+from .tables.link_tables import sensor_tables
 
 __all__ = ["override_detector", "override_settings", "parse_choices", "parse_settings"]
 

@@ -8,7 +8,7 @@ import math
 from coneskin.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
-from coneskin.scene.cone_keys import DOUBLE_CONE_KEYS
+from coneskin.scene.tables.cone_keys import DOUBLE_CONE_KEYS
 
 from .dimensions import given_dimensions, option_name
 

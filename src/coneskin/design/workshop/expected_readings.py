@@ -11,7 +11,7 @@ from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.electrode_layout import SurfaceRectangle
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, SurfaceShape
 from coneskin.geometry.frustum import Frustum
-from coneskin.scene.sensor_table import build_sensor
+from coneskin.scene.tables.sensor_table import build_sensor
 from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import sheet_resistances
 

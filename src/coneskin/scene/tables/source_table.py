@@ -12,7 +12,7 @@ from coneskin.skin.sources.kinds import GROUP, SOURCE_KINDS, SourceKey, find_kin
 from .schema import Key, check
 
 if TYPE_CHECKING:
-    from .scene import SourceScene
+    from coneskin.scene.scene import SourceScene
 
 __all__ = ["read_source", "read_sources", "source_keys", "source_label"]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from .body import BODY_KINDS, BodyScene
+from coneskin.scene.body import BODY_KINDS, BodyScene
+
 from .schema import Key, check
 
 if TYPE_CHECKING:

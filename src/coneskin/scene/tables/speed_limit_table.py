@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.bounded_file import read_file
+from coneskin.scene.sensor_facts import round_facts
+from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
 
 from .schema import Key, check
-from .sensor_facts import round_facts
-from .speed_limit import LimitedPatch, SpeedLimitScene
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from coneskin.scene.scene import Scene
 
 __all__ = [
     "SPEED_LIMIT_KEYS",

@@ -16,18 +16,18 @@ from coneskin.design.summary import design_summary, sensor_toml
 from coneskin.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.scene.cone_keys import CONE_KEYS, DOUBLE_CONE_KEYS, LINK_CONE_KEYS
-from coneskin.scene.schema import Key, check
-from coneskin.scene.sensor_table import SENSOR_KEYS
+from coneskin.scene.tables.cone_keys import CONE_KEYS, DOUBLE_CONE_KEYS, LINK_CONE_KEYS
+from coneskin.scene.tables.schema import Key, check
+from coneskin.scene.tables.sensor_table import SENSOR_KEYS
 
 SOURCE = Path(coneskin.__file__).parent
 NAMES = {key.name for key in DOUBLE_CONE_KEYS}
-TABLE = SOURCE / "scene" / "cone_keys.py"
+TABLE = SOURCE / "scene" / "tables" / "cone_keys.py"
 #: the folder itself; geometry, skin and robot are links, and may not know of scenes
 MODULES = sorted(
     path
     for folder in ("commands", "design", "scene", "session", "replay")
-    for path in (SOURCE / folder).glob("*.py")
+    for path in (SOURCE / folder).rglob("*.py")
     if path != TABLE
 )
 

@@ -143,7 +143,7 @@ def apply_calibration(
     elif name is not None:
         built = build_sensor(plain, where, [])  # what is wrong with it is reported when the table itself is read
         if built is not None:
-            from .calibration_file import calibration_keys
+            from coneskin.scene.calibration_file import calibration_keys
 
             try:
                 needed = {key: table[key] for key in (_NEEDS_CALIBRATION,) if key in table}

@@ -1,0 +1,1 @@
+"""Tables of a scene file: the keys of each, and what is made of them."""
