@@ -45,7 +45,7 @@ class PlacedDevelopable(PlacedFrustum):
     @property
     def kind(self) -> str:
         """Kind of the side, in words."""
-        return f"general {'cone' if self.frustum.sin_half_angle else 'cylinder'}"
+        return f"general {'cylinder' if self.is_straight else 'cone'}"
 
     @property
     def growth(self) -> float:

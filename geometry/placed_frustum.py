@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PlacedFrustum", "double_cone"]
 
+_STRAIGHT = 1e-6  # m
+
 
 @dataclass(frozen=True, slots=True)
 class PlacedFrustum:
@@ -102,9 +104,14 @@ class PlacedFrustum:
         return ()
 
     @property
+    def is_straight(self) -> bool:
+        """True where the radii differ by less than a micrometre: no mesh and no cutter knows it from a cylinder."""
+        return abs(self.frustum.radius2 - self.frustum.radius1) < _STRAIGHT
+
+    @property
     def kind(self) -> str:
         """Kind of the side, in words."""
-        return "cone" if self.frustum.sin_half_angle else "cylinder"
+        return "cylinder" if self.is_straight else "cone"
 
     @property
     def growth(self) -> float:

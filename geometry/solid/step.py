@@ -10,7 +10,7 @@ from coneskin.errors import GeometryError, MissingExtra
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
 
-__all__ = ["WrappedLayer", "write_step"]
+__all__ = ["WrappedLayer", "require_step_writer", "write_step"]
 
 _MM = 1e3
 
@@ -22,6 +22,18 @@ class WrappedLayer(NamedTuple):
     inner: Frustum  #: its inner face, as it would be placed by ``pose``
     thickness: float  #: outwards along the normal [m]
     pose: Pose  #: of the frame of the inner face in the frame of the file
+
+
+def require_step_writer() -> None:
+    """Refuse a STEP file before the work for it begins, if none can be written.
+
+    Raises:
+        MissingExtra: cadquery-ocp is not installed.
+    """
+    try:
+        import OCP  # noqa: F401
+    except ImportError as exc:
+        raise _missing() from exc
 
 
 def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
@@ -50,7 +62,7 @@ def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
         from OCP.TopLoc import TopLoc_Location
         from OCP.XCAFDoc import XCAFDoc_DocumentTool
     except ImportError as exc:
-        raise MissingExtra("cadquery-ocp-novtk", "writing a STEP file", "cad") from exc
+        raise _missing() from exc
     Message.DefaultMessenger_s().ChangePrinters().Clear()  # it would write to standard output
     document = TDocStd_Document(TCollection_ExtendedString("coneskin"))
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
@@ -73,6 +85,10 @@ def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
     writer.Transfer(document)
     if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise GeometryError(f"{path}: the CAD kernel cannot write it")
+
+
+def _missing() -> MissingExtra:
+    return MissingExtra("cadquery-ocp-novtk", "writing a STEP file", "cad")
 
 
 def _section(inner: Frustum, thickness: float) -> list[tuple[float, float]]:

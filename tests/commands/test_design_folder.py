@@ -6,6 +6,7 @@ import math
 import os
 import signal
 import struct
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -138,3 +139,23 @@ def test_what_a_sheet_spans_is_said_beside_its_deviation(tmp_path: Path, capsys:
     assert design(str(tmp_path / "tube.stl"), "-o", str(tmp_path / "out")) == 0
     line = capsys.readouterr().out.splitlines()[0]
     assert "% of it spans holes and grooves, down to 1." in line
+
+
+def test_a_step_file_that_cannot_be_written_is_refused_before_the_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "OCP", None)
+    assert design("nowhere.stl", "--step", "-o", str(tmp_path / "out")) == 1
+    err = capsys.readouterr().err
+    assert "pip install 'coneskin[cad]'" in err
+    assert "reading" not in err
+
+
+def test_the_next_command_names_the_link_where_the_design_knows_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert design(*CYLINDER, "-o", "skin") == 0
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert said.startswith("next: coneskin init skin --simulated --link LINK, with LINK one of base, ")
+    assert main(["init", "skin", "--simulated", "--link", "forearm"]) == 0

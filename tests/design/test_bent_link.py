@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import coneskin as cs
+from coneskin.design.files import FileOptions
 from coneskin.geometry.developable import Bend
 from coneskin.geometry.placed_developable import PlacedDevelopable
+from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.build import place_on_arm
 from coneskin.skin.detection.events import TouchEnded
 from coneskin.skin.wire import encode
@@ -63,6 +65,25 @@ def test_the_active_area_lies_at_its_height_above_the_stadium() -> None:
 def test_a_bend_that_is_too_sharp_for_the_layers_is_refused() -> None:
     with pytest.raises(cs.GeometryError, match=r"lower substrate is strained"):
         cs.design_sheets([stadium(0.1, 0.0012)])
+
+
+def test_radii_that_differ_by_rounding_make_no_cone() -> None:
+    """The radii of a fit are sums of floats: an oval tube was called a general cone of 0.0000 deg."""
+    place = stadium()
+    radius = place.frustum.radius1
+    assert PlacedDevelopable(cs.Frustum(radius, radius + 1e-12, 0.2), POSE, place.bends).kind == "general cylinder"
+    assert PlacedDevelopable(cs.Frustum(radius, radius + 1e-5, 0.2), POSE, place.bends).kind == "general cone"
+    assert PlacedFrustum(cs.Frustum(radius, radius - 1e-12, 0.2), POSE).kind == "cylinder"
+
+
+def test_a_step_file_of_it_is_refused_before_anything_is_drawn(tmp_path: Path) -> None:
+    done: list[str] = []
+    with pytest.raises(cs.GeometryError, match=r"bent as a general cylinder, of which no STEP file .*--round-only"):
+        cs.write_design(
+            tmp_path / "out", cs.design_sheets([stadium()]), options=FileOptions(step=True), progress=done.append
+        )
+    assert not done
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.long

@@ -13,12 +13,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from coneskin.design.files import FileOptions, check_target
+from coneskin.design.first_scene import arm_link
 from coneskin.design.folder import write_design
 from coneskin.design.link import LinkMesh, fit_link
 from coneskin.design.seam_strip import cover_seams
 from coneskin.design.sheets import SheetDesign, design_sheets
 from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
+from coneskin.geometry.solid.step import require_step_writer
+from coneskin.robot.arm.link_frames import LINK_INDEX
 from coneskin.skin.matched_electronics import shunt_ohms
 
 from .arguments.design import add_arguments, design_options
@@ -65,6 +68,8 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
     file_options = FileOptions(
         args.arcs, args.cut_tolerance_mm * 1e-3, args.page, bed, args.bed_gap_mm * 1e-3, args.step
     )
+    if args.step:
+        require_step_writer()  # before the search, which takes a minute
     source: LinkMesh | None = None
     fit: LinkFit | None = None
     notes: tuple[str, ...] = ()
@@ -101,7 +106,9 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
         folder = shlex.quote(str(args.output))
         sensor = shlex.quote(str(args.output / ("sensor.toml" if len(designs) == 1 else "sheet-1/sensor.toml")))
         print(f"real hardware: coneskin firmware {sensor} --to board, then coneskin init {folder} --board uno --help")
-        print(f"next: coneskin init {folder} --simulated")
+        unnamed = source is None or arm_link(source.name) is None
+        which = f" --link LINK, with LINK one of {', '.join(LINK_INDEX)}" if unnamed else ""
+        print(f"next: coneskin init {folder} --simulated{which}")
     return 0
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from coneskin.skin.firmware.board_circuit import BoardCircuit
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["ArmAddress", "DesignFolder", "first_scene", "read_design"]
+__all__ = ["ArmAddress", "DesignFolder", "arm_link", "first_scene", "read_design"]
 
 _MAX_BYTES = 4 << 20  # of design.json
 _TUBES = {"upper_arm": 1, "forearm": 2}  # link -> index of the DH length along which its mesh's z axis runs
@@ -104,10 +104,11 @@ def read_design(folder: Path) -> DesignFolder:
     path, _, name = source.partition("#")
     kinds = {"the mesh's coordinates": "mesh", "the URDF link": "urdf", "mesh": "mesh"}
     kind = next((kind for words, kind in kinds.items() if frame.startswith(words)), None)
-    return DesignFolder(tuple(files), sensors, _link_of(name or PurePath(path).stem), kind)
+    return DesignFolder(tuple(files), sensors, arm_link(name or PurePath(path).stem), kind)
 
 
-def _link_of(name: str) -> str | None:
+def arm_link(name: str) -> str | None:
+    """Return the arm's link that a mesh or a URDF's link is named after; None if it is no link's name."""
     try:
         index = link_index(name)
     except KinematicsError:

@@ -12,7 +12,7 @@ from coneskin.geometry.drawing.nesting import nest_on_beds
 from coneskin.geometry.drawing.test_piece import make_test_piece
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.solid.closed_surface import to_stl
-from coneskin.geometry.solid.step import WrappedLayer, write_step
+from coneskin.geometry.solid.step import WrappedLayer, require_step_writer, write_step
 from coneskin.terminal_text import printable
 
 from .files import FileOptions, new_folder, sheet_folder, write_sheets
@@ -65,10 +65,13 @@ def write_design(
         the content of design.json; "files" lists all files of the design, as paths in the folder.
 
     Raises:
-        GeometryError: the folder is in use, or a scene would refuse a sensor of the design; nothing is written then.
+        GeometryError: the folder is in use, a scene would refuse a sensor of the design, or a STEP file is wanted of a
+            sheet that is not round; nothing is written then.
         MissingExtra: a package that the drawings or pictures need is not installed.
     """
-    sheets = tuple(designs)
+    sheets, options = tuple(designs), options or FileOptions()
+    if options.step:
+        _require_step(sheets)
     title, source, frame, *notes = map(printable, (title, source, frame, *notes))  # a file's name may be no text
     figures = [measure_build(design, index, frame, mesh, sheets[:index]) for index, design in enumerate(sheets)]
     data: dict[str, Any] = {"link": source or title, "frame": frame, "notes": list(notes)}
@@ -78,7 +81,6 @@ def write_design(
     if fit is not None:
         data["bare"] = [{"start_mm": 1e3 * b.start, "end_mm": 1e3 * b.end, "reason": b.reason} for b in fit.bare]
         data["bare_areas"] = [{"share": round(b.share, 4), "reason": b.reason} for b in fit.bare_areas]
-    options = options or FileOptions()
     cuts = [cut for design in sheets for cut in design.cuts]
     pieces = [make_test_piece(material) for material in dict.fromkeys(cut.material for cut in cuts)]
     beds, larger = nest_on_beds([*cuts, *pieces], *options.bed, options.bed_gap)
@@ -110,6 +112,22 @@ def write_design(
     return data
 
 
+def _require_step(sheets: Sequence[SheetDesign]) -> None:
+    """Refuse STEP files before anything is drawn.
+
+    Raises:
+        GeometryError: a sheet is not round.
+        MissingExtra: cadquery-ocp is not installed.
+    """
+    for sheet in sheets:
+        if sheet.place.bends:
+            raise GeometryError(
+                f"{sheet.name} is bent as a {sheet.place.kind}, of which no STEP file is written: leave --step out, or "
+                "use cones only (--round-only)"
+            )
+    require_step_writer()
+
+
 def _write_wrapped(draft: Path, place: Path, design: SheetDesign) -> str:
     """Write the layers of a sheet as they lie on the link as a STEP file; return its path in the folder.
 
@@ -119,14 +137,8 @@ def _write_wrapped(draft: Path, place: Path, design: SheetDesign) -> str:
         design: the sheet.
 
     Raises:
-        GeometryError: the link is not round.
-        MissingExtra: cadquery-ocp is not installed.
+        GeometryError: the CAD kernel refuses a layer.
     """
-    if design.place.bends:
-        raise GeometryError(
-            f"{design.name} is bent as a {design.place.kind}, of which no STEP file is written: leave --step out, or "
-            "use cones only (--round-only)"
-        )
     stack, side = design.options.stack, design.place.frustum
     layers = []
     for index, layer in enumerate(stack.layers):

@@ -10,7 +10,7 @@ import pytest
 from coneskin.errors import MissingExtra
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.solid.step import WrappedLayer, write_step
+from coneskin.geometry.solid.step import WrappedLayer, require_step_writer, write_step
 
 CONE = Frustum(0.05, 0.07, 0.15, math.radians(300))
 
@@ -56,3 +56,5 @@ def test_without_the_kernel_the_pip_line_is_named(tmp_path: Path, monkeypatch: p
     monkeypatch.setitem(sys.modules, "OCP", None)
     with pytest.raises(MissingExtra, match=r"pip install 'coneskin\[cad\]'"):
         write_step(tmp_path / "a.step", [WrappedLayer("a", CONE, 1e-4, Pose())])
+    with pytest.raises(MissingExtra, match=r"pip install 'coneskin\[cad\]'"):
+        require_step_writer()
