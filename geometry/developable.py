@@ -35,6 +35,7 @@ __all__ = ["Bend", "Developable"]
 
 _TURN = 2.0 * math.pi
 _SLACK = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
+_OPEN = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +135,22 @@ class Developable:
         gap = math.dist(at, first.at)
         turned = math.hypot(math.dist(n, first.n), math.dist(t, first.t)) / math.sqrt(2.0)
         return gap, 2.0 * math.asin(min(1.0, 0.5 * turned))
+
+    def check_closed(self) -> None:
+        """Refuse a full wrap whose bends do not close, as where a turn is wrong, or in radians.
+
+        Raises:
+            GeometryError: with what they add up to.
+        """
+        if not self.closed:
+            return
+        gap, angle = self.closing_gap
+        around = _TURN * self.frustum.radius1
+        if gap > _OPEN * around or angle > _TURN * _OPEN or not 0.0 < self.turn < 1.5 * _TURN:
+            raise GeometryError(
+                f"the bends of a full wrap must close: they turn by {math.degrees(self.turn):.6g} deg in all (360 deg "
+                f"around a tube, above 0 outwards), and leave {1e3 * gap:.3g} mm and {math.degrees(angle):.3g} deg open"
+            )
 
     def edge(self) -> tuple[Vector, Vector, Vector, Vector]:
         """Return the point of end 1 at phi = wrap, and T, U and N there, in the frame of the side."""

@@ -40,6 +40,8 @@ _STEP_UP = 1.2  # ratio; smaller ones are not worth it
 _LEAST = 0.01  # of the slider
 _SLOW = 0.02  # rad/s of the leading joint, below which an arm counts as not moving
 _SLIDER_TOLERANCE = 0.02
+_REMEMBERED = 3.0 * _PATIENCE  # s; an arm that obeys is then as slow as the highest slider since lets its joints be
+_JOINT_MARGIN = 1.25  # of that speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,9 @@ class SpeedLimit:
         self._over_since: float | None = None
         self._top = 0.0  # highest ratio since then
         self._ratio_then = 0.0  # when the slider was set
+        self._lowest = 0.0  # where the slider may be by this, as long as a person has not moved it
+        self._joint_speed = model.joint_speed
+        self._sliders: deque[tuple[float, float]] = deque()  # time, and where the slider is from then on
         self._demands: deque[tuple[float, float]] = deque()  # time of motion, ratio at full slider
 
     def ratio(self, q: Sequence[float], qd: Sequence[float]) -> tuple[float, str]:
@@ -158,6 +163,8 @@ class SpeedLimit:
         self._demands.clear()
         if slider is None:
             return f"{name} moves at {ratio:.0%} of the permissible speed, and the speed slider is not known"
+        if self._disobeys(now, state.qd):
+            return f"{name} moves at {ratio:.0%} of the permissible speed, and faster than the speed slider allows"
         if self._over_since is None:
             self._over_since, self._top = now, ratio
             self._lower(now, slider, slider, ratio, ahead, state.speed, name, out)
@@ -193,12 +200,27 @@ class SpeedLimit:
 
     def _note_person(self, now: float, slider: float | None) -> None:
         """Take that a person has moved the slider."""
+        sliders = self._sliders
         if slider is None:
+            sliders.clear()
             return
+        if not sliders or sliders[-1][1] != slider:
+            sliders.append((now, slider))
+        while len(sliders) > 1 and now - sliders[1][0] >= _REMEMBERED:
+            sliders.popleft()
         if self._fraction is None:
             self._ceiling = slider
-        elif now - self._set_at > 0.5 and abs(slider - self._fraction) > _SLIDER_TOLERANCE:
+        elif slider < self._lowest - _SLIDER_TOLERANCE or (
+            now - self._set_at > 0.5 and abs(slider - self._fraction) > _SLIDER_TOLERANCE
+        ):
             self._ceiling, self._fraction = slider, None
+
+    def _disobeys(self, now: float, qd: Joints) -> bool:
+        """Tell whether a joint turns faster than the slider has let it for a while; short strokes show only here."""
+        if now - self._sliders[0][0] < _REMEMBERED:
+            return False
+        top = max(self._fraction or 0.0, max(slider for _, slider in self._sliders))
+        return any(abs(v) > _JOINT_MARGIN * top * most + _SLOW for v, most in zip(qd, self._joint_speed, strict=True))
 
     def _lower(
         self,
@@ -215,6 +237,7 @@ class SpeedLimit:
         grows = max(map(abs, ahead)) > _GROWTH * speed
         fraction = max(_LEAST, (_UNKNOWN if grows else _MARGIN) * fraction / ratio)
         self._fraction, self._set_at, self._ratio_then = min(fraction, slider), now, ratio
+        self._lowest = self._fraction
         out.append(SetSpeedSlider(self._fraction))
         emit(out, EventName.SPEED_LIMITED, now, slider=self._fraction, before=slider, sensor=name, ratio=ratio)
 
@@ -229,7 +252,7 @@ class SpeedLimit:
             self._demands.clear()
             return
         demands = self._demands
-        demands.append((now, ratio / slider))
+        demands.append((now, ratio / max(_LEAST, slider)))
         if now - demands[0][0] < _HOLD:
             return
         while now - demands[0][0] > _HOLD:
@@ -238,7 +261,7 @@ class SpeedLimit:
         fraction = min(self._ceiling, _MARGIN / wanted if wanted > 0.0 else math.inf)
         if fraction < min(self._ceiling, _STEP_UP * self._fraction) or fraction <= self._fraction:
             return
-        before = self._fraction
+        before = self._lowest = self._fraction
         self._fraction, self._set_at = fraction, now
         demands.clear()
         out.append(SetSpeedSlider(fraction))

@@ -1,22 +1,25 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from coneskin.errors import SceneError
+from coneskin.permissible_speed import speed_map
 from coneskin.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.permissible_speed.limits_file import parse_limits
 from coneskin.permissible_speed.speed_map import LEVERS, contact_at, map_speeds
 from coneskin.permissible_speed.speed_map_file import write_map
-from coneskin.permissible_speed.speed_search import keeps
+from coneskin.permissible_speed.speed_search import ForceLimits, keeps
 from coneskin.robot.arm.inertia import effective_mass
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import load_scene, parse_scene
+from coneskin.skin.padding import Padding
 from coneskin.testing.forearm import forearm_scene
 
 from .test_limits_file import TEXT
@@ -96,3 +99,18 @@ def _speeds(found: object, row: object) -> tuple[tuple[float, ...], tuple[float,
 def test_a_scene_without_what_is_needed_is_refused(scene: str, limits: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         map_speeds(parse_scene(scene), parse_limits(limits))
+
+
+def test_two_regions_of_one_name_keep_their_own_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second was searched with the limits of the first."""
+    limits = parse_limits(FREE)
+    (hand,) = limits.regions
+    softer = replace(hand, limits=ForceLimits(0.5 * hand.limits.transient, 0.5 * hand.limits.lasting))
+    monkeypatch.setattr(speed_map, "_MASSES", (8.0,))
+    monkeypatch.setattr(speed_map, "LEVERS", LEVERS[-1:])
+    speeds = []
+    for regions in ((softer,), (hand, softer)):
+        maker = speed_map._CurveMaker(replace(limits, regions=regions), Padding(), lambda _: None)
+        number = maker.number(3, 8.0, 8.0)
+        speeds.append(maker.curves[number].speeds)
+    assert speeds[0] == speeds[1]

@@ -135,3 +135,14 @@ def test_a_file_that_is_none_is_refused_with_what_to_do(tmp_path: Path, content:
 def test_a_recording_names_no_file() -> None:
     with pytest.raises(SceneError, match="a recording carries the speeds"):
         parse_scene(LIMITED, recorded=True)
+
+
+def test_another_section_of_the_same_sheet_is_another_scene(tmp_path: Path) -> None:
+    """Normals differ, and with them the speeds along them; radii and pose are the same."""
+    bends = "bend_wrap_deg = [90, 90, 90, 90]\nbend_turn_deg = [{}, {}, {}, {}]\nheight_mm"
+    round_one = SCENE.replace("radius2_mm = 37.2", "radius2_mm = 37.6").replace(
+        "height_mm", bends.format(90, 90, 90, 90), 1
+    )
+    oval = round_one.replace("[90, 90, 90, 90]\nheight", "[120, 60, 120, 60]\nheight")
+    assert oval != round_one
+    assert limit_fingerprint(parse_scene(oval)) != limit_fingerprint(parse_scene(round_one))

@@ -152,16 +152,16 @@ class _CurveMaker:
     def __init__(self, limits: LimitsFile, padding: Padding, note: Callable[[str], None]) -> None:
         self.curves: list[SpeedCurve] = []
         self._limits, self._padding, self._note = limits, padding, note
-        self._numbers: dict[tuple[tuple[str, ...], tuple[float, ...]], int] = {}
-        self._speeds: dict[tuple[str, float], tuple[float, ...]] = {}
+        self._numbers: dict[tuple[tuple[BodyRegion, ...], tuple[float, ...]], int] = {}
+        self._speeds: dict[tuple[BodyRegion, float], tuple[float, ...]] = {}  # two regions may have one name
 
     def number(self, link: int, lightest: float, heaviest: float) -> int:
         """Return the number of the curve of a link, for a range of masses [kg]."""
-        regions = [region for region in self._limits.regions if not region.links or link in region.links]
+        regions = tuple(region for region in self._limits.regions if not region.links or link in region.links)
         first = max((n for n, mass in enumerate(_MASSES) if mass <= lightest), default=0)
         last = min(n for n, mass in enumerate(_MASSES) if mass >= heaviest)
         masses = _MASSES[first : last + 1]
-        key = tuple(region.name for region in regions), masses
+        key = regions, masses
         if key not in self._numbers:
             least = min((self._search(r, mass)[-1], r.name) for r in regions for mass in masses)[1]
             speeds = zip(*(self._search(region, mass) for region in regions for mass in masses), strict=True)
@@ -173,7 +173,7 @@ class _CurveMaker:
 
     def _search(self, region: BodyRegion, mass: float) -> tuple[float, ...]:
         """Return the permissible speeds of one mass against one region, for each lever."""
-        key = region.name, mass
+        key = region, mass
         if key not in self._speeds:
             self._note(f"{region.name} struck by {mass:g} kg")
             speeds: list[float] = []

@@ -146,3 +146,42 @@ def test_outside_the_positions_of_the_motion_the_slower_speeds_hold() -> None:
 
 def test_a_standing_arm_has_no_ratio() -> None:
     assert SpeedLimit(MODEL, ANYWHERE).ratio(START_Q, (0.0,) * 6) == (0.0, "")
+
+
+def test_short_strokes_that_do_not_obey_the_slider_are_stopped() -> None:
+    """Each ends before its patience does, and the next one began with a new one: for ever at 480 %."""
+    loop = Loop(heeds=False)
+    for _ in range(20):
+        if not loop.run(0.15, speed=1.2, acceleration=20.0).why:
+            loop.run(0.1, speed=0.0, acceleration=20.0)
+    assert "faster than the speed slider allows" in loop.why
+    assert loop.now < 103.0
+
+
+def test_short_strokes_that_obey_are_slowed_and_go_on() -> None:
+    loop = Loop()
+    for _ in range(12):
+        loop.run(0.15, speed=2.0, acceleration=20.0).run(0.1, speed=0.0, acceleration=20.0)
+    assert loop.why == ""
+
+
+@pytest.mark.long
+def test_a_persons_setting_right_after_the_guards_own_is_not_exceeded_later() -> None:
+    """It was taken for the guard's own, and passed 2 s of slow motion later."""
+    loop = Loop().run(0.3, speed=1.0)
+    loop.arm.slider = 0.5 * loop.arm.slider
+    ceiling = loop.arm.slider
+    loop.run(0.1, speed=8.0, acceleration=40.0)
+    assert loop.arm.slider < ceiling  # still too much, and the guard went below the person
+    loop.run(5.0, speed=1.0)
+    assert loop.why == ""
+    assert 0.9 * ceiling < loop.arm.slider <= ceiling
+
+
+def test_a_slider_at_zero_beside_a_moving_arm_does_not_end_the_guard() -> None:
+    loop = Loop(heeds=False)
+    limit, out = loop.limit, []  # type: ignore[var-annotated]
+    state = UR_DRIVER.decode_state(100.0, loop.arm.step())
+    limit.sample(state._replace(qd=(50.0, 0, 0, 0, 0, 0)), 1.0, out)
+    assert out[0] == SetSpeedSlider(0.01)
+    assert limit.sample(state._replace(time=101.0, qd=(0.1, 0, 0, 0, 0, 0)), 0.0, out) == ""

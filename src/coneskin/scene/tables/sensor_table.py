@@ -223,7 +223,9 @@ def _place(frustum: Frustum, pose: Pose, wraps: Sequence[float], turns: Sequence
         raise GeometryError(
             f"bend_wrap_deg and bend_turn_deg must have a number each for every bend, got {len(wraps)} and {len(turns)}"
         )
-    return PlacedDevelopable(frustum, pose, tuple(Bend(*bend) for bend in zip(wraps, turns, strict=True)))
+    placed = PlacedDevelopable(frustum, pose, tuple(Bend(*bend) for bend in zip(wraps, turns, strict=True)))
+    placed.side.check_closed()
+    return placed
 
 
 def _place_map(frustum: Frustum, values: Mapping[str, Any]) -> PlaceMap | None:

@@ -23,6 +23,7 @@ from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
 from .schema import Key, check
 
 if TYPE_CHECKING:
+    from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.scene.scene import Scene
 
 __all__ = [
@@ -77,7 +78,7 @@ def limit_fingerprint(scene: Scene) -> str:
         "format": _FORMAT,
         "arm": scene.arm.model if scene.arm else None,
         "sheets": [
-            [link.name, link.frame, item.sensor.name, asdict(item.sensor.frustum), _pose(item.placed.link_frustum)]
+            [link.name, link.frame, item.sensor.name, asdict(item.sensor.frustum), *_place(item.placed)]
             for link in scene.links
             for item in link.sensors
         ],
@@ -87,8 +88,10 @@ def limit_fingerprint(scene: Scene) -> str:
     return hashlib.sha256(json.dumps(round_facts(facts), sort_keys=True).encode()).hexdigest()
 
 
-def _pose(pose: Any) -> list[Any]:
-    return [pose.rotation, pose.translation]
+def _place(placed: PlacedFrustum) -> list[Any]:
+    pose = placed.link_frustum
+    bends = [[[bend.width, bend.turn] for bend in placed.bends]] if placed.bends else []
+    return [[pose.rotation, pose.translation], *bends]
 
 
 def inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: list[str]) -> bool:

@@ -1,0 +1,32 @@
+"""The keys bend_wrap_deg and bend_turn_deg: a full wrap has to close, outwards."""
+
+import pytest
+
+from coneskin.errors import SceneError
+from coneskin.scene.reader import parse_scene
+from coneskin.testing.forearm import forearm_scene
+
+
+def scene(wraps: list[float], turns: list[float], more: str = "") -> str:
+    keys = f"bend_wrap_deg = {wraps}\nbend_turn_deg = {turns}\n{more}height_mm"
+    return forearm_scene().replace("radius2_mm = 37.2", "radius2_mm = 37.6").replace("height_mm", keys, 1)
+
+
+@pytest.mark.parametrize(
+    "turns",
+    [
+        [3.14159, 3.14159],  # radians
+        [-180, -180],  # inside out: a retreat would press
+        [0, 0],
+        [360, 360],  # twice around
+        [180, 90],
+    ],
+)
+def test_a_full_wrap_that_does_not_close_outwards_is_refused(turns: list[float]) -> None:
+    with pytest.raises(SceneError, match="the bends of a full wrap must close"):
+        parse_scene(scene([180, 180], turns))
+
+
+def test_one_that_closes_within_rounding_and_a_partial_one_are_taken() -> None:
+    assert parse_scene(scene([90, 90, 90, 90], [119.9, 60, 120, 60])).sensors[0].placed.bends
+    assert parse_scene(scene([60, 60], [20, -5], "wrap_deg = 120\n")).sensors[0].placed.bends
