@@ -372,6 +372,7 @@ def test_the_seam_looks_where_it_is_asked_to(tmp_path):
         assert math.remainder(turn, 2.0 * math.pi) == pytest.approx(0.0, abs=0.01)
 
 
+@pytest.mark.long
 def test_a_cube_has_no_sheet_and_says_so(tmp_path, capsys):
     corners = [(x, y, z) for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)]
     faces = [

@@ -237,6 +237,7 @@ def test_another_arm_than_the_scenes_is_refused(controller):
         guard(scene_for(controller, {"UR5e": "UR10e"}), start_timeout=20.0).__enter__()
 
 
+@pytest.mark.long
 def test_a_target_in_degrees_is_refused_before_anything_moves(controller):
     with guard(scene_for(controller)) as session:
         with pytest.raises(ValueError, match=r"q\[1\] must be within -6.283 to 6.283 rad.*-90 deg are -1.5708 rad"):

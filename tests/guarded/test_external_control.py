@@ -301,6 +301,7 @@ def test_leaving_the_guard_stops_the_arm(controller, run):
     assert not any(controller.state()["qd"])
 
 
+@pytest.mark.long
 def test_the_arm_is_not_ours_to_move(controller):
     with (
         guard(external(controller)) as session,

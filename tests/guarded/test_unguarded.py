@@ -94,6 +94,7 @@ def test_a_guard_that_has_hung_guards_again_and_is_missed_again(controller):
             kill(session, name, signal.SIGCONT)
 
 
+@pytest.mark.long
 def test_a_touch_that_cannot_be_is_refused_and_nothing_else_happens(controller):
     with guard(external(controller)) as session:
         send(controller.host, 30002, RAW)

@@ -85,6 +85,7 @@ def test_a_viewer_who_never_reads_holds_nobody_up_and_costs_no_memory() -> None:
             assert lazy.socket.state.name == "OPEN"
 
 
+@pytest.mark.long
 def test_three_hundred_connections_that_say_nothing_leave_the_page_served() -> None:
     with PageServer("a page", port=18180) as server, ExitStack() as stack:
         server.gui.add_html("words")

@@ -16,6 +16,7 @@ def shares(fit) -> dict[str, float]:  # type: ignore[no-untyped-def]
     return {area.reason: area.share for area in fit.bare_areas}
 
 
+@pytest.mark.long
 def test_a_sheet_too_few_is_told_and_what_it_would_cover() -> None:
     told = shares(find_cones(placed(shoulder()), max_sheets=1))
     two = find_cones(placed(shoulder()), max_sheets=2)
@@ -33,6 +34,7 @@ def test_the_ends_of_a_tube_are_flat() -> None:
     assert ((np.abs(ends) < 1e-3) | (np.abs(ends - 0.2) < 2e-3)).all()
 
 
+@pytest.mark.long
 def test_a_dome_is_curved_in_two_ways_and_a_short_ring_has_no_room() -> None:
     dome = [(0.06 + 0.04 * math.sin(t), 0.04 * math.cos(t)) for t in np.linspace(0.1, 1.4, 20)]
     told = shares(find_cones(placed(revolve([(0.0, 0.04), (0.06, 0.04), *dome])), max_sheets=1))

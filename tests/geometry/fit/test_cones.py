@@ -171,6 +171,7 @@ def test_a_shoulder_gets_a_partial_wrap() -> None:
     assert edges[0] == pytest.approx(edges[1], abs=0.06)
 
 
+@pytest.mark.long
 def test_a_wrap_asked_for_is_kept() -> None:
     for sheet in find_cones(placed(shoulder()), wrap=math.radians(180.0)).sheets:
         assert math.degrees(sheet.frustum.wrap) == pytest.approx(180.0, abs=2.5)
@@ -203,6 +204,7 @@ def box(width: float, depth: float, height: float) -> tuple[Floats, Indices]:
     return turned * [width, depth, 1.0], faces
 
 
+@pytest.mark.long
 def test_a_box_is_refused_and_the_nearest_thing_shown() -> None:
     fit = find_cones(placed(box(0.1, 0.12, 0.3)))
     assert fit.sheets == ()
@@ -224,6 +226,7 @@ def test_a_narrow_wrap_asked_for_on_a_convex_body_is_given() -> None:
     assert sheet.frustum.height > 0.29
 
 
+@pytest.mark.long
 def test_a_bent_thing_is_refused_without_blaming_a_hull() -> None:
     corners, faces = noisy(revolve([(0.001 * k, 0.03 + 0.01 * (k % 20 > 9)) for k in range(0, 200, 5)]), 0.0)
     corners = corners * [1.0, 1.5, 1.0]
@@ -275,6 +278,7 @@ def test_two_crossing_tubes_get_sheets_about_both_axes_that_keep_clear() -> None
     assert clashes(one, two, 0.0062) == clashes(two, one, 0.0062) == 0
 
 
+@pytest.mark.long
 def test_the_thickness_of_the_sheets_keeps_them_apart_in_a_corner() -> None:
     one, two = find_cones(placed(shoulder()), wrap=2.0 * math.pi).sheets
     assert clashes(one, two, 0.0062) == clashes(two, one, 0.0062) == 0
@@ -291,6 +295,7 @@ def test_two_partial_wraps_share_a_tube() -> None:
     assert clashes(one, two, 0.006) == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("samples", [3000, 40_000])
 def test_the_sheets_do_not_depend_on_the_samples(samples: int) -> None:
     one, two = (find_cones(placed(noisy(rugby(), 2e-4)), samples=count) for count in (6000, samples))
@@ -311,6 +316,7 @@ def test_a_looser_tolerance_is_never_worse(body) -> None:  # type: ignore[no-unt
     assert all(b > 0.99 * a for a, b in itertools.pairwise(areas))
 
 
+@pytest.mark.long
 def test_what_is_advised_works_when_followed() -> None:
     for body in (box(0.06, 0.07, 0.2), revolve([(0.0, 0.04), (0.05, 0.06), (0.1, 0.04)], segments=9)):
         mesh = placed(body)
@@ -326,6 +332,7 @@ def test_a_cone_is_covered_up_to_the_smallest_radius_and_not_to_its_apex() -> No
     assert max(sheet.frustum.radius1, sheet.frustum.radius2) == pytest.approx(0.06, abs=5e-4)
 
 
+@pytest.mark.long
 def test_wires_are_four_for_each_sheet() -> None:
     assert len(find_cones(placed(shoulder()), max_wires=7).sheets) == 1
     assert len(find_cones(placed(shoulder()), max_wires=8).sheets) == 2
@@ -360,6 +367,7 @@ def test_rules_out_of_range(rule: dict[str, float], words: str) -> None:
 # ---- real links ----
 
 
+@pytest.mark.long
 def test_ur10_upper_arm() -> None:
     fit = find_cones(link("ur/ur10/collision/upperarm.stl"))
     sheet = fit.sheets[0]
@@ -382,6 +390,7 @@ def test_ur10_upper_arm() -> None:
 
 
 # radius, length [mm] at least: the table of design/geometry.md, less 2 mm that its 2..98 percentiles may add
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "radius", "length"), [("upperarm", 42.65, 234.0), ("forearm", 37.5, 259.0)])
 def test_ur5e_links_from_exploded_collada(name: str, radius: float, length: float) -> None:
     fit = find_cones(link(f"ur/ur5e/visual/{name}.dae"), max_sheets=1)
@@ -411,6 +420,7 @@ def test_hull_like_forearm_is_refused_with_the_reason() -> None:
     assert find_cones(link("ur/ur5e/visual/forearm.dae")).sheets
 
 
+@pytest.mark.long
 def test_uf850_link4_is_a_true_cone() -> None:
     sheet = find_cones(link("xarm/uf850_link4.stl"), max_sheets=1).sheets[0]
     assert abs(math.degrees(sheet.half_angle)) == pytest.approx(0.65, abs=0.06)

@@ -35,6 +35,7 @@ def area(fit: LinkFit) -> float:
     return sum(sheet.frustum.area for sheet in fit.sheets)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["rugby", *LONG])
 def test_the_sheets_do_not_depend_on_the_samples(name: str) -> None:
     mesh = mesh_of(name)

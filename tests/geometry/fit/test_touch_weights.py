@@ -109,6 +109,7 @@ def test_the_sheet_goes_where_touches_count() -> None:
     assert any("covers too little that counts" in area.reason for area in two.bare_areas)
 
 
+@pytest.mark.long
 def test_a_partial_wrap_turns_to_the_touched_side() -> None:
     """A wrap of a half turn on a whole tube may lie anywhere; with weights it lies where they are."""
     mesh = placed(frustum(0.05, 0.05, 0.2))

@@ -212,6 +212,7 @@ def test_a_second_control_client_is_refused_and_the_first_unharmed(simulated: Si
     assert got["first"] is True
 
 
+@pytest.mark.long
 def test_the_watchdog_ends_the_program_that_is_not_fed(simulated: SimulatedController) -> None:
     assert wheel.run("watchdog", simulated.host) == {"fed": True, "moved": True, "ended": True, "stands": True}
     assert simulated.events("watchdog")[-1]["action"] == "stop"
