@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import SceneError
 from coneskin.picture_file import write_picture
+from coneskin.robot.arm.link_frames import LINK_INDEX
 from coneskin.skin.padding import Padding
 
 from .speed_map import LEVERS, SpeedMap, contact_at
@@ -50,7 +51,7 @@ def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:
     lowest = min(curve.speeds[_LEVER] for curve in found.curves)
     rows = left.subplots(len(sheets), 1, squeeze=False)[:, 0]
     for axes, name in zip(rows, sheets, strict=True):
-        drawn = _draw_sheet(axes, found, name, (0.98 * lowest, 1.02 * highest))
+        drawn = _draw_sheet(axes, scene, found, name, (0.98 * lowest, 1.02 * highest))
     left.colorbar(
         drawn, ax=list(rows), label=f"permissible speed along the normal at a lever of {LEVERS[_LEVER]:g} m/rad [m/s]"
     )
@@ -61,14 +62,16 @@ def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:
     return figure
 
 
-def _draw_sheet(axes: Any, found: SpeedMap, name: str, scale: tuple[float, float]) -> Any:
+def _draw_sheet(axes: Any, scene: Scene, found: SpeedMap, name: str, scale: tuple[float, float]) -> Any:
+    wrap = next(item.sensor.frustum.wrap for item in scene.sensors if item.sensor.name == name)
     rows = [(patch, row) for patch, row in zip(found.patches, found.table.patches, strict=True) if patch.sensor == name]
     along = sorted({patch.u for patch, _ in rows})
     around = sorted({patch.phi for patch, _ in rows})
     speeds = {(patch.u, patch.phi): found.curves[row.curve].speeds[_LEVER] for patch, row in rows}
-    grid = [[speeds[u, phi] for phi in around] for u in along]
+    columns = around if around[-1] > wrap - 1e-6 else [*around, wrap]  # a full wrap ends where it begins
+    grid = [[speeds[u, around[n % len(around)]] for n in range(len(columns))] for u in along]
     drawn = axes.pcolormesh(
-        [math.degrees(phi) for phi in around],
+        [math.degrees(phi) for phi in columns],
         [1e3 * u for u in along],
         grid,
         shading="nearest",
@@ -76,7 +79,9 @@ def _draw_sheet(axes: Any, found: SpeedMap, name: str, scale: tuple[float, float
         vmax=scale[1],
         cmap="viridis",
     )
-    axes.set(title=f"{name}, link {rows[0][0].link}", xlabel="phi [deg]", ylabel="u [mm]")
+    link = next((word for word, index in LINK_INDEX.items() if index == rows[0][0].link), "")
+    axes.set(title=f"{name}, {link}", xlabel="phi [deg]", ylabel="u [mm]")
+    axes.set(xlim=(0.0, math.degrees(wrap)), ylim=(0.0, 1e3 * along[-1]))  # a cell of the mesh is wider than its sheet
     return drawn
 
 
