@@ -168,6 +168,8 @@ def find_cones(
     if exposure:
         say("casting rays to the outside")
         weights = exposure_weights(hull, rays)
+    if weights is not None:
+        weights.check_place(hull.points)
     worth = None if weights is None else weights.at(counted.points)
     weighed = hull_area if weights is None else float(weights.at(hull.points).sum()) * hull.area
     requirements = SheetRequirements(

@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 LEAST_WEIGHT = 1e-3  #: of the largest; where nothing touches, a sheet may still lie, and it is worth nearly nothing
 _COLUMNS = ("x_mm", "y_mm", "z_mm", "weight")
 _MAX_SIZE = 50_000_000  # bytes of a map; a million places
+_FARTHEST = 10_000.0  # mm of a coordinate, as in a scene
 _RAYS = 32  # from each sample of the hull
 _LIFT = 0.002  # m; a fingertip above the surface, not in its seams and grooves
 
@@ -63,6 +64,22 @@ class TouchWeights:
         nearest = cKDTree(self.points).query(points)[1]
         return np.asarray(np.maximum(self.weights[nearest] / self.weights.max(), LEAST_WEIGHT))
 
+    def check_place(self, hull: Floats) -> None:
+        """Refuse a map of another place, or in another unit, than a link with these points [m], shape (n, 3).
+
+        Raises:
+            GeometryError: all places are farther away than the link reaches, or within a hundredth of that.
+        """
+        from scipy.spatial import cKDTree
+
+        away = float(cKDTree(self.points).query(hull)[0].min())
+        extent, ours = float(np.ptp(hull, axis=0).max()), float(np.ptp(self.points, axis=0).max())
+        if away > extent or 0.0 < ours < 0.01 * extent:
+            raise GeometryError(
+                f"{self.name}: the places are {1e3 * away:.4g} mm from a link of {1e3 * extent:.4g} mm, and reach over "
+                f"{1e3 * ours:.3g} mm: they must be in mm, in the frame of the mesh"
+            )
+
 
 def read_touch_weights(path: str | Path) -> TouchWeights:
     """Read a map of weights: a CSV file with the columns x_mm, y_mm, z_mm and weight, one line for each place.
@@ -99,9 +116,11 @@ def read_touch_weights(path: str | Path) -> TouchWeights:
             raise GeometryError(
                 f"{path}: line {rows.line_num} must have a number in each of {', '.join(_COLUMNS)}"
             ) from exc
-        if not all(math.isfinite(value) for value in values[-1]) or values[-1][3] < 0.0:
+        *place, weight = values[-1]
+        if not (all(abs(x) <= _FARTHEST for x in place) and 0.0 <= weight < math.inf):
             raise GeometryError(
-                f"{path}: line {rows.line_num}: places must be finite and weights not negative, got {values[-1]}"
+                f"{path}: line {rows.line_num}: places must be finite and within {_FARTHEST:g} mm, "
+                f"and weights finite and not negative, got {values[-1]}"
             )
     table = np.array(values, float).reshape(-1, 4)
     return TouchWeights(table[:, :3] * 1e-3, table[:, 3], path.name)

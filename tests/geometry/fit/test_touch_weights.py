@@ -40,8 +40,9 @@ def test_places_are_read_in_millimetres_and_the_nearest_counts(tmp_path: Path) -
         ("x_mm,y_mm,z_mm\n1,2,3\n", "weight is missing"),
         (HEAD, "at least one place must have a weight above 0"),
         (HEAD + "0,0,0,0\n", "at least one place must have a weight above 0"),
-        (HEAD + "0,0,0,1\n0,0,0,-1\n", "line 3: places must be finite and weights not negative"),
+        (HEAD + "0,0,0,1\n0,0,0,-1\n", "line 3: places must be finite and within"),
         (HEAD + "0,0,nan,1\n", "line 2: places must be finite"),
+        (HEAD + "1e300,0,0,1\n", "line 2: places must be finite and within 10000 mm"),
         (HEAD + "0,0,0\n", "line 2 must have a number in each of x_mm, y_mm, z_mm, weight"),
         (HEAD + "0,0,0,much\n", "line 2 must have a number in each of"),
     ],
@@ -155,3 +156,12 @@ def test_weights_are_checked() -> None:
     for points, values in itertools.product([np.zeros((1, 3))], [[math.nan], [-1.0], [1.0, 2.0]]):
         with pytest.raises(GeometryError):
             TouchWeights(points, np.array(values))
+
+
+@pytest.mark.parametrize("places", [[[5.0, 0.0, 0.1]], [[5e-5, 0.0, 1e-4], [-5e-5, 0.0, 1e-4]]])
+def test_places_beside_the_link_or_in_metres_are_refused(places: list[list[float]]) -> None:
+    """They weighed every area of the link the same, and nobody was told."""
+    turn = np.linspace(0.0, 6.0, 50)
+    link = np.stack([0.05 * np.cos(turn), 0.05 * np.sin(turn), np.linspace(0.0, 0.2, 50)], axis=1)
+    with pytest.raises(GeometryError, match="must be in mm, in the frame of the mesh"):
+        TouchWeights(np.array(places), np.ones(len(places))).check_place(link)
