@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,10 +10,12 @@ import pytest
 import tomli_w
 
 from coneskin.errors import SceneError
+from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.guard.phase import Phase
-from coneskin.scene.build import build_core
+from coneskin.scene.build import _speed_limit, build_core, place_on_arm
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.scene import Scene
+from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
 from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.testing.forearm import forearm_scene
 
@@ -146,3 +149,27 @@ def test_another_section_of_the_same_sheet_is_another_scene(tmp_path: Path) -> N
     oval = round_one.replace("[90, 90, 90, 90]\nheight", "[120, 60, 120, 60]\nheight")
     assert oval != round_one
     assert limit_fingerprint(parse_scene(oval)) != limit_fingerprint(parse_scene(round_one))
+
+
+def along(way: tuple[float, ...], normal: tuple[float, ...]) -> float:
+    return sum(a * b for a, b in zip(way, normal, strict=True))
+
+
+BOX = "bend_wrap_deg = [80, 10, 80, 10, 80, 10, 80, 10]\nbend_turn_deg = [0, 90, 0, 90, 0, 90, 0, 90]\n"
+
+
+@pytest.mark.parametrize("bends", ["", BOX], ids=["cylinder", "box"])
+def test_no_place_is_faster_than_its_patches_are_held_to_be(bends: str) -> None:
+    """Of a moving cylinder, and of a moving box, whose normal turns by a right angle between two patches."""
+    even = SCENE.replace("radius2_mm = 37.2", "radius2_mm = 37.6")
+    scene = parse_scene(even.replace("height_mm", f"{bends}height_mm", 1))
+    (place,) = place_on_arm(scene)
+    wrap = place.frustum.frustum.wrap
+    patches = [LimitedPatch(NAME, 0.13, wrap * n / 16, 0, 0) for n in range(16)]
+    table = SpeedLimitScene(1, *[""] * 7, 0.01, 9.0, (), (), (0.1,), ((1.0,),), tuple(patches))
+    limit = _speed_limit(scene, table, arm_model("UR5e"))._speeds
+    for degrees in range(360):
+        way = (0.0, math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))  # the tube lies along x
+        fastest = max(along(way, place.place(0.13, wrap * n / 997)[1]) for n in range(997))
+        seen = max(along(way, patch.normal) for patch in limit.patches)
+        assert fastest <= limit.between * seen + 1e-9

@@ -127,13 +127,21 @@ def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLi
         at = places[patch.sensor]
         curve, any_curve = limit.curves[patch.curve], limit.curves[patch.any_curve]
         patches.append(PermissiblePatch(patch.sensor, at.link, *at.place(patch.u, patch.phi), curve, any_curve))
-    widest = 0.0  # angle between two patches, in the middle of which the speed along the normal may be greatest
-    for name in places:
-        around = sorted({patch.phi for patch in limit.patches if patch.sensor == name})
-        widest = max([widest, *(b - a for a, b in pairwise(around))])
+    widest = 0.0  # angle between two normals, in the middle of which the speed along the normal may be greatest
+    for name, at in places.items():
+        closed = at.frustum.frustum.wrap > 2.0 * math.pi - 1e-9
+        of_sensor = [patch for patch in limit.patches if patch.sensor == name]
+        for u in {patch.u for patch in of_sensor}:
+            normals = [at.place(u, phi)[1] for phi in sorted(patch.phi for patch in of_sensor if patch.u == u)]
+            widest = max([widest, *(_angle(a, b) for a, b in pairwise((*normals, *normals[: 1 if closed else 0])))])
     between = 1.0 / max(0.1, math.cos(0.5 * widest))
     speeds = PermissibleSpeeds(limit.levers, tuple(patches), limit.lowest, limit.highest, between)
     return SpeedLimit(arm, speeds)
+
+
+def _angle(a: Vector, b: Vector) -> float:
+    """Return the angle between two unit vectors [rad]."""
+    return 2.0 * math.asin(min(1.0, 0.5 * math.dist(a, b)))
 
 
 def _planner(scene: Scene, arm: ArmModel) -> ReactionPlanner:
