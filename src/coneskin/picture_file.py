@@ -39,10 +39,12 @@ def write_picture(
         raise refusal(f"{what} cannot be written to {path}: there is no folder {path.parent}; make it first")
     try:
         import matplotlib
+        import numpy as np
     except ImportError as exc:
         raise MissingExtra("matplotlib", "a picture", "pictures") from exc
     matplotlib.use("Agg", force=False)
-    with matplotlib.rc_context({"text.parse_math": False, "text.usetex": False}):  # a name may have dollars in it
+    # a name may have dollars in it; an overflow would be a warning, and a picture of nothing
+    with matplotlib.rc_context({"text.parse_math": False, "text.usetex": False}), np.errstate(over="raise"):
         try:
             compose().savefig(path, dpi=dpi)
         except ConeSkinError:

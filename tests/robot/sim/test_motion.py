@@ -7,7 +7,7 @@ import random
 from collections.abc import Callable
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from coneskin.geometry.pose import Pose
@@ -85,6 +85,7 @@ def _motions(arm: SimulatedArm) -> dict[str, Callable[[], Motion]]:
 
 @LAW
 @given(st.integers(0, 10_000))
+@example(114)  # asks the shoulder for 367 N m
 def test_any_sequence_is_continuous_with_bounded_acceleration(seed: int) -> None:
     """Motions cut off at random by others, slider and holds at random."""
     draw = random.Random(seed)
@@ -95,7 +96,9 @@ def test_any_sequence_is_continuous_with_bounded_acceleration(seed: int) -> None
         scale, hold = draw.choice([1.0, 1.0, 0.5, 0.0]), draw.random() < 0.2
         for _ in range(draw.randint(1, 150)):
             q, qd = arm.q, arm.qd
-            assert arm.step(scale, hold) is None
+            if fault := arm.step(scale, hold):  # more than its motors can: a controller stops it
+                assert "Position deviates from path" in str(fault)
+                return
             # servoj may take 40 rad/s2, and a new path may add its own acceleration to the dying speed of the last
             assert lead([a - b for a, b in zip(arm.qd, qd, strict=True)]) < 45.0 * CYCLE
             for a, b, c, d in zip(arm.q, q, arm.qd, qd, strict=True):
