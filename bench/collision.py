@@ -203,7 +203,8 @@ def draw_picture(found: dict[int, dict[str, Row]], path: Path) -> None:
     for axis, title in zip(axes, ("peak force", "force 0.5 s after the first contact"), strict=True):
         axis.set(title=title, xlabel="speed at contact [m/s]", xscale="log", yscale="log")
     axes[0].set_ylabel("force [N]")
-    axes[1].legend(title="median of each", fontsize="small")
+    handles, labels = axes[1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), title="median of each", fontsize="small")
     figure.savefig(path, dpi=110)
 
 
