@@ -204,7 +204,9 @@ def draw_picture(found: dict[int, dict[str, Row]], path: Path) -> None:
         axis.set(title=title, xlabel="speed at contact [m/s]", xscale="log", yscale="log")
     axes[0].set_ylabel("force [N]")
     handles, labels = axes[1].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), title="median of each", fontsize="small")
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=len(labels), title="median of each", fontsize="small"
+    )
     figure.savefig(path, dpi=110)
 
 
