@@ -1,6 +1,9 @@
 """What a workshop builds: the jig's distance to real links, STEP read back by another reader, and the blind seam.
 
 python -m pip install -e '.[design,cad,bench]'; python bench/build.py --links FOLDER
+
+The links: meshes of the makers' packages that bench/design_links.py names, and Universal Robots'
+(Universal_Robots_ROS2_Description 2221ec0, BSD-3) and UFactory's (xarm_ros2 3654ba7, BSD-3).
 """
 
 from __future__ import annotations
@@ -13,21 +16,25 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from report import head
+from scipy.spatial import KDTree
 
 import coneskin as cs
 from coneskin.design.seam_strip import blind_angle, cover_seams
 from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
 from coneskin.design.workshop.jig import Collar, jig_collars
+from coneskin.design.workshop.jig_surroundings import with_sheets
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
+from coneskin.geometry.ray_casting import RayCaster
+from coneskin.geometry.solid.closed_surface import ClosedSurface
 from coneskin.geometry.solid.step import WrappedLayer, write_step
 
-SAMPLES = 40_000  # on each link
-NEAREST = 800  # of them, near a part
+SAMPLES = 40_000  # on the faces of a link beside a part, and on the part
+NEAREST = 2000  # of them whose distance is computed
 
 
 def main() -> None:
@@ -40,7 +47,7 @@ def main() -> None:
     print("\nSTEP: distance of the surfaces that gmsh reads from the exact ones [m]")
     step()
     if args.links:
-        print("\njig: nearest distance of link and printed part [mm]; clearance 0.3 mm")
+        print("\njig: distance of link and sheets that it bears already from the printed part [mm]; clearance 0.3 mm")
         for path in sorted([*args.links.rglob("*.dae"), *args.links.rglob("*.stl")]):
             jig(path)
 
@@ -117,43 +124,97 @@ def _off(side: Frustum, thickness: float, points: np.ndarray) -> np.ndarray:
 
 def jig(path: Path) -> None:
     try:
-        design = cs.design_link(path)
+        try:
+            design = cs.design_link(path)
+        except cs.MeshError:  # metres by its header, and 200 of them
+            design = cs.design_link(path, unit="mm")
     except cs.ConeSkinError as exc:
-        print(f"  {path.name}: {str(exc)[:90]}")
+        print(f"  {path.name}: {str(exc)[:90]}", flush=True)
         return
     assert design.mesh is not None
-    points = trimesh.Trimesh(design.mesh.vertices, design.mesh.faces, process=False).sample(SAMPLES, seed=1)
     for index, sheet in enumerate(design.sheets):
         collars, without = jig_collars(sheet, design.mesh, design.sheets[:index])
+        body = with_sheets(design.mesh, design.sheets[:index])
         for collar in collars:
-            near = [_nearest(sheet, collar, part.surface, points) for part in collar.parts]
+            gaps = [_gap(sheet, collar, part.surface, body) for part in collar.parts]
             print(
-                f"  {path.name} {sheet.name} end {collar.end}: {min(near):.3f}, lip {1e3 * collar.lip:.1f} mm"
-                f"{', flush' if collar.flush else ''}{', keyed' if collar.keyed else ''}"
+                f"  {path.name} {sheet.name} end {collar.end}: {min(gap for gap, _ in gaps):.3f}"
+                f"{' TOUCHES' if any(crossed for _, crossed in gaps) else ''}, lip {1e3 * collar.lip:.1f} mm"
+                f"{', flush' if collar.flush else ''}{', keyed' if collar.keyed else ''}",
+                flush=True,
             )
         for sentence in without:
-            print(f"  {path.name} {sheet.name}: {sentence}")
+            print(f"  {path.name} {sheet.name}: {sentence}", flush=True)
 
 
-def _nearest(sheet: SheetDesign, collar: Collar, surface: Mesh, points: np.ndarray) -> float:
-    """Return the distance of the nearest point of the link to a part [mm]; -1 where one is in the plastic."""
+def _gap(sheet: SheetDesign, collar: Collar, surface: ClosedSurface, body: Mesh) -> tuple[float, bool]:
+    """Return the distance of the link from a part [mm], negative where it is in the plastic, and whether they meet.
+
+    They meet if an edge of one crosses a face of the other, or if a point of the link is in the plastic.
+    """
     plan, side = sheet.options.jig, sheet.place.frustum
     lift, sign = sheet.options.stack.thickness * side.sin_half_angle, (-1.0 if collar.end == 1 else 1.0)
     start = (min(0.0, -lift) if collar.end == 1 else side.height + max(0.0, -lift)) + sign * plan.clearance
-    x, y, z = sheet.place.link_frustum.inverse().apply_all(points).T
-    local = np.column_stack([x, sign * y, sign * (z - start) + plan.reach])
+    x, y, z = sheet.place.link_frustum.inverse().apply_all(body.vertices).T
+    vertices = np.column_stack([x, sign * y, sign * (z - start) + plan.reach])
     part = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     assert part.is_volume
-    low, high = part.bounds
-    close = local[((local > low - 2e-3) & (local < high + 2e-3)).all(axis=1)]
-    if len(close) == 0:
-        return math.inf
-    chosen = close[:: max(1, len(close) // NEAREST)]
-    if part.contains(chosen).any():
-        return -1.0
-    with np.errstate(all="ignore"):
-        distance = trimesh.proximity.closest_point(part, chosen)[1]
-    return 1e3 * float(distance[distance > 0.0].min())  # a sliver has no closest point: trimesh returns nan or 0
+    corners = vertices[body.faces]
+    near = (corners.max(axis=1) > part.bounds[0] - 3e-3) & (corners.min(axis=1) < part.bounds[1] + 3e-3)
+    faces = body.faces[near.all(axis=1)]
+    if len(faces) == 0:
+        return math.inf, False
+    link = trimesh.Trimesh(vertices, faces, process=False)
+    link.remove_unreferenced_vertices()
+    points = np.concatenate([link.vertices, link.sample(SAMPLES, seed=1)])
+    points = points[((points > part.bounds[0] - 3e-3) & (points < part.bounds[1] + 3e-3)).all(axis=1)]
+    if len(points) == 0:
+        return math.inf, False
+    inside = part.contains(points)
+    if inside.any():
+        return -1e3 * float(_distances(part, points[inside][:NEAREST]).max()), True
+    near_first = np.argsort(KDTree(part.sample(SAMPLES, seed=2)).query(points)[0])
+    distance = _distances(part, points[near_first[:NEAREST]])
+    assert np.isfinite(distance).all()
+    crossed = _crosses(link, part) or _crosses(part, link)
+    return 1e3 * float(distance.min()), crossed or bool((distance == 0.0).any())
+
+
+def _crosses(one: trimesh.Trimesh, other: trimesh.Trimesh) -> bool:
+    """Tell whether an edge of one surface crosses a face of another."""
+    ends = one.vertices[one.edges_unique]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    ends, length = ends[length > 0.0], length[length > 0.0]
+    rays = RayCaster(make_mesh(other.vertices, other.faces, "a part", "m"))
+    depth, _ = rays.cast(ends[:, 0], (ends[:, 1] - ends[:, 0]) / length[:, None])
+    return bool((depth < length).any())
+
+
+def _distances(part: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
+    """Return the distance of points from a surface [m]; slivers are no exception, unlike in trimesh.proximity.
+
+    The nearest point of a triangle lies on an edge, or is the foot of the perpendicular where that is inside.
+    """
+    triangles = np.asarray(part.triangles)
+    centre = triangles.mean(axis=1)
+    reach = float(np.linalg.norm(triangles - centre[:, None], axis=2).max())
+    bound = KDTree(part.vertices).query(points)[0]
+    result = np.empty(len(points))
+    for k, at in enumerate(KDTree(centre).query_ball_point(points, bound + reach + 1e-9)):
+        corner, point = triangles[at], points[k]
+        way = np.roll(corner, -1, axis=1) - corner
+        share = np.einsum("ijk,ijk->ij", point - corner, way) / np.maximum(np.einsum("ijk,ijk->ij", way, way), 1e-30)
+        foot = corner + np.clip(share, 0.0, 1.0)[..., None] * way
+        best = float(np.linalg.norm(point - foot, axis=2).min())
+        normal = np.cross(way[:, 0], way[:, 1])
+        size = np.linalg.norm(normal, axis=1)
+        side = np.einsum("ijk,ik->ij", np.cross(way, point - corner), normal)
+        above = (size > 0.0) & (side >= 0.0).all(axis=1)
+        if above.any():
+            height = np.abs(np.einsum("ij,ij->i", point - corner[above, 0], normal[above])) / size[above]
+            best = min(best, float(height.min()))
+        result[k] = best
+    return result
 
 
 if __name__ == "__main__":

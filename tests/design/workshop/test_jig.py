@@ -1,6 +1,7 @@
 """Jig: closed printable parts that keep clear of link and sheet, reach the datum, and come off without an undercut."""
 
 import io
+import itertools
 import math
 
 import numpy as np
@@ -120,6 +121,45 @@ def test_the_lip_ends_at_the_datum_and_clear_of_what_stands_out() -> None:
             solid = trimesh.Trimesh(part.surface.vertices, part.surface.faces, process=False)
             assert solid.is_volume
             assert not solid.contains(local).any(), "no point of the link is in the plastic"
+
+
+def ridged_tube(along: bool) -> tuple[Mesh, np.ndarray]:
+    """A tube of 50 mm with a sharp ridge of 2 mm, narrower than any grid of rays, along it or around; and the ridge."""
+    fine = np.radians([80.2, 80.35, 80.5])  # between two columns of a jig
+    phi = np.concatenate([np.arange(0.0, 360.0, 5.0), np.degrees(fine)])
+    phi = np.radians(np.sort(phi))
+    z = np.array([-0.03, 0.0, 0.2, 0.2051, 0.2053, 0.2055, 0.25])
+    radius = np.full((len(z), len(phi)), 0.05 / math.cos(math.radians(2.5)))
+    ridge = np.isclose(phi, fine[1])
+    if along:
+        radius[:, ridge] += 2e-3
+    else:
+        radius[4] += 2e-3
+    corners = np.stack([radius * np.cos(phi), radius * np.sin(phi), z[:, None] + 0.0 * phi], axis=-1)
+    index = np.arange(corners.size // 3).reshape(radius.shape)
+    a, b = index[:-1], np.roll(index, -1, axis=1)[:-1]
+    d, c = index[1:], np.roll(index, -1, axis=1)[1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    top = corners[-2:, ridge] if along else corners[4]
+    share = np.linspace(0.0, 1.0, 60)[:, None]
+    ends = top.reshape(-1, 3)
+    line = np.concatenate([(1.0 - share) * p + share * q for p, q in itertools.pairwise(ends)])
+    return make_mesh(corners.reshape(-1, 3), faces), line[(line[:, 2] > 0.2005) & (line[:, 2] < 0.214)]
+
+
+@pytest.mark.parametrize("along", [True, False])
+def test_a_ridge_between_the_rays_keeps_its_clearance(along: bool) -> None:
+    mesh, ridge = ridged_tube(along)
+    design = sheet(Frustum(0.0502, 0.0502, 0.2))
+    (two,) = [collar for collar in jig_collars(design, mesh)[0] if collar.end == 2]
+    away = ridge * [1.0, 1.0, 0.0] / np.hypot(ridge[:, 0], ridge[:, 1])[:, None]
+    solids = [trimesh.Trimesh(part.surface.vertices, part.surface.faces, process=False) for part in two.parts]
+    azimuth = np.arctan2(ridge[:, 1], ridge[:, 0])
+    covered = np.abs(np.sin(azimuth)) > 0.1  # not in the slots between the parts
+    for lift, inside in ((0.0, False), (0.28e-3, False), (0.29e-3 + 2e-3, True)):
+        local = in_part_frame(design, two, ridge + lift * away)
+        hit = np.any([solid.contains(local) for solid in solids], axis=0)
+        assert (hit[covered] == inside).all(), f"{1e3 * lift:.2f} mm above the ridge"
 
 
 def test_no_part_has_an_undercut() -> None:

@@ -20,19 +20,20 @@ from coneskin.design.sheets import SheetDesign
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.surface_shape import ShapeTab
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.solid.closed_surface import ClosedSurface, shell_surface
 from coneskin.geometry.solid.radial_profile import widest_nearby, without_undercut
 
 from .jig_surroundings import meets_neighbour, with_sheets
+from .link_excess import LinkExcess
 
 __all__ = ["Collar", "CollarPart", "jig_collars"]
 
 Floats = NDArray[np.float64]
 
 _TURN = 2.0 * math.pi
-_COLUMN = math.radians(2.0)  # step around the axis; an arc of 100 mm then lies 0.015 mm beside its chord
+_COLUMN = math.radians(1.0)  # step around the axis; an arc of 100 mm then lies 0.004 mm beside its chord
 _ROW = 2e-3  # m; step along the axis where the lip follows a mesh
+_STOP_ROW = 0.25e-3  # m; step by which the end of a lip before what stands out is found
 _FLUSH = 40e-3  # m; an outermost face nearer than this is the datum of the lip
 _RISE = 8e-3  # m; what stands out further from the cone is not gripped: the lip ends before it
 _SHORTEST = 4e-3  # m; a lip that is shorter everywhere holds nothing
@@ -136,14 +137,14 @@ class _Builder:
     def __init__(self, design: SheetDesign, mesh: Mesh | None, body: Mesh | None, end: int) -> None:
         self.design, self.plan, self.end = design, design.options.jig, end
         self.side = design.place.frustum
-        self.body = None if body is None else body.moved(design.place.link_frustum.inverse())
-        self.rays = None if self.body is None else RayCaster(self.body)
         thickness = design.options.stack.thickness
         self.outer = parallel_frustum(self.side, thickness)
         lift = thickness * self.side.sin_half_angle  # the outer face is moved by it towards end 1
         self.sign = -1.0 if end == 1 else 1.0
         sheet_end = min(0.0, -lift) if end == 1 else self.side.height + max(0.0, -lift)
         self.step = sheet_end + self.sign * self.plan.clearance
+        moved = None if body is None else body.moved(design.place.link_frustum.inverse())
+        self.link = LinkExcess(self.side, self.step, self.sign, max(_FLUSH, self.plan.grip), moved)
         self.room: float | None = None
         if mesh is not None:
             z = design.place.link_frustum.inverse().apply_all(mesh.vertices)[:, 2]
@@ -161,7 +162,7 @@ class _Builder:
             wanted = self.room
         taper = self.sign * (self.side.radius2 - self.side.radius1) / self.side.height
         if taper < 0.0:  # the cone ends at its apex
-            wanted = min(wanted, (float(self._cone(self.step)) - _LEAST_RADIUS) / -taper)
+            wanted = min(wanted, (float(self.link.cone(self.step)) - _LEAST_RADIUS) / -taper)
         if self.room is not None:
             wanted = min(wanted, self.room)
         if wanted < _SHORTEST:
@@ -198,35 +199,14 @@ class _Builder:
             spans.append((start, stop, max(4, math.ceil((stop - start) / _COLUMN)) + 1))
         return spans
 
-    def _cone(self, z: float | Floats) -> Floats:
-        """Return the radius of the cone of the link, extended [m]."""
-        slope = (self.side.radius2 - self.side.radius1) / self.side.height
-        return np.asarray(np.maximum(_LEAST_RADIUS, self.side.radius1 + slope * np.asarray(z, float)))
-
-    def _link(self, z: Floats, phi: Floats) -> Floats:
-        """Return the radius of the outermost surface of the link at heights and azimuths of one shape [m]."""
-        cone = self._cone(z)
-        if self.rays is None or self.body is None:
-            return cone
-        radial = np.stack([np.cos(phi), np.sin(phi), np.zeros_like(phi)], axis=-1)
-        far = float(np.hypot(*self.body.vertices[:, :2].T).max()) + 0.01
-        origins = far * radial
-        origins[..., 2] = z
-        depth, _ = self.rays.cast(origins.reshape(-1, 3), -radial.reshape(-1, 3))
-        radius = (far - depth).reshape(phi.shape)
-        # beyond the link, or through an open end of the mesh, there is nothing to lie on
-        return np.where(np.isfinite(radius) & (radius > 0.5 * cone), radius, cone)
-
     def _lip_lengths(self, phi: Floats, wanted: float) -> Floats:
         """Return the length of the lip at each azimuth [m]."""
-        s = np.linspace(0.0, wanted, max(2, math.ceil(wanted / _ROW)) + 1)
-        if self.rays is None:
-            return np.full(len(phi), wanted)
-        z = self.step + self.sign * s[:, None] + np.zeros(len(phi))
-        standing = self._link(z, phi + np.zeros_like(z)) > self._cone(z) + _RISE
-        first = np.where(standing.any(axis=0), standing.argmax(axis=0), len(s))
-        free = np.where(first < len(s), s[np.clip(first - 1, 0, len(s) - 1)] - self.plan.clearance, wanted)
-        return np.asarray(np.maximum(0.0, widest_nearby(-free[None], 0, 2)[0] * -1.0))
+        share = np.linspace(0.0, 1.0, max(2, math.ceil(wanted / _STOP_ROW)) + 1)
+        standing = self.link.over(share, np.full(len(phi), wanted), phi, self.plan.clearance) > _RISE
+        first = np.where(standing.any(axis=0), standing.argmax(axis=0), len(share))
+        before = wanted * share[np.clip(first - 1, 0, len(share) - 1)] - self.plan.clearance
+        free = np.where(first < len(share), before, wanted)
+        return np.asarray(np.maximum(0.0, widest_nearby(-free[None], 0, 1)[0] * -1.0))
 
     def _part(self, phi: Floats, lengths: Floats, number: int) -> ClosedSurface:
         """Return the shell of one part."""
@@ -234,9 +214,9 @@ class _Builder:
         count = max(2, math.ceil(float(lengths.max()) / _ROW)) + 1
         share = np.linspace(1.0, 0.0, count)[:, None]
         lip_z = self.step + self.sign * share * lengths
-        columns = phi + np.zeros_like(lip_z)
-        cone = self._cone(lip_z)
-        lip = cone + widest_nearby(self._link(lip_z, columns) - cone, 1, 1) + plan.clearance
+        cone = self.link.cone(lip_z)
+        excess = self.link.over(share[::-1, 0], lengths, phi, plan.clearance)[::-1]
+        lip = cone + widest_nearby(excess, 1, 1) + plan.clearance
         lip = np.minimum(lip, cone + _RISE + plan.wall)  # where there is no lip, no wall either
         lip = np.where(self._above_tabs(phi), np.maximum(lip, cone + _CHANNEL), lip)
         into = np.array([0.0, _SEAT, _SEAT, plan.reach - _SEAT, plan.reach - _SEAT, plan.reach])[:, None]
@@ -254,7 +234,7 @@ class _Builder:
         outside[[-6, -5, -2, -1]] += _RIM
         notched = np.zeros(len(phi), bool)
         for k in range(number):
-            notched[2 + 3 * k : 4 + 3 * k] = len(phi) > 4 + 3 * k + 2
+            notched[4 + 6 * k : 8 + 6 * k] = len(phi) > 12 + 6 * k
         outside = np.where(notched, outside - _NOTCH, outside)
         z = self.sign * (z - self.step)
         z = z - z.min()
