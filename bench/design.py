@@ -199,8 +199,8 @@ def fit_rows(
         return 1e3 * float(np.sqrt((cone.distances(under) ** 2).mean()))
 
     for count in (500, 1000, 2000, 6000, 20_000):
-        seconds = best(partial(find_cones, mesh, TOLERANCE, samples=count), repeat=3)
-        fit = find_cones(mesh, TOLERANCE, samples=count)
+        seconds = best(partial(find_cones, mesh, tolerance=TOLERANCE, samples=count), repeat=3)
+        fit = find_cones(mesh, tolerance=TOLERANCE, samples=count)
         if not fit.sheets:
             yield "coneskin", count, seconds, math.nan, math.nan, math.nan, math.nan
             continue
@@ -253,7 +253,7 @@ def print_steps(name: str, path: Path) -> None:
     """From the file to the map, with the time of every step."""
     marks: list[tuple[str, float]] = [("reading the file", time.perf_counter())]
     mesh = load_mesh(path)
-    fit = find_cones(mesh, TOLERANCE, progress=lambda step: marks.append((step, time.perf_counter())))
+    fit = find_cones(mesh, tolerance=TOLERANCE, progress=lambda step: marks.append((step, time.perf_counter())))
     if fit.sheets:
         marks.append(("building the map", time.perf_counter()))
         measure_displacement(mesh, fit.sheets[0].placed)
@@ -281,7 +281,7 @@ def main() -> None:
             print_steps(file.name, file)
     bodies = [("/".join(file.parts[-3:]), load_mesh(file)) for file in there] + [("barrel", barrel())]
     for name, mesh in bodies:
-        fit = find_cones(mesh, TOLERANCE, samples=60_000)
+        fit = find_cones(mesh, tolerance=TOLERANCE, samples=60_000)
         if not fit.sheets:
             print(f"\n{name}: {fit.reason}")
             continue

@@ -157,7 +157,7 @@ def main() -> None:
         except MeshError:  # metres by its header, and 200 of them
             mesh = load_mesh(path, "mm")
         start = time.process_time()
-        fit = find_cones(mesh, TOLERANCE, arguments.sheets)
+        fit = find_cones(mesh, tolerance=TOLERANCE, max_sheets=arguments.sheets)
         spent = time.process_time() - start
         area = sum(sheet.frustum.area for sheet in fit.sheets) / fit.hull_area
         top = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -292,7 +292,7 @@ def main() -> None:
         rays = RayCaster(one.mesh)
         hull = sample_surface(one.mesh, rays)
         start = time.process_time()
-        fit = find_cones(one.mesh, TOLERANCE, one.sheets)
+        fit = find_cones(one.mesh, tolerance=TOLERANCE, max_sheets=one.sheets)
         spent = time.process_time() - start
         area = sum(sheet.frustum.area for sheet in fit.sheets)
         off = f"{furthest(one, fit):8.3f}" if fit.sheets else f"{'-':>8}"

@@ -16,8 +16,10 @@ import time
 import numpy as np
 from report import head
 
-from coneskin.geometry.fit.cones import find_cones
-from coneskin.geometry.fit.developables import find_developables
+from coneskin.geometry.fit.cones import fit_cones
+from coneskin.geometry.fit.developable.packing import with_developables
+from coneskin.geometry.fit.fit_options import FitOptions
+from coneskin.geometry.fit.sampled_link import sample_link
 from coneskin.geometry.pose import Pose
 from coneskin.testing.ruled_tube import RuledTube, ellipse_section, rounded_box_section, stadium_section
 
@@ -40,9 +42,11 @@ def row(name: str, tube: RuledTube, kind: str) -> str:
     around, along, noise = MESHES[kind]
     mesh = tube.mesh(around, along, noise)
     start = time.perf_counter()
-    cones = find_cones(mesh)
+    options = FitOptions()
+    link = sample_link(mesh, options, lambda _: None)
+    cones = fit_cones(link, options, lambda _: None)
     middle = time.perf_counter()
-    fit = find_developables(mesh, cones)
+    fit = with_developables(link, cones, options)
     end = time.perf_counter()
     shares = [sum(sheet.area_share for sheet in found.sheets) for found in (cones, fit)]
     text = f"| {name} | {kind} | {shares[0]:.1%} | {shares[1]:.1%} "

@@ -26,7 +26,8 @@ GROUND = {
 MAY_IMPORT: dict[str, str] = {
     "recording_file": "",
     "geometry": "",
-    "geometry.fit": "geometry",
+    "geometry.fit": "geometry geometry.fit.developable",
+    "geometry.fit.developable": "geometry geometry.fit",
     "geometry.drawing": "geometry",
     "geometry.solid": "geometry",
     "skin": "geometry",
@@ -108,6 +109,7 @@ HOMES = {
     ),
     "scipy": (
         "geometry/fit/*.py",
+        "geometry/fit/developable/*.py",
         "geometry/hole_bridging.py",
         "skin/field/*.py",
         "skin/virtual/field_contacts.py",

@@ -5,33 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.errors import GeometryError
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
 from .axis_plan import SheetRequirements
 from .bare_areas import BareArea, bare_areas
-from .candidates import find_axis_candidates
 from .coverage_notes import bare_lengths, hull_note
+from .fit_options import MOST_TOLERANCE, FitOptions
 from .fitted_sheet import FittedSheet, fitted_sheet
 from .plan import AxisSurvey, SheetPlan, best_plan, better_surveys, survey_axes
-from .surface_samples import SurfaceSamples, sample_surface
-from .touch_weights import TouchWeights, exposure_weights
+from .sampled_link import SampledLink, sample_link
+from .surface_samples import SurfaceSamples
 
-__all__ = ["BareLength", "LinkFit", "find_cones"]
+__all__ = ["LEAST_GAIN", "BareLength", "LinkFit", "find_cones", "fit_cones"]
 
 Floats = NDArray[np.float64]
 
-TURN = 2.0 * math.pi
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.05  #: share of the hull that a further sheet must add; a fillet adds less
-SEARCH_SAMPLES = 6000  #: points on the mesh from which the axes are found, whatever ``samples`` is
-_MOST_TOLERANCE = 0.020  # m; a sheet that stands off further does not follow the link
-_MOST_BRIDGE = 0.100  # m; over a wider hole a sheet sags
 _HINT_STEP = 1e-5  # m; a tolerance is advised in hundredths of a millimetre
 
 
@@ -88,22 +84,10 @@ class LinkFit:
 
 def find_cones(
     mesh: Mesh,
-    tolerance: float = 0.001,
-    max_sheets: int = 2,
-    wrap: float | None = None,
-    min_length: float = 0.025,
-    min_wrap: float = math.radians(150.0),
-    max_bridge: float = 0.010,
-    seam_direction: tuple[float, float, float] = (1.0, 0.0, 0.0),
-    samples: int = 6000,
-    progress: Callable[[str], None] | None = None,
+    options: FitOptions | None = None,
     *,
-    max_wires: int | None = None,
-    min_radius: float = 0.004,
-    thickness: float = 0.0062,
-    gap: float = 0.001,
-    weights: TouchWeights | None = None,
-    exposure: bool = False,
+    progress: Callable[[str], None] | None = None,
+    **named: Any,
 ) -> LinkFit:
     """Find the frusta that cover most of a link, about one or several axes; with weights, most of what is touched.
 
@@ -111,89 +95,47 @@ def find_cones(
 
     Args:
         mesh: the link.
-        tolerance: largest distance between a sheet and the hull [m].
-        max_sheets: sheets at most.
-        wrap: angle that a sheet must cover [rad]; None for what covers most, full wraps or partial ones.
-        min_length: smallest length of a sheet along the axis [m].
-        min_wrap: smallest partial wrap [rad].
-        max_bridge: width of the widest hole or groove that a sheet spans [m].
-        seam_direction: direction in the link's frame in which the seam of a full wrap faces.
-        samples: number of points on the mesh by which coverage is measured; the sheets do not depend on it.
+        options: what is asked of the sheets; None for the values that ``FitOptions`` has by itself.
         progress: called with the name of each step.
-        max_wires: wires at most, four for each sheet; None for as many as the sheets need.
-        min_radius: smallest radius of a sheet [m]; a cone is covered up to there, not up to its apex.
-        thickness: of a sheet [m]; sheets about different axes do not run into each other.
-        gap: smallest distance between sheets about different axes, and between partial wraps [m].
-        weights: what areas count, where touches are likelier on some than on others; None for all the same.
-        exposure: True to weigh areas by how much of the space above them is free (``exposure_weights``).
+        named: options by their names, instead of those in ``options``: ``find_cones(mesh, tolerance=0.002)``.
 
     Returns:
         the fit; without sheets where nothing fits within the tolerance.
 
     Raises:
-        GeometryError: an argument is out of range.
+        GeometryError: an option is out of range.
         MeshError: no face of the mesh is visible from outside.
     """
-    lengths = {"tolerance": tolerance, "min_length": min_length, "max_bridge": max_bridge, "min_radius": min_radius}
-    for name, value in lengths.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise GeometryError(f"{name} must be above 0 mm, got {value * 1e3:g} mm")
-    for name, value, most in (("tolerance", tolerance, _MOST_TOLERANCE), ("max_bridge", max_bridge, _MOST_BRIDGE)):
-        if value > most:
-            raise GeometryError(f"{name} must be at most {most * 1e3:g} mm, got {value * 1e3:g} mm")
-    for name, value in {"thickness": thickness, "gap": gap}.items():
-        if not (math.isfinite(value) and value >= 0.0):
-            raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:g} mm")
-    if max_sheets < 1:
-        raise GeometryError(f"max_sheets must be at least 1, got {max_sheets!r}")
-    if max_wires is not None and max_wires < 4:
-        raise GeometryError(f"max_wires must be at least 4, the wires of one sheet, got {max_wires!r}")
-    for name, angle in (("wrap", TURN if wrap is None else wrap), ("min_wrap", min_wrap)):
-        if not 0.0 < angle <= TURN:
-            raise GeometryError(
-                f"{name} must be above 0 and at most a full turn of 360 deg, got {math.degrees(angle):g} deg"
-            )
-    seam = np.asarray(seam_direction, float)
-    size = float(np.linalg.norm(seam))
-    if not (math.isfinite(size) and size > 0.0):
-        raise GeometryError(f"the direction of the seam must be finite and not zero, got {tuple(seam_direction)}")
-    if weights is not None and exposure:
-        raise GeometryError("weights of touches come from a map or from the exposure, not from both")
+    options = replace(options or FitOptions(), **named)
     say = progress or (lambda _: None)
-    say("sampling the hull")
-    rays = RayCaster(mesh)
-    hull = sample_surface(mesh, rays, SEARCH_SAMPLES)
-    counted = hull if samples == SEARCH_SAMPLES else sample_surface(mesh, rays, samples)
-    hull_area = len(hull) * hull.area
-    if exposure:
-        say("casting rays to the outside")
-        weights = exposure_weights(hull, rays)
-    if weights is not None:
-        weights.check_place(hull.points)
-    worth = None if weights is None else weights.at(counted.points)
-    weighed = hull_area if weights is None else float(weights.at(hull.points).sum()) * hull.area
+    return fit_cones(sample_link(mesh, options, say), options, say)
+
+
+def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]) -> LinkFit:
+    """Find the frusta that cover most of a sampled link; ``say`` is called with the name of each step."""
     requirements = SheetRequirements(
-        tolerance,
-        max_sheets if max_wires is None else min(max_sheets, max_wires // 4),
-        wrap,
-        min_length,
-        min_wrap,
-        max_bridge,
-        seam / size,
-        min_radius,
-        thickness,
-        gap,
-        LEAST_GAIN * weighed,
-        weights,
+        options.tolerance,
+        options.most_sheets,
+        options.wrap,
+        options.min_length,
+        options.min_wrap,
+        options.max_bridge,
+        options.seam,
+        options.min_radius,
+        options.thickness,
+        options.gap,
+        LEAST_GAIN * link.weighed_area,
+        link.weights,
     )
-    say("looking for axes")
-    candidates = find_axis_candidates(hull)
+    mesh, rays, hull, counted, worth = link.mesh, link.rays, link.hull, link.counted, link.worth
+    tolerance, min_length = options.tolerance, options.min_length
+    hull_area, weighed, candidates = link.hull_area, link.weighed_area, link.axes
     say("measuring profiles")
     surveys = survey_axes(mesh, rays, candidates, requirements)
     surveys += better_surveys(mesh, rays, surveys, requirements)
     search = _Search(mesh, rays, hull, weighed, surveys, requirements)
     plan, refusal = search.plan(tolerance)
-    name = "" if weights is None else weights.name
+    name = "" if link.weights is None else link.weights.name
     nearest, needed, length = None, math.inf, _longest(hull)
     if plan is None:
         reason = refusal or f"no cone fits within {tolerance * 1e3:g} mm over a length of {min_length * 1e3:g} mm"
@@ -279,7 +221,7 @@ class _Search:
         """Return a plan within the least of some tolerances that gives one, and that tolerance [m]."""
         for factor in (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0):
             tolerance = math.ceil(factor * self.requirements.tolerance / _HINT_STEP - 1e-6) * _HINT_STEP
-            if tolerance > _MOST_TOLERANCE:
+            if tolerance > MOST_TOLERANCE:
                 break
             plan, _ = self.plan(tolerance)
             if plan is not None:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .errors import SkinError as SkinError
     from .errors import SkinTimeout as SkinTimeout
     from .geometry.fit.cones import find_cones as find_cones
+    from .geometry.fit.fit_options import FitOptions as FitOptions
     from .geometry.frustum import Frustum as Frustum
     from .geometry.mesh import load_mesh as load_mesh
     from .geometry.placed_frustum import PlacedFrustum as PlacedFrustum
@@ -87,6 +88,7 @@ _PUBLIC = {
     "RobotConnectionError RobotError RobotRefused RobotTimeout SceneError SensorError SkinConnectionError SkinError "
     "SkinTimeout",
     "geometry.fit.cones": "find_cones",
+    "geometry.fit.fit_options": "FitOptions",
     "geometry.frustum": "Frustum",
     "geometry.mesh": "load_mesh",
     "geometry.placed_frustum": "PlacedFrustum",

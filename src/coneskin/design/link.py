@@ -105,14 +105,14 @@ def fit_link(
         packages: folders of the ROS packages in a URDF's package:// paths.
         progress: called with the name of each step.
         arguments: of a xacro file.
-        search: keyword arguments of ``find_sheets``. Without ``seam_direction`` the seams are put where the link
+        search: fields of ``FitOptions``, and ``round_only``. Without ``seam_direction`` the seams are where the link
             shields them most (``place_seams``).
 
     Raises:
         MeshError: the file, the link or its mesh cannot be found or read.
         GeometryError: an argument of the search is out of range.
     """
-    from coneskin.geometry.fit.developables import find_sheets
+    from coneskin.geometry.fit.sheets import find_sheets
 
     facing = search.pop("seam_direction", None)
     tries: list[tuple[LinkMesh, LinkFit]] = []
@@ -129,7 +129,7 @@ def fit_link(
 
 def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **search: Any) -> tuple[LinkMesh, LinkFit]:
     """Return a mesh with its fit, named by its source; arguments as in ``fit_link``."""
-    from coneskin.geometry.fit.developables import find_sheets
+    from coneskin.geometry.fit.sheets import find_sheets
 
     name = Path(mesh.source).stem
     source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", (*_terms(mesh.source), *mesh.notes))

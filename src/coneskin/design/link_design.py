@@ -77,7 +77,7 @@ def design_link(
         pictures: True to draw pictures too, which needs the extra ``pictures``.
         replace_design: True to allow an earlier design in the folder; files that are not of that design stay.
         progress: called with the name of each step.
-        search: keyword arguments of ``find_cones``, such as ``tolerance=0.002`` [m].
+        search: fields of ``FitOptions``, such as ``tolerance=0.002`` [m].
 
     Returns:
         the design.

@@ -309,7 +309,7 @@ def test_the_sheets_do_not_depend_on_the_samples(samples: int) -> None:
 def test_a_looser_tolerance_is_never_worse(body) -> None:  # type: ignore[no-untyped-def]
     mesh = placed(noisy(body(), 1e-4))
     areas = [
-        sum(sheet.frustum.area for sheet in find_cones(mesh, tolerance).sheets)
+        sum(sheet.frustum.area for sheet in find_cones(mesh, tolerance=tolerance).sheets)
         for tolerance in (5e-4, 7e-4, 1e-3, 1.4e-3, 2e-3, 3e-3)
     ]
     # a slice of 512 is 0.2 %, and a sheet more or less may be worth 5 % of the hull

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .profile import RadialProfile
+from coneskin.geometry.fit.profile import RadialProfile
 
 __all__ = ["RuledRegion", "columns_of", "ruled_region"]
 

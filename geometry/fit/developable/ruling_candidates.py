@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import AxisCandidate
-from .surface_samples import SurfaceSamples
+from coneskin.geometry.fit.candidates import AxisCandidate
+from coneskin.geometry.fit.surface_samples import SurfaceSamples
 
 __all__ = ["RulingCandidate", "find_ruling_candidates"]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from coneskin.geometry.fit.developable_fit import fit_developable
-from coneskin.geometry.fit.developables import find_sheets
+from coneskin.geometry.fit.developable.side_fit import fit_developable
+from coneskin.geometry.fit.sheets import find_sheets
 from coneskin.geometry.pose import Pose
 from coneskin.testing.ruled_tube import RuledTube, Section, ellipse_section, rounded_box_section, stadium_section
 

@@ -9,20 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.errors import GeometryError
+from coneskin.geometry.fit.fit_options import FitOptions
+from coneskin.geometry.fit.fitted_sheet import FittedSheet
+from coneskin.geometry.fit.profile import AxisFrame, RadialProfile, measure_profile
+from coneskin.geometry.fit.surface_samples import SurfaceSamples
 from coneskin.geometry.hole_bridging import bridge_holes
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
 
-from .developable_fit import fit_developable
-from .fitted_sheet import FittedSheet
-from .profile import AxisFrame, RadialProfile, measure_profile
 from .ruled_region import RuledRegion, columns_of, ruled_region
 from .ruling_candidates import RulingCandidate
-from .surface_samples import SurfaceSamples
+from .side_fit import fit_developable
 
-__all__ = ["FoundSheet", "RulingNeeds", "covered_samples", "fit_sheet", "hull_points", "ruled_profile", "widest_region"]
+__all__ = ["FoundSheet", "covered_samples", "fit_sheet", "hull_points", "ruled_profile", "widest_region"]
 
 Floats = NDArray[np.float64]
 
@@ -31,20 +32,6 @@ _FIT_ROWS = 12  # slices whose points are fitted
 _LEAST_POINTS = 100  # of a region, to fit a side to it
 _CHECK_ROWS = 60  # slices by which a fit is judged
 _ALIGNED = 0.9  # cosine between the normals of the hull and of a sheet on it
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RulingNeeds:
-    """The arguments of ``find_developables`` that every step needs; lengths in m."""
-
-    tolerance: float
-    wrap: float | None
-    min_length: float
-    min_wrap: float
-    max_bridge: float
-    seam: Floats
-    min_radius: float
-    clear: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,13 +44,13 @@ class FoundSheet:
 
 
 def ruled_profile(
-    mesh: Mesh, rays: RayCaster, candidate: RulingCandidate, grid: tuple[int, int], needs: RulingNeeds
+    mesh: Mesh, rays: RayCaster, candidate: RulingCandidate, grid: tuple[int, int], options: FitOptions
 ) -> RadialProfile:
     """Measure a profile about a line, of about so many slices and rays, with holes filled up to its section."""
-    frame = AxisFrame.along(candidate.origin, candidate.axis, needs.seam)
+    frame = AxisFrame.along(candidate.origin, candidate.axis, options.seam)
     length = float(np.ptp(frame.local(mesh.vertices)[:, 2]))
-    profile = measure_profile(mesh, rays, frame, max(length / grid[0], 0.0005), grid[1], needs.max_bridge)
-    return _bridged_anew(profile, _apex_height(profile, candidate), needs.max_bridge)
+    profile = measure_profile(mesh, rays, frame, max(length / grid[0], 0.0005), grid[1], options.max_bridge)
+    return _bridged_anew(profile, _apex_height(profile, candidate), options.max_bridge)
 
 
 def _bridged_anew(profile: RadialProfile, apex: float | None, width: float) -> RadialProfile:
@@ -87,13 +74,13 @@ def _apex_height(profile: RadialProfile, candidate: RulingCandidate) -> float | 
     return float((candidate.apex - profile.frame.origin) @ profile.frame.axis)
 
 
-def widest_region(profile: RadialProfile, candidate: RulingCandidate, needs: RulingNeeds) -> RuledRegion | None:
+def widest_region(profile: RadialProfile, candidate: RulingCandidate, options: FitOptions) -> RuledRegion | None:
     """Return the region of a profile that one sheet can cover."""
-    columns = math.ceil(needs.min_wrap / TURN * len(profile.phi))
-    rows = max(3, math.ceil(needs.min_length / profile.step))
-    least = np.full(len(profile.z), 0.25 * needs.min_radius)
+    columns = math.ceil(options.min_wrap / TURN * len(profile.phi))
+    rows = max(3, math.ceil(options.min_length / profile.step))
+    least = np.full(len(profile.z), 0.25 * options.min_radius)
     apex = _apex_height(profile, candidate)
-    return ruled_region(profile, apex, needs.tolerance, rows, least, columns, needs.wrap == TURN)
+    return ruled_region(profile, apex, options.tolerance, rows, least, columns, options.wrap == TURN)
 
 
 def hull_points(profile: RadialProfile, rows: slice = slice(None), columns: NDArray[np.int64] | None = None) -> Floats:
@@ -111,24 +98,24 @@ def fit_sheet(
     hull: SurfaceSamples,
     worth: Floats,
     candidate: RulingCandidate,
-    needs: RulingNeeds,
+    options: FitOptions,
     number: int,
 ) -> FoundSheet | None:
     """Return the sheet of a candidate, fitted on a fine profile and checked there."""
-    region = widest_region(profile, candidate, needs)
+    region = widest_region(profile, candidate, options)
     if region is None:
         return None
-    placed = _side(profile, region, candidate, needs)
+    placed = _side(profile, region, candidate, options)
     if placed is None:
         return None
-    rise = _rise(mesh, placed, needs.tolerance)
+    rise = _rise(mesh, placed, options.tolerance)
     if rise:
         placed = placed.parallel(rise)
-    return _checked(profile, region, placed, hull, worth, needs, rise, number)
+    return _checked(profile, region, placed, hull, worth, options, rise, number)
 
 
 def _side(
-    profile: RadialProfile, region: RuledRegion, candidate: RulingCandidate, needs: RulingNeeds
+    profile: RadialProfile, region: RuledRegion, candidate: RulingCandidate, options: FitOptions
 ) -> PlacedDevelopable | None:
     """Fit a side to a region."""
     columns = columns_of(region, len(profile.phi))
@@ -154,11 +141,11 @@ def _side(
     step = max(1, (region.end - region.first) // _FIT_ROWS)
     points = hull_points(profile, slice(region.first, region.end, step), columns)
     hit = profile.radius[region.first : region.end : step][:, columns]
-    sound = (profile.bridged[region.first : region.end : step][:, columns] - hit <= needs.tolerance).ravel()
+    sound = (profile.bridged[region.first : region.end : step][:, columns] - hit <= options.tolerance).ravel()
     if sound.sum() < _LEAST_POINTS:
         return None
     try:
-        return fit_developable(at, ways, points[sound], full, candidate.apex is not None, needs.tolerance)
+        return fit_developable(at, ways, points[sound], full, candidate.apex is not None, options.tolerance)
     except (GeometryError, np.linalg.LinAlgError):
         return None
 
@@ -194,7 +181,7 @@ def _checked(
     placed: PlacedDevelopable,
     hull: SurfaceSamples,
     worth: Floats,
-    needs: RulingNeeds,
+    options: FitOptions,
     rise: float,
     number: int,
 ) -> FoundSheet | None:
@@ -205,7 +192,7 @@ def _checked(
     rows = rows if rows[-1] == region.end - 1 else np.append(rows, region.end - 1)
     shape = (len(rows), len(columns))
     floor = profile.bridged[rows][:, columns]
-    hole = floor - profile.radius[rows][:, columns] > needs.tolerance
+    hole = floor - profile.radius[rows][:, columns] > options.tolerance
     out = np.stack([np.cos(profile.phi[columns]), np.sin(profile.phi[columns])], axis=1)
     base = profile.frame.origin + profile.z[rows][:, None, None] * profile.frame.axis
     across = (out @ profile.frame.columns[:, :2].T)[None]
@@ -214,20 +201,20 @@ def _checked(
     off = placed.locate_all(points.reshape(-1, 3))[2].reshape(shape)
     rim = placed.locate_all(rims.reshape(-1, 3))[2].reshape(shape) if hole.any() else off
     within = np.where(hole, rim, off)
-    good = np.asarray((np.abs(within) <= needs.tolerance).all(axis=1))
+    good = np.asarray((np.abs(within) <= options.tolerance).all(axis=1))
     run = _longest(good)
     if run[1] - run[0] < 2:
         return None
     ends = _span(placed, profile, float(profile.z[rows[run[0]]]), float(profile.z[rows[run[1] - 1]]))
-    if ends[1] - ends[0] < needs.min_length:
+    if ends[1] - ends[0] < options.min_length:
         return None
     placed = placed.part(ends[0], ends[1], 0.0, placed.frustum.wrap)
     narrow = min(placed.frustum.radius1, placed.frustum.radius2)
-    if narrow < needs.min_radius * max(1.0, placed.sharpest_bend):
+    if narrow < options.min_radius * max(1.0, placed.sharpest_bend):
         return None
     kept = slice(run[0], run[1])
     seen = off[kept][~hole[kept]]
-    covers = covered_samples(placed, hull, 1.5 * needs.tolerance)
+    covers = covered_samples(placed, hull, 1.5 * options.tolerance)
     full = region.columns == len(profile.phi)
     sheet = FittedSheet(
         placed=placed,

@@ -1,0 +1,1 @@
+"""Developable sheets whose section is not round: general cylinders and cones."""
