@@ -1,18 +1,16 @@
-"""General cylinder or general cone: a ruled developable side, isometric to that of a frustum.
+"""General cylinder or general cone, or a side parallel to one: ruled, and bent along its rulings.
 
 A sheet that is bent along straight rulings keeps every length on it. So the side of a tube with any section, whose
 rulings are parallel (a general cylinder) or meet in one point (a general cone), unrolls to the rectangle or the annular
 sector of a frustum, and has its surface coordinates (u, phi): u along the rulings, phi in proportion to the arc across
-them. Only the points and the normals differ, by how sharply the sheet is bent at each azimuth.
+them. Only the points and the normals differ, by how sharply the sheet is bent at each azimuth. The bending is constant
+over each of a row of strips (``BentStrip``), where neighbours share a ruling and its tangent plane. A strip of
+turn = width cos a is one of the frustum itself.
 
-The bending is constant over each of a row of strips: each strip is a part of a circular cone, a cylinder or a plane,
-and neighbours share a ruling and its tangent plane. With the unit vectors T along the arc, U along the ruling and N
-outwards, and with g = sin a / rho1 of the frustum and k = turn / arc of the strip, along the arc at end 1
-
-    T' = -g U - k N        U' = g T        N' = k T
-
-so that within a strip T, U, N turn about the fixed vector k U - g N, and all points have closed forms that hold for
-planes, cylinders and cones alike. A strip of turn = width cos a is one of the frustum itself.
+The parallel side at a height t above a general cone has the same rulings and normals. At a distance r from the point in
+which the rulings meet, an arc of the angle dtheta that is bent by dturn is r dtheta + t dturn long there. Where the
+bending varies, that is the arc of no sector; the sector with the same arcs from edge to edge, in which each ruling has
+its place by the arc in the middle of the slant, misses it by least: by ``mismatch`` at the ends.
 """
 
 from __future__ import annotations
@@ -24,6 +22,8 @@ from typing import TYPE_CHECKING
 
 from coneskin.errors import GeometryError
 
+from .bend import Bend, bends_between, check_bends
+from .bent_strip import BentStrip, RulingFrame, frames_along
 from .frustum import Frustum
 from .pose import Pose, Vector
 
@@ -31,37 +31,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Bend", "Developable"]
+__all__ = ["Developable"]
 
 _TURN = 2.0 * math.pi
-_SLACK = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
 _OPEN = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer
-
-
-@dataclass(frozen=True, slots=True)
-class Bend:
-    """A strip between two rulings, bent evenly.
-
-    Attributes:
-        width: azimuth that it takes [rad], above 0.
-        turn: angle by which its normal turns from one ruling to the other [rad]; 0 for a plane, negative for a hollow.
-    """
-
-    width: float
-    turn: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Strip:
-    """A bend with the frame at its first ruling, on the arc of end 1."""
-
-    start: float  # m; along the arc
-    arc: float  # m
-    k: float  # 1/m
-    at: Vector
-    t: Vector
-    u: Vector
-    n: Vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,44 +45,49 @@ class Developable:
     its outward normal lies in the plane of x and z.
 
     Attributes:
-        frustum: the frustum to whose side it is isometric; its u, phi, lengths and areas are those of this side.
+        frustum: the frustum to whose side it is isometric, but for ``mismatch``; its u, phi, lengths and areas are
+            those of this side.
         bends: strips from phi = 0 to phi = wrap.
+        lift: height above the general cone to which this side is parallel [m]; 0 where it is one itself.
 
     Raises:
-        GeometryError: end 1 of the frustum is an apex, or the bends do not add up to its wrap.
+        GeometryError: end 1 of the frustum is an apex, the bends do not add up to its wrap, or one is too sharp for the
+            lift.
     """
 
     frustum: Frustum
     bends: tuple[Bend, ...]
-    _strips: tuple[_Strip, ...] = field(init=False, repr=False, compare=False)
-    _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)
+    lift: float = 0.0
+    _strips: tuple[BentStrip, ...] = field(init=False, repr=False, compare=False)
+    _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)  # azimuths
 
     def __post_init__(self) -> None:
         f = self.frustum
         if not f.radius1 > 0.0:
             raise GeometryError("radius1 must be above 0 m: a bent side is laid out from its end 1, which has no arc")
-        for bend in self.bends:
-            if not (math.isfinite(bend.width) and bend.width > 0.0 and math.isfinite(bend.turn)):
-                raise GeometryError(f"a bend needs a width above 0 rad and a finite turn, got {bend}")
-            if abs(bend.turn) > _TURN:
-                raise GeometryError(f"a bend turns by a full turn (2 pi rad) at most, got {bend.turn!r} rad")
-        width = math.fsum(bend.width for bend in self.bends)
-        if abs(width - f.wrap) > _SLACK:
-            raise GeometryError(
-                f"the widths of the bends must add up to the wrap of {math.degrees(f.wrap):.6g} deg, they are "
-                f"{math.degrees(width):.6g} deg"
-            )
-        strips: list[_Strip] = []
+        check_bends(self.bends, f.wrap)
+        if not math.isfinite(self.lift):
+            raise GeometryError(f"the lift of a bent side must be finite, got {self.lift!r} m")
+        sunk = self.lift * self.growth
+        low, middle = f.radius1 - sunk, self._middle - sunk  # of the general cone below
+        if min(low, f.radius2 - sunk) <= 0.0:
+            raise GeometryError(f"the side lies {self.lift * 1e3:.4g} mm above a general cone beyond its apex")
+        strips: list[BentStrip] = []
+        starts: list[float] = []
         sa, ca = f.sin_half_angle, f.cos_half_angle
-        at, t, u, n = (f.radius1, 0.0, 0.0), (0.0, 1.0, 0.0), (sa, 0.0, ca), (ca, 0.0, -sa)
-        begin = 0.0
+        at = (f.radius1 - self.lift * ca, 0.0, self.lift * sa)
+        frame, begin = RulingFrame(at, (0.0, 1.0, 0.0), (sa, 0.0, ca), (ca, 0.0, -sa)), 0.0
         for bend in self.bends:
-            arc = bend.width * f.radius1
-            strips.append(_Strip(begin, arc, bend.turn / arc, at, t, u, n))
-            at, t, u, n = self._frame(strips[-1], arc)
-            begin += arc
+            below = (bend.width * self._middle - self.lift * bend.turn) / middle
+            if below <= 0.0:
+                raise GeometryError(f"a bend is too sharp for a side {self.lift * 1e3:.4g} mm above a general cone")
+            arc = below * low
+            strips.append(BentStrip(arc, sa / low, bend.turn / arc, frame))
+            starts.append(begin)
+            frame = strips[-1].frame(arc)
+            begin += bend.width
         object.__setattr__(self, "_strips", tuple(strips))
-        object.__setattr__(self, "_starts", tuple(strip.start for strip in strips))
+        object.__setattr__(self, "_starts", tuple(starts))
 
     @property
     def turn(self) -> float:
@@ -129,12 +107,14 @@ class Developable:
     @property
     def closing_gap(self) -> tuple[float, float]:
         """Distance between the ends of the arc of end 1 [m], and the angle between the normals there [rad]."""
-        strip = self._strips[-1]
-        at, t, _, n = self._frame(strip, strip.arc)
-        first = self._strips[0]
-        gap = math.dist(at, first.at)
-        turned = math.hypot(math.dist(n, first.n), math.dist(t, first.t)) / math.sqrt(2.0)
-        return gap, 2.0 * math.asin(min(1.0, 0.5 * turned))
+        last, first = self.edge(), self._frame(0, 0.0)
+        turned = math.hypot(math.dist(last.n, first.n), math.dist(last.t, first.t)) / math.sqrt(2.0)
+        return math.dist(last.at, first.at), 2.0 * math.asin(min(1.0, 0.5 * turned))
+
+    @property
+    def _middle(self) -> float:
+        """Radius in the middle of the slant [m], where the arcs of this side are those of its frustum."""
+        return 0.5 * (self.frustum.radius1 + self.frustum.radius2)
 
     def check_closed(self) -> None:
         """Refuse a full wrap whose bends do not close, as where a turn is wrong, or in radians.
@@ -152,48 +132,32 @@ class Developable:
                 f"around a tube, above 0 outwards), and leave {1e3 * gap:.3g} mm and {math.degrees(angle):.3g} deg open"
             )
 
-    def edge(self) -> tuple[Vector, Vector, Vector, Vector]:
-        """Return the point of end 1 at phi = wrap, and T, U and N there, in the frame of the side."""
-        strip = self._strips[-1]
-        return self._frame(strip, strip.arc)
+    def edge(self) -> RulingFrame:
+        """Return the ruling at phi = wrap, in the frame of the side."""
+        return self._frame(len(self._strips) - 1, self._strips[-1].arc)
 
-    def _geodesic(self) -> float:
-        return self.frustum.sin_half_angle / self.frustum.radius1
+    def _frame(self, number: int, along: float) -> RulingFrame:
+        """Return a ruling of this side by its strip and its distance from the first one there, below the lift [m]."""
+        (x, y, z), t, u, (nx, ny, nz) = self._strips[number].frame(along)
+        lift = self.lift
+        return RulingFrame((x + lift * nx, y + lift * ny, z + lift * nz), t, u, (nx, ny, nz))
 
-    def _frame(self, strip: _Strip, along: float) -> tuple[Vector, Vector, Vector, Vector]:
-        """Return the point of end 1, and T, U and N there, at a distance [m] from the first ruling of a strip."""
-        g, k = self._geodesic(), strip.k
-        (tx, ty, tz), (ux, uy, uz), (nx, ny, nz) = strip.t, strip.u, strip.n
-        vx, vy, vz = -k * nx - g * ux, -k * ny - g * uy, -k * nz - g * uz  # T'
-        angle = math.hypot(g, k) * along
-        first = along * _sinc(angle)
-        second = 0.5 * (along * _sinc(0.5 * angle)) ** 2
-        dx, dy, dz = first * tx + second * vx, first * ty + second * vy, first * tz + second * vz
-        cosine = math.cos(angle)
-        x, y, z = strip.at
-        return (
-            (x + dx, y + dy, z + dz),
-            (cosine * tx + first * vx, cosine * ty + first * vy, cosine * tz + first * vz),
-            (ux + g * dx, uy + g * dy, uz + g * dz),
-            (nx + k * dx, ny + k * dy, nz + k * dz),
-        )
-
-    def _strip(self, phi: float) -> tuple[_Strip, float]:
-        """Return the strip of an azimuth and the distance from its first ruling [m]; the outer ones continue."""
+    def _ruling(self, phi: float) -> RulingFrame:
+        """Return the ruling at an azimuth [rad]; beyond the edges the outer strips continue."""
         if self.closed:
             phi %= _TURN
-        arc = phi * self.frustum.radius1
-        strip = self._strips[max(0, bisect.bisect_right(self._starts, arc) - 1)]
-        return strip, arc - strip.start
+        number = max(0, bisect.bisect_right(self._starts, phi) - 1)
+        strip, bend = self._strips[number], self.bends[number]
+        return self._frame(number, (phi - self._starts[number]) * strip.arc / bend.width)
 
     def point(self, u: float, phi: float) -> Vector:
         """Return the point at u [m] and phi [rad], in the frame of the side [m]."""
-        (x, y, z), _, (ux, uy, uz), _ = self._frame(*self._strip(phi))
+        (x, y, z), _, (ux, uy, uz), _ = self._ruling(phi)
         return x + u * ux, y + u * uy, z + u * uz
 
     def normal(self, phi: float) -> Vector:
         """Return the outward unit normal at azimuth phi [rad]; it is the same all along a ruling."""
-        return self._frame(*self._strip(phi))[3]
+        return self._ruling(phi).n
 
     def locate(self, x: float, y: float, z: float) -> tuple[float, float, float]:
         """Return the surface coordinates of the nearest foot of a point, the inverse of ``point``.
@@ -223,16 +187,10 @@ class Developable:
         phi = np.asarray(phi, float)
         if self.closed:
             phi = phi % _TURN
-        arc = phi * self.frustum.radius1
-        number = np.clip(np.searchsorted(self._starts, arc, side="right") - 1, 0, None)
-        k, start, at, t, u, n = self._columns()
-        g, k = self._geodesic(), k[number][..., None]
-        along = (arc - start[number])[..., None]
-        angle = np.hypot(g, k) * along
-        first = along * np.sinc(angle / np.pi)
-        second = 0.5 * (along * np.sinc(0.5 * angle / np.pi)) ** 2
-        step = first * t[number] - second * (k * n[number] + g * u[number])
-        return at[number] + step, u[number] + g * step, n[number] + k * step
+        number = np.clip(np.searchsorted(self._starts, phi, side="right") - 1, 0, None)
+        share = np.array([strip.arc / bend.width for strip, bend in zip(self._strips, self.bends, strict=True)])
+        at, way, normal = frames_along(self._strips, number, (phi - np.array(self._starts)[number]) * share[number])
+        return at + self.lift * normal, way, normal
 
     def points(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
         """Return the points for arrays u [m] and phi [rad] that broadcast: shape (..., 3) [m]."""
@@ -242,84 +200,65 @@ class Developable:
         base, way, _ = self.rulings(phi)
         return np.asarray(base + u[..., None] * way)
 
-    def normals(self, phi: ArrayLike) -> NDArray[np.float64]:
-        """Return the outward unit normals for an array of azimuths [rad]: shape (..., 3)."""
-        return self.rulings(phi)[2]
-
     def locate_all(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return u [m], phi [rad] and the signed distance [m] of many points, shape (n, 3), as ``locate`` does."""
         import numpy as np
 
         points = np.asarray(points, float)
-        best = np.full(len(points), np.inf)
-        arc, g = np.zeros(len(points)), self._geodesic()
+        best, phi = np.full(len(points), np.inf), np.zeros(len(points))
         last = len(self._strips) - 1
-        for number, strip in enumerate(self._strips):
-            k = strip.k
-            qt, qu, qn = ((points - strip.at) @ np.array((strip.t, strip.u, strip.n)).T).T
-            # the foot is where the arc's tangent is square to the way to the point: tan(angle) = omega qT / (1 - qV)
-            rest = 1.0 + k * qn + g * qu
-            omega = math.hypot(g, k)
-            if omega * strip.arc > 1e-9:
-                angle = np.arctan2(omega * qt, rest)
-                middle = 0.5 * omega * strip.arc
-                along = (angle - _TURN * np.round((angle - middle) / _TURN)) / omega
-            else:
-                along = qt / np.where(np.abs(rest) > 1e-12, rest, 1e-12)
+        for number, (strip, bend) in enumerate(zip(self._strips, self.bends, strict=True)):
             low = 0.0 if number or self.closed else -np.inf
             high = strip.arc if number < last or self.closed else np.inf
-            along = np.clip(along, low, high)
-            angle = omega * along
-            first = along * np.sinc(angle / np.pi)
-            second = 0.5 * (along * np.sinc(0.5 * angle / np.pi)) ** 2
-            to_t, to_u, to_n = qt - first, qu + second * g, qn + second * k
-            out = k * first * to_t - k * g * second * to_u + (1.0 - k * k * second) * to_n
-            across = np.cos(angle) * to_t - first * (g * to_u + k * to_n)
-            gap = np.hypot(out, across)
+            along, gap = strip.feet(points, low, high)
             better = gap < best
             best[better] = gap[better]
-            arc[better] = strip.start + along[better]
-        phi = arc / self.frustum.radius1
-        base, way, normal = self.rulings(phi)
-        to = points - base
-        return np.einsum("ij,ij->i", to, way), phi, np.einsum("ij,ij->i", to, normal)
-
-    def _columns(self) -> tuple[NDArray[np.float64], ...]:
-        import numpy as np
-
-        strips = self._strips
-        return (
-            np.array([strip.k for strip in strips]),
-            np.array([strip.start for strip in strips]),
-            *(np.array([getattr(strip, name) for strip in strips]) for name in ("at", "t", "u", "n")),
-        )
+            phi[better] = self._starts[number] + along[better] * bend.width / strip.arc
+        at, way, normal = self.rulings(phi)
+        return np.einsum("ij,ij->i", points - at, way), phi, np.einsum("ij,ij->i", points - at, normal)
 
     def parallel(self, height: float) -> tuple[Developable, Pose]:
         """Return the side parallel to this one at a height [m] along the normals, and its frame in the frame of this.
 
-        A bend grows by height * turn, a plane does not. Where the rulings meet and the bending varies, the parallel
-        side is no general cone any more: ``mismatch`` is what its sector then misses.
+        A bend grows by height * turn, a plane does not.
 
         Raises:
             GeometryError: a bend is sharper than the height allows.
         """
         f, grow = self.frustum, height * self.growth
-        frustum = Frustum(f.radius1 + grow, f.radius2 + grow, f.height, f.wrap)
-        widths = [(bend.width * f.radius1 + height * bend.turn) / frustum.radius1 for bend in self.bends]
+        middle = self._middle
+        widths = [(bend.width * middle + height * bend.turn) / (middle + grow) for bend in self.bends]
         if min(widths) <= 0.0:
             raise GeometryError(f"a bend is too sharp for a parallel side at {height * 1e3:.4g} mm")
         bends = tuple(Bend(width, bend.turn) for width, bend in zip(widths, self.bends, strict=True))
         shift = Pose(translation=(height * (f.cos_half_angle - self.growth), 0.0, -height * f.sin_half_angle))
-        return Developable(frustum, bends), shift
+        frustum = Frustum(f.radius1 + grow, f.radius2 + grow, f.height, f.wrap)
+        return Developable(frustum, bends, self.lift + height), shift
+
+    def azimuth_above(self, height: float, phi: float) -> float:
+        """Return the azimuth [rad] on the parallel side at a height [m] of the ruling that has the azimuth phi here."""
+        f, middle, turns = self.frustum, self._middle, 0.0
+        if self.closed:
+            turns, phi = divmod(phi, _TURN)
+        arc, left = 0.0, phi
+        for number, bend in enumerate(self.bends):
+            width = left if number == len(self.bends) - 1 else min(left, bend.width)
+            arc += width * (middle + height * bend.turn / bend.width)
+            left -= width
+            if left <= 0.0:
+                break
+        return turns * f.wrap + arc / (middle + height * self.growth)
 
     def mismatch(self, height: float) -> float:
         """Return how far the parallel side at a height [m] is from being a sector, in arc at end 1 or 2 [m]."""
-        f, arc, turned, worst = self.frustum, 0.0, 0.0, 0.0
-        for bend in self.bends:
+        below, _ = self.parallel(-self.lift)
+        f, arc, turned, worst = below.frustum, 0.0, 0.0, 0.0
+        lift = self.lift + height
+        for bend in below.bends:
             arc += bend.width
             turned += bend.turn
             worst = max(worst, abs(self.growth * arc - turned))
-        return abs(height * worst * f.slant * f.sin_half_angle / (f.radius1 + height * self.growth))
+        return abs(0.5 * lift * worst * f.slant * f.sin_half_angle / (below._middle + lift * self.growth))
 
     def turned(self, turn: float) -> tuple[Developable, Pose]:
         """Return a closed side whose phi = 0 lies where phi was ``turn`` [rad], and its frame in the frame of this.
@@ -330,22 +269,13 @@ class Developable:
         if not self.closed:
             raise GeometryError("only a full wrap can be turned: a partial one has edges where it ends")
         turn %= _TURN
-        first: list[Bend] = []  # from the new seam on
-        second: list[Bend] = []
-        begin = 0.0
-        for bend in self.bends:
-            before = min(max(turn - begin, 0.0), bend.width)
-            for width, pieces in ((before, second), (bend.width - before, first)):
-                if width > 1e-9:
-                    pieces.append(Bend(width, bend.turn * width / bend.width))
-            begin += bend.width
-        moved = Developable(self.frustum, (*first, *second))
-        return moved, self._frame_at(0.0, turn)
+        bends = bends_between(self.bends, turn, turn + _TURN, around=True)
+        return Developable(self.frustum, bends, self.lift), self._frame_at(0.0, turn)
 
     def _frame_at(self, u: float, phi: float) -> Pose:
         """Return the frame of a side that begins at u [m], phi [rad], in the frame of this side."""
         f = self.frustum
-        at, t, way, n = self._frame(*self._strip(phi))
+        at, t, way, n = self._ruling(phi)
         sa, ca = f.sin_half_angle, f.cos_half_angle
         x = tuple(sa * a + ca * b for a, b in zip(way, n, strict=True))
         z = tuple(ca * a - sa * b for a, b in zip(way, n, strict=True))
@@ -354,28 +284,17 @@ class Developable:
         return Pose(((x[0], t[0], z[0]), (x[1], t[1], z[1]), (x[2], t[2], z[2])), (px, py, pz))
 
     def part(self, u1: float, u2: float, phi1: float, phi2: float) -> tuple[Developable, Pose]:
-        """Return the part between two arcs u [m] and two rulings phi [rad], and its frame in the frame of this side."""
+        """Return the part between two arcs u [m] and two rulings phi [rad], and its frame in the frame of this side.
+
+        The part of a lifted side has the sector of its own arcs, its rulings at their places in its own middle.
+        """
         if not 0.0 <= phi1 < phi2:
             raise GeometryError(f"phi1 must not be below 0 and phi2 above it, got {phi1!r} and {phi2!r} rad")
+        if self.lift:
+            below, down = self.parallel(-self.lift)
+            piece, at = below.part(u1, u2, *(self.azimuth_above(-self.lift, phi) for phi in (phi1, phi2)))
+            above, up = piece.parallel(self.lift)
+            return above, down @ at @ up
         f = self.frustum
         frustum = Frustum(f.radius_at(u1), f.radius_at(u2), (u2 - u1) * f.cos_half_angle, phi2 - phi1)
-        bends, begin = [], 0.0
-        for bend in self._unwound(phi2):
-            low, high = max(begin, phi1), min(begin + bend.width, phi2)
-            if high - low > 1e-9:
-                bends.append(Bend(high - low, bend.turn * (high - low) / bend.width))
-            begin += bend.width
-        return Developable(frustum, tuple(bends)), self._frame_at(u1, phi1)
-
-    def _unwound(self, phi2: float) -> tuple[Bend, ...]:
-        """Return the bends from phi = 0 on as far as phi2: a closed side goes on, the last bend of an open one does."""
-        if self.closed:
-            return self.bends * math.ceil(phi2 / _TURN + 1e-12)
-        last, beyond = self.bends[-1], phi2 - self.frustum.wrap
-        if beyond <= 1e-9:
-            return self.bends
-        return (*self.bends, Bend(beyond, last.turn * beyond / last.width))
-
-
-def _sinc(x: float) -> float:
-    return math.sin(x) / x if x else 1.0
+        return Developable(frustum, bends_between(self.bends, phi1, phi2, self.closed)), self._frame_at(u1, phi1)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from .developable import Bend, Developable
+from .bend import Bend
+from .developable import Developable
 from .placed_frustum import PlacedFrustum
 from .pose import Pose, Vector
 
@@ -24,18 +25,20 @@ class PlacedDevelopable(PlacedFrustum):
         frustum: the frustum to which the side is isometric.
         link_frustum: pose of the side's frame in the link's frame; the frustum there touches it along phi = 0.
         bends: strips from phi = 0 to phi = wrap.
+        lift: height above the general cone to which the side is parallel [m].
     """
 
     bends: tuple[Bend, ...] = ()
+    lift: float = 0.0
     _side: Developable = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_side", Developable(self.frustum, self.bends))
+        object.__setattr__(self, "_side", Developable(self.frustum, self.bends, self.lift))
 
     @classmethod
     def of(cls, side: Developable, pose: Pose) -> PlacedDevelopable:
         """Place a side."""
-        return cls(side.frustum, pose, side.bends)
+        return cls(side.frustum, pose, side.bends, side.lift)
 
     @property
     def side(self) -> Developable:
@@ -98,7 +101,7 @@ class PlacedDevelopable(PlacedFrustum):
 
     def moved(self, frame: Pose) -> PlacedDevelopable:
         """Return the side in another frame, in which ``frame`` is the pose of the link's."""
-        return PlacedDevelopable(self.frustum, frame @ self.link_frustum, self.bends)
+        return PlacedDevelopable(self.frustum, frame @ self.link_frustum, self.bends, self.lift)
 
     def turned(self, turn: float) -> PlacedDevelopable:
         """Return a full wrap whose seam lies at the azimuth that was ``turn`` [rad]."""
@@ -115,14 +118,7 @@ class PlacedDevelopable(PlacedFrustum):
 
         A bend grows with the height and a plane does not, so that they take other shares of the wrap there.
         """
-        f, arc, left = self.frustum, 0.0, phi
-        for number, bend in enumerate(self.bends):
-            width = left if number == len(self.bends) - 1 else min(left, bend.width)
-            arc += width * (f.radius1 + height * bend.turn / bend.width)
-            left -= width
-            if left <= 0.0:
-                break
-        return arc / (f.radius1 + height * self.growth)
+        return self._side.azimuth_above(height, phi)
 
     def part(self, u1: float, u2: float, phi1: float, phi2: float) -> PlacedDevelopable:
         """Return the part between two arcs u [m] and two rulings phi [rad]."""

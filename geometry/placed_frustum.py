@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .developable import Bend
+    from .bend import Bend
 
 __all__ = ["PlacedFrustum", "double_cone"]
 
@@ -102,6 +102,11 @@ class PlacedFrustum:
     def bends(self) -> tuple[Bend, ...]:
         """Strips of a side that is not round; none of a cone."""
         return ()
+
+    @property
+    def lift(self) -> float:
+        """Height above the general cone to which a side that is not round is parallel [m]; 0 of a cone."""
+        return 0.0
 
     @property
     def is_straight(self) -> bool:

@@ -10,7 +10,7 @@ import pytest
 
 import coneskin as cs
 from coneskin.design.files import FileOptions
-from coneskin.geometry.developable import Bend
+from coneskin.geometry.bend import Bend
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.build import place_on_arm

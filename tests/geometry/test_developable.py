@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from coneskin.errors import GeometryError
-from coneskin.geometry.developable import Bend, Developable
+from coneskin.geometry.bend import Bend
+from coneskin.geometry.developable import Developable
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -64,7 +65,7 @@ def test_an_even_bend_is_the_frustum(frustum: Frustum) -> None:
     side = bent(frustum, even=True)
     u, phi = places(side)
     assert side.points(u, phi) == pytest.approx(frustum.points(u, phi), abs=1e-15)
-    assert side.normals(phi) == pytest.approx(frustum.normals(phi), abs=1e-14)
+    assert side.rulings(phi)[2] == pytest.approx(frustum.normals(phi), abs=1e-14)
     assert side.growth == pytest.approx(frustum.cos_half_angle, rel=1e-14)
 
 
@@ -93,7 +94,7 @@ def test_a_straight_line_of_the_flat_pattern_keeps_its_length_and_is_a_geodesic(
     line = side.points(u, phi)
     assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() == pytest.approx(math.dist(one, two), rel=1e-8)
     before, at, after = line[100:19800:400], line[150:19850:400], line[200:19900:400]
-    sideways = np.cross(side.normals(phi[150:19850:400]), after - before)
+    sideways = np.cross(side.rulings(phi[150:19850:400])[2], after - before)
     curvature = np.einsum("ij,ij->i", after - 2.0 * at + before, sideways)
     assert np.abs(curvature).max() < 1e-4 * np.linalg.norm(after - before, axis=1).max() ** 3
 
@@ -106,14 +107,14 @@ def test_a_ruling_has_one_normal_so_the_gaussian_curvature_is_zero(frustum: Frus
     around = (side.points(u, phi + h) - side.points(u, phi - h)) / (2.0 * h)
     normal = np.cross(around, along)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    assert normal == pytest.approx(side.normals(phi), abs=1e-7)
+    assert normal == pytest.approx(side.rulings(phi)[2], abs=1e-7)
 
 
 @each_frustum
 def test_locate_undoes_point(frustum: Frustum) -> None:
     side = bent(frustum)
     u, phi = places(side)
-    found = side.locate_all(side.points(u, phi) + 0.004 * side.normals(phi))
+    found = side.locate_all(side.points(u, phi) + 0.004 * side.rulings(phi)[2])
     assert found[0] == pytest.approx(u, abs=1e-12)
     assert found[1] == pytest.approx(phi, abs=1e-11)
     assert found[2] == pytest.approx(0.004, abs=1e-12)
@@ -126,7 +127,7 @@ def test_numbers_and_arrays_agree() -> None:
     assert np.array([side.point(*at) for at in zip(u, phi, strict=True)]) == pytest.approx(
         side.points(u, phi), abs=1e-15
     )
-    assert np.array([side.normal(at) for at in phi]) == pytest.approx(side.normals(phi), abs=1e-14)
+    assert np.array([side.normal(at) for at in phi]) == pytest.approx(side.rulings(phi)[2], abs=1e-14)
 
 
 def test_a_stadium_closes_and_is_a_stadium() -> None:
@@ -152,16 +153,59 @@ def test_a_parallel_side_of_a_tube_is_a_tube_at_its_height() -> None:
     assert placed.mismatch(height) == 0.0
 
 
-def test_what_a_parallel_cone_misses_is_stated() -> None:
-    """Where rulings meet, a bend of its own makes the parallel side no sector; the bound is not 0, and holds."""
-    placed, height = PlacedDevelopable.of(bent(FRUSTA["widening"]), POSE), 0.003
+@pytest.mark.parametrize("lift", [0.0, 0.002])
+@each_frustum
+def test_a_parallel_side_lies_at_its_height_whatever_the_section(frustum: Frustum, lift: float) -> None:
+    placed, height = PlacedDevelopable.of(bent(frustum), POSE).parallel(lift), 0.003
     above = placed.parallel(height)
     u, phi = places(placed.side)
     points, normals = placed.place(u, phi)
     raised = np.array([placed.azimuth_above(height, value) for value in phi])
-    off = np.linalg.norm(above.place(u, raised)[0] - points - height * normals, axis=1)
-    assert 0.1 * placed.mismatch(height) < off.max() < 1.5 * placed.mismatch(height)
-    assert bent(FRUSTA["widening"], even=True).mismatch(height) == pytest.approx(0.0, abs=1e-15)
+    assert above.place(u, raised)[0] == pytest.approx(points + height * normals, abs=1e-14)
+    assert above.place(u, raised)[1] == pytest.approx(normals, abs=1e-13)
+    found = above.locate_all(points)
+    assert found[0] == pytest.approx(u, abs=1e-12)
+    assert found[1] == pytest.approx(raised, abs=1e-11)
+    assert found[2] == pytest.approx(-height, abs=1e-12)
+    down = above.parallel(-height - lift)
+    assert down.lift == pytest.approx(0.0, abs=1e-18)
+    assert down.frustum.radius1 == pytest.approx(frustum.radius1, rel=1e-14)
+
+
+@each_frustum
+def test_what_a_parallel_cone_misses_is_stated(frustum: Frustum) -> None:
+    """Arcs are measured with chords of the true parallel side; at the ends they miss the sector's by the mismatch."""
+    placed, height = PlacedDevelopable.of(bent(frustum), POSE), 0.003
+    phi = np.linspace(0.0, frustum.wrap * (1.0 - 1e-12), 40_001)
+    raised = np.array([placed.azimuth_above(height, value) for value in phi[::200]])
+    sector = placed.parallel(height).frustum
+    missed = []
+    for u in (0.0, 0.5 * frustum.slant, frustum.slant):
+        points, normals = placed.place(np.full(phi.shape, u), phi)
+        chords = np.linalg.norm(np.diff(points + height * normals, axis=0), axis=1)
+        arc = np.concatenate([[0.0], np.cumsum(chords)])[::200]
+        missed.append(float(np.abs(arc - sector.radius_at(u) * raised).max()))
+    assert missed[1] < 1e-7
+    assert missed[0] == pytest.approx(placed.mismatch(height), rel=0.02, abs=1e-7)
+    assert missed[2] == pytest.approx(placed.mismatch(height), rel=0.02, abs=1e-7)
+    assert (placed.mismatch(height) > 1e-5) == (frustum.radius1 != frustum.radius2)
+    assert bent(frustum, even=True).mismatch(height) == pytest.approx(0.0, abs=1e-15)
+    assert placed.parallel(0.001).mismatch(0.002) == pytest.approx(placed.mismatch(height), rel=1e-12)
+
+
+@each_frustum
+def test_a_part_of_a_lifted_side_lies_within_its_mismatch_of_it(frustum: Frustum) -> None:
+    whole = PlacedDevelopable.of(bent(frustum), POSE).parallel(0.003)
+    part = whole.part(0.2 * frustum.slant, 0.7 * frustum.slant, 0.3, 2.5)
+    side = part.frustum
+    u, phi = np.linspace(0.0, side.slant, 9)[:, None], np.linspace(0.0, side.wrap, 50)[None]
+    found = whole.locate_all(part.place(u, phi)[0])
+    assert found[2] == pytest.approx(0.0, abs=1e-12)
+    assert found[0] == pytest.approx(np.broadcast_to(0.2 * frustum.slant + u, found[0].shape), abs=1e-12)
+    assert found[1].min() == pytest.approx(0.3, abs=1e-12)
+    assert found[1].max() == pytest.approx(2.5, abs=1e-12)
+    arcs = (found[1] - 0.3) * whole.frustum.radius_at(0.45 * frustum.slant), phi * side.radius_at(0.5 * side.slant)
+    assert np.abs(arcs[0] - arcs[1]).max() < 2.0 * whole.mismatch(0.0) + 1e-12
 
 
 @pytest.mark.parametrize("make", [lambda: stadium(), lambda: bent(FRUSTA["narrowing"])], ids=["tube", "cone"])

@@ -1,4 +1,4 @@
-"""The keys bend_wrap_deg and bend_turn_deg: a full wrap has to close, outwards."""
+"""The keys bend_wrap_deg, bend_turn_deg and bend_lift_mm: a full wrap has to close, outwards."""
 
 import pytest
 
@@ -30,3 +30,21 @@ def test_a_full_wrap_that_does_not_close_outwards_is_refused(turns: list[float])
 def test_one_that_closes_within_rounding_and_a_partial_one_are_taken() -> None:
     assert parse_scene(scene([90, 90, 90, 90], [119.9, 60, 120, 60])).sensors[0].placed.bends
     assert parse_scene(scene([60, 60], [20, -5], "wrap_deg = 120\n")).sensors[0].placed.bends
+
+
+def test_a_lift_moves_the_rulings_of_a_cone_and_needs_bends() -> None:
+    """The points stay on the normals of the side below, 3 mm above it: found by the distance of the two sides."""
+
+    def cone(more: str) -> str:
+        text = scene([60, 140], [20, 150], f"wrap_deg = 200\n{more}")
+        return text.replace("radius2_mm = 37.6", "radius2_mm = 30")
+
+    lifted, plain = (parse_scene(cone(more)).sensors[0].placed for more in ("bend_lift_mm = 3\n", ""))
+    below = lifted.parallel(-0.003)
+    assert below.lift == pytest.approx(0.0, abs=1e-15)
+    assert below.frustum.radius1 == pytest.approx(lifted.frustum.radius1 - 0.003 * 170.0 / 200.0, rel=1e-12)
+    assert lifted.point(0.1, 1.0) != pytest.approx(plain.point(0.1, 1.0), abs=1e-6)
+    bads = (scene([], [], "bend_lift_mm = 3\n"), "a cone has none"), (cone("bend_lift_mm = 60\n"), "beyond its apex")
+    for bad, message in bads:
+        with pytest.raises(SceneError, match=message):
+            parse_scene(bad)

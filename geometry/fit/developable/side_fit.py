@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.geometry.developable import Bend
+from coneskin.geometry.bend import Bend
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.pose import Pose

@@ -109,7 +109,9 @@ def sensor_toml(design: SheetDesign, index: int, frame: str) -> str:
         if design.active.bends
     )
     if bends:
-        bends = f"\n# the link is not round: shares of the wrap, and the angle by which each turns the normal\n{bends}"
+        lift = f"bend_lift_mm = {1e3 * design.active.lift!r}  # above the side whose rulings meet in a point\n"
+        what = "# the link is not round: shares of the wrap, and the angle by which each turns the normal"
+        bends = f"\n{what}\n{bends}{lift}"
     radius1, radius2 = _round(design.place.frustum.radius1 * 1e3), _round(design.place.frustum.radius2 * 1e3)
     return f"""\
 # Sensor of {design.name}, written by `coneskin design`. A scene refers to it; keys in the scene take precedence.
@@ -155,6 +157,7 @@ def _bends(design: SheetDesign) -> dict[str, Any]:
             {"width_deg": _round(math.degrees(bend.width), 6), "turn_deg": _round(math.degrees(bend.turn), 6)}
             for bend in place.bends
         ],
+        "bend_lift_mm": _round(1e3 * place.lift, 6),
         "sector_error_mm": _round(1e3 * place.mismatch(height)),
         "closing_gap_mm": _round(1e3 * place.closing_gap) if place.frustum.wrap > 2.0 * math.pi - 1e-9 else None,
     }

@@ -121,6 +121,7 @@ def _facts(item: PlacedSensor) -> Any:
         facts["map"] = [sensor.place_map.along, sensor.place_map.around]
     if bends := item.placed.bends:
         facts["bends"] = [[bend.width, bend.turn] for bend in bends]
+        facts["lift"] = item.placed.lift
     return round_facts(facts)
 
 

@@ -39,6 +39,7 @@ _PLACE = (
 _BENDS = (
     Key("bend_wrap_deg", list, (), low=0.0, high=360.0, above=True, meaning="shares of the wrap, evenly bent each"),
     Key("bend_turn_deg", list, (), low=-360.0, high=360.0, meaning="angle by which each of them turns the normal"),
+    Key("bend_lift_mm", float, 0.0, low=0.0, high=100.0, meaning="height above a side whose rulings meet in a point"),
 )
 _WIRE = (
     Key("id", int, 0, low=0, high=255),
@@ -202,7 +203,7 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
             force_table=forces,
         )
         pose = Pose.from_xyz_rpy(values["xyz"], values["rpy"])
-        return sensor, _place(frustum, pose, values["bend_wrap"], values["bend_turn"])
+        return sensor, _place(frustum, pose, values["bend_wrap"], values["bend_turn"], values["bend_lift"])
     except ConeSkinError as exc:
         turn = math.degrees(values["wrap"])
         hint = f"; wrap_deg = {turn:g} looks like radians: then write {math.degrees(turn):.4g}" if turn < 6.3 else ""
@@ -210,20 +211,22 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
         return None
 
 
-def _place(frustum: Frustum, pose: Pose, wraps: Sequence[float], turns: Sequence[float]) -> PlacedFrustum:
+def _place(frustum: Frustum, pose: Pose, wraps: Sequence[float], turns: Sequence[float], lift: float) -> PlacedFrustum:
     """Return the place of a sensor: on a cone, or on a general cylinder or cone where bends are given."""
     from coneskin.geometry.placed_frustum import PlacedFrustum
 
     if not wraps and not turns:
+        if lift:
+            raise GeometryError(f"bend_lift_mm = {1e3 * lift:g} needs bend_wrap_deg and bend_turn_deg: a cone has none")
         return PlacedFrustum(frustum, pose)
-    from coneskin.geometry.developable import Bend
+    from coneskin.geometry.bend import Bend
     from coneskin.geometry.placed_developable import PlacedDevelopable
 
     if len(wraps) != len(turns):
         raise GeometryError(
             f"bend_wrap_deg and bend_turn_deg must have a number each for every bend, got {len(wraps)} and {len(turns)}"
         )
-    placed = PlacedDevelopable(frustum, pose, tuple(Bend(*bend) for bend in zip(wraps, turns, strict=True)))
+    placed = PlacedDevelopable(frustum, pose, tuple(Bend(*bend) for bend in zip(wraps, turns, strict=True)), lift)
     placed.side.check_closed()
     return placed
 

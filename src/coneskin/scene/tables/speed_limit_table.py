@@ -90,7 +90,7 @@ def limit_fingerprint(scene: Scene) -> str:
 
 def _place(placed: PlacedFrustum) -> list[Any]:
     pose = placed.link_frustum
-    bends = [[[bend.width, bend.turn] for bend in placed.bends]] if placed.bends else []
+    bends = [[[bend.width, bend.turn] for bend in placed.bends], placed.lift] if placed.bends else []
     return [[pose.rotation, pose.translation], *bends]
 
 
