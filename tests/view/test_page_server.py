@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from coneskin.errors import ConeSkinError
-from coneskin.view.page_server import PageServer
+from coneskin.view.page_server import PageServer, page_client
 
 pytest.importorskip("viser", reason="viser is not installed: no page is served")
 import msgspec
@@ -41,6 +41,14 @@ def test_the_page_is_given(server: PageServer) -> None:
     status, body = get(server, "/")
     assert status == 200
     assert b"<html" in body.lower()
+
+
+@pytest.mark.parametrize("path", ["/", "/index.html", "/?darkMode"])
+def test_the_page_has_the_script_for_computers_without_a_gpu(server: PageServer, path: str) -> None:
+    status, body = get(server, path)
+    assert status == 200
+    assert body.decode() == page_client()
+    assert body.index(b"antialias: false") < body.index(b"<title")
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from .browser import browser_page, look_closely, magenta, pixels, quiet, violet,
 
 RUN = Path(__file__).parents[1] / "data" / "collision.rec"
 NOTICE = "No safety display"
+SMOOTHED = "() => document.querySelector('canvas[data-engine]').getContext('webgl2').getContextAttributes().antialias"
 pytestmark = pytest.mark.long
 
 
@@ -51,6 +52,7 @@ def test_a_recording_is_scrubbed_to_its_touch() -> None:
         wait_for_text(page, "#coneskin-clock", "2.970 s")
         place = look_closely(server, page, point, normal)
         assert magenta(pixels(page, place)) > 5
+        assert page.evaluate(SMOOTHED) is False, "a processor draws here"
         page.get_by_label("potential").first.click()
         page.get_by_role("option", name="touch phase, lower sheet").click()
         wait_for_text(page, "#coneskin-potential", " V")

@@ -22,6 +22,7 @@ ALLOWED = frozenset({"ViewerCameraMessage", "GuiUpdateMessage"})
 #: and those with which a file is dropped onto it
 UPLOADS = frozenset({"FileTransferStartUpload", "FileTransferPart"})
 _UPDATE = "GuiUpdateMessage"
+_PAGE = frozenset({"/", "/index.html"})
 _LARGEST = 1 << 16  # bytes of a message that is no part of a file
 _VIEWERS = 32  # that are served at once
 _RATE = 200.0  # messages a second of a viewer, who drags a handle or the camera at 60; more have to wait
@@ -68,6 +69,7 @@ class ConnectionGate:
     Args:
         decode: bytes of a message -> the message as a dict; raises ValueError for what is none.
         hosts: names of this server; None for any.
+        page: HTML that is given out in the place of the library's own; None for that.
         allowed: types of message that get in.
         largest: bytes of a message.
 
@@ -80,11 +82,13 @@ class ConnectionGate:
         self,
         decode: Callable[[bytes], Any],
         hosts: frozenset[str] | None,
+        page: str | None = None,
         allowed: frozenset[str] = ALLOWED,
         largest: int = _LARGEST,
     ) -> None:
         self.refused = self.viewers = 0
         self._decode, self._hosts, self._allowed, self._largest = decode, hosts, allowed, largest
+        self._page = page
 
     def serve_arguments(self, handler: Callable[[Any], Awaitable[None]], **given: Any) -> dict[str, Any]:
         """Return the arguments of the server's ``serve`` with this gate in them.
@@ -103,6 +107,11 @@ class ConnectionGate:
             if why:
                 self.refused += 1
                 return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
+            if self._page is not None and not headers.get("Upgrade") and request.path.partition("?")[0] in _PAGE:
+                response = connection.respond(HTTPStatus.OK, self._page)
+                del response.headers["Content-Type"]
+                response.headers["Content-Type"] = "text/html; charset=utf-8"
+                return response
             return answer(connection, request) if answer is not None else None
 
         async def handle(connection: Any) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from coneskin.errors import ConeSkinError
@@ -16,6 +17,7 @@ from .moment import Moment
 from .page_server import PageServer
 from .panel_text import event_list, notice, status
 from .phase_words import UNKNOWN, PhaseWords
+from .playout import Playout
 from .stage.level_scale import level_bars
 from .stage.stage import Stage
 from .stage_nodes import StageNodes, look_at_stages
@@ -27,7 +29,7 @@ __all__ = ["LivePage"]
 
 _PERIOD = 1.0 / 30.0  # s between two pictures
 _POLL = 0.008  # s between two looks at the recording
-_TEXT_PERIOD = 0.1  # s between two changes of the text
+_TEXT_PERIOD = 0.2  # s between two changes of the text: a processor that draws the arm draws it too
 _PLOT_PERIOD = 0.5  # s between two changes of timeline, traces and potentials
 _ROOT = "/run"
 _SEARCH_PERIOD = 0.3  # s between two looks for a guard
@@ -60,6 +62,7 @@ class LivePage:
         self._status = gui.add_html("")
         self._levels = gui.add_html("")
         self._events = gui.add_html("")
+        self._playout = Playout()
         self._choices: dict[int, FieldChoice] = {}
         self._entering = threading.Lock()  # viewers come and go in threads of their own
         self._stand(stage)
@@ -72,14 +75,15 @@ class LivePage:
             over: ends the page.
             ended: asked with each picture.
         """
-        drawn = 0.0
+        due = 0.0
         while not over.is_set() and not ended():
             now = time.monotonic()
             news = self.look(now)
-            if now - drawn >= _PERIOD or news:
+            if now >= due or news:
                 self.draw(now)
-                drawn = now
-            over.wait(_POLL)
+                if now >= due:  # the next one on time, unless this one was late by more than that
+                    due = due + _PERIOD if now < due + _PERIOD else now + _PERIOD
+            over.wait(max(0.0, min(_POLL, due - time.monotonic())))
 
     def look(self, now: float) -> bool:
         """Take what is new; return whether an event is among it.
@@ -125,7 +129,7 @@ class LivePage:
             self._text(now, [(self._stage.title, UNKNOWN, "")], "", "no guard records a run: what is drawn is at rest")
             return
         at = strand.history.until - strand.zero
-        moment = strand.moment(at)
+        moment = replace(strand.moment(at), poses=strand.poses(self._playout.time(at, now)))
         assert self._nodes is not None
         with self._server.together():
             self._nodes.show(moment)
@@ -189,6 +193,7 @@ class LivePage:
             self._plot.remove()
             self._plot = None
         self._clock = ""
+        self._playout = Playout()
         if self._nodes is not None and self._drawn.same_shape(stage):
             self._drawn = stage
             return

@@ -16,6 +16,7 @@ from typing import Any
 from coneskin.errors import ConeSkinError, MissingExtra
 
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
+from .software_drawing import with_plain_edges
 
 __all__ = ["LOOPBACK", "PageServer", "page_client"]
 
@@ -34,12 +35,13 @@ def _viser() -> Any:
 
 
 def page_client() -> str:
-    """Return the HTML of viser's client, which a file that opens without Python contains.
+    """Return the HTML of viser's client as it is served, and as a file that opens without Python contains it.
 
     Raises:
         MissingExtra: viser is not installed.
     """
-    return (Path(_viser().__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
+    client = Path(_viser().__file__).parent / "client" / "build" / "index.html"
+    return with_plain_edges(client.read_text(encoding="utf-8"))
 
 
 class PageServer:
@@ -76,7 +78,7 @@ class PageServer:
 
         hosts = LOOPBACK | {host} if host in LOOPBACK else None
         allowed = ALLOWED | UPLOADS if uploads else ALLOWED
-        self.gate = ConnectionGate(decode, hosts, allowed, **({"largest": _UPLOAD} if uploads else {}))
+        self.gate = ConnectionGate(decode, hosts, page_client(), allowed, **({"largest": _UPLOAD} if uploads else {}))
         _check_address(host)
         with _starting, _gated(self.gate), contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host=host, port=port, label=title, verbose=False)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.geometry.pose import Vector
 
+from .stage.floor import floor_lines
 from .stage.level_scale import level_colour
 from .stage.rotation import along, quaternion
 
@@ -23,6 +24,7 @@ __all__ = ["StageNodes", "look_at_stages"]
 
 _MARKS = 6  # nodes for contacts on each link with a sheet, used again and again
 _LOCATED, _UNCERTAIN, _PAST = (192, 38, 211), (249, 115, 22), (120, 113, 108)
+_FLOOR, _RIM = (175, 175, 180), (30, 33, 36)
 _NORMAL = 0.14  # m; length of the arrow along the normal
 _LEAST = 0.004  # m; half axes of an ellipse that can still be seen
 _FADES = 8  # steps in which a mark fades
@@ -47,7 +49,10 @@ def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
     scene.configure_default_lights(enabled=False, cast_shadow=False)
     scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.0)
     scene.add_light_directional("/sun", intensity=2.2, position=(1.5, -2.0, 3.0), cast_shadow=False)
-    scene.add_grid("/floor", width=4.0 * reach, height=4.0 * reach, cell_size=0.1, section_size=0.5)
+    lines, faces = floor_lines(reach)
+    scene.add_mesh_simple(
+        "/floor", _single(lines), faces, color=_FLOOR, side="double", cast_shadow=False, receive_shadow=False
+    )
 
 
 class StageNodes:
@@ -88,7 +93,15 @@ class StageNodes:
                 cast_shadow=False,
                 receive_shadow=False,
             )
-            scene.add_line_segments(f"{name}/active area", _single(sheet.rim), colors=(20, 40, 35), thickness=0.0015)
+            scene.add_mesh_simple(
+                f"{name}/active area",
+                _single(sheet.rim_vertices),
+                sheet.rim_faces,
+                color=_RIM,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
         links = sorted({sheet.link for sheet in stage.sheets})
         self._marks = {
             link: [_MarkNodes(scene, f"{root}/link {link}/contact {k}") for k in range(_MARKS)] for link in links

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coneskin.errors import RecordingError
-from coneskin.geometry.pose import Vector
+from coneskin.geometry.pose import Pose, Vector
 from coneskin.replay.run import Run, read_run
 from coneskin.robot.guard.journal import EventName
 
@@ -47,6 +47,10 @@ class Strand:
     def moment(self, time: float) -> Moment:
         """Return what is seen at a time on the page's clock [s]."""
         return moment_at(self.stage, self.history, self.zero + time)
+
+    def poses(self, time: float) -> dict[int, Pose]:
+        """Return the poses of the links' frames at a time on the page's clock [s]."""
+        return self.stage.poses(self.history.q(self.zero + time))
 
 
 def read_strands(paths: Sequence[Path]) -> list[Strand]:

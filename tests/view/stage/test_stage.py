@@ -1,6 +1,7 @@
 """Solids and sheets: where they are, and that they are closed."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.view.stage.arm_solids import arm_solids
+from coneskin.view.stage.floor import floor_lines
 from coneskin.view.stage.level_scale import level_colour
 from coneskin.view.stage.rotation import along, quaternion
 from coneskin.view.stage.solid import Solid, barrel
@@ -28,6 +30,14 @@ def test_a_barrel_is_closed_and_its_faces_look_out() -> None:
     volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
     whole = math.pi * 0.05**2 * 0.2
     assert 0.93 * whole < volume < whole
+
+
+def test_no_face_of_a_barrel_is_empty() -> None:
+    """A fan about the axis: half of the faces of its rings would have no area."""
+    solid = barrel("b", 0, Pose(), 0.05, (0.0, 0.2), (1, 2, 3))
+    corners = solid.vertices[solid.faces]
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    assert areas.min() > 1e-7
 
 
 def distance(points: np.ndarray, solid: Solid) -> np.ndarray:
@@ -90,6 +100,50 @@ def test_the_sheet_lies_on_its_frustum() -> None:
     for item, sheet in zip(placed, set_stage(scene, placed, "a scene").sheets, strict=True):
         _, _, off = item.frustum.locate_all(sheet.vertices)
         assert off == pytest.approx(np.full(len(off), 0.0015), abs=2e-6)
+
+
+@pytest.mark.parametrize("radius", [0.03, 0.06, 0.3])
+def test_the_flat_pieces_of_a_sheet_cover_its_link(radius: float) -> None:
+    """Their middles lie deepest; what is sensed is 1.5 mm below their corners, and stays 1 mm below them."""
+    text = re.sub(
+        r"(radius\d_mm) = (\d+)", lambda found: f"{found[1]} = {float(found[2]) * radius / 0.046}", DOUBLE_CONE
+    )
+    scene = parse_scene(text, "scene.toml")
+    assert max(item.sensor.frustum.radius1 for item in scene.sensors) == pytest.approx(radius)
+    placed = place_on_arm(scene)
+    for item, sheet in zip(placed, set_stage(scene, placed, "a scene").sheets, strict=True):
+        middles = sheet.vertices[sheet.faces].mean(axis=1)
+        edges = 0.5 * (sheet.vertices[sheet.faces] + sheet.vertices[np.roll(sheet.faces, 1, axis=1)]).reshape(-1, 3)
+        for points in (middles, edges):
+            assert item.frustum.locate_all(points)[2].min() > 0.999e-3
+
+
+def test_the_rim_is_a_narrow_band_inside_of_the_active_area() -> None:
+    scene = parse_scene(DOUBLE_CONE, "scene.toml")
+    placed = place_on_arm(scene)
+    for item, sheet in zip(placed, set_stage(scene, placed, "a scene").sheets, strict=True):
+        cone = item.frustum.frustum
+        corners = sheet.rim_vertices[sheet.rim_faces]
+        area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        around = cone.wrap * (cone.radius1 + cone.radius2) + 2.0 * cone.slant
+        assert area.sum() == pytest.approx(0.0025 * around, rel=0.05)
+        u, _, off = item.frustum.locate_all(sheet.rim_vertices)
+        assert u.min() > -1e-9
+        assert u.max() < cone.slant + 1e-9
+        assert off.min() > 0.0019, "above the sheet"
+
+
+@pytest.mark.parametrize("reach", [0.4, 1.3, 1.9])
+def test_the_floor_has_a_line_every_quarter_of_a_metre(reach: float) -> None:
+    vertices, faces = floor_lines(reach)
+    corners = vertices[faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert across[:, 2].min() > 0.0, "seen from above"
+    lines = 2 * (2 * math.ceil(2.0 * reach / 0.25) + 1)
+    far = vertices[:, :2].max()
+    assert 2.0 * reach <= far < 2.0 * reach + 0.26
+    assert 0.5 * across[:, 2].sum() == pytest.approx(lines * 0.006 * 2.0 * (far - 0.003), rel=1e-9)
+    assert (np.abs(vertices[:, :2] / 0.25 - np.round(vertices[:, :2] / 0.25)).min(axis=1) < 0.0121).all()
 
 
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, -0.48, 0.64)])

@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 __all__ = ["SheetSurface", "sheet_surfaces"]
 
 _ABOVE = 0.0015  # m above the surface that is sensed: the sheets are that thick, and their link is not to shine through
-_STEP = 0.008  # m between two vertices, about
+_SAGITTA = 0.0005  # m by which a flat piece may lie below the round side, so that the link does not shine through
+_STEP = 0.008  # m between two vertices along a side that is not straight, about
 _MOST = 96  # vertices along or around
+_RIM_WIDTH, _RIM_ABOVE = 0.0025, 0.0006  # m; of the band that shows where the active area ends, above the sheet
 
 
 class SheetSurface(NamedTuple):
@@ -28,7 +30,8 @@ class SheetSurface(NamedTuple):
         link: index of the DH frame that it moves with.
         vertices: in that frame [m], shape (n, 3).
         faces: indices of vertices, shape (m, 3).
-        rim: line segments around the active area [m], shape (k, 2, 3).
+        rim_vertices: of a narrow band inside of the active area's edges, in that frame [m], shape (k, 3).
+        rim_faces: indices of those vertices, shape (l, 3).
         touch_level: from which the sensor is touched.
         slimmest: the least radius of its link there [m].
         sensor: with its electronics, and what force its level stands for.
@@ -39,7 +42,8 @@ class SheetSurface(NamedTuple):
     link: int
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
-    rim: NDArray[np.float64]
+    rim_vertices: NDArray[np.float64]
+    rim_faces: NDArray[np.int64]
     touch_level: float
     slimmest: float
     sensor: Sensor
@@ -60,23 +64,51 @@ def _surface(item: SensorOnArm, sensor: Sensor) -> SheetSurface:
     import numpy as np
 
     cone = item.frustum.frustum
-    along = _count(cone.slant)
-    around = _count(cone.wrap * max(cone.radius1, cone.radius2), least=24)
-    u, phi = np.meshgrid(np.linspace(0.0, cone.slant, along), np.linspace(0.0, cone.wrap, around), indexing="ij")
-    points, normals = item.frustum.place(u, phi)
-    if item.surface is not None:  # a mesh lies below the sheet, and is not quite a cone
-        flat = zip(u.ravel().tolist(), phi.ravel().tolist(), strict=True)
+    largest = max(cone.radius1, cone.radius2)
+    straight = item.surface is None  # a mesh lies below another sheet, and is not quite a cone
+    u = np.linspace(0.0, cone.slant, 2 if straight else _count(cone.slant / _STEP, 8))
+    step = 2.0 * math.acos(1.0 - min(_SAGITTA / largest, 1.0)) if straight else _STEP / largest
+    phi = np.linspace(0.0, cone.wrap, _count(cone.wrap / step, 24))
+    vertices, faces = _strip(item, u, phi, _ABOVE)
+    width, turn = min(_RIM_WIDTH, cone.slant), min(_RIM_WIDTH / largest, cone.wrap)
+    bands = [(u[[0]] + (0.0, width), phi), (u[[-1]] - (width, 0.0), phi)]
+    bands += [(u, phi[[0]] + (0.0, turn)), (u, phi[[-1]] - (turn, 0.0))]
+    rim_vertices, rim_faces, before = [], [], 0
+    for along, around in bands:
+        points, triangles = _strip(item, along, around, _ABOVE + _RIM_ABOVE)
+        rim_vertices.append(points)
+        rim_faces.append(before + triangles)
+        before += len(points)
+    return SheetSurface(
+        item.name,
+        item.link,
+        vertices,
+        faces,
+        np.concatenate(rim_vertices),
+        np.concatenate(rim_faces),
+        sensor.thresholds.touch_level,
+        0.97 * min(cone.radius1, cone.radius2),
+        sensor,
+        item,
+    )
+
+
+def _strip(
+    item: SensorOnArm, u: NDArray[np.float64], phi: NDArray[np.float64], above: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices and faces of the part of a side between places, so far above what is sensed [m]."""
+    import numpy as np
+
+    rows, columns = np.meshgrid(u, phi, indexing="ij")
+    points, normals = item.frustum.place(rows, columns)
+    if item.surface is not None:
+        flat = zip(rows.ravel().tolist(), columns.ravel().tolist(), strict=True)
         points = np.array([item.surface.point(a, b) for a, b in flat]).reshape(points.shape)
-    points = points + _ABOVE * normals
-    index = np.arange(along * around).reshape(along, around)
+    index = np.arange(rows.size).reshape(rows.shape)
     a, b, c, d = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel(), index[:-1, 1:].ravel()
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    edges = [points[0], points[-1], points[:, 0], points[:, -1]]
-    rim = np.concatenate([np.stack([edge[:-1], edge[1:]], axis=1) for edge in edges])
-    touch_level = sensor.thresholds.touch_level
-    slimmest = 0.97 * min(cone.radius1, cone.radius2)
-    return SheetSurface(item.name, item.link, points.reshape(-1, 3), faces, rim, touch_level, slimmest, sensor, item)
+    return (points + above * normals).reshape(-1, 3), faces
 
 
-def _count(length: float, least: int = 8) -> int:
-    return min(max(math.ceil(length / _STEP) + 1, least), _MOST)
+def _count(pieces: float, least: int) -> int:
+    return min(max(math.ceil(pieces) + 1, least), _MOST)

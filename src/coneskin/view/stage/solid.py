@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Solid", "barrel", "revolve"]
 
-_SEGMENTS = 40  # around
+_SEGMENTS = 28  # around: a corner sticks out by .6 % of the radius
 _CHAMFER = 0.16  # of the radius, at the rims of a barrel
 
 
@@ -44,7 +44,8 @@ def revolve(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return vertices and faces of the surface that a profile sweeps about the z axis.
 
-    Each straight piece of the profile has vertices of its own, so that its rims are shaded as edges.
+    Each straight piece of the profile has vertices of its own, so that its rims are shaded as edges. A piece that
+    begins or ends on the axis is a fan.
 
     Args:
         profile: radius and z [m], in the order of growing z where the outside is seen from outside.
@@ -62,8 +63,10 @@ def revolve(
         vertices += [np.column_stack([r1 * ring, np.full(segments, z1)])]
         low = 2 * piece * segments
         high = low + segments
-        faces += [np.column_stack([low + k, low + after, high + after])]
-        faces += [np.column_stack([low + k, high + after, high + k])]
+        if r0 > 0.0:
+            faces += [np.column_stack([low + k, low + after, high + after])]
+        if r1 > 0.0:
+            faces += [np.column_stack([low + k, high + after, high + k])]
     return np.concatenate(vertices), np.concatenate(faces)
 
 

@@ -1,0 +1,61 @@
+"""Playout: parcels every 50 ms become even steps, which are late and never ahead."""
+
+import random
+from itertools import pairwise
+
+import pytest
+
+from coneskin.view.playout import DELAY, Playout
+
+STEP = 1.0 / 30.0  # s between two pictures
+PARCEL = 0.05  # s of a run that its recorder hands over together
+RUN = 1000.0  # s by which the run's clock is ahead
+
+
+def shown(late: float, seconds: float = 4.0, offset: float = RUN) -> list[tuple[float, float, float]]:
+    """Clock, newest and what is shown of a run whose parcels come up to so late [s]."""
+    playout, chance, found = Playout(), random.Random(1), []
+    parcels = [(k * PARCEL + late * chance.random(), offset + k * PARCEL) for k in range(round(seconds / PARCEL))]
+    for picture in range(3, round(seconds / STEP)):
+        now = picture * STEP
+        newest = max(at for came, at in parcels if came <= now)
+        found.append((now, newest, playout.time(newest, now)))
+    return found
+
+
+def test_parcels_become_even_steps() -> None:
+    """As they come, the steps would be 0, 50 or 100 ms."""
+    found = shown(late=0.01)[30:]
+    raw = [after[1] - before[1] for before, after in pairwise(found)]
+    steps = [after[2] - before[2] for before, after in pairwise(found)]
+    assert max(raw) - min(raw) > 0.04
+    assert min(steps) > 0.95 * STEP
+    assert max(steps) < 1.05 * STEP
+
+
+def test_what_is_shown_is_late_by_the_delay() -> None:
+    """Of a run whose parcels come at once; the offset is seen at pictures, which fall a third of a step apart."""
+    for now, _, at in shown(late=0.0)[30:]:
+        assert at == pytest.approx(now + RUN - DELAY, abs=STEP / 3.0)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.03, 0.2])
+def test_it_is_never_ahead_and_never_runs_back(late: float) -> None:
+    found = shown(late)
+    assert all(at <= newest for _, newest, at in found)
+    assert all(after[2] >= before[2] for before, after in pairwise(found))
+
+
+def test_a_run_that_ends_is_shown_to_its_end() -> None:
+    playout = Playout()
+    playout.time(RUN, 1.0)
+    assert playout.time(RUN, 1.0 + 0.5 * DELAY) < RUN
+    assert playout.time(RUN, 2.0) == RUN
+
+
+def test_a_parcel_after_a_silence_is_caught_up_with() -> None:
+    """A computer that slept: what came late once does not stay late."""
+    playout = Playout()
+    playout.time(RUN, 1.0)
+    playout.time(RUN + 1.0, 5.0)  # came three seconds late
+    assert playout.time(RUN + 5.0, 6.0) == pytest.approx(RUN + 5.0 - DELAY)
