@@ -162,6 +162,19 @@ def test_a_ridge_between_the_rays_keeps_its_clearance(along: bool) -> None:
         assert (hit[covered] == inside).all(), f"{1e3 * lift:.2f} mm above the ridge"
 
 
+def test_a_part_is_whole_where_a_block_begins_at_the_sheet_and_leaves_no_lip() -> None:
+    """The block is 0.2 mm from the sheet's end, less than the step is; beside it the lip is whole."""
+    mesh = tube(bump=1.0)
+    design = sheet(Frustum(0.05, 0.05, 0.2068))
+    (two,) = [collar for collar in jig_collars(design, mesh)[0] if collar.end == 2]
+    assert two.keyed
+    block = np.array([[0.06 * math.cos(a), 0.06 * math.sin(a), 0.20705] for a in np.linspace(0.7, 1.3, 20)])
+    for part in two.parts:
+        solid = trimesh.Trimesh(part.surface.vertices, part.surface.faces, process=False)
+        assert solid.is_volume
+        assert not solid.contains(in_part_frame(design, two, block)).any()
+
+
 def test_no_part_has_an_undercut() -> None:
     """Pulled off away from the link along its middle, a part never meets the link."""
     design = sheet(Frustum(0.05, 0.05, 0.2))

@@ -36,6 +36,7 @@ _ROW = 2e-3  # m; step along the axis where the lip follows a mesh
 _STOP_ROW = 0.25e-3  # m; step by which the end of a lip before what stands out is found
 _FLUSH = 40e-3  # m; an outermost face nearer than this is the datum of the lip
 _RISE = 8e-3  # m; what stands out further from the cone is not gripped: the lip ends before it
+_THINNEST = 1e-3  # m; a lip is left out where it would be shorter
 _SHORTEST = 4e-3  # m; a lip that is shorter everywhere holds nothing
 _SLOT = 4e-3  # m; between the parts, so that the seam is seen and a strap pulls them tight
 _CHANNEL = 8e-3  # m; height of the way out for tabs with their wires
@@ -206,32 +207,37 @@ class _Builder:
         first = np.where(standing.any(axis=0), standing.argmax(axis=0), len(share))
         before = wanted * share[np.clip(first - 1, 0, len(share) - 1)] - self.plan.clearance
         free = np.where(first < len(share), before, wanted)
-        return np.asarray(np.maximum(0.0, widest_nearby(-free[None], 0, 1)[0] * -1.0))
+        free = -widest_nearby(-free[None], 0, 1)[0]
+        return np.where(free < _THINNEST, 0.0, free)
 
     def _part(self, phi: Floats, lengths: Floats, number: int) -> ClosedSurface:
         """Return the shell of one part."""
         plan = self.plan
         count = max(2, math.ceil(float(lengths.max()) / _ROW)) + 1
         share = np.linspace(1.0, 0.0, count)[:, None]
-        lip_z = self.step + self.sign * share * lengths
+        # without a lip the part ends before the step: what stands out may begin at the sheet itself
+        start = np.where(lengths > 0.0, 0.0, 2.0 * plan.clearance)
+        lip_z = self.step + self.sign * (share * lengths - start)
         cone = self.link.cone(lip_z)
         excess = self.link.over(share[::-1, 0], lengths, phi, plan.clearance)[::-1]
         lip = cone + widest_nearby(excess, 1, 1) + plan.clearance
         lip = np.minimum(lip, cone + _RISE + plan.wall)  # where there is no lip, no wall either
         lip = np.where(self._above_tabs(phi), np.maximum(lip, cone + _CHANNEL), lip)
-        into = np.array([0.0, _SEAT, _SEAT, plan.reach - _SEAT, plan.reach - _SEAT, plan.reach])[:, None]
-        sleeve_z = self.step - self.sign * into + np.zeros(len(phi))
+        into = np.array([0.0, _SEAT, _SEAT, plan.reach - _SEAT, plan.reach - _SEAT, plan.reach])
+        sleeve_z = self.step - self.sign * np.maximum(into[:, None], start)
         slope = (self.outer.radius2 - self.outer.radius1) / self.outer.height
         lifted = sleeve_z + self.design.options.stack.thickness * self.side.sin_half_angle
         sleeve = self.outer.radius1 + slope * lifted + plan.clearance
         z, inside = np.concatenate([lip_z, sleeve_z]), np.concatenate([lip, sleeve])
         inside = without_undercut(inside, phi)
+        inside[:count] = np.where(lengths > 0.0, inside[:count], inside[count])  # no lip: the step is the end there
         near = np.abs(z[:, None] - z[None]) <= plan.wall
         outside = np.where(near, inside[None], 0.0).max(axis=1)
         outside = widest_nearby(outside, 0, max(1, math.ceil(plan.wall / (float(inside.min()) * _COLUMN)))) + plan.wall
         seat = max(float(outside[-6:].max()), float((sleeve + plan.wall).max()))
         outside[-6:] = seat
         outside[[-6, -5, -2, -1]] += _RIM
+        outside[:count] = np.where(lengths > 0.0, outside[:count], outside[count])
         notched = np.zeros(len(phi), bool)
         for k in range(number):
             notched[4 + 6 * k : 8 + 6 * k] = len(phi) > 12 + 6 * k
