@@ -34,7 +34,7 @@ from coneskin.geometry.solid.closed_surface import ClosedSurface
 from coneskin.geometry.solid.step import WrappedLayer, write_step
 
 SAMPLES = 40_000  # on the faces of a link beside a part, and on the part
-NEAREST = 2000  # of them whose distance is computed
+NEAREST = 800  # of them whose distance is computed
 
 
 def main() -> None:
@@ -137,10 +137,11 @@ def jig(path: Path) -> None:
         body = with_sheets(design.mesh, design.sheets[:index])
         for collar in collars:
             gaps = [_gap(sheet, collar, part.surface, body) for part in collar.parts]
+            turns = "" if collar.play is None else f", turns {math.degrees(collar.play):.0f} deg"
             print(
                 f"  {path.name} {sheet.name} end {collar.end}: {min(gap for gap, _ in gaps):.3f}"
                 f"{' TOUCHES' if any(crossed for _, crossed in gaps) else ''}, lip {1e3 * collar.lip:.1f} mm"
-                f"{', flush' if collar.flush else ''}{', keyed' if collar.keyed else ''}",
+                f"{', flush' if collar.flush else ''}{turns}",
                 flush=True,
             )
         for sentence in without:

@@ -70,6 +70,8 @@ def report_text(
     lines += _table(head, [[_text(row[key]) for key in keys] for row in material_rows(designs)])
     lines += ["", "### Everything to buy or to cut", ""]
     lines += _table(("item", "quantity", "for"), bill_of_materials(designs, figures, beds))
+    if len(designs) > 1:
+        lines += ["", "Build all sheets flat in any order; put them on the link in the order of their numbers."]
     for index, (design, item) in enumerate(zip(designs, figures, strict=True)):
         lines += ["", *guide_lines(design, item, sheet_folder(designs, index).as_posix())]
     return "\n".join(lines) + "\n"

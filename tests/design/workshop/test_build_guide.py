@@ -10,13 +10,16 @@ from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
 from coneskin.design.workshop.bill_of_materials import bill_of_materials
 from coneskin.design.workshop.build_figures import BuildFigures, measure_build
 from coneskin.design.workshop.build_guide import guide_lines
-from coneskin.design.workshop.placement import find_placement
+from coneskin.design.workshop.placement import find_placement, sharpest_bends
 from coneskin.design.workshop.wiring import LOOP, cable_exit
 from coneskin.errors import GeometryError
+from coneskin.geometry.developable import Bend
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
-from coneskin.geometry.drawing.surface_shape import SheetSide
+from coneskin.geometry.drawing.surface_shape import SheetSide, drawing_point
+from coneskin.geometry.drawing.touch_marks import mark_labels
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.geometry.pose import Pose
 from coneskin.skin.sensor import sheet_resistances
@@ -162,3 +165,54 @@ def test_the_bill_counts_every_sheet() -> None:
     assert bill["plastic pin with flat head, 2.4 x 8 mm"] == "6"
     net = sum(part.area for design in designs for k in (0, 6) for part in design.cuts[k].parts)
     assert bill["silicone foam sheet 2.50 mm"].startswith(f"{1e4 * net:.0f} cm2 net")
+
+
+def test_the_bends_of_an_oval_and_of_a_rounded_box_show_where_edge_0_is() -> None:
+    """Quarter turns of 10 mm between planes of 40 and 60 mm; edge 0 in the middle of a plane, and in a corner."""
+    corner, long, short = 0.010 * math.pi / 2, 0.060, 0.040
+    arcs = [0.5 * long, corner, short, corner, long, corner, short, corner, 0.5 * long]
+    radius = sum(arcs) / (2 * math.pi)
+    turns = [math.pi / 2 if k % 2 else 0.0 for k in range(9)]
+    bends = tuple(Bend(arc / radius, turn) for arc, turn in zip(arcs, turns, strict=True))
+    place = PlacedDevelopable(Frustum(radius, radius, 0.2), Pose(), bends)
+    middles = [0.5 * long + 0.5 * corner]
+    for plane in (short, long, short):
+        middles.append(middles[-1] + plane + corner)
+    found = sharpest_bends(place)
+    assert [bend for bend, _ in found] == pytest.approx([0.010] * 4)
+    assert [way for _, way in found] == pytest.approx(middles, abs=1e-5)
+    turned = sharpest_bends(place.turned(middles[0] / radius))
+    assert sorted(min(way, 2 * math.pi * radius - way) for _, way in turned)[0] == pytest.approx(0.0, abs=1e-5)
+    assert sharpest_bends(PlacedFrustum(Frustum(radius, radius, 0.2))) == []
+
+
+def test_a_sheet_beyond_whose_edge_something_stands_out_is_placed_by_a_straight_line() -> None:
+    """A tape measure does not follow the link there: the distance of the two points, by their coordinates."""
+    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2, math.radians(200)))], DesignOptions())
+    text = guide(design, measure_build(design, 0, "mesh", bumped(4.5)))
+    exact = math.dist((0.05, 0.0, 0.2), (0.08 * math.cos(4.5), 0.08 * math.sin(4.5), 0.24))
+    assert f"{1e3 * exact:.1f} mm straight through the air, from edge 0 at end 2 (257.8 deg)" in text
+    assert "around end 2, in the direction of the wrap (257.8" not in text
+    assert "| +y | 78.5 mm (90.0 deg) |" in text
+    assert "| -y |" not in text, "no place of the sheet faces there"
+
+
+def test_the_measured_sheets_are_what_the_guide_says_a_perfect_sheet_gives() -> None:
+    """A short sheet: what lies beside its active area carries most of the current, and the guide says so."""
+    design, figures = built(Frustum(0.054, 0.049, 0.036, math.radians(210)))
+    text = guide(design, figures, "sheet-2")
+    assert "Write the measured sheets into `sheet-2/sensor.toml`" in text
+    ab, cd = figures.pairs
+    assert cd.ohms / cd.squares < 0.5 * cd.sheet_ohms
+    assert f"gives {ab.ohms / ab.squares:.4g} and {cd.ohms / cd.squares:.4g}" in text
+
+
+def test_marks_to_touch_are_in_the_table_and_on_the_drawing() -> None:
+    design, figures = built(CONE)
+    rows = re.findall(r"\| mark (\d) to touch \| ([\d.]+) \| ([\d.]+) \|", guide(design, figures))
+    assert [int(row[0]) for row in rows] == list(range(1, 10))
+    surface = design.cuts[6].surface
+    drawn = list(mark_labels(design.layout, surface))
+    for (_, u, phi), label in zip(rows, drawn, strict=True):
+        x, y = drawing_point(surface, 1e-3 * float(u), math.radians(float(phi)))
+        assert math.dist((x, y), (label.x, label.y)) < 8e-3

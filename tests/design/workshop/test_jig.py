@@ -112,8 +112,9 @@ def test_the_lip_ends_at_the_datum_and_clear_of_what_stands_out() -> None:
     assert one.before == pytest.approx(0.0, abs=1e-9)
     assert one.lip == pytest.approx(0.03 - design.options.jig.clearance)
     assert two.stopped
-    assert two.keyed, "the block fixes its azimuth"
-    assert not one.keyed
+    assert one.play is None
+    assert two.play is not None, "the block fixes its azimuth"
+    assert math.radians(2.0) <= two.play <= math.radians(8.0)
     points = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).sample(20000, seed=1)
     for collar in (one, two):
         local = in_part_frame(design, collar, POSE.apply_all(points))
@@ -167,12 +168,27 @@ def test_a_part_is_whole_where_a_block_begins_at_the_sheet_and_leaves_no_lip() -
     mesh = tube(bump=1.0)
     design = sheet(Frustum(0.05, 0.05, 0.2068))
     (two,) = [collar for collar in jig_collars(design, mesh)[0] if collar.end == 2]
-    assert two.keyed
+    assert two.play is not None
     block = np.array([[0.06 * math.cos(a), 0.06 * math.sin(a), 0.20705] for a in np.linspace(0.7, 1.3, 20)])
     for part in two.parts:
         solid = trimesh.Trimesh(part.surface.vertices, part.surface.faces, process=False)
         assert solid.is_volume
         assert not solid.contains(in_part_frame(design, two, block)).any()
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_collar_turned_by_more_than_its_play_meets_what_stands_out(way: float) -> None:
+    mesh = tube(bump=1.0)
+    design = sheet(Frustum(0.05, 0.05, 0.2))
+    (two,) = [collar for collar in jig_collars(design, mesh)[0] if collar.end == 2]
+    assert two.play is not None
+    fine = np.linspace(1.0 - math.radians(20), 1.0 + math.radians(20), 200)
+    points = np.array([[r * math.cos(a), r * math.sin(a), 0.2071] for r in (0.0535, 0.055, 0.057) for a in fine])
+    for turn, meets in ((0.0, False), (way * two.play, True)):
+        pose = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (0.0, 0.0, turn))
+        local = in_part_frame(design, two, pose.apply_all(points))
+        solids = [trimesh.Trimesh(part.surface.vertices, part.surface.faces, process=False) for part in two.parts]
+        assert any(solid.contains(local).any() for solid in solids) == meets
 
 
 def test_no_part_has_an_undercut() -> None:

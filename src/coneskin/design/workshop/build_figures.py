@@ -87,7 +87,7 @@ class BuildFigures:
                     "lip_mm": _mm(collar.lip),
                     "flush": collar.flush,
                     "stopped": collar.stopped,
-                    "keyed": collar.keyed,
+                    "play_deg": None if collar.play is None else round(math.degrees(collar.play), 1),
                     "parts": [
                         {
                             "file": f"jig/{collar.slug(part)}.stl",

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from coneskin.design.sheets import SheetDesign
+from coneskin.geometry.drawing.touch_marks import touch_marks
 
 from .build_figures import BuildFigures
 from .closing_steps import cable_steps, reading_lines, test_steps
@@ -36,7 +37,7 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
         "edge 0 where D is, the other edge where C is."
     )
     steps = [*flat_steps(design, figures), *wrap_steps(design, figures), *cable_steps(design, figures)]
-    steps += test_steps(figures)
+    steps += test_steps(figures, folder)
     yield ""
     yield from (f"{number}. {step}" for number, step in enumerate(steps, 1))
     yield ""
@@ -82,3 +83,6 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
     yield f"| electrode A | {1e3 * box.u2:.2f} to {1e3 * (box.u2 + width):.2f} | along end 2 |"
     yield f"| electrode D | along edge 0 | {phi1 - turn:.3f} to {phi1:.3f} |"
     yield f"| electrode C | along the other edge | {phi2:.3f} to {phi2 + turn:.3f} |"
+    for mark in touch_marks(design.layout):
+        u, phi = 1e3 * (box.u1 + mark.u), math.degrees(box.phi1 + mark.phi)
+        yield f"| mark {mark.number} to touch | {u:.2f} | {phi:.3f} |"

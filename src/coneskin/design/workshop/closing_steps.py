@@ -32,8 +32,14 @@ def cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     )
 
 
-def test_steps(figures: BuildFigures) -> Iterator[str]:
-    """Yield the steps that test the sheet that is built."""
+def test_steps(figures: BuildFigures, folder: str) -> Iterator[str]:
+    """Yield the steps that test the sheet that is built.
+
+    Args:
+        figures: for building it.
+        folder: of its files, as a path in the folder of the design; "." for that folder itself.
+    """
+    sensor = "sensor.toml" if folder == "." else f"{folder}/sensor.toml"
     ab, cd = figures.pairs
     yield (
         f"Measure at the connector: pins 1-2 {in_ohms(ab.ohms)}, pins 3-4 {in_ohms(cd.ohms)}; pins 1-3 above 10 Mohm "
@@ -41,9 +47,11 @@ def test_steps(figures: BuildFigures) -> Iterator[str]:
         "is lifted."
     )
     yield (
-        "Write the measured sheets into `sensor.toml`: `upper_sheet_ohm` = reading 1-2 divided by "
-        f"{ab.squares:.4f}, `lower_sheet_ohm` = reading 3-4 divided by {cd.squares:.4f}. *Check:* they are within "
-        f"{SPREAD:.0%} of those on the strip."
+        f"Write the measured sheets into `{sensor}`: `upper_sheet_ohm` = reading 1-2 divided by "
+        f"{ab.squares:.4f}, `lower_sheet_ohm` = reading 3-4 divided by {cd.squares:.4f}. *Check:* a sheet of exactly "
+        f"{ab.sheet_ohms:g} and {cd.sheet_ohms:g} ohm per square gives {ab.ohms / ab.squares:.4g} and "
+        f"{cd.ohms / cd.squares:.4g}, less than its own, for what lies beside the active area conducts too; yours "
+        f"differ from these as the strips did, and by {SPREAD:.0%} at most."
     )
     yield (
         "Plug it into the board (`coneskin firmware` writes sketch, wiring and parts) and run `coneskin monitor "

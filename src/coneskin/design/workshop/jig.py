@@ -25,6 +25,7 @@ from coneskin.geometry.solid.radial_profile import widest_nearby, without_underc
 
 from .jig_surroundings import meets_neighbour, with_sheets
 from .link_excess import LinkExcess
+from .lip_play import lip_play
 
 __all__ = ["Collar", "CollarPart", "jig_collars"]
 
@@ -45,7 +46,6 @@ _SEAT, _RIM = 2e-3, 1.5e-3  # m; width of the rims that keep a strap on its seat
 _NOTCH = 1e-3  # m; depth of the grooves that number a part
 _LEAST_RADIUS = 4e-3  # m
 _FLATTEST = 0.5  # cosine of the half angle; a collar around a flatter cone has nothing to grip
-_KEY = 3e-3  # m; a lip whose length differs by less fits at every azimuth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +75,8 @@ class Collar:
         lip: greatest length of the lip on the link [m].
         flush: the lip ends flush with the outermost face of the link.
         stopped: the edge of the lip lies against a part of the link that stands out.
-        keyed: it does so at some azimuths only, which fixes its own.
+        play: angle by which it can be turned until its lip meets a part of the link on the other side [rad]; None
+            where the link does not show its azimuth.
         before: from the outermost face of the link to the edge of the lip, along the axis [m]; None without a mesh.
     """
 
@@ -84,7 +85,7 @@ class Collar:
     lip: float
     flush: bool
     stopped: bool
-    keyed: bool
+    play: float | None
     before: float | None
 
     def slug(self, part: CollarPart) -> str:
@@ -174,14 +175,16 @@ class _Builder:
         if longest < _SHORTEST:
             raise _NoRoomError(f"the link stands out right at end {self.end}: push the sheet against it there")
         shortest = min(float(lengths.min()) for lengths in free)
-        stopped, keyed = shortest < wanted - 1e-9, shortest < longest - _KEY
-        parts = []
+        stopped = shortest < wanted - 1e-9
+        parts, lips = [], []
         for number, ((start, stop, _), lengths) in enumerate(zip(spans, free, strict=True), 1):
             phi = np.linspace(start, stop, len(lengths))
             parts.append(CollarPart(number, start, stop, self._part(phi, lengths, number)))
+            lips.append((phi, lengths, self._above_tabs(phi)))
+        play = lip_play(self.link, lips, wanted, self.plan.clearance)
         reached = flush and longest > wanted - 1e-9
         before = None if self.room is None else self.room - longest
-        return Collar(self.end, tuple(parts), longest, reached, stopped, keyed, before)
+        return Collar(self.end, tuple(parts), longest, reached, stopped, play, before)
 
     def _spans(self) -> list[tuple[float, float, int]]:
         """Return start, end and number of columns of each part."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from coneskin.design.sheets import SheetDesign
@@ -47,12 +48,17 @@ def jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iterat
         if collar.flush:
             how += " and ends flush with its outermost face: that is its place along the axis"
         elif collar.stopped:
-            how += "; where a part of the link stands out, its edge lies against that: this is its place"
-            how += ", around the link too" if collar.keyed else " along the axis, at any azimuth"
+            how += "; where a part of the link stands out, its edge lies against that: this is its place along the axis"
         elif collar.before is not None:
             how += f"; its edge is {in_mm(collar.before)} from the outermost face of the link, along the axis"
         else:
             how += "; its step is on the pencil line of this end"
+        if collar.play is not None:
+            radius = design.place.frustum.radius1 if collar.end == 1 else design.place.frustum.radius2
+            how += (
+                f". What stands out lets it be turned by {math.degrees(collar.play):.0f} deg "
+                f"({in_mm(collar.play * radius)}) at most: put it in the middle"
+            )
         yield how + "."
     for sentence in figures.no_collar:
         yield f"* No collar: {sentence}."

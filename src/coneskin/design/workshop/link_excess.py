@@ -54,6 +54,10 @@ class LinkExcess:
         slope = (self._side.radius2 - self._side.radius1) / self._side.height
         return np.asarray(np.maximum(_LEAST_RADIUS, self._side.radius1 + slope * np.asarray(z, float)))
 
+    def height(self, outwards: float | Floats) -> Floats:
+        """Return the height on the axis at a distance from the sheet's end [m]."""
+        return np.asarray(self._step + self._sign * np.asarray(outwards, float))
+
     def over(self, share: Floats, lengths: Floats, phi: Floats, margin: float) -> Floats:
         """Return the height of the link above the cone at the nodes of a grid [m], 0 where there is no link.
 
@@ -66,7 +70,7 @@ class LinkExcess:
         result = np.zeros((len(share), len(phi)))
         if self._rays is None or self._edges is None:
             return result
-        z = self._step + self._sign * share[:, None] * lengths
+        z = self.height(share[:, None] * lengths)
         cone, radial = self.cone(z), np.stack([np.cos(phi), np.sin(phi), np.zeros_like(phi)], axis=-1)
         origins = np.broadcast_to(self._far * radial, (*z.shape, 3)).copy()
         origins[..., 2] = z

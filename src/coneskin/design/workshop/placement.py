@@ -11,9 +11,11 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 if TYPE_CHECKING:
     from coneskin.geometry.mesh import Mesh
 
-__all__ = ["LinkFeature", "SheetPlacement", "find_placement"]
+__all__ = ["LinkFeature", "SheetPlacement", "find_placement", "sharpest_bends"]
 
 _STANDS_OUT = 3e-3  # m; what stands out less is no feature that a person finds
+_ALIKE = 0.01  # bends of two strips that differ by less are alike: they are fitted
+_NEARLY = 0.05  # a strip that is bent less than another by less belongs to it
 _OUTERMOST = 1e-3  # m; points so near to the outermost one are its neighbours
 
 
@@ -76,7 +78,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None) -> SheetPlace
     radius = np.hypot(x, y)
     feature = None
     furthest = int(radius.argmax())
-    if radius[furthest] > max(side.radius1, side.radius2) + _STANDS_OUT:
+    if not place.bends and radius[furthest] > max(side.radius1, side.radius2) + _STANDS_OUT:
         near = radius > radius[furthest] - _OUTERMOST
         first = math.atan2(y[furthest], x[furthest])
         turns = (np.arctan2(y[near], x[near]) - first + math.pi) % (2.0 * math.pi) - math.pi
@@ -88,3 +90,44 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None) -> SheetPlace
             arc = azimuth * (side.radius1 if end == 1 else side.radius2)
             feature = LinkFeature(float(radius[furthest]), azimuth, height, arc, end)
     return SheetPlacement(*around, -float(z.min()), float(z.max()) - side.height, seam, feature)
+
+
+def sharpest_bends(place: PlacedFrustum) -> list[tuple[float, float]]:
+    """Return the places where a side that is not round is bent most around end 1, from edge 0 on.
+
+    A place counts if it is bent a tenth more than a circle of the same arc, and no other within an eighth of the wrap
+    is bent more. It reaches as far as it is bent nearly as much.
+
+    Returns:
+        radius of the bend, and the way from edge 0 around end 1 to its middle [m].
+    """
+    side, count = place.frustum, len(place.bends)
+    if not count:
+        return []
+    widths = [bend.width for bend in place.bends]
+    rates = [bend.turn / bend.width for bend in place.bends]
+    starts = [math.fsum(widths[:k]) for k in range(count)]
+    closed = side.wrap > 2.0 * math.pi - 1e-6
+    round_rate = math.fsum(bend.turn for bend in place.bends) / side.wrap
+
+    def reached(first: int, way: int) -> tuple[float, bool]:
+        """Return how far a bend goes on [rad] one way, and whether it is bent more within an eighth of the wrap."""
+        on, away, whole = 0.0, 0.0, True
+        for step in range(1, count):
+            k = first + way * step
+            if (not closed and not 0 <= k < count) or away > side.wrap / 8.0:
+                break
+            if rates[k % count] > rates[first] * (1.0 + _ALIKE):
+                return on, True
+            whole = whole and rates[k % count] > rates[first] * (1.0 - _NEARLY)
+            on += widths[k % count] if whole else 0.0
+            away += widths[k % count]
+        return on, False
+
+    found: dict[float, float] = {}
+    for k, rate in enumerate(rates):
+        (after, more), (before, also) = reached(k, 1), reached(k, -1)
+        if rate > 1.1 * round_rate and not more and not also:
+            middle = starts[k] + 0.5 * (widths[k] + after - before)
+            found[round(middle % side.wrap if closed else middle, 4)] = side.radius1 / rate
+    return [(radius, middle * side.radius1) for middle, radius in sorted(found.items())]

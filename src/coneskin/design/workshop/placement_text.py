@@ -9,6 +9,7 @@ from coneskin.design.sheets import SheetDesign
 
 from .build_figures import BuildFigures
 from .guide_words import in_mm
+from .placement import LinkFeature, SheetPlacement, sharpest_bends
 
 __all__ = ["placement_lines"]
 
@@ -41,50 +42,94 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
     yield f"| {word} | at end 1 | {in_mm(place.around1)} by tape measure |"
     yield f"| {word} | at end 2 | {in_mm(place.around2)} by tape measure |"
     if place.feature is not None:
-        part = place.feature
-        yield (
-            f"| line of edge 0 | middle of the part of the link that stands out furthest, {in_mm(part.radius)} from "
-            f"the axis | {in_mm(part.arc)} around end {part.end}, in the direction of the wrap "
-            f"({math.degrees(part.azimuth):.1f} "
-            "deg) |"
-        )
+        yield f"| line of edge 0 | {_feature_way(design, place.feature)} |"
     yield ""
-    x, y, z = (f"{value:z.3f}" for value in place.seam)
-    yield f"Edge 0 faces the direction ({x}, {y}, {z}) of the frame above. Around end 1, from edge 0:"
-    yield ""
-    yield "| to where the frame's axis points | around end 1, in the direction of the wrap |"
-    yield "|---|---|"
-    for name, turn in _axes_around(design):
-        yield f"| {name} | {in_mm(turn * side.radius1)} ({math.degrees(turn):.1f} deg) |"
-    yield ""
-    keyed = any(collar.keyed for collar in figures.collars)
+    yield from _facing(design, place)
     if place.before is None:
         yield (
             "There is no mesh, so the link shows no datum: choose where end 1 and edge 0 lie, draw them, and write "
             "where they are in the frame of your arm's link into `xyz_mm` and `rpy_deg` of the sensor file: x of the "
             "sheet points at edge 0, z from end 1 to end 2."
         )
-    elif place.feature is None and not keyed:
+    elif any(collar.play is not None for collar in figures.collars):
+        yield "What stands out from the link lets a collar lie at one azimuth only: take edge 0 from the jig."
+    elif design.place.bends:
+        yield from _bend_lines(design)
+    elif place.feature is None:
         yield (
             "Nothing stands out from the link by which edge 0 could be found. Any one will do: choose it, and if it "
             "does not face as above, design again with `--seam X Y Z`, the direction in which yours faces. To find a "
             "direction on the link, hold the picture of the link beside it: it shows the axes of the frame."
         )
-    elif keyed:
-        yield "The lip of a collar keeps clear of what stands out from the link: it fits in one position only."
     yield (
         "`coneskin commission` shows whether it is right: a sheet that is turned by 10 mm or more reads its marks at "
         "other places than it has them."
     )
 
 
+def _feature_way(design: SheetDesign, part: LinkFeature) -> str:
+    """Return the way from edge 0 to what stands out, around the sheet, or straight where that is not on the sheet."""
+    side = design.place.frustum
+    what = f"middle of the part of the link that stands out furthest, {in_mm(part.radius)} from the axis"
+    if part.azimuth <= side.wrap:
+        way = f"{in_mm(part.arc)} around end {part.end}, in the direction of the wrap"
+    else:  # no tape follows the link there
+        radius, height = (side.radius1, 0.0) if part.end == 1 else (side.radius2, side.height)
+        x, y = part.radius * math.cos(part.azimuth), part.radius * math.sin(part.azimuth)
+        straight = math.dist((x, y, part.height), (radius, 0.0, height))
+        way = f"{in_mm(straight)} straight through the air, from edge 0 at end {part.end}"
+    return f"{what} | {way} ({math.degrees(part.azimuth):.1f} deg)"
+
+
+def _facing(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
+    """Yield where edge 0 faces, and which places of the sheet face along the axes of the link's frame."""
+    x, y, z = (f"{value:z.3f}" for value in place.seam)
+    yield f"Edge 0 faces the direction ({x}, {y}, {z}) of the frame above."
+    yield ""
+    facing = list(_axes_around(design))
+    if not facing:
+        return
+    yield "| place that faces along an axis of the frame | from edge 0, around end 1, in the direction of the wrap |"
+    yield "|---|---|"
+    for name, phi in facing:
+        yield f"| {name} | {in_mm(phi * design.place.frustum.radius1)} ({math.degrees(phi):.1f} deg) |"
+    yield ""
+
+
+def _bend_lines(design: SheetDesign) -> Iterator[str]:
+    """Yield where a link that is not round is bent most, by which edge 0 is found."""
+    yield (
+        "The link is not round, so its bends show where edge 0 is. A strip of paper that is laid around the link and "
+        "marked at these places must lie with each mark in the middle of its bend:"
+    )
+    yield ""
+    yield "| bend | radius of the link there, at end 1 | from edge 0, around end 1, in the direction of the wrap |"
+    yield "|---|---|---|"
+    for number, (radius, arc) in enumerate(sharpest_bends(design.place), 1):
+        yield f"| {number} | {in_mm(radius)} | {in_mm(arc)} |"
+    yield ""
+
+
 def _axes_around(design: SheetDesign) -> Iterator[tuple[str, float]]:
-    """Yield the axes of the link's frame that point away from the axis of a sheet, with their azimuths [rad]."""
-    back = design.place.link_frustum.inverse()
+    """Yield the axes of the link's frame along which a place of the sheet faces, with its azimuth [rad]."""
+    import numpy as np
+
+    wrap, back = design.place.frustum.wrap, design.place.link_frustum.inverse()
+    phi = np.linspace(0.0, wrap, 3601)
+    _, normals = design.place.place(0.0, phi)
     for name, axis in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0))):
         across, up, _ = back.rotate(axis)
-        if math.hypot(across, up) > 0.5:
-            yield f"+{name}", round(math.atan2(up, across), 9) % (2.0 * math.pi)
+        if math.hypot(across, up) < 0.5:
+            continue
+        for sign in (1.0, -1.0):
+            if design.place.bends:
+                facing = sign * (normals @ np.array(axis))
+                found = float(np.median(phi[facing > facing.max() - 1e-9])) if facing.max() > 0.9 else None
+            else:
+                turn = round(math.atan2(sign * up, sign * across), 9) % (2.0 * math.pi)
+                found = turn if turn <= wrap else None
+            if found is not None:
+                yield f"{'+' if sign > 0.0 else '-'}{name}", found
 
 
 def _strip_placement(design: SheetDesign) -> Iterator[str]:

@@ -92,9 +92,17 @@ def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     if design.layout.holes:
         yield "Cut the pins flush. Use no metal: it would short-circuit the two conductive sheets."
     if figures.collars:
+        ends = [collar.end for collar in figures.collars]
+        first = f"the collars on again, first the one of end {ends[0]}" if len(ends) == 2 else "the collar on again"
+        other = "" if len(ends) == 2 else ", and hold the other end with masking tape"
+        middle = (
+            "its seam in the middle of the slot between the parts"
+            if side.wrap > 2.0 * math.pi - 0.5
+            else "its two edges flush with the outer sides of the parts"
+        )
         yield (
-            "Put the collars on again, first the one of end 1: push the sheet against its step, the seam in the middle "
-            f"of its slot, and strap the parts with hook-and-loop tape on their flat seats. {SETTING} Take them off."
+            f"Put {first}: push the sheet against its step, {middle}, and strap the parts with hook-and-loop tape "
+            f"around the link, on their flat seats{other}. {SETTING} Take them off."
         )
     else:
         yield f"Wind masking tape around both rims. {SETTING}"
