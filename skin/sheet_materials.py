@@ -29,7 +29,7 @@ class SheetMaterial(NamedTuple):
         return f"conductive sheet {self.ohms:g} ohm/sq"
 
 
-#: in ascending order of resistance; nominal values of data sheets
+#: in ascending order of resistance; nominal values by which such sheets are sold: measure what you buy
 SHEET_MATERIALS = (
     SheetMaterial("carbon-filled polyimide film, 50 um, 100 ohm per square", 100.0),
     SheetMaterial("PEDOT:PSS on polyester film, 350 ohm per square", 350.0),

@@ -7,6 +7,7 @@ import pytest
 
 from coneskin.design.layout_picture import draw_layout
 from coneskin.design.sheets import DesignOptions, design_sheets
+from coneskin.design.workshop.wiring import cable_exit
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
@@ -15,13 +16,38 @@ def test_dimensions_have_units_and_lines_a_legend() -> None:
     module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
     figure = module.Figure()
     (design,) = design_sheets((PlacedFrustum(Frustum(0.04, 0.07, 0.15, math.radians(270.0))),), DesignOptions())
-    draw_layout(figure, design)
+    draw_layout(figure, design, cable_exit(design.layout, design.options.connector))
     (axes,) = figure.axes
     words = "\n".join(text.get_text() for text in axes.texts)
     numbers = re.findall(r"\d+\.\d+(?! *(?:mm|cm2|deg))\b(?!\d)", words)
     assert numbers == []
-    assert len(re.findall(r"\d mm", words)) == 7  # both sides, the slant, two arcs, two radii
+    assert len(re.findall(r"\d mm", words)) == 9  # both sides, the slant, two arcs, two radii, tie and connector
+    assert "cable tie, 30 mm from the rim" in words
+    assert "connector, 60 mm from the rim" in words
     (legend,) = figure.legends
     named = {text.get_text() for text in legend.texts}
     assert {"upper conductive layer", "lower conductive layer", "substrates and isolation", "active area"} < named
     assert {line.get_linestyle() for line in legend.get_lines()} == {"-", "--", ":"}
+
+
+@pytest.mark.parametrize("wires", ["end1", "end2"])
+@pytest.mark.parametrize("wrap_deg", [200.0, 270.0, 360.0])
+def test_wires_are_drawn_from_the_tabs_past_the_tie_to_the_connector(wires: str, wrap_deg: float) -> None:
+    module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
+    figure = module.Figure()
+    frustum = Frustum(0.05, 0.06, 0.1, math.radians(wrap_deg))
+    (design,) = design_sheets((PlacedFrustum(frustum),), DesignOptions(wires=wires))  # type: ignore[arg-type]
+    draw_layout(figure, design, cable_exit(design.layout, 0.06))
+    (axes,) = figure.axes
+    marks = [line for line in axes.lines if line.get_marker() in "sD" and len(line.get_xdata()) == 1]
+    assert [line.get_marker() for line in marks] == ["s", "D"]
+    (tx, ty), (cx, cy) = ((line.get_xdata()[0], line.get_ydata()[0]) for line in marks)
+    assert math.dist((tx, ty), (cx, cy)) == pytest.approx(30.0, abs=1e-6)
+    last = [(line.get_xdata()[-1], line.get_ydata()[-1]) for line in axes.lines if line.get_linewidth() == 1.2]
+    assert len(last) == 4
+    ends = [end for end in last if math.dist(end, (cx, cy)) < 1e-6]
+    crossing = sum(text.get_text().startswith("C, ") for text in axes.texts)
+    assert len(ends) + crossing == 4
+    assert crossing == (wrap_deg > 200.0)
+    rim = [y for line in axes.lines[:1] for y in line.get_ydata()]
+    assert cy < min(rim) if wires == "end1" else cy > min(rim)

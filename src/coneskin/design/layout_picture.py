@@ -10,6 +10,7 @@ from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw
 from coneskin.geometry.sector import unroll
 
 from .sheets import SheetDesign
+from .workshop.wiring import CableExit
 
 __all__ = ["FOIL_COLOUR", "INK_COLOUR", "draw_layout"]
 
@@ -26,12 +27,13 @@ def _xy(outline: Outline) -> tuple[list[float], list[float]]:
     return [x for x, _ in points], [y for _, y in points]
 
 
-def draw_layout(figure: Any, design: SheetDesign) -> None:
-    """Draw the layout of a sheet on the cone of its upper conductive layer, with dimensions in mm.
+def draw_layout(figure: Any, design: SheetDesign, cable: CableExit) -> None:
+    """Draw the layout of a sheet on the cone of its upper conductive layer, with dimensions in mm, and its wires.
 
     Args:
         figure: an empty figure of matplotlib.
         design: the sheet.
+        cable: its wires, from the tabs past the strain relief to the connector.
     """
     axes = figure.add_subplot()
     layout = design.layout
@@ -53,11 +55,47 @@ def draw_layout(figure: Any, design: SheetDesign) -> None:
         label = None if number else f"registration holes, diameter {1e3 * layout.plan.hole:g} mm"
         hole = _xy(draw_hole(cone, u, phi, layout.plan.hole))
         axes.fill(*hole, facecolor="white", edgecolor=INK_COLOUR, lw=0.8, label=label)
+    if cable.side.startswith("end"):
+        _draw_cable(axes, design, cone, cable)
     _dimensions(axes, design, cone)
     axes.margins(0.08)
     axes.set_aspect("equal")
     axes.axis("off")
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+
+
+def _draw_cable(axes: Any, design: SheetDesign, cone: Any, cable: CableExit) -> None:
+    """Draw the wires as they would lie if the link were flat too; one that crosses the seam ends at the edge."""
+    from .workshop.guide_words import WIRE_COLOURS
+
+    out = -1.0 if cable.side == "end1" else 1.0
+
+    def at(away: float, phi: float) -> tuple[float, float]:
+        """Return a place beyond the end [mm], away from it [m] along the ruling through phi."""
+        x, y = drawing_point(cone, cable.u, phi)
+        turn = (phi - 0.5 * cone.wrap) * cone.sin_half_angle
+        return 1e3 * (x + out * away * math.sin(turn)), 1e3 * (y + out * away * math.cos(turn))
+
+    middle = math.remainder(cable.phi, 2.0 * math.pi) if cable.phi > cone.wrap else cable.phi
+    middle = middle - 2.0 * math.pi if middle > math.pi and cone.wrap > 2.0 * math.pi - 0.5 else middle
+    tab = design.layout.plan.tab
+    for wire in cable.wires:
+        name, colour = wire.electrode, WIRE_COLOURS[wire.electrode]
+        style = {"color": "#d4a800" if colour == "yellow" else colour, "lw": 1.2}
+        if abs(wire.phi - middle) > math.pi:
+            axes.plot(*zip(at(tab, wire.phi), at(0.5 * cable.tie + 0.5 * tab, cone.wrap), strict=True), **style)
+            way = "across\nthe seam" if cone.wrap > 2.0 * math.pi - 0.5 else "around\nthe link"
+            axes.text(*at(cable.tie, wire.phi), f"{name}, {way}", fontsize=7, ha="center", va="center")
+            continue
+        steps = [at(tab, wire.phi), at(cable.tie, middle), at(cable.connector, middle)]
+        if abs(wire.phi - middle) > 0.6:  # around the end, not across it
+            around = [wire.phi + (middle - wire.phi) * k / 24.0 for k in range(25)]
+            steps[1:2] = [at(tab + (cable.tie - tab) * k / 24.0, phi) for k, phi in enumerate(around)]
+        axes.plot(*zip(*steps, strict=True), **style)
+    for away, marker, word in ((cable.tie, "s", "cable tie"), (cable.connector, "D", "connector")):
+        x, y = at(away, middle)
+        axes.plot([x], [y], marker, color=INK_COLOUR, ms=6)
+        axes.text(x - 4.0, y, f"{word}, {1e3 * away:g} mm from the rim", fontsize=8, ha="right", va="center")
 
 
 def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
@@ -72,7 +110,8 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
 
     x0, y0, x1, y1 = draw_shape(cone, layout.rim).bounds
     far = 1.5e3 * lift
-    bottom, right = y0 * 1e3 - far - 12.0 * bool(layout.plan.wires == "end1"), x1 * 1e3 + far
+    wires = 1e3 * design.options.connector if layout.plan.wires == "end1" else 0.0
+    bottom, right = y0 * 1e3 - far - wires, x1 * 1e3 + far
     arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.7, "shrinkA": 0, "shrinkB": 0}
     axes.plot(
         [x0 * 1e3, x1 * 1e3, right], [bottom - 0.6e3 * lift, bottom, bottom], lw=0.0
@@ -92,7 +131,8 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
             f"r1 {flat.r1 * 1e3:.3f} mm, r2 {flat.r2 * 1e3:.3f} mm, theta0 {math.degrees(flat.theta0):.4f} deg"
         )
     lines.append(f"active area {1e4 * layout.active.area(layout.sheet):.1f} cm2 ({layout.active_share:.0%})")
-    axes.text(*at(0.5 * slant, 0.5 * wrap), "\n".join(lines), **style)
+    tabs = design.options.connector if layout.plan.wires == "end2" else 0.0
+    axes.text(500.0 * (x0 + x1), 1e3 * (y1 + tabs) + 4.0, "\n".join(lines), **{**style, "va": "bottom"})
     half = 0.5 * layout.plan.electrode
     narrow = min(layout.sheet.radius1, layout.sheet.radius2)
     field = layout.field

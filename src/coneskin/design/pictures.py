@@ -76,9 +76,13 @@ def draw_pictures(
     for design, item in zip(designs, figures, strict=True):
         progress(f"{design.name}: drawing the layout")
         figure = Figure(figsize=(9, 7), layout="constrained")
-        draw_layout(figure, design)
+        draw_layout(figure, design, item.cable)
         name = design.name.replace(" ", "-")
-        save(figure, f"{name}-layout.png", f"{design.name.capitalize()}, flat, seen from outside; dimensions in mm.")
+        save(
+            figure,
+            f"{name}-layout.png",
+            f"{design.name.capitalize()}, flat, seen from outside, and the way of its wires; dimensions in mm.",
+        )
         title = design.name.capitalize()
         progress(f"{design.name}: drawing how it is built")
         figure = Figure(figsize=(9, 7), layout="constrained")

@@ -11,7 +11,7 @@ from coneskin.geometry.drawing.touch_marks import touch_marks
 from .build_figures import BuildFigures
 from .closing_steps import cable_steps, reading_lines, test_steps
 from .flat_steps import flat_steps
-from .guide_words import in_mm
+from .guide_words import WIRE_COLOURS, in_mm
 from .jig_text import jig_lines
 from .placement_text import placement_lines
 from .wrap_steps import wrap_steps
@@ -53,10 +53,9 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
     yield ""
     yield "| pin | electrode | wire | tab at u | tab at phi | cut to |"
     yield "|---|---|---|---|---|---|"
-    colours = dict(zip("ABCD", ("red", "black", "yellow", "green"), strict=True))
     for wire in figures.cable.wires:
         yield (
-            f"| {wire.pin} | {wire.electrode} | {colours[wire.electrode]} | {in_mm(wire.u)} | "
+            f"| {wire.pin} | {wire.electrode} | {WIRE_COLOURS[wire.electrode]} | {in_mm(wire.u)} | "
             f"{math.degrees(wire.phi):.2f} deg | {1e3 * wire.length:.0f} mm |"
         )
     yield ""

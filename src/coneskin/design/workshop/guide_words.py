@@ -8,8 +8,10 @@ from coneskin.design.sheets import SheetDesign
 
 from .build_figures import BuildFigures
 
-__all__ = ["ROLLING", "SETTING", "SPREAD", "TAPE", "in_mm", "in_ohms", "side_name", "tie_place"]
+__all__ = ["ROLLING", "SETTING", "SPREAD", "TAPE", "WIRE_COLOURS", "in_mm", "in_ohms", "side_name", "tie_place"]
 
+#: of the insulation, by electrode
+WIRE_COLOURS = {"A": "red", "B": "black", "C": "yellow", "D": "green"}
 SPREAD = 0.2  # of the expected ohms: conductive sheets vary by as much
 TAPE = "double-sided tape"
 #: the roller is that of the peel test of ASTM D3330: 2 kg on a width of 45 mm
