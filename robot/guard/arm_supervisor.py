@@ -155,7 +155,9 @@ class ArmSupervisor:
             if self._plain:
                 return
             reaction = self._reaction = touches.note(contact)
-            if reaction.kind == "slow" and self.speed_reduction.begin(now, self.state, reaction, self._limits, out):
+            if reaction.kind == "slow" and self.speed_reduction.begin(
+                now, self.state, reaction, self._limits, [contact.on_link()], out
+            ):
                 self.phase = Phase.SLOWED
             else:
                 self._stop_now(now, "touch", True, out, contact)

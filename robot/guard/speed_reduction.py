@@ -1,9 +1,10 @@
 """Speed reduction: the reaction that lowers the controller's speed slider while the skin is touched. Pure.
 
 The slider slows whatever moves the arm, except a stream of servo setpoints. So its value alone is not trusted: the
-measured speed of the touched surface has to fall, or to be low anyway, within the budget of a stop, and to stay so; and
-the surface may move into the touch little farther than in a stop (``contact_approach``). What a person does with the
-slider meanwhile has priority: it is not put back over it.
+measured speed of the touched surface has to fall, or to be low anyway, within the budget of a stop, and to stay so.
+What moves into the touch is stopped, at once where it is fast (``contact_approach``); so is an arm whose motors show
+that something holds it while its setpoints go on (``joint_current``). What a person does with the slider meanwhile
+has priority: it is not put back over it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from .outputs import Outputs, emit
 
 if TYPE_CHECKING:  # a scene without a slow reaction does not load it
     from coneskin.robot.reaction.contact_approach import ContactApproach
+
+    from .joint_current import JointCurrentMonitor
 
 __all__ = ["HOLD", "ReducedSpeedTouch", "SpeedReduction"]
 
@@ -134,8 +137,12 @@ class SpeedReduction:
         if used:  # here, so that no touch waits for it
             from coneskin.robot.reaction.contact_approach import ContactApproach
 
-            self._approach_of = ContactApproach
+            from .joint_current import JointCurrentMonitor
+
+            self._approach_of, self._monitor_of = ContactApproach, JointCurrentMonitor
         self.approach: ContactApproach | None = None
+        self._currents: JointCurrentMonitor | None = None
+        self._held = ""  # why the arm counts as held by something
         self.slider: float | None = None
         self._read_at = -math.inf
         self.now: ReducedSpeedTouch | None = None
@@ -151,26 +158,40 @@ class SpeedReduction:
         return self.slider is not None and time - self._read_at <= _MAX_SLIDER_AGE
 
     def begin(
-        self, time: float, state: ControllerState | None, reaction: Reaction, limits: MonitoringLimits, out: Outputs
+        self,
+        time: float,
+        state: ControllerState | None,
+        reaction: Reaction,
+        limits: MonitoringLimits,
+        contacts: Sequence[ContactOnLink],
+        out: Outputs,
     ) -> bool:
-        """Reduce the speed; return False where the position of the slider, or the state of the arm, is not known.
+        """Reduce the speed; return False where the arm has to be stopped instead.
+
+        That is where it moves into the touch too fast, or where the position of the slider, or the state of the arm, is
+        not known.
 
         Args:
             time: host time [s].
             state: of the arm, the newest.
             reaction: its kind is "slow".
             limits: of the monitoring; the arm has the time of a stop to become slower.
+            contacts: the touches there are.
             out: takes commands and events.
         """
         before, top = self.slider, [0.0, 0.0]
         if before is None or state is None or not self.knows(time):
+            return False
+        approach = self._approach_of(self._model, state.q, state.qd, reaction.deceleration, reaction.press)
+        approach.note(state.q, state.qd, contacts)
+        if approach.exceeded:
             return False
         if self._last is not None and time - self._last[0] < HOLD:  # slider and speed may not yet be as before
             before, top = self._last[1].before, self._last[1].top
         budget = limits.stop_budget(state.speed, reaction.deceleration)
         longest, slow = reaction.time_budget, reaction.slow_speed
         self.now = ReducedSpeedTouch(time, top, before, reaction.slow_to, budget, longest, slow)
-        self.approach = self._approach_of(self._model, state.q, state.qd, reaction.deceleration, reaction.press)
+        self.approach, self._currents, self._held = approach, self._monitor_of(), ""
         out.append(SetSpeedSlider(self.now.fraction))
         emit(out, EventName.SPEED_REDUCED, time, slider=self.now.fraction, before=before)
         return True
@@ -180,6 +201,8 @@ class SpeedReduction:
         if self.now is not None and self.approach is not None:
             self.approach.note(state.q, state.qd, contacts)
             self.now.sample(state.time, self.approach.speed, self.approach.certain)
+            if self._currents is not None and contacts and not self._held:
+                self._held = self._currents.resistance(state)
 
     def look(self, time: float, touched: bool) -> str:
         """Return why the arm has to be stopped after all; empty where it has not."""
@@ -187,7 +210,9 @@ class SpeedReduction:
             return ""
         self.now.touched(time, touched)
         if self.approach is not None and self.approach.exceeded:
-            return f"while slow, the surface has moved {1e3 * self.approach.way:.1f} mm into the touch"
+            return f"while slow, the surface would move {1e3 * self.approach.way:.1f} mm into the touch"
+        if self._held:
+            return f"while slow, {self._held}"
         if not self.knows(time):
             return "the controller does not report its speed slider any more"
         return self.now.trouble(time, self.slider)

@@ -1,9 +1,10 @@
-"""Approach of a moving arm to what touches it: how far the surface has moved into each touch since it began. Pure.
+"""Approach of a moving arm to what touches it: how far the surface moves into each touch. Pure.
 
-An arm that goes on slowly while it is touched must press no farther than one that is stopped. A stop at the touch would
-have taken the surface v s / (2 a) further into it: v its speed along the outward normal, s and a speed and deceleration
-of the leading joint. What the surface has moved into the touch, and would still move if it were stopped now, is held
-against that. Sliding along the touch or away from it counts nothing; where the place is not certain, every motion does.
+An arm that goes on slowly while it is touched must not clamp harder than one that is stopped. So what moves into a
+touch is stopped, and at once where a stop takes it farther than a little: what its surface has moved into the touch,
+and would still move if it were stopped now, v s / (2 a), is held against that little (v: its speed along the outward
+normal; s, a: speed and deceleration of the leading joint). Sliding along the touch or away from it counts nothing.
+Where the place is not certain, every motion counts beside that of the supposed place.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from .types import ContactOnLink
 
 __all__ = ["ContactApproach"]
 
+_BLIND = 4.0  # times as far any point may move while the place of a touch is not certain: that takes 2 frames or more
+
 
 @dataclass(slots=True)
 class _Approach:
-    """Way into one touch, and the way of a stop at its beginning [m]."""
+    """Way into one touch [m]."""
 
-    q: Joints  # where the arm was then [rad]
-    qd: Joints  # and how fast [rad/s]
-    stop: float
+    q: Joints  # where the arm was when it began [rad]
     made: float = 0.0
     blind: float = 0.0  # way of any point, while its place was not certain yet [m]
     placed: bool = False
@@ -41,14 +42,14 @@ class ContactApproach:
         q: joint positions at the touch, or just before [rad].
         qd: joint speeds then [rad/s].
         deceleration: of the leading joint in a stop [rad/s2].
-        press: how much farther into a touch than a stop the surface may move [m].
+        press: how far the surface may move into a touch, the way of a stop included [m].
 
     Attributes:
         speed: of the fastest touched surface, as last seen; where its place is not certain, of any point that the
             joints below could move [m/s].
         certain: True where that speed is the surface's own.
         exceeded: number of the touch into which the surface has moved too far; 0 where there is none.
-        way: how far it has moved into that one [m].
+        way: how far it would move into that one if it were stopped now [m].
     """
 
     def __init__(self, model: ArmModel, q: Joints, qd: Joints, deceleration: float, press: float) -> None:
@@ -67,27 +68,22 @@ class ContactApproach:
         """Take measured joint positions [rad] and speeds [rad/s], and the touches there are by their newest frames."""
         speeds = []
         for contact in contacts:
-            touch = self._touches.get(contact.number)
-            if touch is None:
-                _, _, before = self._motion(contact, self._q, self._q, self._qd)
-                touch = self._touches[contact.number] = _Approach(self._q, self._qd, self._stop(before, self._qd))
-            step, speed, approach = self._motion(contact, self._q, q, qd)
-            speeds.append(speed)
-            room = touch.stop + self._press
-            if not contact.location_valid:  # it may have only begun: so little that a place may come yet
-                touch.blind += step
-                way, room = touch.made + touch.blind, room + self._press
+            touch = self._touches.setdefault(contact.number, _Approach(self._q))
+            placed = contact.location_valid
+            if placed and not touch.placed:  # only now it shows how far it has gone into it
+                touch.placed, touch.blind, since = True, 0.0, touch.q
             else:
-                if not touch.placed:  # only now it shows how far a stop would have gone into it
-                    step = self._motion(contact, touch.q, q, qd)[0]
-                    touch.blind = 0.0
-                    before = self._motion(contact, touch.q, touch.q, touch.qd)[2]
-                    touch.stop = self._stop(before, touch.qd)
-                touch.placed = True
+                since = self._q
+            bound, speed, _ = self._motion(contact, since, q, qd, placed)
+            step, _, approach = self._motion(contact, since, q, qd)
+            speeds.append(speed)
+            if placed:
                 touch.made = max(0.0, touch.made + step)  # what has receded may be followed, and pressed again
-                way = touch.made + touch.blind
-            if way + self._stop(approach, qd) > room and not self.exceeded:
-                self.exceeded, self.way = contact.number, way
+            else:
+                touch.blind += bound
+            way = touch.made + self._stop(approach, qd)
+            if (way > self._press or touch.blind > _BLIND * self._press) and not self.exceeded:
+                self.exceeded, self.way = contact.number, max(way, touch.blind)
         if speeds:
             self.speed = max(speeds)
             self.certain = all(contact.location_valid for contact in contacts)
@@ -100,12 +96,17 @@ class ContactApproach:
         """Return the way of a surface in a stop [m], from its speed into the touch [m/s] and the joints' [rad/s]."""
         return max(0.0, speed) * max(map(abs, qd)) / (2.0 * self._deceleration)
 
-    def _motion(self, contact: ContactOnLink, before: Joints, q: Joints, qd: Joints) -> tuple[float, float, float]:
-        """Return the way into a touch from joints to joints [m], the speed of the surface, and that into it [m/s]."""
+    def _motion(
+        self, contact: ContactOnLink, before: Joints, q: Joints, qd: Joints, placed: bool = True
+    ) -> tuple[float, float, float]:
+        """Return the way into a touch from joints to joints [m], the speed of the surface, and that into it [m/s].
+
+        Where it is not ``placed``: bounds of them, for any point of the link.
+        """
         link = contact.link
         if link == 0:
             return 0.0, 0.0, 0.0
-        if not contact.location_valid:
+        if not placed:
             way = sum(abs(a - b) * far for a, b, far in zip(q[:link], before, self._reach, strict=False))
             bound = sum(abs(v) * far for v, far in zip(qd[:link], self._reach, strict=False))
             return way, bound, bound

@@ -87,7 +87,8 @@ class Reaction:
         full_level: level at which comply gives way with its full speed.
         slow_to: the controller's speed slider while slow, 0..1.
         slow_speed: of the touched surface, below which an arm counts as slow whatever it was before [m/s].
-        press: how much farther than in a stop the surface may move into a touch while the arm is slow [m].
+        press: how far the surface may move into a touch while the arm is slow, the way of a stop included; what
+            moves into it faster is stopped at once [m].
 
     Raises:
         RobotRefused: a value is out of its range; no guard starts with such settings.
@@ -107,7 +108,7 @@ class Reaction:
     full_level: float = 0.6
     slow_to: float = 0.2
     slow_speed: float = 0.05
-    press: float = 0.001
+    press: float = 0.0005
 
     def __post_init__(self) -> None:
         for name, choices in (

@@ -119,7 +119,7 @@ def _reaction(reaction: Reaction) -> str:
     if reaction.kind == "slow":
         return (
             f"slow to {100.0 * reaction.slow_to:g} % for at most {reaction.time_budget:g} s, and no more than "
-            f"{1e3 * reaction.press:g} mm farther into the touch than a stop; then stop, {stop}"
+            f"{1e3 * reaction.press:g} mm into the touch; then, or where it would be more, stop, {stop}"
         )
     text = (
         f"{reaction.kind}: stop, {stop}, then at most {1e3 * reaction.distance:g} mm at up to "
