@@ -112,9 +112,18 @@ def test_targets_arrive_and_the_answer_is_measured_in_the_next_cycle(remote) -> 
     [
         (b"too short", "9 bytes"),
         (encode_state(ELSEWHERE._replace(qd=(float("nan"),) * 6)), "not a number"),
+        (
+            encode_state(ELSEWHERE._replace(q=(0.0, 1e30, *ELSEWHERE.q[2:]))),
+            "position of joint 2 of 1e[+]30 rad; at most",
+        ),
+        (
+            encode_state(ELSEWHERE._replace(qd=(*ELSEWHERE.qd[:5], -101.0))),
+            "speed of joint 6 of -101 rad/s; at most 100",
+        ),
+        (encode_state(ELSEWHERE._replace(current=(1e5,) * 6)), "current of joint 1 of 1e[+]05 A"),
         (None, "has ended"),
     ],
-    ids=["nonsense", "not a number", "gone"],
+    ids=["nonsense", "not a number", "far away", "too fast", "too strong", "gone"],
 )
 def test_a_plant_that_is_gone_or_says_nonsense_is_lost(remote, answer, said) -> None:  # type: ignore[no-untyped-def]
     plant, other = remote
@@ -123,6 +132,17 @@ def test_a_plant_that_is_gone_or_says_nonsense_is_lost(remote, answer, said) -> 
     else:
         other.send(answer)
     with pytest.raises(PlantLost, match=said):
+        plant.advance(START_Q, QD)
+
+
+def test_a_plant_that_answers_what_it_was_not_asked_is_lost(remote) -> None:  # type: ignore[no-untyped-def]
+    """Answers ahead of their targets would hide as many that do not come."""
+    plant, other = remote
+    other.send(encode_state(ELSEWHERE))
+    assert plant.advance(START_Q, QD) == ELSEWHERE
+    other.send(encode_state(ELSEWHERE))
+    other.send(encode_state(ELSEWHERE))
+    with pytest.raises(PlantLost, match="was not sent"):
         plant.advance(START_Q, QD)
 
 
