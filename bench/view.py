@@ -204,7 +204,8 @@ def main() -> None:
     parser.add_argument("--no-browser", action="store_true", help="measure without chromium")
     args = parser.parse_args()
     print(head("viser", "playwright"), flush=True)
-    host, spans = free_host(), {}
+    host = free_host()
+    spans: dict[str, tuple[float, float]] = {}
     folder = tempfile.TemporaryDirectory()
     recording = Path(folder.name) / "run.rec"
     scene = parse_scene(forearm_scene(host, limits=LIMITS).replace('"virtual"', '"virtual"\nrate_hz = 1000'))

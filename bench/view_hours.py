@@ -10,7 +10,6 @@ garbage first. Needs the extra `view`, playwright and chromium.
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
 import threading
 import time
@@ -20,13 +19,11 @@ from typing import Any
 from report import head
 from view import page_of
 from view_browser import FLAGS, PROGRAM, memory_of, resident
+from view_collisions import collisions_again, header_of
 
-from coneskin.recording import END, Block
+from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind
 
-RUN = Path(__file__).parents[1] / "tests" / "data" / "collision.rec"
 STEP = 0.05  # s of the run that are written together: the recorder's own
 
 
@@ -40,42 +37,23 @@ class Writer(threading.Thread):
 
     def __init__(self, recorder: Recorder, rate: float) -> None:
         super().__init__(daemon=True)
-        run = read_run(RUN)
         self._recorder, self._rate = recorder, rate
-        self._blocks = [block for block in run.blocks if block.kind not in (BlockKind.HEADER, END)]
-        self._begin = self._blocks[0].time
-        self._length = self._blocks[-1].time - self._begin + 0.1
         self.shown, self.collisions, self.over = 0.0, 0, threading.Event()
-        recorder.write(Block(BlockKind.HEADER, self._begin, json.dumps(run.header).encode()), flush=True)
+        recorder.write(header_of(), flush=True)
 
     def run(self) -> None:
         """Write until it is over."""
-        began = time.monotonic()
-        at = 0
-        while not self.over.wait(STEP / self._rate):
-            until = self._rate * (time.monotonic() - began)
-            found = []
-            while True:
-                block = self._blocks[at]
-                when = self.collisions * self._length + block.time - self._begin
-                if when > until:
-                    break
-                found.append(self._again(block, self._begin + when))
-                at += 1
-                if at == len(self._blocks):
-                    at, self.collisions = 0, self.collisions + 1
-            self._recorder.write(*found, flush=True)
-            self.shown = until
-
-    def _again(self, block: Block, when: float) -> Block:
-        """Return a block at another time; the touches of each collision have numbers of their own."""
-        payload = block.payload
-        if block.kind == BlockKind.EVENT:
-            name, details = json.loads(payload)
-            if isinstance(details.get("number"), int):
-                details["number"] += 1000 * self.collisions
-            payload = json.dumps([name, details]).encode()
-        return Block(block.kind, when, payload)
+        began, start = time.monotonic(), None
+        found: list[Block] = []
+        for self.collisions, block in collisions_again():
+            start = block.time if start is None else start
+            while block.time - start > self.shown:
+                self._recorder.write(*found, flush=True)
+                found = []
+                if self.over.wait(STEP / self._rate):
+                    return
+                self.shown = self._rate * (time.monotonic() - began)
+            found.append(block)
 
 
 def main() -> None:
