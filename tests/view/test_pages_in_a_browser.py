@@ -17,11 +17,13 @@ from coneskin.view.page_server import PageServer
 from coneskin.view.run_page import show_runs
 from coneskin.view.strand import Strand, read_strands
 
-from .browser import browser_page, look_closely, magenta, pixels, quiet, violet, wait_for_text
+from .browser import browser_page, look_closely, look_closely_at_a_file, magenta, pixels, quiet, violet, wait_for_text
 
 RUN = Path(__file__).parents[1] / "data" / "collision.rec"
 NOTICE = "No safety display"
 SMOOTHED = "() => document.querySelector('canvas[data-engine]').getContext('webgl2').getContextAttributes().antialias"
+JUMP = """(words) => [...document.querySelectorAll('#coneskin-events div')]
+  .find((row) => row.textContent.includes(words)).click()"""
 pytestmark = pytest.mark.long
 
 
@@ -73,11 +75,28 @@ def test_a_file_without_python_jumps_to_the_touch(tmp_path: Path) -> None:
         page.goto(f"file://{tmp_path / 'run.html'}")
         wait_for_text(page, "#coneskin-notice", NOTICE)
         page.wait_for_selector("#root [role=slider]", state="attached")
-        page.evaluate("[...document.querySelectorAll('#coneskin-events div')].find((row) => "
-                      "row.textContent.includes('touch located')).click()")  # fmt: skip
+        page.evaluate(JUMP, "touch located")
         wait_for_text(page, "#coneskin-clock", "0.021 s")
         wait_for_text(page, ".coneskin-phase", "stopping")
         assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
+        assert page.wrong == []
+
+
+def test_a_file_shows_the_contact_where_it_was_when_it_was(tmp_path: Path) -> None:
+    strands = read_strands([RUN])
+    at, point, normal = contact(strands[0])
+    write_html(tmp_path / "run.html", strands)
+    with browser_page() as page:
+        page.goto(f"file://{tmp_path / 'run.html'}")
+        page.wait_for_selector("#root [role=slider]", state="attached")
+        for words, clock, marked in (("activated", "1.9", False), ("touch located", f"{at:.3f} s", True)):
+            page.evaluate(JUMP, words)
+            wait_for_text(page, "#coneskin-clock", clock)
+            place = look_closely_at_a_file(page, "/run 1", point, normal)
+            assert (magenta(pixels(page, place)) > 5) is marked, words
+        assert f"{at:.4f} s touch located" in page.inner_text("#coneskin-events"), "the same clock"
+        assert [box for box in page.query_selector_all("#root input") if box.is_visible() and "." in box.input_value()
+                and not box.input_value().endswith("x")] == [], "no other clock"  # fmt: skip
         assert page.wrong == []
 
 

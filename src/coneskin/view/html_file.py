@@ -25,11 +25,12 @@ __all__ = ["write_html"]
 
 _RATE = 30.0  # pictures a second ...
 _PICTURES = 6000  # ... but not more than these in a file
-_EVENTS = 3000  # in a file
+_EVENTS = 3000  # of a run in a file, each with a picture of its own ...
+_AFTER = 1e-6  # ... so long after it [s]
 _FIRST = b"<!doctype html"  # of every page
 
 _STYLE = """
-#coneskin{position:fixed;top:12px;right:12px;width:360px;max-height:calc(100% - 24px);overflow:auto;z-index:9;
+#coneskin{position:fixed;top:12px;right:12px;width:360px;max-height:calc(100% - 84px);overflow:auto;z-index:9;
 background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px 8px rgba(0,0,0,.25);padding:10px}
 #coneskin b{word-break:break-all}
 #coneskin-notice{border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px;margin:6px 0}
@@ -38,7 +39,8 @@ background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px
 #coneskin-timeline{width:100%;display:block;cursor:pointer}
 #coneskin-events{font:11px/1.5 monospace;margin-top:6px}
 #coneskin-events div{cursor:pointer;white-space:nowrap;overflow:hidden;text-overflow:ellipsis}
-"""
+#root .mantine-NumberInput-root,#root .mantine-Slider-label{display:none}
+"""  # the client's own field and label count from the first picture, which is not where the run's clock has its zero
 
 #: moves the client's own playback by its field for the time, and follows what its slider shows
 _SCRIPT = """
@@ -66,7 +68,8 @@ _SCRIPT = """
     const input = field();
     if (input === null) return;
     const setter = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
-    setter.call(input, String(Math.max(time, 0.0001).toFixed(4)));
+    const steps = Math.min(Math.max(Math.ceil(1e4 * time), 1), Math.floor(1e4 * data.duration));  // of its slider
+    setter.call(input, (1e-4 * steps).toFixed(4));
     input.dispatchEvent(new Event('input', { bubbles: true }));
     input.dispatchEvent(new Event('blur', { bubbles: true }));
   }
@@ -85,7 +88,7 @@ _SCRIPT = """
     const time = shown();
     if (time !== null && time !== before) {
       before = time;
-      clock.textContent = (time + data.since).toFixed(3) + ' s';
+      clock.textContent = (1e-3 * Math.floor(1e3 * (time + data.since))).toFixed(3) + ' s';
       cursor.style.left = (100 * time / data.duration) + '%';
       data.runs.forEach((run, k) => {
         const phase = last(run.phases, time);
@@ -120,7 +123,7 @@ def write_html(path: Path, strands: Sequence[Strand]) -> float:
     since, until = min(item.span[0] for item in strands), max(item.span[1] for item in strands)
     duration = max(until - since, 1e-3)
     count = min(max(2, int(duration * _RATE)), _PICTURES)
-    scene = _serialized(strands, since, duration, count)
+    scene = _serialized(strands, since, _pictures(strands, since, duration, count))
     embedded = base64.b64encode(scene).decode("ascii")
     head = (
         f"<title>coneskin: {escape(strands[0].stage.title)}</title><style>{_STYLE}</style>"
@@ -151,7 +154,14 @@ def _check_target(path: Path) -> None:
         raise RecordingError(f"{path} exists already and is no page, so it is not replaced: name another file")
 
 
-def _serialized(strands: Sequence[Strand], since: float, duration: float, count: int) -> bytes:
+def _pictures(strands: Sequence[Strand], since: float, duration: float, count: int) -> list[float]:
+    """Return the times of the pictures from the first one on [s]: even steps, and one just after each event."""
+    even = {duration * picture / (count - 1) for picture in range(count)}
+    events = [event.time - item.zero - since + _AFTER for item in strands for event in item.history.events[:_EVENTS]]
+    return sorted(even | {at for at in events if 0.0 <= at < duration})
+
+
+def _serialized(strands: Sequence[Strand], since: float, pictures: Sequence[float]) -> bytes:
     """Return the scene and its pictures as viser's client reads them."""
     with PageServer("coneskin", port=0x2F00) as server:
         taken = server.serializer()
@@ -162,12 +172,13 @@ def _serialized(strands: Sequence[Strand], since: float, duration: float, count:
             StageNodes(server.scene, strand.stage, f"/run {number}", strand.offset)
             for number, strand in enumerate(strands, 1)
         ]
-        for picture in range(count):
-            at = since + duration * picture / (count - 1)
+        before = 0.0
+        for at in pictures:
+            if at > before:
+                taken.insert_sleep(at - before)
+            before = at
             for strand, drawn in zip(strands, nodes, strict=True):
-                drawn.show(strand.moment(at))
-            if picture < count - 1:
-                taken.insert_sleep(duration / (count - 1))
+                drawn.show(strand.moment(since + at))
         return bytes(taken.serialize())
 
 
