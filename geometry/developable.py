@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["Developable"]
 
 _TURN = 2.0 * math.pi
+_AT_EDGE = 1e-9  # rad; a foot so close to an edge may lie beyond it
 _OPEN = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer
 
 
@@ -171,10 +172,8 @@ class Developable:
             u [m], phi [rad] and the signed distance [m], positive outside. The foot is on the continuation of the
             rulings, so u may lie outside [0, slant]; phi outside [0, wrap] where the outer strips continue.
         """
-        import numpy as np
-
-        u, phi, distance = self.locate_all(np.array([[x, y, z]]))
-        return float(u[0]), float(phi[0]), float(distance[0])
+        u, phi, distance = (float(one[0]) for one in self.locate_all([[x, y, z]]))
+        return u, phi, distance
 
     def rulings(self, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return the points of end 1 [m], the directions of the rulings and the normals: shapes (..., 3).
@@ -206,14 +205,16 @@ class Developable:
 
         points = np.asarray(points, float)
         best, phi = np.full(len(points), np.inf), np.zeros(len(points))
-        last = len(self._strips) - 1
-        for number, (strip, bend) in enumerate(zip(self._strips, self.bends, strict=True)):
-            low = 0.0 if number or self.closed else -np.inf
-            high = strip.arc if number < last or self.closed else np.inf
-            along, gap = strip.feet(points, low, high)
+        for number, strip in enumerate(self._strips):
+            along, gap = strip.feet(points, 0.0, strip.arc)
             better = gap < best
             best[better] = gap[better]
-            phi[better] = self._starts[number] + along[better] * bend.width / strip.arc
+            phi[better] = self._starts[number] + along[better] * self.bends[number].width / strip.arc
+        if not self.closed:  # beyond its edges the outer strips go on, but not over the side itself
+            for number, edge in ((0, 0.0), (-1, self.frustum.wrap)):
+                strip, out = self._strips[number], np.abs(phi - edge) < _AT_EDGE
+                along, _ = strip.feet(points[out], *((-np.inf, 0.0) if number == 0 else (0.0, np.inf)))
+                phi[out] = self._starts[number] + along * self.bends[number].width / strip.arc
         at, way, normal = self.rulings(phi)
         return np.einsum("ij,ij->i", points - at, way), phi, np.einsum("ij,ij->i", points - at, normal)
 
@@ -237,17 +238,16 @@ class Developable:
 
     def azimuth_above(self, height: float, phi: float) -> float:
         """Return the azimuth [rad] on the parallel side at a height [m] of the ruling that has the azimuth phi here."""
-        f, middle, turns = self.frustum, self._middle, 0.0
-        if self.closed:
-            turns, phi = divmod(phi, _TURN)
-        arc, left = 0.0, phi
+        middle = self._middle
+        turns, left = divmod(phi, _TURN) if self.closed else (0.0, phi)
+        arc = 0.0
         for number, bend in enumerate(self.bends):
             width = left if number == len(self.bends) - 1 else min(left, bend.width)
             arc += width * (middle + height * bend.turn / bend.width)
             left -= width
             if left <= 0.0:
                 break
-        return turns * f.wrap + arc / (middle + height * self.growth)
+        return turns * _TURN + arc / (middle + height * self.growth)
 
     def mismatch(self, height: float) -> float:
         """Return how far the parallel side at a height [m] is from being a sector, in arc at end 1 or 2 [m]."""

@@ -22,7 +22,7 @@ from .layer_stack import LayerStack, snap_to_cylinder
 from .outline import Outline
 from .part_labels import PartLabel, ascii_text, part_labels, strip_label
 from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
-from .touch_marks import between_marks, mark_labels, mark_lines
+from .touch_marks import CoverMarks
 
 __all__ = [
     "LINE_COLOURS",
@@ -193,10 +193,12 @@ def cut_sheets(
             pair = "CD" if index < 2 else "AB"
             parts = tuple(_foil(layout, surface, which, face, plain) for which in pair)
         else:
-            strokes = _marks(layout, surface, index) + _border(layout, surface, index, overlap if index == 4 else 0.0)
-            clear = between_marks(layout) if index == 4 else None
-            labels = part_labels(layout, surface, (*text, ascii_text(material)), clear)
-            labels += tuple(mark_labels(layout, surface)) if index == 4 else ()
+            crosses = CoverMarks.of(flat, layout, surface, stack, place) if index == 4 else None
+            strokes = _marks(layout, surface, index, crosses) + _border(
+                layout, surface, index, overlap if index == 4 else 0.0
+            )
+            labels = part_labels(layout, surface, (*text, ascii_text(material)), crosses.clear if crosses else None)
+            labels += tuple(crosses.labels()) if crosses else ()
             parts = (CutPart(name, strokes, labels),)
         return CutSheet(
             number, name, material, face, surface, tuple(_finish(part, kerf, face == "inside") for part in parts)
@@ -239,13 +241,13 @@ def _border(layout: SheetLayout, surface: Frustum, index: int, overlap: float) -
     return (*strokes, Stroke("cut", draw_shape(surface, shape)))
 
 
-def _marks(layout: SheetLayout, surface: Frustum, index: int) -> tuple[Stroke, ...]:
+def _marks(layout: SheetLayout, surface: Frustum, index: int, crosses: CoverMarks | None) -> tuple[Stroke, ...]:
     """Mark the conductive sheet on its substrate, the electrodes on their conductive sheet, touches on the cover."""
     if index == 0:
         return (Stroke("score", draw_shape(surface, layout.lower)),)
-    if index == 4:
-        crosses = (Stroke("score", draw_shape(surface, line, closed=False)) for line in mark_lines(layout))
-        return (Stroke("score", draw_shape(surface, layout.upper)), *crosses)
+    if crosses:
+        lines = (Stroke("score", draw_shape(surface, line, closed=False)) for line in crosses.lines())
+        return (Stroke("score", draw_shape(surface, layout.upper)), *lines)
     marks: tuple[SurfaceShape, ...] = layout.marks.get({1: "lower", 3: "upper"}.get(index, ""), ())
     return tuple(Stroke("score", draw_shape(surface, mark, closed=False)) for mark in marks)
 

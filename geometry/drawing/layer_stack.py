@@ -103,6 +103,10 @@ class LayerStack:
         heights = [self.face_offset(i) + self.layers[i].neutral_factor * self.layers[i].thickness for i in body]
         return math.fsum(w * y for w, y in zip(weights, heights, strict=True)) / math.fsum(weights)
 
+    def middle(self, index: int) -> float:
+        """Return the height of the middle of a layer above the link [m]."""
+        return self.face_offset(index) + 0.5 * self.layers[index].thickness
+
     def surface(self, link: PlacedFrustum, index: int) -> Frustum:
         """Return the cone for which a layer is cut, or to which the side is isometric for which it is.
 

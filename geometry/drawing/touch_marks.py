@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
 
 from .electrode_layout import SheetLayout, SurfaceRectangle
+from .layer_stack import LayerStack
 from .part_labels import PartLabel
 from .surface_shape import ShapeCorner, SurfaceShape, drawing_point
 
-__all__ = ["TouchMark", "between_marks", "mark_labels", "mark_lines", "mark_parts", "touch_marks"]
+__all__ = ["CoverMarks", "TouchMark", "mark_parts", "touch_marks"]
 
 _FIRST, _LAST = 0.1, 0.9  # of the slant and of the wrap; beyond, a touch is cut off by the rim
 _PRINTED = 3  # marks along and around
+_READ, _COVER = 3, 4  # layers: the upper conductive one, on which touches are located, and the one that is drawn on
 _ARM = 2e-3  # m; half of a line of the cross
 _NUMBER = 2e-3  # m; height of a mark's number
 
@@ -24,7 +28,7 @@ class TouchMark(NamedTuple):
 
     number: int
     u: float  #: slant distance from end 1 [m]
-    phi: float  #: azimuth from electrode D [rad]
+    phi: float  #: azimuth from electrode D, on the upper conductive layer [rad]
 
 
 def mark_parts(side: int) -> Iterator[tuple[float, float]]:
@@ -39,40 +43,74 @@ def mark_parts(side: int) -> Iterator[tuple[float, float]]:
             yield along, around
 
 
-def touch_marks(layout: SheetLayout) -> tuple[TouchMark, ...]:
-    """Return the marks that are drawn on the cover of a sheet."""
-    field = layout.field
+def touch_marks(active: Frustum) -> tuple[TouchMark, ...]:
+    """Return the marks that are drawn on the cover of a sheet.
+
+    Args:
+        active: cone between the inner edges of the electrodes, on the upper conductive layer.
+    """
     return tuple(
-        TouchMark(number, along * (field.u2 - field.u1), around * (field.phi2 - field.phi1))
+        TouchMark(number, along * active.slant, around * active.wrap)
         for number, (along, around) in enumerate(mark_parts(_PRINTED), 1)
     )
 
 
-def between_marks(layout: SheetLayout) -> SurfaceRectangle:
-    """Return the part of a sheet between the first two rows of marks, free for text."""
-    field, marks = layout.field, touch_marks(layout)
-    low, high = field.u1 + marks[0].u + 2.0 * _ARM, field.u1 + marks[_PRINTED].u - 2.0 * _ARM
-    return SurfaceRectangle(low, high, layout.active.phi1, layout.active.phi2)
+@dataclass(frozen=True, slots=True)
+class CoverMarks:
+    """Marks where they are drawn on the cover: on the normals of their places on the upper conductive layer.
 
+    On a cone both have the same azimuth. A bend grows with the height and a plane does not, so on another section the
+    cover has other shares of its arc there.
 
-def mark_lines(layout: SheetLayout) -> Iterator[SurfaceShape]:
-    """Yield the two lines of each mark's cross."""
-    for _, u, phi in touch_marks(layout):
-        u, phi = layout.field.u1 + u, layout.field.phi1 + phi
-        turn = _ARM / layout.sheet.radius_at(u)
-        yield ShapeCorner(u - _ARM, phi), ShapeCorner(u + _ARM, phi)
-        yield ShapeCorner(u, phi - turn), ShapeCorner(u, phi + turn)
-
-
-def mark_labels(layout: SheetLayout, surface: Frustum) -> Iterator[PartLabel]:
-    """Yield the number of each mark, beside its cross.
-
-    Args:
-        layout: of the sheet.
+    Attributes:
+        layout: of the sheet, on its cover.
         surface: the cone for which the cover is cut.
+        places: slant distance [m] and azimuth [rad] of each mark on the cover, in the order of the numbers.
     """
-    for number, u, phi in touch_marks(layout):
-        u, phi = layout.field.u1 + u, layout.field.phi1 + phi
-        turn = 1.5 * (_ARM + _NUMBER) / surface.radius_at(u)
-        x, y = drawing_point(surface, u + 0.5 * _NUMBER, phi + turn)
-        yield PartLabel(str(number), x, y, _NUMBER, -(phi - 0.5 * surface.wrap) * surface.sin_half_angle)
+
+    layout: SheetLayout
+    surface: Frustum
+    places: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of(
+        cls, flat: SheetLayout, cover: SheetLayout, surface: Frustum, stack: LayerStack, place: PlacedFrustum
+    ) -> Self:
+        """Return the marks of a sheet.
+
+        Args:
+            flat: layout of the sheet on its link.
+            cover: the same on the cover.
+            surface: the cone for which the cover is cut.
+            stack: the layers.
+            place: side of the link under the sheet.
+        """
+        middle, top = stack.middle(_READ), stack.offset(_COVER)
+        read, field = place.parallel(middle), flat.field
+        first, last = (place.azimuth_above(middle, phi) for phi in (field.phi1, field.phi2))
+        places = []
+        for along, around in mark_parts(_PRINTED):
+            below = read.azimuth_above(-middle, first + around * (last - first))
+            places.append((field.u1 + along * (field.u2 - field.u1), place.azimuth_above(top, below)))
+        return cls(cover, surface, tuple(places))
+
+    @property
+    def clear(self) -> SurfaceRectangle:
+        """Part of the cover between the first two rows of marks, free for text."""
+        low, high = self.places[0][0] + 2.0 * _ARM, self.places[_PRINTED][0] - 2.0 * _ARM
+        return SurfaceRectangle(low, high, self.layout.active.phi1, self.layout.active.phi2)
+
+    def lines(self) -> Iterator[SurfaceShape]:
+        """Yield the two lines of each mark's cross."""
+        for u, phi in self.places:
+            turn = _ARM / self.surface.radius_at(u)
+            yield ShapeCorner(u - _ARM, phi), ShapeCorner(u + _ARM, phi)
+            yield ShapeCorner(u, phi - turn), ShapeCorner(u, phi + turn)
+
+    def labels(self) -> Iterator[PartLabel]:
+        """Yield the number of each mark, beside its cross."""
+        surface = self.surface
+        for number, (u, phi) in enumerate(self.places, 1):
+            turn = 1.5 * (_ARM + _NUMBER) / surface.radius_at(u)
+            x, y = drawing_point(surface, u + 0.5 * _NUMBER, phi + turn)
+            yield PartLabel(str(number), x, y, _NUMBER, -(phi - 0.5 * surface.wrap) * surface.sin_half_angle)

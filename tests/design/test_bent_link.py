@@ -62,6 +62,36 @@ def test_the_active_area_lies_at_its_height_above_the_stadium() -> None:
     assert feet == pytest.approx(normals, abs=1e-9)
 
 
+def tapered() -> PlacedDevelopable:
+    """Return three quarters of a box with two sharp corners, tapered."""
+    bends = tuple(Bend(width, turn) for width, turn in ((1.0, 0.1), (0.5, 1.5), (1.6, 0.0), (0.5, 1.6), (1.1, 0.9)))
+    return PlacedDevelopable(cs.Frustum(0.05, 0.06, 0.2, 4.7), POSE, bends)
+
+
+@pytest.mark.parametrize("place", [stadium(), tapered()], ids=["stadium", "tapered box"])
+def test_printed_crosses_lie_above_the_places_that_a_calibration_expects(place: PlacedDevelopable) -> None:
+    """Each cross is folded with its cover back onto the link; its foot on the active side is the place of its mark."""
+    (design,) = cs.design_sheets([place], cs.DesignOptions(face_up="outside"))
+    cover, active = design.cuts[6], design.active.frustum
+    lines = [s.outline for s in cover.parts[0].strokes if s.kind == "score"][1:]
+    middles = [np.mean([(x, y) for x, y, _ in line.vertices], axis=0) for line in lines[::2]]
+    u, phi = np.array([cover.surface.locate_flat(x, y) for x, y in middles]).T
+    phi = phi + 0.5 * cover.surface.wrap  # a drawing begins in the middle
+    above = place.parallel(design.options.stack.offset(4))
+    assert above.frustum == cover.surface
+    found = design.active.locate_all(above.place(u, phi)[0])
+    parts = np.array(
+        [(a, b) for row, a in enumerate((0.1, 0.5, 0.9)) for b in ((0.1, 0.5, 0.9), (0.9, 0.5, 0.1))[row % 2]]
+    )
+    assert found[0] == pytest.approx(parts[:, 0] * active.slant, abs=1e-9)
+    tolerance = 1e-9 if place.is_straight else place.mismatch(design.options.stack.offset(4)) / active.radius1
+    assert found[1] == pytest.approx(parts[:, 1] * active.wrap, abs=tolerance)
+    shares = (phi - phi[0]) / above.frustum.wrap - (found[1] - found[1][0]) / above.frustum.wrap
+    assert (
+        np.abs(shares * above.frustum.wrap * above.frustum.radius1).max() > 0.3e-3
+    )  # shares of the cover would not do
+
+
 def test_a_bend_that_is_too_sharp_for_the_layers_is_refused() -> None:
     with pytest.raises(cs.GeometryError, match=r"lower substrate is strained"):
         cs.design_sheets([stadium(0.1, 0.0012)])

@@ -121,6 +121,17 @@ def test_locate_undoes_point(frustum: Frustum) -> None:
     assert side.locate(*side.point(0.01, 1.0)) == pytest.approx((0.01, 1.0, 0.0), abs=1e-12)
 
 
+def test_beyond_an_open_edge_the_strip_goes_on_but_not_over_the_side() -> None:
+    """Nearly all of a stadium, cut open in a flat: what is high above the bend beside it has its foot on that bend."""
+    whole = PlacedDevelopable.of(stadium(), POSE)
+    part = whole.part(0.0, 0.2, 0.3, TURN - 0.3)
+    phi = np.linspace(0.0, part.frustum.wrap, 60)
+    points, normals = part.place(np.full(60, 0.1), phi)
+    assert part.locate_all(points + 0.004 * normals)[1] == pytest.approx(phi, abs=1e-9)
+    ahead = part.place(0.1, -0.2)[0]
+    assert part.locate(tuple(ahead))[1] == pytest.approx(-0.2, abs=1e-12)
+
+
 def test_numbers_and_arrays_agree() -> None:
     side = bent(FRUSTA["widening"])
     u, phi = places(side, 40)

@@ -269,7 +269,7 @@ def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
 
 def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> PlacedFrustum:
     """Return the cone between the electrodes, on the middle surface of the wrapped upper conductive layer."""
-    height = stack.face_offset(_UPPER_CONDUCTIVE) + 0.5 * stack.layers[_UPPER_CONDUCTIVE].thickness
+    height = stack.middle(_UPPER_CONDUCTIVE)
     box = layout.field
     phi1, phi2 = (place.azimuth_above(height, phi) for phi in (box.phi1, box.phi2))
     return place.parallel(height).part(box.u1, box.u2, phi1, phi2)

@@ -33,7 +33,7 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
         "field_patch": _patch(layout.field),
         "touch_marks": [
             {"number": mark.number, "u_mm": _round(1e3 * mark.u), "phi_deg": _round(math.degrees(mark.phi))}
-            for mark in touch_marks(layout)
+            for mark in touch_marks(design.active.frustum)
         ],
         "layers": [
             {
