@@ -21,6 +21,7 @@ __all__ = [
     "BlockKind",
     "EventName",
     "GuardEvent",
+    "body_places",
     "contact_force",
     "decode_event",
     "describe_way",
@@ -121,6 +122,7 @@ SESSION_EVENTS = frozenset(
 )
 
 
+_PLACE_DIGITS = 5  # decimals of a body's place [m]: 0.01 mm
 _CONTACTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED})
 
 
@@ -158,9 +160,26 @@ def stopping_contact(stop: GuardEvent, events: Sequence[GuardEvent]) -> GuardEve
     return max(same, key=lambda event: event.name == EventName.CONTACT_LOCATED, default=None)
 
 
-def force_block(time: float, force: float) -> Block:
-    """Return the block that records which force physics found between the arm and what it meets [N]."""
-    return Block(BlockKind.TRUTH, time, json.dumps({"contact_force_N": force}).encode())
+def force_block(time: float, force: float, places: Sequence[Sequence[float]] = ()) -> Block:
+    """Return the block that records which force physics found between the arm and what it meets.
+
+    Args:
+        time: host clock [s].
+        force: sum of all contacts [N].
+        places: of the scene's bodies then, in the base frame [m], part by part: a grip has two.
+    """
+    facts: dict[str, Any] = {"contact_force_N": force}
+    if places:
+        facts["bodies_m"] = [[round(value, _PLACE_DIGITS) for value in place] for place in places]
+    return Block(BlockKind.TRUTH, time, json.dumps(facts).encode())
+
+
+def body_places(payload: bytes) -> tuple[tuple[float, float, float], ...]:
+    """Return the places in what ``force_block`` has recorded [m]; none for another truth, and for nonsense."""
+    try:
+        return tuple((float(x), float(y), float(z)) for x, y, z in json.loads(payload).get("bodies_m", ()))
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        return ()
 
 
 def contact_force(payload: bytes) -> float | None:

@@ -10,7 +10,7 @@ import pytest
 from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
 from coneskin.replay.run import read_run, replay
-from coneskin.robot.guard.journal import BlockKind, EventName
+from coneskin.robot.guard.journal import BlockKind, EventName, body_places, contact_force
 from coneskin.scene.body import BodyScene
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.scene import Scene
@@ -64,6 +64,13 @@ def test_the_force_of_a_contact_stops_the_arm_through_skin_bytes_and_guard_and_t
     recorded = read_run(path)
     assert [event.name for event in recorded.events] == [event.name for event in run.events]
     assert replay(recorded).same
+    (pressed, force, (place,)) = [
+        (block, force, body_places(block.payload))
+        for block in recorded.select(kinds=frozenset({BlockKind.TRUTH}))
+        if (force := contact_force(block.payload)) is not None
+    ][-1]
+    assert pressed.time > 100.0
+    assert math.dist(place, HAND.place) * HAND.stiffness == pytest.approx(force, rel=0.02)  # at rest: F = k x
 
 
 @pytest.mark.long

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 
 from coneskin.errors import Collision, MissingExtra, RobotRefused
 from coneskin.replay.run import read_run, replay
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.journal import BlockKind, EventName, body_places, contact_force
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.scene import Scene
 from coneskin.session.session import guard
@@ -72,7 +73,16 @@ def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(live, tmp_pat
     assert rest["q"][0] != rest["tcp"][0]
     located = next(e for e in events if e.name == EventName.CONTACT_LOCATED)
     assert located.details["u"] == pytest.approx(0.13, abs=0.01)
-    assert replay(read_run(tmp_path / "run.rec")).same
+    run = read_run(tmp_path / "run.rec")
+    assert replay(run).same
+    truths = list(run.select(kinds=frozenset({BlockKind.TRUTH})))
+    felt = [(block.time, force) for block in truths if (force := contact_force(block.payload)) is not None]
+    assert felt[0][0] == pytest.approx(began, abs=0.004)
+    assert 0.5 * outcome.peak < max(force for _, force in felt) <= outcome.peak  # told every 10 ms, not at its peak
+    places = [body_places(block.payload)[0] for block in truths if body_places(block.payload)]
+    start = scene.bodies[0].place
+    assert math.dist(places[0], start) < 0.002
+    assert 0.3 < max(math.dist(place, start) for place in places) * 2e3 / outcome.peak < 2.0  # F = k x, and it swings
 
 
 @pytest.mark.long

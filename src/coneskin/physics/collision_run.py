@@ -16,7 +16,7 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetSpeedSlider
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, force_block
+from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.guard.phase import Phase
 from coneskin.scene.body import BodyScene
 from coneskin.scene.build import build_core
@@ -32,6 +32,7 @@ from .impact_outcome import ImpactMeter, ImpactOutcome
 from .joint_program import JointProgram
 from .mujoco_plant import MujocoPlant
 from .scene_plant import currents_of, presses_of, sheets_of
+from .truth_recorder import TruthRecorder
 
 __all__ = ["PROTECTIONS", "CollisionRun"]
 
@@ -56,8 +57,8 @@ class CollisionRun:
         seed: of the skins' noise.
         sheets: model of the skins' sheets, "ladder" or "field".
         heeds: True where what moves the arm obeys the speed slider; a stream of servo setpoints does not.
-        note: is told each block that the guard takes, each event that it makes, and the force of the contacts, for a
-            recording.
+        note: is told each block that the guard takes, each event that it makes, the force of the contacts, and
+            where the bodies are, for a recording.
 
     Attributes:
         plant: the arm among its bodies.
@@ -102,7 +103,7 @@ class CollisionRun:
         self._began = math.nan
         self._steps = 0
         self._note = note
-        self._told = 0.0  # N; the force that was noted last
+        self._truth = TruthRecorder(_STEP)
 
     @property
     def outcome(self) -> ImpactOutcome:
@@ -174,9 +175,8 @@ class CollisionRun:
         plant = self.plant
         rate = max((contact.rate for contact in plant.contacts), default=0.0)
         speed = max(map(abs, plant.qd))
-        if plant.force != self._told:
-            self._told = plant.force
-            self._note(force_block(self.now, plant.force))
+        if (block := self._truth.take(self.now, plant.force, plant.places)) is not None:
+            self._note(block)
         self.meter.take(self.now, plant.force, rate, plant.peak, plant.deepest, plant.impulse, speed)
 
     # guard

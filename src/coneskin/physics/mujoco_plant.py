@@ -123,6 +123,7 @@ class MujocoPlant:
                 self._m.actuator_biasprm[joint] = 0.0
         self._step = step
         self._d.qpos[:_ARM], self._d.qvel[:_ARM] = q, qd
+        self._starts = [place for body in bodies for place in parts_of(body)]
         self._moving = [(number, at) for number, at in enumerate(self._address) if at is not None]
         self._damping = [0.0 if at is None else float(self._m.dof_damping[at]) for at in self._address]
         self._touched: dict[int, float] = {}  # body -> when it was first touched
@@ -202,6 +203,15 @@ class MujocoPlant:
         if at is None:
             return np.zeros(3), np.zeros(3)
         return self._d.qpos[at : at + 3].copy(), self._d.qvel[at : at + 3].copy()
+
+    @property
+    def places(self) -> list[Vector]:
+        """Places of the bodies' parts now, in the base frame [m]."""
+        found: list[Vector] = []
+        for start, at in zip(self._starts, self._address, strict=True):
+            moved = (0.0, 0.0, 0.0) if at is None else self._d.qpos[at : at + 3].tolist()
+            found.append((start[0] + moved[0], start[1] + moved[1], start[2] + moved[2]))
+        return found
 
     # time
 

@@ -22,6 +22,7 @@ from coneskin.errors import ConeSkinError, MissingExtra
 __all__ = ["main"]
 
 _PATIENCE = 1.0  # s between two looks at whether anybody is left
+_TRUTH_PERIOD = 0.01  # s from one recorded force to the next
 _PRECEDENCE = -10  # niceness; behind the guard
 _RELAXED = 500  # cycles after which the foam of a skin that nothing presses has come back: it need not be told more
 
@@ -36,6 +37,7 @@ def main(arguments: list[str]) -> int:
 
     from .impact_outcome import ImpactMeter
     from .scene_plant import ScenePlant
+    from .truth_recorder import TruthRecorder
 
     while not (hello := program.receive()) and not program.closed:
         wait_readable([program], _PATIENCE)
@@ -54,7 +56,7 @@ def main(arguments: list[str]) -> int:
     program.send(encode_json({"ready": True}))
     gc.collect()
     gc.freeze()
-    meter = ImpactMeter()
+    meter, recorder = ImpactMeter(), TruthRecorder(_TRUTH_PERIOD)
     quiet = _RELAXED  # cycles since something pressed
     while not controller.closed and not program.closed:
         ready = wait_readable([program, controller], _PATIENCE)
@@ -70,9 +72,12 @@ def main(arguments: list[str]) -> int:
             if quiet < _RELAXED:
                 skin.send(encode_json({"step": CYCLE, "presses": presses}))
             physics = plant.physics
+            now = time.monotonic()
+            if (truth := recorder.take(now, physics.force, physics.places)) is not None:
+                skin.send(encode_json({"truth": truth.payload.decode(), "time": truth.time}))
             rate = max((contact.rate for contact in physics.contacts), default=0.0)
             speed = max(map(abs, state.qd))
-            meter.take(time.monotonic(), physics.force, rate, physics.peak, physics.deepest, physics.impulse, speed)
+            meter.take(now, physics.force, rate, physics.peak, physics.deepest, physics.impulse, speed)
         if program in ready:
             _report(program, meter)
     return 0

@@ -133,6 +133,8 @@ class ChildProcesses:
                 child.wait()
 
     def close(self) -> None:
-        """Close the channel to the guard; may be called again."""
+        """Close the lines to guard and physics; may be called again."""
+        if self.skin is not None:
+            self.skin.close()
         if self.guard is not None:
             self.guard.close()

@@ -66,6 +66,7 @@ class EventLog:
         self.began = time.monotonic()
         self.ended = self.activated = self.ending = False
         self.line = HeardLine()
+        self.physics: Callable[[], list[Block]] = list  # what it knows since it was last asked
         self._truths: deque[Block] = deque()  # that the thread which writes has not written yet
         self._recorder = _recorder(recording, limits) if recording else None
         self._delivery = None if on_event is None else EventDelivery(on_event)
@@ -130,8 +131,7 @@ class EventLog:
         """Close the recording, and deliver what waits for the program's function; may be called again."""
         if self._delivery is not None:
             self._delivery.close()
-        if self._truths:
-            self._write([])
+        self._write([])
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
             recorder.close()
@@ -139,9 +139,10 @@ class EventLog:
     def _write(self, blocks: list[Block]) -> None:
         events = []
         self.line.take(blocks)
+        blocks += self.physics()
         while self._truths:
             blocks.append(self._truths.popleft())
-        if self._recorder is not None:
+        if self._recorder is not None and blocks:
             try:
                 # an event is what people look for: it, and all that led to it, must outlive this process
                 self._recorder.write(*blocks, flush=any(block.kind == BlockKind.EVENT for block in blocks))

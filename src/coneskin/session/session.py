@@ -304,6 +304,8 @@ class Session:
         self._log = EventLog(self.recording, self._take_event if virtual else self._on_event, scene.recording)
         self._log.open({**start, "resolved": resolved_settings(scene)})
         channel = self._processes.start(scene, start, self._log.note_truth, self.pressed_by)
+        if self._processes.skin is not None:
+            self._log.physics = self._processes.skin.physics
         program = self._processes.program
         fallback = None
         if scene.arm is not None and program is not None:

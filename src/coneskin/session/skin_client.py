@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from coneskin.channel import Channel, decode_json, encode_json, pair, wait_readable
 from coneskin.child_process import spawn
 from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.recording import Block
+from coneskin.robot.guard.journal import BlockKind
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
 if TYPE_CHECKING:
@@ -45,7 +48,13 @@ class SkinClient:
         pressed_by: socket.socket | None = None,
     ) -> None:
         ours, theirs = pair()
-        ends = [theirs] if pressed_by is None else [theirs, pressed_by]
+        ends = [theirs]
+        self._physics: Channel | None = None
+        self._reading = threading.Lock()
+        if pressed_by is not None:
+            known, told = pair()
+            self._physics = Channel(known)
+            ends += [pressed_by, told]
         self.process = spawn("coneskin.session.skin_process", *ends)
         self.channel = Channel(ours)
         self.channel.send(encode_json(start))
@@ -73,6 +82,19 @@ class SkinClient:
         """End the touches that there are now."""
         self.channel.send(encode_json({"release": True}))
         self._note_truth({"released": time.monotonic()})
+
+    def physics(self) -> list[Block]:
+        """Return what the physics knows since this was last asked, as blocks of a recording; any thread may ask."""
+        if self._physics is None or self._physics.closed:
+            return []
+        with self._reading:
+            told = [decode_json(message) for message in self._physics.receive()]
+        return [Block(BlockKind.TRUTH, float(one["time"]), one["truth"].encode()) for one in told]
+
+    def close(self) -> None:
+        """Close the line on which the physics is heard; may be called again. The process ends with its channel."""
+        if self._physics is not None:
+            self._physics.close()
 
     def _name(self, wanted: str | int) -> str:
         if wanted == "":

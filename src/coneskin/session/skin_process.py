@@ -11,6 +11,7 @@ import math
 import os
 import sys
 import time
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,10 +50,11 @@ def virtual_skin(scene: Scene, script: bool = True, pressed: bool = False) -> Vi
 
 def main(arguments: list[str]) -> int:
     """Take the channel and the scene, report the port, and play until the channel ends."""
-    _, (channel, *presses) = inherit(arguments)  # it ends with the program at once: nothing depends on it then
+    _, (channel, *lines) = inherit(arguments)  # it ends with the program at once: nothing depends on it then
     from coneskin.scene.reader import parse_scene
     from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, play, wait_for_reader, write_all
 
+    presses, truths = lines[:1], lines[1:]  # from the physics, and what it knows on to the program
     while not (hello := channel.receive()) and not channel.closed:
         wait_readable([channel], 1.0)
     if not hello:
@@ -71,7 +73,7 @@ def main(arguments: list[str]) -> int:
             if channel in ready:
                 _serve(channel, skin, began)
             for line in presses:
-                _press(line, skin)
+                _press(line, skin, truths)
             if channel.closed or any(line.closed for line in presses):
                 return True
         return False
@@ -106,13 +108,17 @@ def _serve(channel: Channel, skin: VirtualSkin, began: float) -> None:
             channel.send(encode_json({"touched": _told(touch, began)}))
 
 
-def _press(line: Channel, skin: VirtualSkin) -> None:
-    """Let the bodies press as the physics engine says."""
+def _press(line: Channel, skin: VirtualSkin, truths: Sequence[Channel]) -> None:
+    """Let the bodies press as the physics engine says, and pass on what only that knows."""
     from coneskin.skin.virtual.pressed_skin import Press, PressedSkin
 
     assert isinstance(skin, PressedSkin)
     for message in line.receive():
         told = decode_json(message)
+        if "truth" in told:
+            for program in truths:
+                program.send(message)  # never waits: what a program that stands does not take is left out
+            continue
         skin.press({(sheet, part): Press(*press) for sheet, part, *press in told["presses"]}, told["step"])
     if line.closed:
         print("coneskin: the physics that presses the virtual skin has ended; so does the skin", file=sys.stderr)
