@@ -10,15 +10,15 @@ BIN := $(VENV)/bin
 PYTHON ?= $(shell for p in python3.12 python3.11 python3; do \
 	$$p -c 'import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' 2>/dev/null && echo $$p && break; done)
 
+# hundreds of Python processes start in the tests: without bytecode on the disk each of them compiles all modules anew
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: demo test check docs fuzz dist clean
 demo: $(VENV)/demo.stamp
 	$(BIN)/coneskin demo
 
 test: $(VENV)/test.stamp
-	@failed=0; \
-	$(BIN)/python -m pytest -m "not long and not processes" -n auto || failed=1; \
-	$(BIN)/python -m pytest -m "not long and processes" || failed=1; \
-	exit $$failed
+	PATH="$(CURDIR)/$(BIN):$$PATH" scripts/tests "not long"
 
 check: $(VENV)/test.stamp $(VENV)/dev.stamp
 	PATH="$(CURDIR)/$(BIN):$$PATH" scripts/check

@@ -1,9 +1,11 @@
 """Hypothesis profiles, the short run, tests with processes, and the check that a test leaves none of them behind."""
 
+import os
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,9 @@ from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, settings
 
 from .hold_ups import HoldUpWatch
+
+# before numpy is loaded: each core has a worker of its own, and threads of linear algebra only wait for each other
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _TASKS = Path("/proc/self/task")  # Linux; elsewhere only threads are looked at
 _HERE = Path(__file__).parent
@@ -42,8 +47,13 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests with real processes: their peers have to be punctual, so they do not run beside others."""
     for item in items:
-        if any(item.path.is_relative_to(_HERE / place) for place in _WITH_PROCESSES):
+        if _has_processes(item.path):
             item.add_marker(pytest.mark.processes)
+
+
+@cache
+def _has_processes(path: Path) -> bool:
+    return any(path.is_relative_to(_HERE / place) for place in _WITH_PROCESSES)
 
 
 @pytest.hookimpl(tryfirst=True)

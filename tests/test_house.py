@@ -151,16 +151,23 @@ def name_of(path: Path) -> str:
 
 
 @cache
+def tree_of(path: Path) -> ast.Module:
+    """The syntax of a module."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imports(path: Path) -> tuple[tuple[str, int, bool], ...]:
     """Full names that a module imports, the lazy ones inside functions too; the line; whether at the top."""
     return tuple(_imports(path))
 
 
 def _imports(path: Path) -> Iterator[tuple[str, int, bool]]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
+    top_level = set(map(id, tree.body))
     package = name_of(path) if path.name == "__init__.py" else name_of(path).rpartition(".")[0]
     for node in ast.walk(tree):
-        top = node in tree.body
+        top = id(node) in top_level
         if isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno, top) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -170,10 +177,6 @@ def _imports(path: Path) -> Iterator[tuple[str, int, bool]]:
         elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
             constant = node.args[0]
             yield (str(constant.value) if isinstance(constant, ast.Constant) else "?"), node.lineno, top
-
-
-IDS = [str(path.relative_to(ROOT)) for path in sources()]
-each_source = pytest.mark.parametrize("path", sources(), ids=IDS)
 
 
 def test_the_reader_of_imports_sees_every_kind() -> None:
@@ -329,17 +332,19 @@ def test_tests_and_benches_import_nothing_of_each_other(folder: str, other: str)
     assert wrong == []
 
 
-@each_source
-def test_a_module_says_what_it_is(path: Path) -> None:
-    docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
-    assert docstring
-    assert docstring.splitlines()[0].rstrip().endswith((".", ":", "?", ";", ",", ")")) or len(docstring) > 100
+def test_a_module_says_what_it_is() -> None:
+    wrong = []
+    for path in sources():
+        words = ast.get_docstring(tree_of(path)) or ""
+        if len(words) <= 100 and not words.partition("\n")[0].rstrip().endswith((".", ":", "?", ";", ",", ")")):
+            wrong.append(f"{path.relative_to(ROOT)}: {words!r}")
+    assert wrong == []
 
 
 def test_no_class_stands_twice() -> None:
     homes: dict[str, list[str]] = {}
     for path in sources():
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree_of(path).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
     assert {name: places for name, places in homes.items() if len(places) > 1} == {}
@@ -352,21 +357,22 @@ def test_nothing_of_ours_is_called_safe() -> None:
     for path in sources():
         if str(path.relative_to(ROOT).parent) in allowed:
             continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and "safe" in node.name.lower():
                 wrong.append(f"{path.relative_to(ROOT)}: {node.name}")
     assert wrong == []
 
 
-@each_source
-def test_all_is_complete_and_true(path: Path) -> None:
+def test_all_is_complete_and_true() -> None:
     """``__all__`` names what the module itself defines without an underscore, and nothing else."""
-    if path.name in ("__init__.py", "__main__.py"):
-        return
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    modules = [path for path in sources() if path.name not in ("__init__.py", "__main__.py")]
+    assert {str(path.relative_to(ROOT)): wrong for path in modules if (wrong := _wrong_in_all(path))} == {}
+
+
+def _wrong_in_all(path: Path) -> str:
     listed: set[str] | None = None
     defined: set[str] = set()
-    for node in tree.body:
+    for node in tree_of(path).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             defined.add(node.name)
         elif isinstance(node, ast.Assign):
@@ -376,12 +382,15 @@ def test_all_is_complete_and_true(path: Path) -> None:
             defined |= names
         elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
             defined.add(node.target.id)
-    assert listed is not None, "no __all__"
+    if listed is None:
+        return "no __all__"
     imported = {name.rpartition(".")[2] for name, _, top in imports(path) if top}
-    assert listed <= defined | imported, "names that do not exist here"
+    if missing := listed - defined - imported:
+        return f"names that do not exist here: {sorted(missing)}"
     public = {name for name in defined - listed if not name.startswith("_")}
-    outside = {f"{name_of(path)}.{name}" for name in public} & _used_outside(name_of(path).rpartition(".")[0])
-    assert not outside
+    full = {f"{name_of(path)}.{name}" for name in public}
+    outside = full & _used_outside(name_of(path).rpartition(".")[0])
+    return f"used outside its package, and not listed: {sorted(outside)}" if outside else ""
 
 
 @cache
@@ -391,12 +400,14 @@ def _used_outside(package: str) -> frozenset[str]:
     return frozenset(name for path in others for name, _, _ in imports(path))
 
 
-@each_source
-def test_a_module_imports_cleanly_and_its_names_are_there(path: Path) -> None:
-    if path.name == "__main__.py":
-        return
-    module = importlib.import_module(name_of(path))
-    assert all(hasattr(module, name) for name in getattr(module, "__all__", ()))
+def test_a_module_imports_cleanly_and_its_names_are_there() -> None:
+    wrong = []
+    for path in sources():
+        if path.name != "__main__.py":
+            module = importlib.import_module(name_of(path))
+            missing = [name for name in getattr(module, "__all__", ()) if not hasattr(module, name)]
+            wrong += [f"{path.relative_to(ROOT)}: {name}" for name in missing]
+    assert wrong == []
 
 
 def test_every_folder_with_modules_is_a_package() -> None:

@@ -127,6 +127,7 @@ def test_bodies_farther_out_are_not_in_the_way() -> None:
     assert np.abs(grid.heights).max() < 2e-5
 
 
+@pytest.mark.long
 def test_a_barrel_is_followed_to_microns() -> None:
     mesh = placed(barrel())
     for sheet in find_cones(mesh).sheets:

@@ -168,8 +168,9 @@ def test_no_place_is_faster_than_its_patches_are_held_to_be(bends: str) -> None:
     patches = [LimitedPatch(NAME, 0.13, wrap * n / 16, 0, 0) for n in range(16)]
     table = SpeedLimitScene(1, *[""] * 7, 0.01, 9.0, (), (), (0.1,), ((1.0,),), tuple(patches))
     limit = _speed_limit(scene, table, arm_model("UR5e"))._speeds
+    normals = [place.place(0.13, wrap * n / 997)[1] for n in range(997)]
     for degrees in range(360):
         way = (0.0, math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))  # the tube lies along x
-        fastest = max(along(way, place.place(0.13, wrap * n / 997)[1]) for n in range(997))
+        fastest = max(along(way, normal) for normal in normals)
         seen = max(along(way, patch.normal) for patch in limit.patches)
         assert fastest <= limit.between * seen + 1e-9

@@ -117,6 +117,7 @@ def test_one_cone_of_any_half_angle(degrees: float) -> None:
     assert sector.slant == pytest.approx(sheet.frustum.slant)
 
 
+@pytest.mark.long
 def test_a_barrel_keeps_its_axis_and_its_tolerance() -> None:
     fit = find_cones(placed(barrel()))
     assert len(fit.sheets) == 2
