@@ -54,6 +54,17 @@ def test_a_simulated_scene_has_all_that_a_guard_needs(here: Path, capsys: Output
     assert main(["guard", "scene.toml", "--check"]) == 0
 
 
+def test_the_padding_is_as_thick_as_the_sheets_of_the_design(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    layers = ["--thickness-mm", "3", "0.2", "1", "0.2", "4"]
+    assert main(["design", *CYLINDER, *layers, "-o", "skin", "--no-pictures"]) == 0
+    assert main(["init", "skin", "--simulated", "--link", "forearm"]) == 0
+    padding = load_scene("scene.toml").padding
+    assert padding is not None
+    assert padding.thickness == pytest.approx(8.4e-3)
+    assert padding.stiffness == pytest.approx(10e3)
+
+
 def test_real_hardware_is_named_and_nothing_is_simulated(here: Path) -> None:
     words = ["--arm", "ur10e", "--host", "192.168.0.10", "--port", "/dev/ttyUSB0", "--link", "forearm"]
     assert main(["init", "ball", *words, "-o", "sub.toml"]) == 0

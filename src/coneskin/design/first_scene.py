@@ -70,12 +70,14 @@ class DesignFolder:
         link: the arm's link that the design was made for; None where its name is that of no link.
         frame: "mesh" or "urdf", to which the poses of the sensors refer; None where the design was made from dimensions
             and has no place on a link.
+        thickness: of a sheet with all its layers [m]; None where the design does not say it.
     """
 
     sensor_files: tuple[Path, ...]
     sensors: tuple[Sensor, ...]
     link: str | None
     frame: str | None
+    thickness: float | None = None
 
 
 def read_design(folder: Path) -> DesignFolder:
@@ -89,11 +91,14 @@ def read_design(folder: Path) -> DesignFolder:
         frame, source, count = str(data["frame"]), str(data["link"]), len(data["sheets"])
         if not count:
             raise ValueError("it has no sheet")
+        thickness = data["sheets"][0].get("thickness_mm")
+        if thickness is not None and not 0.1 <= float(thickness) <= 100.0:
+            raise ValueError(f"its sheets are {thickness!r} mm thick, not 0.1 to 100 mm")
         files = (
             [folder / "sensor.toml"] if count == 1 else [folder / f"sheet-{n + 1}/sensor.toml" for n in range(count)]
         )
         tables = [tomllib.loads(read_file(path, _MAX_BYTES).decode()) for path in files]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as exc:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as exc:
         why = (exc.strerror or exc) if isinstance(exc, OSError) else exc
         raise GeometryError(f"{folder} is no design: {why}; make one with `coneskin design LINK -o {folder}`") from exc
     problems: list[str] = []
@@ -104,7 +109,13 @@ def read_design(folder: Path) -> DesignFolder:
     path, _, name = source.partition("#")
     kinds = {"the mesh's coordinates": "mesh", "the URDF link": "urdf", "mesh": "mesh"}
     kind = next((kind for words, kind in kinds.items() if frame.startswith(words)), None)
-    return DesignFolder(tuple(files), sensors, arm_link(name or PurePath(path).stem), kind)
+    return DesignFolder(
+        tuple(files),
+        sensors,
+        arm_link(name or PurePath(path).stem),
+        kind,
+        None if thickness is None else 1e-3 * float(thickness),
+    )
 
 
 def arm_link(name: str) -> str | None:
@@ -158,6 +169,8 @@ def first_scene(
             lines.append(f"# as the board has it ({boards[number].facts.title}):")
             lines += [f"{key} = {value_text(value)}" for key, value in boards[number].keys.items()]
         lines.append("")
+    if arm is not None and design.thickness is not None:
+        lines.append(_padding(design.thickness))
     lines += _sources(ports, boards) if ports else [_virtual(design)]
     if arm is not None:
         lines.append('[reaction]\nkind = "stop"               # retreat and comply need `coneskin commission`\n')
@@ -179,6 +192,17 @@ def _sources(ports: Sequence[str], boards: Sequence[BoardCircuit]) -> list[str]:
     head = "[source]" if len(ports) == 1 else "[[source]]"
     baud = f"\nbaud = {boards[0].board.baud}" if boards else ""
     return [f'{head}\nkind = "serial"\nport = {json.dumps(port)}{baud}\n' for port in ports]
+
+
+def _padding(thickness: float) -> str:
+    """Return the table of the padding of sheets of a thickness [m]."""
+    from coneskin.skin.padding import Padding
+
+    assumed = Padding(thickness)
+    return (
+        "[padding]                      # all layers together; the stiffness is assumed: press yours on a scale\n"
+        f"thickness_mm = {1e3 * thickness:g}\nstiffness_n_per_mm = {1e-3 * assumed.stiffness:g}\n"
+    )
 
 
 def _middle_of_tube(cone: Frustum, link: str, model: str) -> str:

@@ -9,6 +9,7 @@ from coneskin.geometry.drawing.outline import Outline
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw_shape, drawing_point
 from coneskin.geometry.sector import unroll
 
+from .sector_text import polar_text
 from .sheets import SheetDesign
 from .workshop.wiring import CableExit
 
@@ -126,10 +127,7 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
         f"slant {slant * 1e3:.3f} mm",
         f"arcs {flat.arc1 * 1e3:.3f} mm (end 1), {flat.arc2 * 1e3:.3f} mm (end 2)",
     ]
-    if math.isfinite(flat.r1):
-        lines.append(
-            f"r1 {flat.r1 * 1e3:.3f} mm, r2 {flat.r2 * 1e3:.3f} mm, theta0 {math.degrees(flat.theta0):.4f} deg"
-        )
+    lines.append(polar_text(flat))
     lines.append(f"active area {1e4 * layout.active.area(layout.sheet):.1f} cm2 ({layout.active_share:.0%})")
     tabs = design.options.connector if layout.plan.wires == "end2" else 0.0
     axes.text(500.0 * (x0 + x1), 1e3 * (y1 + tabs) + 4.0, "\n".join(lines), **{**style, "va": "bottom"})

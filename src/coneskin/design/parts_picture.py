@@ -9,6 +9,7 @@ from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS
 from coneskin.geometry.sector import unroll
 
 from .layout_picture import INK_COLOUR
+from .sector_text import polar_text
 from .sheets import SheetDesign
 
 __all__ = ["draw_parts"]
@@ -41,10 +42,7 @@ def draw_parts(figure: Any, design: SheetDesign) -> None:
         sector = unroll(cut.surface)
         lines = f"{cut.number} {cut.name}, {cut.face} up\nslant {1e3 * sector.slant:.2f}, arcs "
         lines += f"{1e3 * sector.arc1:.2f} (end 1), {1e3 * sector.arc2:.2f} (end 2)"
-        if math.isfinite(sector.r1):
-            lines += (
-                f"\nr1 {1e3 * sector.r1:.2f}, r2 {1e3 * sector.r2:.2f}, theta0 {math.degrees(sector.theta0):.3f} deg"
-            )
+        lines += f"\n{polar_text(sector)}"
         axes.set_title(lines, fontsize=7)
         axes.plot([x0 - off, x1 + 2 * off], [y0 - 2 * off, y1 + off], lw=0)  # arrows do not extend the axes
         axes.set_aspect("equal")

@@ -7,12 +7,11 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from coneskin.geometry.drawing.nesting import MaterialBed
-from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.sector import unroll
 from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
 
 from .files import sheet_folder
+from .sector_text import sector_text
 from .sheets import SheetDesign
 from .summary import design_summary, material_rows
 from .workshop.bill_of_materials import bill_of_materials
@@ -103,7 +102,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         ["height, slant", f"{side.height * 1e3:.3f}, {side.slant * 1e3:.3f} mm"],
         ["half angle", f"{math.degrees(side.half_angle):z.4f} deg"],
         ["wrap", f"{math.degrees(side.wrap):.3f} deg"],
-        ["flat sector of the bare link", _sector(side)],
+        ["flat sector of the bare link", sector_text(side)],
         ["position of end 1 (frame above)", _vector(data["link_cone"]["xyz_mm"], "mm")],
         ["roll, pitch, yaw of the axis", _vector(data["link_cone"]["rpy_deg"], "deg")],
     ]
@@ -146,7 +145,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
                 f"{layer.thickness * 1e3:.2f}",
                 f"{stack.offset(i) * 1e3:.3f}",
                 f"{surface.radius1 * 1e3:.3f}, {surface.radius2 * 1e3:.3f}",
-                _sector(surface),
+                sector_text(surface),
                 f"{stack.ignored_gap(design.place, i) * 1e3:.2f}",
                 f"{inner:+.1%}, {outer:+.1%}",
             ]
@@ -225,13 +224,6 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
 def _sharpest(place: PlacedFrustum) -> float:
     """Return the smallest radius to which a sheet is bent [m]."""
     return min(place.frustum.radius1, place.frustum.radius2) / place.sharpest_bend
-
-
-def _sector(cone: Frustum) -> str:
-    flat = unroll(cone)
-    if flat.r1 > 1e4:  # 10 km: within 1 um of a rectangle
-        return f"rectangle {flat.arc1 * 1e3:.3f} x {flat.slant * 1e3:.3f} mm"
-    return f"r1 {flat.r1 * 1e3:.3f} mm, r2 {flat.r2 * 1e3:.3f} mm, theta0 {math.degrees(flat.theta0):.4f} deg"
 
 
 def _vector(values: list[float], unit: str) -> str:

@@ -46,6 +46,7 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
             }
             for cut in design.cuts
         ],
+        "thickness_mm": _round(1e3 * stack.thickness),
         "ignored_gap_mm": {
             layer.name: _round(1e3 * stack.ignored_gap(design.place, i)) for i, layer in enumerate(stack.layers)
         },
