@@ -73,7 +73,8 @@ MAY_IMPORT: dict[str, str] = {
     "design.workshop": "design scene.tables skin skin.diagnosis geometry geometry.drawing geometry.solid",
     "commands": "physics permissible_speed calibration commissioning design doctor monitor scene scene.tables session "
     "replay runs studio view view.stage geometry geometry.fit geometry.drawing geometry.solid skin skin.field "
-    "skin.firmware skin.detection skin.sources robot.arm robot.driver robot.guard robot.sim commands.arguments",
+    "skin.firmware skin.sources robot.arm robot.driver robot.guard robot.sim commands.arguments commands.terminal",
+    "commands.terminal": "commissioning skin.detection",
     "commands.arguments": "design geometry geometry.drawing scene.tables skin",
     "testing": "scene robot.arm robot.driver robot.guard robot.reaction robot.stop robot.ur skin skin.detection "
     "skin.sources skin.virtual geometry",

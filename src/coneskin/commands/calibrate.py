@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .person_at_terminal import LiveReading, Person
+from .terminal.person_at_terminal import LiveReading, Person
 
 if TYPE_CHECKING:
     from coneskin.calibration.calibrate import CalibrationResult, Calibrator

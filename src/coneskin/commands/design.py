@@ -33,7 +33,7 @@ from .arguments.link import (
     seam_direction,
     xacro_arguments,
 )
-from .ending_signals import ending_signals
+from .terminal.ending_signals import ending_signals
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit

@@ -20,7 +20,7 @@ from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
 from coneskin.time_argument import positive_seconds
 
 from .simulated_arm import simulated_arm
-from .typed_lines import typed_lines
+from .terminal.typed_lines import typed_lines
 
 if TYPE_CHECKING:
     from coneskin.scene.scene import Scene
