@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from coneskin.arrays import frozen
 from coneskin.bounded_file import read_file
 from coneskin.errors import MeshError, MissingExtra
 
+from .collada_asset import TO_Z_UP, ColladaAsset, read_collada_asset
 from .pose import Pose
 
 __all__ = ["UNITS", "Mesh", "load_mesh", "make_mesh", "refuse_entities"]
@@ -31,11 +31,6 @@ MAX_LENGTH = 5.0  # m; a longer mesh is in another unit
 MIN_THICKNESS = 0.0005  # m; a thinner mesh is a flat drawing
 #: note on a mesh of a model; {0} is the model
 TERMS = "{0}: the maker's terms for its drawings forbid physical models of {0} for commercial use"
-_UP = {  # rotations that bring the named up axis to z, as COLLADA 1.4.1 describes the three frames
-    "X_UP": ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
-    "Y_UP": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
-    "Z_UP": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,8 +104,9 @@ def load_mesh(
 
     Args:
         path: an STL, OBJ, DAE (COLLADA) or PLY file.
-        unit: the file's unit, a key of ``UNITS``; None to take COLLADA's unit tag, or to guess: a mesh of a largest
-            extent under 5 is taken to be in metres, a larger one in millimetres. The guess is in ``Mesh.notes``.
+        unit: the file's unit, a key of ``UNITS``; None to take COLLADA's unit tag (unless it makes a link of over 5 m
+            where millimetres make one), or to guess: a mesh of a largest extent under 5 is taken to be in metres, a
+            larger one in millimetres. What was taken is in ``Mesh.notes``.
         up_axis: what to do with COLLADA's up_axis tag: "ignore" keeps the file's axes, as RViz, MoveIt and Gazebo do,
             so that the frame stays the link's; "apply" rotates Y_UP and X_UP files to z up, as COLLADA asks.
         scale: factors along the axes, after the unit and the up axis, as a URDF's mesh tag has them.
@@ -137,28 +133,47 @@ def load_mesh(
         raise MeshError(f"{path}: the file is empty")
     notes = [TERMS.format(part.upper()) for part in path.resolve().parts if part.lower() in ("ur20", "ur30")]
     metres = None if unit is None else UNITS[unit]
-    turn = None
+    asset = turn = None
     if path.suffix.lower() == ".dae":
         refuse_entities(data, path)
-        tag_name, tag_metres, up = _collada_asset(path, data)
-        if metres is None:
-            unit, metres = tag_name, tag_metres
-            notes.append(f"unit {tag_name} ({tag_metres:g} m), from the COLLADA file")
-        if up != "Z_UP" and up_axis == "apply":
-            turn = np.array(_UP[up])
-            notes.append(f"rotated from {up} to z up")
-        elif up != "Z_UP":
-            notes.append(f"the file declares {up}; its axes are kept, as in RViz and MoveIt")
+        asset = read_collada_asset(path, data)
+        if asset.up_axis != "Z_UP" and up_axis == "apply":
+            turn = np.array(TO_Z_UP[asset.up_axis])
+            notes.append(f"rotated from {asset.up_axis} to z up")
+        elif asset.up_axis != "Z_UP":
+            notes.append(f"the file declares {asset.up_axis}; its axes are kept, as in RViz and MoveIt")
     vertices, faces = _read(path, data)
     if turn is not None:
         vertices = vertices @ turn.T
     if metres is None:
-        extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
-        unit, metres = ("m", 1.0) if extent < MAX_LENGTH else ("mm", 0.001)
-        notes.append(f"unit {unit} guessed from the largest extent, {extent:g}")
+        extent = float((np.ptp(vertices[np.unique(faces)], axis=0) * np.abs(scale)).max())
+        unit, metres, note = _unit(extent, asset)
+        notes.append(note)
     if tuple(scale) != (1.0, 1.0, 1.0):
         notes.append(f"scaled by {scale[0]:g}, {scale[1]:g}, {scale[2]:g}")
     return make_mesh(vertices * (metres * np.asarray(scale, float)), faces, str(path), unit or "m", notes)
+
+
+def _unit(extent: float, asset: ColladaAsset | None) -> tuple[str, float, str]:
+    """Return the unit of a file from its largest extent: its name, its length in metres, and a note that says why.
+
+    Makers ship COLLADA files whose numbers are millimetres and whose tag says metres; a tag that makes the link longer
+    than any, where millimetres make one, is not believed.
+    """
+    if asset is not None:
+        name, metres = asset.unit, asset.metres
+        if not (extent * metres > MAX_LENGTH and MIN_LENGTH <= extent * 1e-3 <= MAX_LENGTH):
+            return name, metres, f"unit {name} ({metres:g} m), from the COLLADA file"
+        return (
+            "mm",
+            0.001,
+            (
+                f"the COLLADA file declares its unit as {name}, which makes a link of {extent * metres:.4g} m: "
+                f"taken as mm, {extent:.4g} mm; name the unit if that is wrong"
+            ),
+        )
+    unit, metres = ("m", 1.0) if extent < MAX_LENGTH else ("mm", 0.001)
+    return unit, metres, f"unit {unit} guessed from the largest extent, {extent:g}"
 
 
 def make_mesh(
@@ -266,27 +281,3 @@ def _read(path: Path, data: bytes) -> tuple[Floats, Indices]:
     if not faces:
         raise MeshError(f"{path}: not a readable {path.suffix[1:].upper()} file (no triangles in it)")
     return np.concatenate(corners), np.concatenate(faces)
-
-
-def _collada_asset(path: Path, data: bytes) -> tuple[str, float, str]:
-    """Read the name of the unit, its length in metres and the up axis of a COLLADA file."""
-    name, metres, up = "m", 1.0, "Y_UP"  # defaults of COLLADA for missing tags
-    try:
-        for _, element in ElementTree.iterparse(io.BytesIO(data), ("end",)):
-            tag = element.tag.rpartition("}")[2]
-            if tag == "unit":
-                metres = float(element.get("meter", "1"))
-                name = element.get("name", "unit")
-            elif tag == "up_axis":
-                up = (element.text or up).strip()
-            elif tag == "asset":
-                break
-    except ElementTree.ParseError as error:
-        raise MeshError(f"{path}: malformed XML: {error}") from error
-    except ValueError as error:
-        raise MeshError(f"{path}: the unit tag must hold a number of metres: {error}") from error
-    if not (np.isfinite(metres) and metres > 0.0):
-        raise MeshError(f"{path}: the unit tag must hold metres above 0, got {metres}")
-    if up not in _UP:
-        raise MeshError(f"{path}: up_axis must be X_UP, Y_UP or Z_UP, got {up!r}")
-    return name, metres, up

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coneskin.errors import MeshError, MissingExtra
-from coneskin.geometry import mesh as mesh_module
+from coneskin.geometry.collada_asset import TO_Z_UP
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.urdf import urdf_links
@@ -113,6 +113,20 @@ def test_collada_unit_is_applied(tmp_path: Path) -> None:
     assert any("centimeter (0.01 m), from the COLLADA file" in note for note in mesh.notes)
 
 
+def test_a_collada_tag_of_metres_on_millimetres_is_not_believed(tmp_path: Path) -> None:
+    body = (TUBE[0] * 1000.0, TUBE[1])
+    tag = '<unit name="meter" meter="1"/><up_axis>Z_UP</up_axis>'
+    mesh = load_mesh(write_dae(tmp_path / "a.dae", body, tag))
+    assert mesh.size[2] == pytest.approx(0.3, abs=1e-6)
+    assert mesh.unit == "mm"
+    assert any("declares its unit as meter, which makes a link of 300 m: taken as mm" in note for note in mesh.notes)
+    with pytest.raises(MeshError, match="300 m long"):  # a person's word counts
+        load_mesh(tmp_path / "a.dae", unit="m")
+    scaled = load_mesh(tmp_path / "a.dae", scale=(0.001, 0.001, 0.001))  # as a maker's URDF has it
+    assert scaled.size[2] == pytest.approx(0.3, abs=1e-6)
+    assert scaled.unit == "meter"
+
+
 def test_collada_node_matrix_is_applied(tmp_path: Path) -> None:
     matrix = "<matrix>1 0 0 0.5 0 0 -1 0 0 1 0 0 0 0 0 1</matrix>"
     mesh = load_mesh(write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Z_UP</up_axis>", matrix))
@@ -134,7 +148,7 @@ def test_collada_up_axis_is_kept_and_said_or_applied(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("axis", ["X_UP", "Y_UP", "Z_UP"])
 def test_up_axes_turn_up_to_z_without_mirroring(axis: str) -> None:
-    turn = np.array(mesh_module._UP[axis])
+    turn = np.array(TO_Z_UP[axis])
     assert np.linalg.det(turn) == pytest.approx(1.0)
     np.testing.assert_array_equal(turn @ np.eye(3)["XYZ".index(axis[0])], [0.0, 0.0, 1.0])
 
