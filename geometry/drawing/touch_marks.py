@@ -14,7 +14,7 @@ from .layer_stack import LayerStack
 from .part_labels import PartLabel
 from .surface_shape import ShapeCorner, SurfaceShape, drawing_point
 
-__all__ = ["CoverMarks", "TouchMark", "mark_parts", "touch_marks"]
+__all__ = ["CoverMarks", "TouchMark", "mark_parts", "marks_on_link", "touch_marks"]
 
 _FIRST, _LAST = 0.1, 0.9  # of the slant and of the wrap; beyond, a touch is cut off by the rim
 _PRINTED = 3  # marks along and around
@@ -55,6 +55,26 @@ def touch_marks(active: Frustum) -> tuple[TouchMark, ...]:
     )
 
 
+def marks_on_link(layout: SheetLayout, stack: LayerStack, place: PlacedFrustum) -> tuple[tuple[float, float], ...]:
+    """Return slant distance [m] and azimuth [rad] on the link of each mark, in the order of their numbers.
+
+    Args:
+        layout: of the sheet on its link.
+        stack: the layers.
+        place: side of the link under the sheet.
+    """
+    height, field = stack.middle(_READ), layout.field
+    read = place.parallel(height)
+    first, last = (place.azimuth_above(height, phi) for phi in (field.phi1, field.phi2))
+    return tuple(
+        (
+            field.u1 + along * (field.u2 - field.u1),
+            read.azimuth_above(-height, first + around * (last - first)),
+        )
+        for along, around in mark_parts(_PRINTED)
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class CoverMarks:
     """Marks where they are drawn on the cover: on the normals of their places on the upper conductive layer.
@@ -85,13 +105,8 @@ class CoverMarks:
             stack: the layers.
             place: side of the link under the sheet.
         """
-        middle, top = stack.middle(_READ), stack.offset(_COVER)
-        read, field = place.parallel(middle), flat.field
-        first, last = (place.azimuth_above(middle, phi) for phi in (field.phi1, field.phi2))
-        places = []
-        for along, around in mark_parts(_PRINTED):
-            below = read.azimuth_above(-middle, first + around * (last - first))
-            places.append((field.u1 + along * (field.u2 - field.u1), place.azimuth_above(top, below)))
+        top = stack.offset(_COVER)
+        places = ((u, place.azimuth_above(top, phi)) for u, phi in marks_on_link(flat, stack, place))
         return cls(cover, surface, tuple(places))
 
     @property

@@ -30,6 +30,7 @@ TURN = 2.0 * math.pi
 _AZIMUTHS = 36
 _ROWS = 21  # along a sheet; most of what shields a tube stands beyond its ends
 _NEAR = 1  # azimuths on both sides that count too: a blind seam is 20 to 35 deg wide
+_SEAM = math.radians(15.0)  # rad on both sides of a seam that its electrodes take
 _SHIELDED = 0.005  # of the half-space; a smaller difference between the sides is the error of the rays
 
 
@@ -69,7 +70,14 @@ def place_seams(
         wide = np.mean([np.roll(exposed, k) for k in range(-_NEAR, _NEAR + 1)], axis=0)
         best = int(wide.argmin())
         shielded, least = 1.0 - float(wide[best]), 1.0 - float(wide.max())
-        turn = 0.0 if shielded - least < _SHIELDED else best * TURN / _AZIMUTHS
+        flat = _bends_around([sheets[i].placed for i in full])
+        even = shielded - least < _SHIELDED
+        if even:
+            best = 0 if flat is None else int(flat.argmin())
+        elif flat is not None:  # among the places that are shielded as well, that with the least bend: it peels least
+            best = int(np.where(wide <= wide.min() + _SHIELDED, flat, np.inf).argmin())
+            shielded = 1.0 - float(wide[best])
+        turn = best * TURN / _AZIMUTHS
         for i in full:
             placed = sheets[i].placed
             sheets[i] = replace(
@@ -79,7 +87,15 @@ def place_seams(
             )
         direction = sheets[full[0]].placed.link_frustum.rotate((1.0, 0.0, 0.0))
         names = " and ".join(str(i + 1) for i in full)
-        places.append(ChosenSeam(axis, direction, shielded, least, _reason(names, direction, shielded, least, weights)))
+        places.append(
+            ChosenSeam(
+                axis,
+                direction,
+                shielded,
+                least,
+                _reason(names, direction, shielded, least, weights, even and flat is not None),
+            )
+        )
     return replace(fit, sheets=tuple(sheets)), tuple(places)
 
 
@@ -95,12 +111,33 @@ def _touches_around(placed: PlacedFrustum, rays: RayCaster, weights: TouchWeight
     return np.asarray(free.reshape(_ROWS, _AZIMUTHS).mean(axis=0))
 
 
+def _bends_around(places: list[PlacedFrustum]) -> Floats | None:
+    """Return how sharply the sheets are bent around evenly spaced azimuths [rad]; None of cones."""
+    if not any(placed.bends for placed in places):
+        return None
+    worst = np.zeros(_AZIMUTHS)
+    reach = np.linspace(-1.0, 1.0, 9) * _SEAM
+    for placed in places:
+        phi = np.arange(_AZIMUTHS)[:, None] * TURN / _AZIMUTHS + reach
+        normals = placed.place(np.zeros(phi.shape), phi)[1]
+        turns = np.linalg.norm(np.diff(normals, axis=1), axis=2).sum(axis=1)
+        worst = np.maximum(worst, np.round(turns, 3))
+    return worst
+
+
 def _reason(
-    names: str, direction: tuple[float, float, float], shielded: float, least: float, weights: TouchWeights | None
+    names: str,
+    direction: tuple[float, float, float],
+    shielded: float,
+    least: float,
+    weights: TouchWeights | None,
+    flattest: bool,
 ) -> str:
     x, y, z = (f"{value:z.2f}" for value in direction)
     where = f"the seam of sheet {names} faces ({x}, {y}, {z})"
     other = "--seam or --touch-side put it elsewhere"
+    if flattest:
+        return f"{where}, where the link is flattest, because a seam over a sharp bend peels; {other}"
     if shielded - least < _SHIELDED:
         return f"{where}: the link shields no side of it more than another, so it is any side; {other}"
     if weights is not None:

@@ -16,7 +16,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.build import place_on_arm
 from coneskin.skin.detection.events import TouchEnded
 from coneskin.skin.wire import encode
-from coneskin.testing.ruled_tube import RuledTube, ellipse_section
+from coneskin.testing.ruled_tube import oval_tube
 
 TURN = 2.0 * math.pi
 POSE = cs.Pose.from_xyz_rpy((0.01, 0.02, 0.05), (0.1, -0.2, 0.3))
@@ -118,7 +118,7 @@ def test_a_step_file_of_it_is_refused_before_anything_is_drawn(tmp_path: Path) -
 
 @pytest.mark.long
 def test_a_touch_on_an_oval_link_is_found_on_the_oval(tmp_path: Path) -> None:
-    tube = RuledTube(ellipse_section(0.06, 0.045), 0.2, pose=POSE)
+    tube = oval_tube(POSE)
     design = cs.design_link(tube.mesh(around=200), tmp_path / "skin", pictures=False)
     (sheet,) = design.sheets
     report = (tmp_path / "skin" / "report.md").read_text(encoding="utf-8")

@@ -10,9 +10,11 @@ import pytest
 from coneskin.design.link import LinkMesh
 from coneskin.design.sheets import DesignOptions
 from coneskin.errors import GeometryError
+from coneskin.geometry.bend import Bend
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
@@ -21,16 +23,23 @@ from coneskin.studio.design_text import design_facts, flat_drawing, warning_list
 from coneskin.studio.deviation_bands import deviation_bands
 from coneskin.studio.studio_page import StudioPage
 from coneskin.studio.workbench import Handles, Workbench, adjusted
+from coneskin.testing.ruled_tube import oval_tube
 from coneskin.view.page_server import PageServer
 
 from ..geometry.synthetic import placed, revolve
 
 FULL = PlacedFrustum(Frustum(0.04, 0.06, 0.20), Pose.from_xyz_rpy((0.1, -0.2, 0.3), (0.4, 0.5, -0.6)))
+ROUND = math.tau * 0.03 + 0.08  # m; around a stadium of two flats of 40 mm and two half circles of 60 mm
+BENDS = tuple(
+    Bend(math.tau * arc / ROUND, turn)
+    for arc, turn in ((0.02, 0.0), (math.pi * 0.03, math.pi), (0.04, 0.0), (math.pi * 0.03, math.pi), (0.02, 0.0))
+)
+OVAL = PlacedDevelopable(Frustum(ROUND / math.tau, ROUND / math.tau, 0.20), FULL.link_frustum, BENDS)
 PART = PlacedFrustum(Frustum(0.04, 0.06, 0.20, math.radians(200.0)), FULL.link_frustum)
 HANDLES = Handles(0.03, 0.05, math.radians(150.0), math.radians(20.0))
 
 
-@pytest.mark.parametrize("found", [FULL, PART], ids=["a full wrap", "a partial wrap"])
+@pytest.mark.parametrize("found", [FULL, PART, OVAL], ids=["a full wrap", "a partial wrap", "an oval"])
 def test_an_adjusted_sheet_lies_within_the_found_one(found: PlacedFrustum) -> None:
     sheet = adjusted(found, HANDLES)
     for u in (0.0, sheet.frustum.slant):
@@ -43,10 +52,35 @@ def test_an_adjusted_sheet_lies_within_the_found_one(found: PlacedFrustum) -> No
             assert sheet.normal(phi) == pytest.approx(found.normal(was_phi))
 
 
-def test_nothing_set_changes_nothing() -> None:
-    same = adjusted(FULL, Handles())
-    assert same.frustum == FULL.frustum
-    assert same.point(0.1, 1.0) == pytest.approx(FULL.point(0.1, 1.0))
+@pytest.mark.parametrize("found", [FULL, OVAL], ids=["a cone", "an oval"])
+def test_nothing_set_changes_nothing(found: PlacedFrustum) -> None:
+    assert adjusted(found, Handles()) == found
+
+
+def test_a_seam_that_is_turned_on_an_oval_leaves_it_where_it_was() -> None:
+    turned = adjusted(OVAL, Handles(seam=math.radians(60.0)))
+    assert turned.frustum == OVAL.frustum
+    assert turned.point(0.05, 0.4) == pytest.approx(OVAL.point(0.05, 0.4 + math.radians(60.0)), abs=1e-12)
+
+
+@pytest.mark.long
+def test_an_oval_link_is_found_shown_and_written(tmp_path: Path) -> None:
+    """The colours of the bands say what the tube is: its corners lie on the sheet, within the height of its facets."""
+    mesh = oval_tube(FULL.link_frustum, 0.1).mesh(around=120)
+    made = Workbench.of(LinkMesh("oval", mesh, "its own", ()))
+    (sheet,) = made.fit.sheets
+    bands = deviation_bands(RayCaster(mesh), sheet.placed, made.fit.tolerance)
+    assert {(band.low < 0.0 or band.high > 0.0) and max(-band.low, band.high) < 5e-4 for band in bands} == {True}
+    made.handle(0, Handles(0.01, 0.005, math.radians(200.0), math.radians(30.0)))
+    assert "<td>general cylinder</td>" in design_facts(made.designs)
+    made.write(tmp_path / "skin", pictures=False)
+    text = (tmp_path / "skin" / "sensor.toml").read_text(encoding="utf-8")
+    assert "bend_wrap_deg" in text
+    (tmp_path / "scene.toml").write_text(
+        '[[link]]\nname = "shell"\n[[link.sensor]]\nfile = "skin/sensor.toml"\n[source]\nkind = "virtual"\n'
+    )
+    (item,) = load_scene(tmp_path / "scene.toml").links[0].sensors
+    assert item.placed.point(0.03, 1.0) == pytest.approx(made.designs[0].active.point(0.03, 1.0), abs=1e-6)
 
 
 def test_a_partial_wrap_is_not_turned_beyond_what_was_found() -> None:

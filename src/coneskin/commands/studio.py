@@ -21,7 +21,7 @@ __all__ = ["add_arguments", "run"]
 
 _EXAMPLE = """\
 examples:
-  coneskin studio forearm.stl -o skin            the link, its cones, handles, layers; "write" makes the folder skin
+  coneskin studio forearm.stl -o skin            the link, its sheets, handles, layers; "write" makes the folder skin
   coneskin studio robot.urdf#forearm_link -o skin --tolerance-mm 0.5
 
 The folder is the one that `coneskin design` writes. The page is served to this computer alone. Ctrl-C ends it.
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     signal.signal(signal.SIGTERM, lambda *_: over.set())
     with PageServer("coneskin studio", port=args.port, uploads=True) as server:
         if not args.json:
-            print(f"looking for cones in {args.link} ...", file=sys.stderr, flush=True)
+            print(f"looking for sheets in {args.link} ...", file=sys.stderr, flush=True)
         bench = bench_of(next(iter(load_link(args.link, args.unit))))
         page = StudioPage(server, bench, args.output, args.force, bench_of)
         if args.json:

@@ -106,8 +106,8 @@ def draw_pictures(
             save(
                 figure,
                 f"{name}-deviation.png",
-                f"{design.name.capitalize()}: height of the mesh above the cone. Grey: holes and grooves deeper than "
-                "the tolerance, which the sheet bridges.",
+                f"{design.name.capitalize()}: height of the mesh above the {design.place.kind}. Grey: holes and "
+                "grooves deeper than the tolerance, which the sheet bridges.",
             )
     return done
 
@@ -258,7 +258,7 @@ def _covered(design: SheetDesign, triangles: Any) -> Any:
 
 
 def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: float) -> None:
-    """Draw the height of the mesh above the cone over azimuth and slant distance."""
+    """Draw the height of the mesh above the side of a sheet over azimuth and slant distance."""
     import numpy as np
     from matplotlib import colormaps
 
@@ -278,9 +278,9 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
     image = axes.imshow(
         shown, origin="lower", aspect="auto", extent=extent, cmap=colormaps["RdBu_r"], vmin=-limit, vmax=limit
     )
-    figure.colorbar(image, label="height above the cone [mm]")
+    figure.colorbar(image, label=f"height above the {design.place.kind} [mm]")
     axes.set(
         xlabel="azimuth phi [deg]",
         ylabel="slant distance u from end 1 [mm]",
-        title=f"{design.name}: deviation of the mesh from the cone, tolerance {1e3 * tolerance:g} mm",
+        title=f"{design.name}: deviation of the mesh from the {design.place.kind}, tolerance {1e3 * tolerance:g} mm",
     )

@@ -24,6 +24,7 @@ def design_facts(designs: Sequence[SheetDesign]) -> str:
         r1 = "infinite" if math.isinf(sector.r1) else f"{1e3 * sector.r1:.1f} mm"
         r2 = "infinite" if math.isinf(sector.r2) else f"{1e3 * sector.r2:.1f} mm"
         rows = (
+            ("side", design.place.kind),
             ("r1, r2", f"{r1}, {r2}"),
             ("theta0", f"{math.degrees(sector.theta0):.2f} deg"),
             ("radii", f"{1e3 * cone.radius1:.2f} and {1e3 * cone.radius2:.2f} mm"),

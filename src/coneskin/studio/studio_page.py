@@ -1,4 +1,4 @@
-"""Studio's page: the link with its cones in 3D, handles beside it, and the layers flat."""
+"""Studio's page: the link with its sheets in 3D, handles beside it, and the layers flat."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class StudioPage:
 
     Args:
         server: of the page.
-        bench: with the link and its cones.
+        bench: with the link and its sheets.
         folder: where the design is written.
         overwrite: an earlier design there may be replaced.
         load: makes the workbench of a mesh file that was put onto the page.
@@ -146,13 +146,13 @@ class StudioPage:
         self._flat.content = ""
 
     def _take_upload(self) -> None:
-        """Find the cones of a mesh file that was put onto the page."""
+        """Find the sheets of a mesh file that was put onto the page."""
         file = self._upload.value
         suffix = Path(file.name).suffix.lower()
         if suffix not in _SUFFIXES:
             self._say(f"{file.name} is no {', '.join(sorted(_SUFFIXES))} file")
             return
-        self._say(f"looking for cones in {file.name} ...")
+        self._say(f"looking for sheets in {file.name} ...")
         try:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / f"link{suffix}"  # the name that a page sends is no path of ours

@@ -1,4 +1,4 @@
-"""Workbench: a link, the cones found in it, and the handles that shorten, narrow and turn a sheet. No page in it."""
+"""Workbench: a link, the sheets found in it, and the handles that shorten, narrow and turn a sheet. No page in it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ from coneskin.design.folder import write_design
 from coneskin.design.link import LinkMesh
 from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
 from coneskin.errors import GeometryError
-from coneskin.geometry.fit.cones import LinkFit, find_cones
+from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
-from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.fit.sheets import find_sheets
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.pose import Pose
 
 __all__ = ["Handles", "Workbench", "adjusted"]
 
@@ -52,7 +51,7 @@ def adjusted(placed: PlacedFrustum, handles: Handles) -> PlacedFrustum:
     """
     cone = placed.frustum
     if handles.from_end1 < 0.0 or handles.from_end2 < 0.0:
-        raise GeometryError("a sheet may be shortened, not lengthened: beyond its ends the link is no cone")
+        raise GeometryError("a sheet may be shortened, not lengthened: beyond its ends the link has another shape")
     height = cone.height - handles.from_end1 - handles.from_end2
     if height < _LEAST:
         raise GeometryError(
@@ -65,11 +64,12 @@ def adjusted(placed: PlacedFrustum, handles: Handles) -> PlacedFrustum:
     turn = handles.seam
     if cone.wrap < _TURN:  # a partial wrap can only be moved within what was found
         turn = min(max(turn, 0.0), cone.wrap - wrap)
-    slope = (cone.radius2 - cone.radius1) / cone.height
-    shape = Frustum(cone.radius1 + slope * handles.from_end1, cone.radius2 - slope * handles.from_end2, height, wrap)
-    c, s = math.cos(turn), math.sin(turn)
-    moved = Pose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, handles.from_end1))
-    return PlacedFrustum(shape, placed.link_frustum @ moved)
+    if cone.wrap == _TURN and turn % _TURN:
+        placed, turn = placed.turned(turn), 0.0
+    ends = handles.from_end1 / cone.cos_half_angle, cone.slant - handles.from_end2 / cone.cos_half_angle
+    if turn == 0.0 and wrap == cone.wrap and ends == (0.0, cone.slant):
+        return placed
+    return placed.part(*ends, turn, turn + wrap)
 
 
 @dataclass(slots=True)
@@ -78,7 +78,7 @@ class Workbench:
 
     Attributes:
         link: its mesh.
-        fit: the cones found in it.
+        fit: the sheets found in it: cones, or sides of another section where they cover more.
         options: of the design.
         handles: of each sheet.
         designs: of the sheets as they are now; empty where none can be made.
@@ -100,7 +100,7 @@ class Workbench:
         tolerance: float = 0.001,
         progress: Callable[[str], None] | None = None,
     ) -> Workbench:
-        """Return the workbench for a link, with the cones that are found in it.
+        """Return the workbench for a link, with the sheets that are found in it.
 
         Args:
             link: the link.
@@ -112,7 +112,7 @@ class Workbench:
             GeometryError: the tolerance is not above 0.
             MeshError: no face of the mesh is visible from outside.
         """
-        fit = find_cones(link.mesh, tolerance=tolerance, progress=progress)
+        fit = find_sheets(link.mesh, tolerance=tolerance, progress=progress)
         made = cls(link, fit, replace(options or DesignOptions(), link=link.name))
         made.handles = [Handles() for _ in fit.sheets]
         made.update()

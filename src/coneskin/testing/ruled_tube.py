@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.pose import Pose
 
-__all__ = ["RuledTube", "ellipse_section", "rounded_box_section", "stadium_section"]
+__all__ = ["RuledTube", "ellipse_section", "oval_tube", "rounded_box_section", "stadium_section"]
 
 Floats = NDArray[np.float64]
 Section = Callable[[Floats], Floats]  #: parts of the way around, from 0 to 1, to points (n, 2) [m], counter-clockwise
@@ -124,3 +124,8 @@ class RuledTube:
         normal = np.cross(tangent, np.broadcast_to(ruling, tangent.shape))
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         return np.asarray(np.abs(np.einsum("ij,ij->i", local - low, normal)))
+
+
+def oval_tube(pose: Pose | None = None, height: float = 0.2) -> RuledTube:
+    """Return a tube of 120 x 90 mm, an ellipse in section, 200 mm high where no height [m] is given."""
+    return RuledTube(ellipse_section(0.06, 0.045), height, pose=pose or Pose())

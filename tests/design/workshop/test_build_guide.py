@@ -16,7 +16,7 @@ from coneskin.errors import GeometryError
 from coneskin.geometry.developable import Bend
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.surface_shape import SheetSide, drawing_point
-from coneskin.geometry.drawing.touch_marks import mark_labels
+from coneskin.geometry.drawing.touch_marks import CoverMarks
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_developable import PlacedDevelopable
@@ -212,7 +212,8 @@ def test_marks_to_touch_are_in_the_table_and_on_the_drawing() -> None:
     rows = re.findall(r"\| mark (\d) to touch \| ([\d.]+) \| ([\d.]+) \|", guide(design, figures))
     assert [int(row[0]) for row in rows] == list(range(1, 10))
     surface = design.cuts[6].surface
-    drawn = list(mark_labels(design.layout, surface))
+    stack, flat = design.options.stack, design.layout
+    drawn = list(CoverMarks.of(flat, flat, surface, stack, design.place).labels())
     for (_, u, phi), label in zip(rows, drawn, strict=True):
         x, y = drawing_point(surface, 1e-3 * float(u), math.radians(float(phi)))
         assert math.dist((x, y), (label.x, label.y)) < 8e-3

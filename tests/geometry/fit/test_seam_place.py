@@ -5,10 +5,16 @@ import math
 import numpy as np
 import pytest
 
+from coneskin.geometry.bend import Bend
 from coneskin.geometry.fit.cones import LinkFit, find_cones
+from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.seam_place import place_seams
 from coneskin.geometry.fit.touch_weights import TouchWeights
+from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
+from coneskin.geometry.placed_developable import PlacedDevelopable
+from coneskin.geometry.pose import Pose
+from coneskin.testing.ruled_tube import RuledTube, stadium_section
 
 from ..synthetic import TILTED, frustum, joined, placed
 
@@ -71,3 +77,23 @@ def test_partial_wraps_have_no_choice() -> None:
     after, places = place_seams(before, mesh)
     assert places == ()
     assert after.sheets == before.sheets
+
+
+def test_the_seam_of_a_stadium_lies_on_a_flat_of_it() -> None:
+    """The sheet begins in the middle of a half circle, where its seam would peel."""
+    tube = RuledTube(stadium_section(0.04, 0.03), 0.2, pose=TILTED)
+    around, half = math.tau * 0.03 + 0.08, 0.5 * math.pi
+    arcs = (half * 0.03, half), (0.04, 0.0), (math.pi * 0.03, math.pi), (0.04, 0.0), (half * 0.03, half)
+    bends = tuple(Bend(math.tau * arc / around, turn) for arc, turn in arcs)
+    radius = around / math.tau
+    side = PlacedDevelopable(Frustum(radius, radius, 0.2), TILTED @ Pose(translation=(0.05 - radius, 0.0, 0.0)), bends)
+    assert tube.distances(side.place(0.1, np.linspace(0.0, math.tau, 90))[0]).max() < 1e-6
+    before = LinkFit(
+        (FittedSheet(side, 0.0, 1e-4, 1e-4, 0.0, 0.0, 1.0, 1.0, 0.0),), None, (), 1e-3, 0.2, 0.05, (), "", 1, "grid"
+    )
+    after, (place,) = place_seams(before, tube.mesh())
+    seam = after.sheets[0].placed
+    one, two = (seam.normal(math.radians(angle)) for angle in (-14.0, 14.0))
+    assert math.dist(one, two) < 1e-9, "no bend under the seam and its electrodes"
+    assert seam.place(0.1, 0.7)[0] == pytest.approx(side.place(0.1, 0.7 + side.locate(seam.point(0.1, 0.0))[1])[0])
+    assert "flattest" in place.reason

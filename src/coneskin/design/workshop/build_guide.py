@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from coneskin.design.sheets import SheetDesign
-from coneskin.geometry.drawing.touch_marks import touch_marks
+from coneskin.geometry.drawing.touch_marks import marks_on_link
 
 from .build_figures import BuildFigures
 from .closing_steps import cable_steps, reading_lines, test_steps
@@ -82,6 +82,5 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
     yield f"| electrode A | {1e3 * box.u2:.2f} to {1e3 * (box.u2 + width):.2f} | along end 2 |"
     yield f"| electrode D | along edge 0 | {phi1 - turn:.3f} to {phi1:.3f} |"
     yield f"| electrode C | along the other edge | {phi2:.3f} to {phi2 + turn:.3f} |"
-    for mark in touch_marks(design.layout):
-        u, phi = 1e3 * (box.u1 + mark.u), math.degrees(box.phi1 + mark.phi)
-        yield f"| mark {mark.number} to touch | {u:.2f} | {phi:.3f} |"
+    for number, (u, phi) in enumerate(marks_on_link(design.layout, design.options.stack, design.place), 1):
+        yield f"| mark {number} to touch | {1e3 * u:.2f} | {math.degrees(phi):.3f} |"
