@@ -14,6 +14,7 @@ from coneskin.design.sheets import SheetDesign
 from coneskin.errors import ConeSkinError
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.view.page_server import PageServer
+from coneskin.view.stage_nodes import light_plainly
 
 from .design_text import design_facts, flat_drawing, warning_list
 from .deviation_bands import deviation_bands
@@ -70,15 +71,23 @@ class StudioPage:
         bench, scene, gui = self._bench, self._server.scene, self._server.gui
         scene.reset()
         scene.set_up_direction("+z")
+        light_plainly(scene)
         vertices = bench.link.mesh.vertices
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         middle, size = 0.5 * (low + high), float((high - low).max())
         self._server.look_from(
-            (float(middle[0] + 0.7 * size), float(middle[1] - 0.6 * size), float(middle[2] + 0.35 * size)),
+            (float(middle[0] + 1.1 * size), float(middle[1] - 0.95 * size), float(middle[2] + 0.55 * size)),
             (float(middle[0]), float(middle[1]), float(middle[2])),
         )
         scene.add_mesh_simple(
-            "/link", vertices.astype("float32"), bench.link.mesh.faces, color=_LINK, side="double", flat_shading=True
+            "/link",
+            vertices.astype("float32"),
+            bench.link.mesh.faces,
+            color=_LINK,
+            side="double",
+            flat_shading=True,
+            cast_shadow=False,
+            receive_shadow=False,
         )
         for handle in self._handles:
             handle.remove()
@@ -126,6 +135,7 @@ class StudioPage:
                         color=band.colour,
                         side="double",
                         cast_shadow=False,
+                        receive_shadow=False,
                     )
                 for letter, points in electrode_lines(design).items():
                     scene.add_line_segments(f"{name}/{letter}", points, colors=_ELECTRODES[letter], thickness=0.002)

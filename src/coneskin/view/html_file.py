@@ -14,23 +14,23 @@ from pathlib import Path
 
 from coneskin.draft_file import draft_of
 from coneskin.errors import RecordingError
-from coneskin.replay.event_text import describe
 
 from .page_server import PageServer, page_client
 from .panel_text import NOTICE
 from .stage_nodes import StageNodes, look_at_stages
-from .strand import Strand
+from .strand import Strand, event_lines
 
 __all__ = ["write_html"]
 
 _RATE = 30.0  # pictures a second ...
 _PICTURES = 6000  # ... but not more than these in a file
-_EVENTS = 3000  # of a run in a file, each with a picture of its own ...
+_EVENTS = 3000  # in a file, each with a picture of its own ...
 _AFTER = 1e-6  # ... so long after it [s]
 _FIRST = b"<!doctype html"  # of every page
 
 _STYLE = """
-#coneskin{position:fixed;top:12px;right:12px;width:360px;max-height:calc(100% - 84px);overflow:auto;z-index:9;
+body #root{width:calc(100% - 384px);overflow:hidden;transform:translateZ(0)}
+#coneskin{position:fixed;top:12px;right:12px;width:360px;max-height:calc(100% - 24px);overflow:auto;z-index:9;
 background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px 8px rgba(0,0,0,.25);padding:10px}
 #coneskin b{word-break:break-all}
 #coneskin-notice{border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px;margin:6px 0}
@@ -157,7 +157,7 @@ def _check_target(path: Path) -> None:
 def _pictures(strands: Sequence[Strand], since: float, duration: float, count: int) -> list[float]:
     """Return the times of the pictures from the first one on [s]: even steps, and one just after each event."""
     even = {duration * picture / (count - 1) for picture in range(count)}
-    events = [event.time - item.zero - since + _AFTER for item in strands for event in item.history.events[:_EVENTS]]
+    events = {line.time - since + _AFTER for line in event_lines(strands)[:_EVENTS]}
     return sorted(even | {at for at in events if 0.0 <= at < duration})
 
 
@@ -187,7 +187,6 @@ def _panel(strands: Sequence[Strand], since: float, until: float) -> str:
 
     several = len(strands) > 1
     runs, parts = [], []
-    events: list[tuple[float, str]] = []
     for strand in strands:
         phases = [[max(c.time - strand.zero - since, 0.0), c.phase.text, c.phase.colour] for c in strand.history.phases]
         health = [[0.0, ""]]
@@ -198,10 +197,7 @@ def _panel(strands: Sequence[Strand], since: float, until: float) -> str:
         title = "" if several else f"<b>{escape(strand.stage.title)}</b>"  # of several, each phase says whose it is
         parts.append(f'{title}<div class="coneskin-phase"></div>')
         parts.append('<div class="coneskin-health"></div>')
-        for event in strand.history.events[:_EVENTS]:
-            words = " ".join(describe(event, strand.start).split())
-            events.append((event.time - strand.zero - since, words))
-    events.sort(key=lambda item: item[0])
+    events = [(line.time - since, " ".join(line.text.split())) for line in event_lines(strands)[:_EVENTS]]
     data = {"since": since, "duration": max(until - since, 1e-3), "several": several, "runs": runs, "events": events}
     text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element
     drawn = timeline(strands, since, until)

@@ -177,7 +177,7 @@ class LivePage:
         newest = len(events) and id(events[-1])
         if newest != self._lines_of:
             self._lines_of = newest
-            lines = [(event, describe(event, strand.start)) for event in events[-_LISTED:]]
+            lines = [(event, describe(event, strand.zero)) for event in events[-_LISTED:]]
             self._events.content = event_list(lines, len(lines) - 1)
         if now - self._plotted >= _PLOT_PERIOD and not (self._run is not None and self._run.ended):
             self._plotted = now

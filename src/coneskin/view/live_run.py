@@ -52,7 +52,7 @@ class LiveRun:
         except BaseException:
             self._tail.close()
             raise
-        self.strand = Strand(stage, history, run.start, run.start)
+        self.strand = Strand(stage, history, run.start)
         self._grown = time.monotonic()
 
     @property

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import Any
 
-from coneskin.replay.event_text import describe
 from coneskin.robot.guard.journal import EventName
 
 from .field_choice import FieldChoice
@@ -19,7 +18,7 @@ from .panel_text import event_list, notice, status
 from .playback import SPEEDS, Playback
 from .stage.level_scale import level_bars
 from .stage_nodes import StageNodes, look_at_stages
-from .strand import Strand
+from .strand import Strand, event_lines
 from .timeline import timeline
 from .trace_plot import TracePlot
 
@@ -60,13 +59,10 @@ class _Player:
             StageNodes(client.scene, strand.stage, f"/run {number}", strand.offset)
             for number, strand in enumerate(strands, 1)
         ]
-        events = [
-            (event.time - strand.zero, event, strand.start) for strand in strands for event in strand.history.events
-        ]
-        events.sort(key=lambda item: item[0])
-        self._times = [at for at, _, _ in events]
-        self._lines = [(event, describe(event, start)) for _, event, start in events]
-        self._jumps = [index for index, (_, event, _) in enumerate(events) if event.name in _IMPORTANT]
+        lines = event_lines(strands)
+        self._times = [line.time for line in lines]
+        self._lines = [(line.event, line.text) for line in lines]
+        self._jumps = [index for index, line in enumerate(lines) if line.event.name in _IMPORTANT]
         self._make_panel(client.gui)
         self._shown = -2
         self._texted = -1.0

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .page_server import PageServer
     from .stage.stage import Stage
 
-__all__ = ["StageNodes", "look_at_stages"]
+__all__ = ["StageNodes", "light_plainly", "look_at_stages"]
 
 _MARKS = 6  # nodes for contacts on each link with a sheet, used again and again
 _LOCATED, _UNCERTAIN, _PAST = (192, 38, 211), (249, 115, 22), (120, 113, 108)
@@ -31,26 +31,37 @@ _FADES = 8  # steps in which a mark fades
 _SEGMENTS = 32
 
 
+def light_plainly(scene: Any) -> None:
+    """Set two plain lights in the place of viser's own.
+
+    Reflections of its surroundings and shadows of three cascades cost two thirds of a picture where a processor draws
+    it (bench/RESULTS-view.md).
+
+    Args:
+        scene: viser's ``SceneApi``.
+    """
+    scene.configure_environment_map(hdri=None)
+    scene.configure_default_lights(enabled=False, cast_shadow=False)
+    scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.0)
+    scene.add_light_directional("/sun", intensity=2.2, position=(1.5, -2.0, 3.0), cast_shadow=False)
+
+
 def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
     """Draw the floor, set the lights, and set from where a new viewer looks.
-
-    viser's own lights are left out: reflections of its surroundings and shadows of three cascades cost two thirds of a
-    picture where a processor draws it (bench/RESULTS-view.md).
 
     Args:
         server: of the page.
         reach: how far anything can be from its base [m].
         count: stages side by side.
     """
-    away = 0.5 * reach * (1.0 + 0.5 * (count - 1))
-    server.look_from((-away, -away, 0.6 * reach), (-0.1 * reach, 0.0, 0.3 * reach))  # most arms work to that side
-    scene = server.scene
-    scene.configure_environment_map(hdri=None)
-    scene.configure_default_lights(enabled=False, cast_shadow=False)
-    scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=2.0)
-    scene.add_light_directional("/sun", intensity=2.2, position=(1.5, -2.0, 3.0), cast_shadow=False)
+    away = 0.5 * reach
+    if count == 1:
+        server.look_from((-away, -away, 0.6 * reach), (-0.1 * reach, 0.0, 0.3 * reach))  # most arms work to that side
+    else:  # from in front, so that none stands before another
+        server.look_from((-away * (0.3 + count), 0.0, 0.7 * reach), (0.0, 0.0, 0.28 * reach))
+    light_plainly(server.scene)
     lines, faces = floor_lines(reach)
-    scene.add_mesh_simple(
+    server.scene.add_mesh_simple(
         "/floor", _single(lines), faces, color=_FLOOR, side="double", cast_shadow=False, receive_shadow=False
     )
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from coneskin.errors import RecordingError
 from coneskin.geometry.pose import Pose, Vector
+from coneskin.replay.event_text import describe
 from coneskin.replay.run import Run, read_run
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.journal import EventName, GuardEvent
 
 from .history import History, history_of
 from .moment import Moment, moment_at
 from .stage.stage import Stage, set_stage
 
-__all__ = ["Strand", "read_strands"]
+__all__ = ["EventLine", "Strand", "event_lines", "read_strands"]
 
 _APART = 0.75  # of the arms' reach, between two bases
 _ZEROS = (EventName.CONTACT, EventName.STOPPING)  # by which two runs are laid side by side
@@ -29,14 +31,12 @@ class Strand:
         stage: what is drawn.
         history: what happened.
         zero: host time that is 0 on the page's clock [s].
-        start: host time at which the run was started, from which its events count [s].
         offset: where the base stands [m].
     """
 
     stage: Stage
     history: History
     zero: float
-    start: float
     offset: Vector = (0.0, 0.0, 0.0)
 
     @property
@@ -53,6 +53,31 @@ class Strand:
         return self.stage.poses(self.history.q(self.zero + time))
 
 
+class EventLine(NamedTuple):
+    """Event in words.
+
+    Attributes:
+        time: on the page's clock [s].
+        event: what happened.
+        text: for people; of several runs, it says in which.
+    """
+
+    time: float
+    event: GuardEvent
+    text: str
+
+
+def event_lines(strands: Sequence[Strand]) -> list[EventLine]:
+    """Return the events of runs in the order of the page's clock, by which they count."""
+    found = []
+    for number, strand in enumerate(strands, 1):
+        whose = f"run {number}: " if len(strands) > 1 else ""
+        for event in strand.history.events:
+            time, _, words = describe(event, strand.zero).strip().partition("  ")
+            found.append(EventLine(event.time - strand.zero, event, f"{time}  {whose}{words}"))
+    return sorted(found, key=lambda line: line.time)
+
+
 def read_strands(paths: Sequence[Path]) -> list[Strand]:
     """Read runs: one as it is, several side by side, each with its first touch at the time 0.
 
@@ -65,7 +90,7 @@ def read_strands(paths: Sequence[Path]) -> list[Strand]:
     apart = _APART * max(strand.stage.reach for strand in found)
     middle = 0.5 * (len(found) - 1)
     return [
-        Strand(item.stage, item.history, item.zero, item.start, (0.0, apart * (middle - number), 0.0))
+        Strand(item.stage, item.history, item.zero, (0.0, apart * (middle - number), 0.0))
         for number, item in enumerate(found)
     ]
 
@@ -77,4 +102,4 @@ def _strand(run: Run, title: str, aligned: bool) -> Strand:
         raise RecordingError(f"nothing was recorded in {title}: there is nothing to be shown")
     stage = set_stage(scene, run.place_sensors(), title)
     first = next((event.time for event in history.events if event.name in _ZEROS), run.start) if aligned else run.start
-    return Strand(stage, history, first, run.start)
+    return Strand(stage, history, first)

@@ -1,0 +1,31 @@
+"""Strands: the clock of a page, and the events that count by it."""
+
+from pathlib import Path
+
+import pytest
+
+from coneskin.replay.run import read_run
+from coneskin.robot.guard.journal import EventName
+from coneskin.view.strand import event_lines, read_strands
+
+RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+
+
+def test_the_events_of_one_run_count_from_its_start() -> None:
+    (strand,) = read_strands([RUN])
+    lines = event_lines([strand])
+    assert [line.event for line in lines] == strand.history.events
+    for line in lines:
+        assert line.time == pytest.approx(line.event.time - read_run(RUN).start)
+        assert line.text.startswith(f"{line.time:.4f} s  ")
+        assert "run 1" not in line.text
+
+
+def test_the_events_of_two_runs_count_from_the_first_touch_and_say_whose_they_are() -> None:
+    strands = read_strands([RUN, RUN])
+    lines = event_lines(strands)
+    assert len(lines) == 2 * len(strands[0].history.events)
+    assert [line.time for line in lines] == sorted(line.time for line in lines)
+    touches = [line for line in lines if line.event.name == EventName.CONTACT]
+    assert [line.text[:26] for line in touches] == ["0.0000 s  run 1: touch on ", "0.0000 s  run 2: touch on "]
+    assert min(line.time for line in lines) < 0.0
