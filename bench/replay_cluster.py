@@ -15,7 +15,7 @@ from pathlib import Path
 
 from report import head
 
-from coneskin.runs.batch import judge_runs
+from coneskin.runs.what_if.batch import judge_runs
 
 __all__ = ["cluster_rates"]
 

@@ -13,7 +13,7 @@ from coneskin.commissioning.marks_picture import draw_marks
 from coneskin.errors import MissingExtra, RecordingError, SceneError
 from coneskin.picture_file import write_picture
 from coneskin.replay.run_picture import draw_run
-from coneskin.runs.what_if_picture import draw_variants
+from coneskin.runs.what_if.variant_picture import draw_variants
 
 NOTHING: Any = SimpleNamespace(name="a scene")
 PICTURES: dict[str, Callable[[Path], None]] = {

@@ -11,6 +11,10 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import SensorError
+from coneskin.skin.detection.untouched.currents import UntouchedCurrents
+from coneskin.skin.detection.untouched.guides import UntouchedGuides
+from coneskin.skin.detection.untouched.leak import UntouchedLeak
+from coneskin.skin.detection.untouched.level import UntouchedLevel
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
 
@@ -25,10 +29,6 @@ from .stuck_values import StuckValues
 from .timing import FrameTiming
 from .touch_place import TouchPlace
 from .touch_reading import TouchReading
-from .untouched_currents import UntouchedCurrents
-from .untouched_guides import UntouchedGuides
-from .untouched_leak import UntouchedLeak
-from .untouched_level import UntouchedLevel
 
 if TYPE_CHECKING:  # for replays only
     from .quiet_frames import QuietFrames

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 
+from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
 from .contact_matrix import FrameInversion
 from .faults import Fault
-from .untouched_currents import UntouchedCurrents
 from .wiring_hypothesis import Observation, PointContact, WiringHypothesis, list_hypotheses, observe
 
 __all__ = ["DIAGNOSED", "FaultDiagnosis"]

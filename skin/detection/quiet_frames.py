@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from coneskin.skin.detection.untouched.guides import JUMP
 from coneskin.skin.frame_batch import FrameBatch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status, frame_at
 
 from .reading import GUIDE_SLACK, LEVEL_NOISE, read
-from .untouched_guides import JUMP
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 
+from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 
 from .contact_matrix import ContactMatrix
-from .untouched_currents import UntouchedCurrents
 
 __all__ = ["FrameSelfTest"]
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import math
 
+from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 
 from .contact_matrix import ContactMatrix, FrameInversion
 from .settings import DetectorSettings
-from .untouched_currents import UntouchedCurrents
 
 __all__ = ["DANGEROUS_ANGLE", "SingleContactTest", "frames_until_certain", "weakest_pair_excluded"]
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 
+from coneskin.skin.detection.untouched.currents import UntouchedCurrents
+from coneskin.skin.detection.untouched.leak import UntouchedLeak
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
@@ -24,8 +26,6 @@ from .settings import DetectorSettings
 from .single_contact import SingleContactTest
 from .touch_reading import TouchReading
 from .touch_velocity import TouchVelocity
-from .untouched_currents import UntouchedCurrents
-from .untouched_leak import UntouchedLeak
 
 __all__ = ["TouchPlace"]
 

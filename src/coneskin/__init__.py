@@ -52,8 +52,8 @@ if TYPE_CHECKING:
     from .robot.reaction.rules import Rule as Rule
     from .robot.reaction.types import Reaction as Reaction
     from .robot.sim.process import SimulatedController as SimulatedController
-    from .runs.batch import judge_runs as judge_runs
-    from .runs.what_if import what_if as what_if
+    from .runs.what_if.batch import judge_runs as judge_runs
+    from .runs.what_if.what_if import what_if as what_if
     from .scene.build import place_on_arm as place_on_arm
     from .scene.reader import load_scene as load_scene
     from .scene.reader import parse_scene as parse_scene
@@ -101,8 +101,8 @@ _PUBLIC = {
     "robot.reaction.rules": "Rule",
     "robot.reaction.types": "Reaction",
     "robot.sim.process": "SimulatedController",
-    "runs.batch": "judge_runs",
-    "runs.what_if": "what_if",
+    "runs.what_if.batch": "judge_runs",
+    "runs.what_if.what_if": "what_if",
     "scene.build": "place_on_arm",
     "scene.reader": "load_scene parse_scene",
     "scene.scene": "Commissioning Scene",

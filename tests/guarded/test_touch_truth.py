@@ -7,8 +7,8 @@ import pytest
 
 from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import EventName
-from coneskin.runs.touch_labels import true_touches
-from coneskin.runs.what_if import judge_run
+from coneskin.runs.what_if.touch_labels import true_touches
+from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 

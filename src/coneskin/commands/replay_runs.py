@@ -51,9 +51,9 @@ def replay_with_settings(path: Path, words: Sequence[str], scene_file: Path | No
 
 def replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
     """Replay many runs with each variant; return 0, 1 for a difference or an error, or 4 for a damaged run."""
-    from coneskin.runs.batch import judge_runs
     from coneskin.runs.progress_bar import ProgressBar
-    from coneskin.runs.what_if_table import score_variants, variant_lines, write_rows
+    from coneskin.runs.what_if.batch import judge_runs
+    from coneskin.runs.what_if.variant_table import score_variants, variant_lines, write_rows
 
     variants = _variants(args)
     if args.table is not None and args.table.suffix != ".parquet":
@@ -70,7 +70,7 @@ def replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
     if args.table is not None:
         write_rows(args.table, rows)
     if args.picture is not None:
-        from coneskin.runs.what_if_picture import draw_variants
+        from coneskin.runs.what_if.variant_picture import draw_variants
 
         draw_variants(scores, args.picture)
     if args.json:

@@ -196,7 +196,7 @@ def _sides(args: argparse.Namespace) -> tuple[Decisions, Decisions]:
 
 
 def _export(args: argparse.Namespace) -> int:
-    from coneskin.runs.export import export_run
+    from coneskin.runs.export.export import export_run
 
     written = export_run(_read(args.run), args.output, args.format, _bar("the frames"))
     if args.json:

@@ -11,7 +11,7 @@ from coneskin.skin.detection.contact_matrix import FrameInversion
 from coneskin.skin.detection.reading import read
 from coneskin.skin.detection.self_test import FrameSelfTest
 from coneskin.skin.detection.settings import DetectorSettings
-from coneskin.skin.detection.untouched_currents import UntouchedCurrents
+from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor

@@ -12,7 +12,7 @@ from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, Tou
 from coneskin.skin.detection.faults import Fault
 from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
-from coneskin.skin.detection.untouched_currents import BLOCK
+from coneskin.skin.detection.untouched.currents import BLOCK
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, WiringFaults
 from coneskin.skin.virtual.fault_injection import FaultInjection

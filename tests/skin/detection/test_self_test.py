@@ -11,7 +11,7 @@ from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault, TouchBegan
 from coneskin.skin.detection.faults import Fault
 from coneskin.skin.detection.self_test import FrameSelfTest
-from coneskin.skin.detection.untouched_currents import UntouchedCurrents
+from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet

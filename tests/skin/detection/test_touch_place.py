@@ -15,8 +15,8 @@ from coneskin.skin.detection.reading import read
 from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.detection.single_contact import SingleContactTest
 from coneskin.skin.detection.touch_place import TouchPlace
-from coneskin.skin.detection.untouched_currents import UntouchedCurrents
-from coneskin.skin.detection.untouched_leak import UntouchedLeak
+from coneskin.skin.detection.untouched.currents import UntouchedCurrents
+from coneskin.skin.detection.untouched.leak import UntouchedLeak
 from coneskin.skin.electronics import Electronics, Polarity
 from coneskin.skin.robin_function import RobinFunction
 from coneskin.skin.sensor import Sensor

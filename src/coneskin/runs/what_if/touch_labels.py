@@ -12,8 +12,7 @@ from coneskin.bounded_file import read_file
 from coneskin.errors import RecordingError
 from coneskin.recording import is_time
 from coneskin.robot.guard.journal import BlockKind, EventName, contact_force
-
-from .decisions import Decisions
+from coneskin.runs.decisions import Decisions
 
 if TYPE_CHECKING:
     from coneskin.replay.run import Run

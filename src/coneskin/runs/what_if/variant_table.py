@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .parquet_file import write_parquet
+from coneskin.runs.export.parquet_file import write_parquet
 
 __all__ = ["VariantScore", "duration_words", "score_variants", "shared_settings", "variant_lines", "write_rows"]
 

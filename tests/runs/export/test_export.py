@@ -13,8 +13,8 @@ import pytest
 from coneskin.errors import RecordingError
 from coneskin.replay.run import Run
 from coneskin.robot.guard.journal import BlockKind
-from coneskin.runs.export import export_run
-from coneskin.runs.tables import Table, arm_states, run_tables, skin_frames, table_pieces
+from coneskin.runs.export.export import export_run
+from coneskin.runs.export.tables import Table, arm_states, run_tables, skin_frames, table_pieces
 from coneskin.skin.wire import DrivenPotentials, FrameDecoder, encode
 
 
@@ -166,8 +166,8 @@ def test_an_export_that_fails_leaves_nothing_torn(
         raise OSError(28, "No space left on device")
 
     states = arm_states(collision)
-    monkeypatch.setattr("coneskin.runs.tables.arm_states", torn)
-    monkeypatch.setattr("coneskin.runs.mcap_file.arm_states", torn)
+    monkeypatch.setattr("coneskin.runs.export.tables.arm_states", torn)
+    monkeypatch.setattr("coneskin.runs.export.mcap_file.arm_states", torn)
     with pytest.raises(RecordingError, match=r"cannot write .*No space left"):
         export_run(collision, tmp_path / "out", form)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
@@ -178,7 +178,7 @@ def test_a_table_in_pieces_is_the_table(
 ) -> None:
     export_run(collision, tmp_path / "large.npz", "npz")
     export_run(collision, tmp_path / "large", "csv")
-    monkeypatch.setattr("coneskin.runs.tables._PIECE", 100)
+    monkeypatch.setattr("coneskin.runs.export.tables._PIECE", 100)
     assert len(list(table_pieces(collision)["frames"]())) == math.ceil(len(tables["frames"]["time_s"]) / 100)
     assert run_tables(collision) == tables
     written = export_run(collision, tmp_path / "small.npz", "npz")

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.errors import RecordingError
+from coneskin.runs.block_progress import Progress, silent
 
-from .block_progress import Progress, silent
 from .what_if import broken_rows, judge_run
 
 __all__ = ["judge_runs"]

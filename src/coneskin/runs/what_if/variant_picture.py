@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from coneskin.errors import RecordingError
 from coneskin.picture_file import write_picture
 
-from .what_if_table import VariantScore, duration_words, shared_settings
+from .variant_table import VariantScore, duration_words, shared_settings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from coneskin.draft_file import draft_of
 from coneskin.errors import RecordingError
+from coneskin.runs.block_progress import Progress, silent
 
-from .block_progress import Progress, silent
 from .tables import Pieces, Table, table_pieces
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
-from coneskin.skin.detection.untouched_leak import BLOCK, UntouchedLeak
+from coneskin.skin.detection.untouched.leak import BLOCK, UntouchedLeak
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch

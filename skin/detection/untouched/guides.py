@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from coneskin.skin.wire import Frame
 
-from .untouched_currents import UntouchedCurrents
+from .currents import UntouchedCurrents
 
 __all__ = ["JUMP", "UntouchedGuides"]
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from coneskin.robot.guard.journal import EventName
+from coneskin.runs.decisions import Decisions
 
-from .decisions import Decisions
 from .touch_labels import TouchLabel
 
 __all__ = ["DetectionScore", "score_detection"]

@@ -17,11 +17,11 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.runs.arm_command import recorded_commands
+from coneskin.runs.block_progress import Progress, silent
 from coneskin.skin.detection.reading import read
 from coneskin.terminal_text import printable
 
-from .arm_command import recorded_commands
-from .block_progress import Progress, silent
 from .foxglove_schemas import SCHEMAS
 from .tables import arm_states, skin_frames, slider_positions, wall_clock
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.runs.what_if_picture import draw_variants
-from coneskin.runs.what_if_table import VariantScore, score_variants, shared_settings, variant_lines
+from coneskin.runs.what_if.variant_picture import draw_variants
+from coneskin.runs.what_if.variant_table import VariantScore, score_variants, shared_settings, variant_lines
 
 
 def test_each_variant_is_a_point_with_its_name(tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from coneskin.recording_file.recorder import Recorder
 from coneskin.replay.run import Run, read_run
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.runs.cut import cut_run
-from coneskin.runs.touch_labels import true_touches
-from coneskin.runs.what_if import judge_run
+from coneskin.runs.what_if.touch_labels import true_touches
+from coneskin.runs.what_if.what_if import judge_run
 
 SKIN = "forearm skin"
 TOUCHED = 2.94  # s since the start of the recorded collision; it is seen 9 ms later

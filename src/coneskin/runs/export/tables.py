@@ -18,10 +18,9 @@ from coneskin.replay.quantities import QUANTITIES
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.journal import BlockKind
+from coneskin.runs.arm_command import recorded_commands
+from coneskin.runs.block_progress import Progress, silent, watch
 from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame, FrameDecoder
-
-from .arm_command import recorded_commands
-from .block_progress import Progress, silent, watch
 
 if TYPE_CHECKING:
     from coneskin.replay.run import Run

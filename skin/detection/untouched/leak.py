@@ -7,10 +7,9 @@ place alone: no threshold is compared with what is left, so that no press is los
 
 from __future__ import annotations
 
+from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
-
-from .contact_matrix import ContactMatrix, FrameInversion
 
 __all__ = ["UntouchedLeak"]
 

@@ -14,12 +14,12 @@ import pytest
 
 from coneskin.errors import RecordingError
 from coneskin.replay.run import Run
-from coneskin.runs.batch import judge_runs
 from coneskin.runs.comparison_text import comparison_lines
-from coneskin.runs.what_if import judge_run, what_if
-from coneskin.runs.what_if_table import score_variants, variant_lines, write_rows
+from coneskin.runs.what_if.batch import judge_runs
+from coneskin.runs.what_if.variant_table import score_variants, variant_lines, write_rows
+from coneskin.runs.what_if.what_if import judge_run, what_if
 
-from .conftest import COLLISION
+from ..conftest import COLLISION
 
 DEAF = {"detection.touch_level": 0.9, "detection.location_level": 0.95}
 VARIANTS: tuple[dict[str, Any], ...] = ({}, DEAF)
@@ -98,8 +98,8 @@ from pathlib import Path
 import distributed
 
 from coneskin.errors import RecordingError
-from coneskin.runs import dask_cluster
-from coneskin.runs.batch import judge_runs
+from coneskin.runs.what_if import dask_cluster
+from coneskin.runs.what_if.batch import judge_runs
 
 if __name__ == "__main__":
     paths, variants = [Path(word) for word in sys.argv[2:]], json.loads(sys.argv[1])

@@ -10,12 +10,12 @@ from coneskin.errors import ConeSkinError
 from coneskin.replay.quantities import Tolerances
 from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import EventName
+from coneskin.runs.block_progress import Progress, silent
+from coneskin.runs.comparison import Comparison, compare_decisions
+from coneskin.runs.decisions import Decisions, decide_again, recorded_decisions
+from coneskin.runs.run_files import run_name
 
-from .block_progress import Progress, silent
-from .comparison import Comparison, compare_decisions
-from .decisions import Decisions, decide_again, recorded_decisions
 from .detection_score import score_detection
-from .run_files import run_name
 from .touch_labels import TouchLabel, label_path, read_labels, recorded_labels, true_touches
 
 if TYPE_CHECKING:

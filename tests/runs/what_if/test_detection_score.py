@@ -7,8 +7,8 @@ import pytest
 from coneskin.errors import RecordingError
 from coneskin.robot.guard.journal import EventName, GuardEvent
 from coneskin.runs.decisions import Decisions
-from coneskin.runs.detection_score import score_detection
-from coneskin.runs.touch_labels import TouchLabel, read_labels, recorded_labels
+from coneskin.runs.what_if.detection_score import score_detection
+from coneskin.runs.what_if.touch_labels import TouchLabel, read_labels, recorded_labels
 
 
 def contacts(*times: float, sensor: str = "a", until: float = float("inf")) -> Decisions:

@@ -1,0 +1,1 @@
+"""Runs for other programs: tables as CSV, Parquet and NumPy files, and MCAP for Foxglove."""

@@ -1,0 +1,1 @@
+"""What if: many runs with other settings, judged by the touches that there really were."""
