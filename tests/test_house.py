@@ -78,7 +78,9 @@ MAY_IMPORT: dict[str, str] = {
     "commands": "physics permissible_speed calibration commissioning design doctor monitor scene scene.tables session "
     "replay runs runs.export runs.what_if studio view view.stage "
     "geometry geometry.fit geometry.drawing geometry.solid skin skin.field "
-    "skin.firmware skin.sources robot.arm robot.driver robot.guard robot.sim commands.arguments commands.terminal",
+    "skin.firmware skin.sources robot.arm robot.driver robot.guard robot.sim commands.arguments commands.terminal "
+    "commands.demonstration",
+    "commands.demonstration": "replay scene robot.arm robot.guard",
     "commands.terminal": "commissioning skin.detection",
     "commands.arguments": "design geometry geometry.drawing scene.tables skin",
     "testing": "scene robot.arm robot.driver robot.guard robot.reaction robot.stop robot.ur skin skin.detection "

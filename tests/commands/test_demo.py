@@ -5,7 +5,9 @@ import time
 import pytest
 
 from coneskin.commands.demo import _Transcript
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.commands.demonstration.report import hold_up
+from coneskin.recording import Block
+from coneskin.robot.guard.journal import BlockKind, GuardEvent
 
 
 def test_a_line_of_the_program_follows_the_event_that_it_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -24,3 +26,20 @@ def test_a_line_of_the_program_follows_the_event_that_it_waits_for(monkeypatch: 
     times = [float(line.split()[0]) for line in lines]
     assert times == sorted(times)
     assert times[0] == 1.0  # since the run began
+
+
+def flow(kind: BlockKind, *times: float) -> list[Block]:
+    return [Block(kind, time, b"") for time in times]
+
+
+def test_what_a_busy_computer_held_up_is_named_before_what_followed() -> None:
+    skin, arm = flow(BlockKind.SKIN, 1.0, 1.01, 1.08, 1.09), flow(BlockKind.ARM, 1.0, 1.02, 1.06)
+    late = Block(BlockKind.OVERRUN, 1.2, b'{"late": 0.12}')
+    assert hold_up([*skin, *arm]).startswith(
+        "this computer was too busy: it held up frames of the skin for 70 ms (50 ms"
+    )
+    assert "frames of the skin for 70 ms, the guard for 120 ms (" in hold_up([*skin, *arm, late])
+
+
+def test_a_computer_that_was_not_busy_is_not_blamed() -> None:
+    assert hold_up([*flow(BlockKind.SKIN, 1.0, 1.04), *flow(BlockKind.ARM, 2.0), *flow(BlockKind.TICK, 1.0, 9.0)]) == ""

@@ -15,22 +15,25 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from coneskin.errors import Collision, MissingExtra, RobotConnectionError, RobotRefused
-from coneskin.robot.guard.journal import EventName, describe_way
+from coneskin.errors import Collision, ConeSkinError, MissingExtra, RecordingError, RobotConnectionError, RobotRefused
 from coneskin.scene.required_packages import has_physics_engine
+
+from .demonstration.report import collision_facts, hold_up, print_report
+from .demonstration.scene import FROM_DEG, TO_DEG, TOUCHED_U, leading_side, make_scene
 
 if TYPE_CHECKING:
     import socket
     from collections.abc import Callable
 
+    from coneskin.physics.impact_outcome import ImpactOutcome
     from coneskin.replay.run import Run
     from coneskin.robot.guard.journal import GuardEvent
     from coneskin.scene.scene import Scene
     from coneskin.session.session import Session
 
-__all__ = ["SCENE", "add_arguments", "run"]
+__all__ = ["add_arguments", "run"]
 
 _EXAMPLE = """\
 example:
@@ -40,57 +43,10 @@ example:
 exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
 """
 
-#: the scene of the demo: the tube of the UR5e's forearm as ``coneskin design`` finds it. The limits of
-#: silence are long because a pseudo-terminal on a busy machine can stall for that long
-SCENE = """\
-[arm]
-model = "UR5e"
-host = "{host}"
-
-[[link]]
-name = "forearm"
-
-[[link.sensor]]
-id = 1
-name = "forearm skin"
-radius1_mm = 37.62
-radius2_mm = 37.30
-height_mm = 240
-xyz_mm = [0, -0.4, 100]
-
-[source]
-kind = "virtual"
-rate_hz = 500
-
-[reaction]
-kind = "{reaction}"
-deceleration_rad_s2 = 40      # this arm's motors can, folded as it is here: docs/safety.md
-distance_mm = 20              # and back what it moved while it stopped: the whole arm may go 100 mm
-
-[monitoring]                  # defaults: 50 ms each; a pseudo-terminal on a busy machine can stall for longer
-skin_silence_ms = 250
-skin_late_ms = 250
-arm_silence_ms = 250
-{more}"""
-#: with physics: servos follow 10 ms late, and what they do comes from one more process
-_PATIENCE = "escalate_ms = 100"
-#: what it runs into, half way; as heavy as a hand (ISO/TS 15066, table A.3), and much softer
-_BODY = """
-[[body]]
-kind = "hand"
-xyz_mm = [{x:.1f}, {y:.1f}, {z:.1f}]
-radius_mm = {radius_mm:g}
-mass_kg = 0.6
-stiffness_n_per_mm = 2
-"""
-_RADIUS = 0.03  # m of that
-_FROM_DEG = (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)  # joint positions at the start
-_TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)  # joint positions at the end
 _SPEED = 1.0  # rad/s, of the leading joint
 _ACCELERATION = 2.0  # rad/s2, of the leading joint
 _TOUCH_DELAY = 0.9  # s after the start of the second move: in the middle of it, at full speed
 _EVENT_TIMEOUT = 2.0  # s for an event that has happened to be printed
-_U = 0.13  # m; slant distance of the touch from end 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -111,8 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo."""
     from coneskin.replay.run import read_run, replay
-    from coneskin.robot.sim.process import SimulatedController, free_host
-    from coneskin.scene.reader import parse_scene
+    from coneskin.robot.sim.process import free_host
 
     folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
     try:
@@ -121,12 +76,8 @@ def run(args: argparse.Namespace) -> int:
         raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
     host = args.host or free_host()
     soft = has_physics_engine()
-    text = SCENE.format(host=host, reaction=args.reaction, more=_PATIENCE if soft else "")
-    scene = parse_scene(text, "scene.toml", folder)
-    if soft:
-        text += _body_in_the_way(scene)
-        scene = parse_scene(text, "scene.toml", folder)
-    (folder / "scene.toml").write_text(text, encoding="utf-8")
+    scene = make_scene(host, args.reaction, soft, folder)
+    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
 
     def say(line: str) -> None:
         if not args.json:
@@ -137,27 +88,15 @@ def run(args: argparse.Namespace) -> int:
         say("a script touches it: to let it run into something soft, pip install 'coneskin[physics]'")
     if scene.moves_away:
         _commission(scene, say)
-    start_q = [math.radians(q) for q in _FROM_DEG]
-    with contextlib.ExitStack() as stack:
-        plant = None
-        if soft:
-            from coneskin.physics.live_plant import LivePlant
-
-            plant = stack.enter_context(LivePlant(scene, start_q))
-        line = None if plant is None else plant.controller
-        controller = stack.enter_context(SimulatedController("UR5e", host, start_q, plant=line))
-        if plant is None:
-            touched, force = _touch_by_script(scene, folder, say), None
-        else:
-            _collide(scene, folder, say, lambda _: None, plant.skin)
-            if lost := controller.state()["plant_lost"]:
-                raise RobotConnectionError(f"the simulated arm was lost: {lost}")
-            force, touched = plant.outcome()
-            if math.isnan(touched):
-                raise RobotRefused("the arm met nothing, though there is a body in its way")
+    try:
+        touched, force = _meet(scene, soft, folder, say)
+    except ConeSkinError as exc:
+        if cause := _cause(folder):
+            raise RobotRefused(f"{cause}. What followed: {exc}") from exc
+        raise
     recorded = read_run(folder)
     again = replay(recorded)
-    facts = _facts(recorded, touched)
+    facts = collision_facts(recorded, touched)
     facts["peak_n"], facts["clamp_n"] = (None, None) if force is None else (round(force.peak, 1), round(force.clamp, 1))
     facts["same_in_replay"] = again.same
     facts["picture"] = _draw(recorded, folder, say)
@@ -165,9 +104,47 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({**facts, "folder": str(folder)}))
     else:
-        _report(facts, folder, recorded.missing)
+        print_report(facts, folder, recorded.missing)
     alone = facts["contacts"] == 1 or (soft and facts["contacts"] > 1)  # what is soft may swing back
-    return 0 if facts["standstill_ms"] is not None and again.same and alone else 1
+    as_it_should = facts["standstill_ms"] is not None and again.same and alone
+    if (not as_it_should or facts["cut_short"]) and (cause := hold_up(recorded.blocks)):
+        print(f"coneskin demo: {cause}", file=sys.stderr)
+    return 0 if as_it_should else 1
+
+
+def _meet(scene: Scene, soft: bool, folder: Path, say: Callable[[str], None]) -> tuple[float, ImpactOutcome | None]:
+    """Let the arm run into something; return when that began [s], and with which forces where physics is there."""
+    from coneskin.robot.sim.process import SimulatedController
+
+    assert scene.arm is not None
+    start_q = [math.radians(q) for q in FROM_DEG]
+    with contextlib.ExitStack() as stack:
+        plant = None
+        if soft:
+            from coneskin.physics.live_plant import LivePlant
+
+            plant = stack.enter_context(LivePlant(scene, start_q))
+        line = None if plant is None else plant.controller
+        controller = stack.enter_context(SimulatedController("UR5e", scene.arm.host, start_q, plant=line))
+        if plant is None:
+            return _touch_by_script(scene, folder, say), None
+        _collide(scene, folder, say, lambda _: None, plant.skin)
+        if lost := controller.state()["plant_lost"]:
+            raise RobotConnectionError(f"the simulated arm was lost: {lost}")
+        force, touched = plant.outcome()
+        if math.isnan(touched):
+            raise RobotRefused("the arm met nothing, though there is a body in its way")
+        return touched, force
+
+
+def _cause(folder: Path) -> str:
+    """Return what held the run up, by its recording; empty where nothing did, or none tells."""
+    from coneskin.replay.run import read_run
+
+    try:
+        return hold_up(read_run(folder).blocks)
+    except RecordingError:
+        return ""
 
 
 class _Transcript:
@@ -241,7 +218,7 @@ def _collide(
         transcript.line("the arm moves", after="activated")
         meanwhile(session)
         try:
-            session.arm.move_j([math.radians(q) for q in _TO_DEG], _SPEED, _ACCELERATION)
+            session.arm.move_j([math.radians(q) for q in TO_DEG], _SPEED, _ACCELERATION)
             print("coneskin demo: the arm arrived although it was touched", file=sys.stderr)
         except Collision as exc:
             transcript.line(f"the program gets Collision: {exc}", after="latched")
@@ -250,11 +227,11 @@ def _collide(
 def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
     """Touch the arm while it moves; return when the touch began [s]."""
     touches: list[float] = []
-    phi = _leading_side(scene)
+    phi = leading_side(scene)
     timers: list[threading.Timer] = []
 
     def touch_later(session: Session) -> None:
-        timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(session.touch(_U, phi, duration=0.15)))
+        timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(session.touch(TOUCHED_U, phi, duration=0.15)))
         timer.start()
         timers.append(timer)
 
@@ -268,72 +245,6 @@ def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> 
     return touches[0]
 
 
-def _body_in_the_way(scene: Scene) -> str:
-    """Return the table of a body that the sensor's leading side meets half way."""
-    from coneskin.robot.arm.kinematics import link_pose
-    from coneskin.robot.arm.ur_models import arm_model
-    from coneskin.scene.build import place_on_arm
-
-    (placed,) = place_on_arm(scene)
-    assert scene.arm is not None
-    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
-    point, normal = placed.place(_U, _leading_side(scene))
-    pose = link_pose(arm_model(scene.arm.model), middle, placed.link)
-    out = pose.rotate(normal)
-    x, y, z = (1e3 * (p + _RADIUS * n) for p, n in zip(pose.apply(point), out, strict=True))
-    return _BODY.format(x=x, y=y, z=z, radius_mm=1e3 * _RADIUS)
-
-
-def _leading_side(scene: Scene) -> float:
-    """Return the azimuth of the sensor's leading side [rad]: there an obstacle would hit the arm."""
-    from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-    from coneskin.robot.arm.ur_models import arm_model
-    from coneskin.scene.build import place_on_arm
-
-    (placed,) = place_on_arm(scene)
-    assert scene.arm is not None
-    arm = arm_model(scene.arm.model)
-    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
-    qd = [math.radians(b - a) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
-
-    def towards(phi: float) -> float:
-        point, normal = placed.place(_U, phi)
-        rows = point_jacobian(arm, middle, placed.link, point)
-        n = link_pose(arm, middle, placed.link).rotate(normal)
-        return sum(n[k] * sum(j * v for j, v in zip(rows[k], qd, strict=True)) for k in range(3))
-
-    return max((math.radians(degree) for degree in range(360)), key=towards)
-
-
-def _facts(run: Run, touched: float) -> dict[str, Any]:
-    """Return the times after the touch [ms], and what happened."""
-    from coneskin.robot.guard.journal import BlockKind
-
-    events = run.events
-    contact = next((e for e in events if e.name == EventName.CONTACT), None)
-
-    def after(name: str) -> float | None:
-        event = next((e for e in events if e.name == name and contact and e.time >= contact.time), None)
-        return None if event is None else round(1e3 * (event.time - touched), 3)
-
-    commands = [b.time for b in run.blocks if b.kind == BlockKind.COMMAND and contact and b.time >= contact.time]
-    retreated = next((e for e in events if e.name == EventName.RETREATED), None)
-    placed = next((e for e in events if e.name == EventName.CONTACT_LOCATED), contact)
-    return {
-        "contacts": sum(e.name == EventName.CONTACT for e in events),
-        "frame_ms": after("contact"),
-        "command_ms": round(1e3 * (commands[0] - touched), 3) if commands else None,
-        "slower_ms": after("decelerating"),
-        "standstill_ms": after("standstill"),
-        "latched_ms": after("latched"),
-        "retreat_mm": None if retreated is None else round(1e3 * retreated.details["progress"], 2),
-        "way": None if retreated is None else describe_way(retreated.details),
-        "cut_short": retreated.details["why"] if retreated is not None and not retreated.details["complete"] else None,
-        "u_mm": None if placed is None else round(1e3 * placed.details["u"], 2),
-        "phi_deg": None if placed is None else round(math.degrees(placed.details["phi"]), 2),
-    }
-
-
 def _draw(recorded: Run, folder: Path, say: Callable[[str], None]) -> str | None:
     from coneskin.replay.run_picture import draw_run
 
@@ -343,26 +254,3 @@ def _draw(recorded: Run, folder: Path, say: Callable[[str], None]) -> str | None
         say(f"no picture: {exc}")
         return None
     return "run.png"
-
-
-def _report(facts: dict[str, Any], folder: Path, missing: str) -> None:
-    print("\nafter the touch began:")
-    for key, words in (
-        ("frame_ms", "frame over the threshold decoded"),
-        ("command_ms", "stop written to the driver process"),
-        ("slower_ms", "arm decelerating, as measured"),
-        ("standstill_ms", "standstill, as measured"),
-        ("latched_ms", "latched: standstill after the reaction"),
-    ):
-        value = facts[key]
-        print(f"  {'never' if value is None else f'{value:8.2f} ms'}  {words}")
-    if facts["peak_n"] is not None:
-        print(f"  {facts['peak_n']:8.1f} N   peak force on the body; {facts['clamp_n']:.1f} N at most 0.5 s later")
-    if facts["retreat_mm"] is not None:
-        print(f"  {facts['way']}, along the normal")
-    if facts["cut_short"] is not None:
-        print(f"  the retreat was NOT made as far as it was to: {facts['cut_short']}; on a quieter machine it is")
-    print("replay: " + ("the same events, bit by bit" if facts["same_in_replay"] else "NOT the same events"))
-    if missing:
-        print(f"recording: {missing}")
-    print(f"written to {folder}: run.rec, scene.toml, summary.json" + (", run.png" if facts["picture"] else ""))

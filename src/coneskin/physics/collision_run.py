@@ -110,12 +110,13 @@ class CollisionRun:
         """Outcome so far."""
         return self.meter.outcome
 
-    def run(self, program: JointProgram, longest: float = 3.0) -> ImpactOutcome:
+    def run(self, program: JointProgram, longest: float = 3.0, after: float = _AFTER) -> ImpactOutcome:
         """Wait until the guard is active, let the program move the arm, and see what comes of it.
 
         Args:
             program: that moves the arm until the guard does.
             longest: for which to look on [s]; it is over 0.5 s after the first contact.
+            after: for which to go on then, to see what comes later [s].
 
         Returns:
             the outcome; that of no contact has a peak of 0.
@@ -130,7 +131,7 @@ class CollisionRun:
         while self.now - self._began < longest and left > 0.0:
             self._step()
             if self.meter.over:
-                left = min(left, _AFTER) - _STEP
+                left = min(left, after) - _STEP
         return self.outcome
 
     def _step(self, moving: bool = True) -> None:

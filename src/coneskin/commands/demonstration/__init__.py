@@ -1,0 +1,1 @@
+"""Parts of ``coneskin demo``: its scene, and what it reports."""
