@@ -21,6 +21,7 @@ from .fitted_sheet import FittedSheet, fitted_sheet
 from .plan import AxisSurvey, SheetPlan, best_plan, better_surveys, survey_axes
 from .sampled_link import SampledLink, sample_link
 from .surface_samples import SurfaceSamples
+from .touch_weights import TouchWeights
 
 __all__ = ["LEAST_GAIN", "BareLength", "LinkFit", "find_cones", "fit_cones"]
 
@@ -65,6 +66,7 @@ class LinkFit:
         needed_tolerance: where nothing fits, a tolerance with which something does, tried [m]; infinite without one.
         bare_areas: what no sheet covers, by reason, the largest first; empty where no sheet fits.
         weights: name of the map by which areas were weighed; empty where all count the same.
+        touch_weights: that map; None where all count the same.
     """
 
     sheets: tuple[FittedSheet, ...]
@@ -80,6 +82,7 @@ class LinkFit:
     needed_tolerance: float = math.inf
     bare_areas: tuple[BareArea, ...] = ()
     weights: str = ""
+    touch_weights: TouchWeights | None = None
 
 
 def find_cones(
@@ -160,6 +163,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
             candidates=len(candidates),
             ray_engine=rays.engine,
             weights=name,
+            touch_weights=link.weights,
         )
     first = plan.axes[0]
     return LinkFit(
@@ -189,6 +193,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         candidates=len(candidates),
         ray_engine=rays.engine,
         weights=name,
+        touch_weights=link.weights,
     )
 
 

@@ -7,6 +7,8 @@ import pytest
 
 from coneskin.design.pictures import _covered
 from coneskin.design.sheets import DesignOptions, design_sheets
+from coneskin.design.weights_picture import draw_weights
+from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
@@ -37,3 +39,27 @@ def test_a_triangle_under_a_sheet_is_covered(u: float, phi: float, height: float
         )
     assert _covered(design, np.array([corners])).tolist() == [covered]
     assert math.dist(corners[0], corners[1]) == pytest.approx(0.002)
+
+
+def test_what_counts_is_drawn_in_the_colours_of_its_weights() -> None:
+    """Half of a tube counts, half does not: each triangle has the colour of the nearest place of the map."""
+    module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
+    from matplotlib import colormaps
+
+    figure = module.Figure()
+    side = Frustum(0.05, 0.05, 0.2)
+    designs = design_sheets([PlacedFrustum(side)], DesignOptions())
+    phi = np.linspace(0.0, 2.0 * math.pi, 41)[:-1]
+    around = np.stack([0.05 * np.cos(phi), 0.05 * np.sin(phi), np.full(40, 0.1)], axis=1)
+    triangles = np.stack([around, around + [0.0, 0.0, 0.01], np.roll(around, -1, axis=0)], axis=1)
+    weights = TouchWeights(np.array([[0.05, 0.0, 0.1], [-0.05, 0.0, 0.1]]), np.array([4.0, 1.0]), "map.csv")
+    draw_weights(figure, triangles, designs, weights)
+    one, two, bar = figure.axes
+    assert "map.csv" in bar.get_xlabel()
+    for axes in (one, two):
+        drawn = axes.collections[0]
+        colours = np.unique(np.round(drawn.get_facecolor(), 6), axis=0)
+        wanted = np.round([colormaps["viridis"](1.0), colormaps["viridis"](0.25)], 2)
+        assert len(colours) == 2
+        assert sorted(map(tuple, np.round(colours, 2).tolist())) == sorted(map(tuple, wanted.tolist()))
+        assert len(axes.lines) == 4 * len(designs)

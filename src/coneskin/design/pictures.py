@@ -14,10 +14,12 @@ from .layout_picture import FOIL_COLOUR, INK_COLOUR, draw_layout
 from .parts_picture import draw_parts
 from .sheets import SheetDesign
 from .stack_picture import draw_seam, draw_stack
+from .weights_picture import draw_weights
 from .workshop.build_figures import BuildFigures
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea
+    from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
 
 __all__ = ["draw_pictures"]
@@ -35,6 +37,7 @@ def draw_pictures(
     tolerance: float,
     progress: Callable[[str], None],
     bare: Sequence[BareArea] = (),
+    weights: TouchWeights | None = None,
 ) -> list[tuple[str, str]]:
     """Draw the link with its sheets, and of each sheet its layout, parts, stack and seam, and the map of deviations.
 
@@ -46,6 +49,7 @@ def draw_pictures(
         tolerance: of the fit [m].
         progress: called with the name of each step.
         bare: what no sheet covers, by reason; each has a colour of its own.
+        weights: what areas count; None where all count the same.
 
     Returns:
         caption and path in the folder of each picture.
@@ -73,6 +77,11 @@ def draw_pictures(
         "The link with its sheets: outer faces in colour, middle lines of the electrodes in orange, edges black."
         + (" What is bare is tinted by its reason." if bare else ""),
     )
+    if weights is not None and mesh is not None:
+        progress("drawing what counts")
+        figure = Figure(figsize=(10, 6), layout="constrained")
+        draw_weights(figure, _coarser(mesh), designs, weights)
+        save(figure, "weights.png", f"What counts on the link, by {weights.name}, from two sides.")
     for design, item in zip(designs, figures, strict=True):
         progress(f"{design.name}: drawing the layout")
         figure = Figure(figsize=(9, 7), layout="constrained")
