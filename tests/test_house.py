@@ -45,7 +45,9 @@ MAY_IMPORT: dict[str, str] = {
     "robot.reaction": "robot.arm geometry",
     "robot.stop": "robot.arm robot.driver",
     "robot.ur": "robot.arm robot.driver geometry",
-    "robot.guard": "robot.arm robot.driver robot.reaction robot.stop skin skin.detection skin.sources geometry",
+    "robot.guard": "robot.guard.speed robot.arm robot.driver robot.reaction robot.stop skin skin.detection "
+    "skin.sources geometry",
+    "robot.guard.speed": "robot.guard robot.arm robot.driver robot.reaction robot.stop geometry",
     "robot.sim": "robot.sim.functions robot.sim.motion robot.sim.polyscope robot.sim.ports robot.sim.urscript "
     "robot.arm robot.ur",
     "robot.sim.functions": "robot.sim robot.sim.motion robot.sim.urscript robot.arm robot.ur geometry",
@@ -53,8 +55,8 @@ MAY_IMPORT: dict[str, str] = {
     "robot.sim.polyscope": "robot.sim robot.sim.ports robot.sim.urscript",
     "robot.sim.ports": "robot.sim robot.sim.motion robot.sim.urscript robot.arm robot.ur geometry",
     "robot.sim.urscript": "geometry",
-    "scene": "scene.tables robot.arm robot.driver robot.guard robot.reaction robot.stop skin skin.detection "
-    "skin.sources skin.virtual geometry",
+    "scene": "scene.tables robot.arm robot.driver robot.guard robot.guard.speed robot.reaction robot.stop skin "
+    "skin.detection skin.sources skin.virtual geometry",
     "scene.tables": "scene robot.arm robot.reaction robot.stop skin skin.detection skin.sources skin.virtual geometry",
     "calibration": "commissioning scene scene.tables session skin skin.detection geometry.drawing",
     "commissioning": "scene session robot.arm robot.driver skin skin.detection skin.sources geometry",

@@ -35,14 +35,14 @@ from .journal import EventName
 from .motion_away import MotionAway
 from .outputs import Outputs, emit
 from .phase import Phase
-from .speed_reduction import SpeedReduction
+from .speed.speed_reduction import SpeedReduction
 from .stop_escalation import StopEscalation
 from .touch_record import TouchRecord
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .controller_heartbeat import ControllerHeartbeat
     from .reaction_motion import ReactionPlanner
-    from .speed_limit import SpeedLimit
+    from .speed.speed_limit import SpeedLimit
 
 __all__ = ["ArmSupervisor"]
 
@@ -109,6 +109,7 @@ class ArmSupervisor:
         self._reaction = reaction  # the one that is under way
         self._fresh = -math.inf  # host time of the newest state that was a new one
         self._why = ""
+        self._ending = False
         self._watch = StandstillWatch(limits.standstill)
         self.stop_number = 0  # of the newest stop, counted since the guard's start
 
@@ -199,6 +200,12 @@ class ArmSupervisor:
             self._away.permitted = False
         elif self.phase.stopping:
             self._why, self._away.permitted = self._again(why), False
+
+    def end(self, now: float, out: Outputs) -> None:
+        """Leave the speed slider as it was found once the arm stands latched: the guard ends, at a host time [s]."""
+        self._ending = True
+        if self.phase in (Phase.STARTING, Phase.LATCHED):
+            self._put_slider_back(now, out)
 
     def lose(self, paths: frozenset[StopPath], now: float, for_good: bool = True) -> None:
         """Drop stop paths that are lost, or that this stop must not count on, and use the next one at once."""
@@ -353,6 +360,13 @@ class ArmSupervisor:
         if self._stops.unconfirmed(state):
             self._why += "; the controller does not show the protective stop"
         emit(out, EventName.LATCHED, state.time, why=self._why, stop=self.stop_number)
+        if self._ending:
+            self._put_slider_back(state.time, out)
+
+    def _put_slider_back(self, now: float, out: Outputs) -> None:
+        if self._speed_limit is not None:
+            slider = self.speed_reduction.slider if self.speed_reduction.knows(now) else None
+            self._speed_limit.end(now, slider, out)
 
     def _note_slider(self) -> None:
         """Remember where the slider was before a stop put it to 0; a person's reset puts it back."""

@@ -225,6 +225,8 @@ class GuardCore:
         self._faults.react(block.time, why, out)
         if what == "session":
             self._folding.flush(block.time, out)
+            if self._arm is not None:
+                self._arm.end(block.time, out)
         emit(out, EventName.ENDING if what == "session" else EventName.FAULT, block.time, what=why)
 
     def _take_reopened(self, block: Block, out: Outputs) -> None:

@@ -36,6 +36,8 @@ def table(**changes: object) -> dict[str, object]:
         "measured_by": "a test",
         "reaction_ms": 10.0,
         "deceleration_rad_s2": 9.0,
+        "curves": 1,
+        "patches": 8,
         "levers_mm": [100.0, 200.0, 400.0],
         "curve": [{"region": "hand", "speeds_mm_s": [50.0, 100.0, 200.0]}],
         "patch": [
@@ -110,7 +112,11 @@ def test_a_slow_reaction_is_refused_beside_it(tmp_path: Path) -> None:
             {"patch": [{"sensor": NAME, "u_mm": 0.0, "phi_deg": 0.0, "curve": 9, "any_curve": 0}]},
             "a curve that there is",
         ),
-        ({"patch": [{"sensor": "?", "u_mm": 0.0, "phi_deg": 0.0, "curve": 0, "any_curve": 0}]}, "not in both"),
+        (
+            {"patch": [{"sensor": "?", "u_mm": 0.0, "phi_deg": 0.0, "curve": 0, "any_curve": 0}], "patches": 1},
+            "not in both",
+        ),
+        ({"curves": 2}, "was cut or changed"),
     ],
 )
 def test_a_table_with_a_mistake_is_refused(tmp_path: Path, changes: dict[str, object], message: str) -> None:
@@ -167,10 +173,18 @@ def test_no_place_is_faster_than_its_patches_are_held_to_be(bends: str) -> None:
     wrap = place.frustum.frustum.wrap
     patches = [LimitedPatch(NAME, 0.13, wrap * n / 16, 0, 0) for n in range(16)]
     table = SpeedLimitScene(1, *[""] * 7, 0.01, 9.0, (), (), (0.1,), ((1.0,),), tuple(patches))
-    limit = _speed_limit(scene, table, arm_model("UR5e"))._speeds
+    limit = _speed_limit(scene, table, arm_model("UR5e")).speeds
     normals = [place.place(0.13, wrap * n / 997)[1] for n in range(997)]
     for degrees in range(360):
         way = (0.0, math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))  # the tube lies along x
         fastest = max(along(way, normal) for normal in normals)
         seen = max(along(way, patch.normal) for patch in limit.patches)
         assert fastest <= limit.between * seen + 1e-9
+
+
+def test_a_file_that_was_cut_at_a_row_is_refused(tmp_path: Path) -> None:
+    rows = table()["speed_limit"]["patch"]
+    for left in range(1, len(rows)):  # what is left is TOML, and every row in it is whole
+        with pytest.raises(SceneError, match="the file was cut or changed"):
+            load(tmp_path, patch=rows[:left])
+    load(tmp_path, patch=rows)

@@ -38,6 +38,7 @@ def map_table(found: SpeedMap) -> dict[str, Any]:
         values["lowest_deg"] = [math.degrees(q) for q in table.lowest]
         values["highest_deg"] = [math.degrees(q) for q in table.highest]
     values["levers_mm"] = [1e3 * lever for lever in table.levers]
+    values |= {"curves": len(found.curves), "patches": len(table.patches)}  # a file that was cut at a row shows it
     values["curve"] = [
         {"region": curve.region}
         | ({} if math.isinf(curve.mass) else {"mass_kg": curve.mass})

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.guard.core import GuardCore
     from coneskin.robot.guard.reaction_motion import ReactionPlanner
-    from coneskin.robot.guard.speed_limit import SpeedLimit
+    from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 
     from .scene import Scene
     from .speed_limit import SpeedLimitScene
@@ -117,7 +117,8 @@ def _arm(scene: Scene) -> ArmSupervisor:
 
 def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLimit:
     """Build the limit of the speed; a place between two patches is faster than they are by at most a little."""
-    from coneskin.robot.guard.speed_limit import PermissiblePatch, PermissibleSpeeds, SpeedLimit
+    from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds
+    from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 
     # on the frusta, not on the meshes below: a mesh file must not be needed, and the speed of either is the same
     bare = replace(scene, links=tuple(replace(link, mesh=None) for link in scene.links))

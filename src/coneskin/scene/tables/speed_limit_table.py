@@ -52,6 +52,8 @@ SPEED_LIMIT_KEYS = (
     Key("lowest_deg", list, (), low=-363.0, high=363.0),
     Key("highest_deg", list, (), low=-363.0, high=363.0),
     Key("levers_mm", list, low=0.1, high=10_000.0),
+    Key("curves", int, low=1, high=_MAX_ROWS),
+    Key("patches", int, low=1, high=_MAX_ROWS),
     Key("curve", dict),
     Key("patch", dict),
 )
@@ -143,6 +145,7 @@ def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLim
         return None
     lines: list[str] = []
     values = check(tables["speed_limit"], SPEED_LIMIT_KEYS, "speed_limit", lines)
+    counts = [values.pop(key, None) for key in ("curves", "patches")]
     rows = values.pop("curve", ())[:_MAX_ROWS]
     curves = [check(row, _CURVE, f"speed_limit.curve {n}", lines) for n, row in enumerate(rows)]
     rows = values.pop("patch", ())[:_MAX_ROWS]
@@ -151,6 +154,11 @@ def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLim
     if not lines:
         if values["format"] != _FORMAT:
             lines.append(f"speed_limit.format must be {_FORMAT}, got {values['format']}: {HOW_TO}")
+        if counts != [len(curves), len(patches)]:
+            lines.append(
+                f"speed_limit: curves = {counts[0]} and patches = {counts[1]} were written, there are {len(curves)} "
+                f"and {len(patches)}: the file was cut or changed; {HOW_TO}"
+            )
         if not levers or any(b <= a for a, b in pairwise(levers)):
             lines.append("speed_limit.levers_mm must rise")
         if not curves or any(len(curve["speeds"]) != len(levers) for curve in curves):

@@ -4,7 +4,7 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.guard.speed_reduction import HOLD, ReducedSpeedTouch, SpeedReduction
+from coneskin.robot.guard.speed.speed_reduction import HOLD, ReducedSpeedTouch, SpeedReduction
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES

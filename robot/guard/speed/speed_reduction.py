@@ -16,17 +16,15 @@ from typing import TYPE_CHECKING
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.outputs import Outputs, emit
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES
 
-from .journal import EventName
-from .outputs import Outputs, emit
-
 if TYPE_CHECKING:  # a scene without a slow reaction does not load it
+    from coneskin.robot.guard.joint_current import JointCurrentMonitor
     from coneskin.robot.reaction.contact_approach import ContactApproach
-
-    from .joint_current import JointCurrentMonitor
 
 __all__ = ["HOLD", "ReducedSpeedTouch", "SpeedReduction"]
 
@@ -135,9 +133,8 @@ class SpeedReduction:
     def __init__(self, model: ArmModel, used: bool) -> None:
         self._model = model
         if used:  # here, so that no touch waits for it
+            from coneskin.robot.guard.joint_current import JointCurrentMonitor
             from coneskin.robot.reaction.contact_approach import ContactApproach
-
-            from .joint_current import JointCurrentMonitor
 
             self._approach_of, self._monitor_of = ContactApproach, JointCurrentMonitor
         self.approach: ContactApproach | None = None

@@ -1,0 +1,142 @@
+"""Permissible speeds of the surfaces of an arm towards what they could strike, and a motion's share of them. Pure.
+
+Each patch of a skin has a permissible speed along its outward normal. It depends on the lever: the speed of the patch
+over that of the leading joint, which says how far the surface still goes while that joint brakes.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import mul
+
+from coneskin.geometry.pose import Vector
+from coneskin.robot.arm.compiled_kinematics import compile_contact
+from coneskin.robot.arm.model import ArmModel
+
+__all__ = ["PermissiblePatch", "PermissibleSpeeds", "SurfaceSpeeds"]
+
+
+@dataclass(frozen=True, slots=True)
+class PermissiblePatch:
+    """Patch of a skin.
+
+    Attributes:
+        name: of its sensor.
+        link: index of the link's DH frame.
+        point: in that frame [m].
+        normal: outward unit normal in that frame.
+        curve: permissible speeds within the joint positions of the motion, for each lever [m/s].
+        any_curve: in any position [m/s].
+    """
+
+    name: str
+    link: int
+    point: Vector
+    normal: Vector
+    curve: tuple[float, ...]
+    any_curve: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PermissibleSpeeds:
+    """Permissible speeds of one arm.
+
+    Attributes:
+        levers: [m/rad], rising.
+        patches: of its skins.
+        lowest: joint positions [rad] from which on the patches' own curves hold; empty where they never do.
+        highest: joint positions [rad] up to which they do.
+        between: factor by which a place between the patches may be faster than they are.
+    """
+
+    levers: tuple[float, ...]
+    patches: tuple[PermissiblePatch, ...]
+    lowest: tuple[float, ...] = ()
+    highest: tuple[float, ...] = ()
+    between: float = 1.0
+
+    def covers(self, q: Sequence[float]) -> bool:
+        """Tell whether the patches' own curves hold at joint positions [rad]."""
+        if not self.lowest:
+            return False
+        return all(low <= at <= high for low, at, high in zip(self.lowest, q, self.highest, strict=True))
+
+
+class SurfaceSpeeds:
+    """Speeds of the surfaces of one arm.
+
+    Args:
+        model: the arm.
+        speeds: that are permissible.
+    """
+
+    def __init__(self, model: ArmModel, speeds: PermissibleSpeeds) -> None:
+        self._speeds = speeds
+        self._links = [
+            (link, compile_contact(model, link).place, [_Row(patch) for patch in speeds.patches if patch.link == link])
+            for link in sorted({patch.link for patch in speeds.patches if patch.link > 0})
+        ]
+
+    def ratio(self, q: Sequence[float], qd: Sequence[float]) -> tuple[float, str]:
+        """Return the highest speed of a patch over what is permissible, and the patch's sensor.
+
+        Args:
+            q: joint positions [rad].
+            qd: joint speeds [rad/s].
+        """
+        leading = max(map(abs, qd))
+        if leading <= 0.0:
+            return 0.0, ""
+        speeds, worst, name = self._speeds, 0.0, ""
+        inside = speeds.covers(q)
+        for link, place, rows in self._links:
+            twist: list[float] = []
+            for point, axis in _FRAME:
+                _, _, _, nx, ny, nz, *columns = place(*q, *point, *axis)
+                vx, vy, vz = (sum(columns[3 * i + k] * qd[i] for i in range(link)) for k in range(3))
+                twist += (vx, vy, vz, nx, ny, nz)
+            flow = _flow(twist)
+            for row in rows:
+                speed = speeds.between * sum(map(mul, row.weights, flow))
+                if speed > 0.0:
+                    curve = row.patch.curve if inside else row.patch.any_curve
+                    ratio = speed / max(1e-6, _interpolate(speeds.levers, curve, speed / leading))
+                    if ratio > worst:
+                        worst, name = ratio, row.patch.name
+        return worst, name
+
+
+#: points and directions in a link's frame, at which its motion is read off
+_FRAME = (
+    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
+)
+
+
+class _Row:
+    """Patch with the weights that make its speed along the normal of the speeds of four points of its link."""
+
+    def __init__(self, patch: PermissiblePatch) -> None:
+        self.patch = patch
+        x, y, z = patch.point
+        self.weights = [share * n for share in (1.0 - x - y - z, x, y, z) for n in patch.normal]
+
+
+def _flow(twist: Sequence[float]) -> list[float]:
+    """Return the speeds of the four points along the axes of the frame of the link [m/s], as ``_Row`` weighs them."""
+    axes = [twist[6 * number + 3 : 6 * number + 6] for number in range(3)]
+    speeds = [twist[6 * number : 6 * number + 3] for number in range(4)]
+    return [sum(map(mul, axis, speed)) for speed in speeds for axis in axes]
+
+
+def _interpolate(levers: Sequence[float], curve: Sequence[float], lever: float) -> float:
+    """Return a value of a curve that begins at 0; the curves bend downwards, so it is never above the curve."""
+    if lever >= levers[-1]:
+        return curve[-1]
+    at = bisect_left(levers, lever)
+    low, below = (levers[at - 1], curve[at - 1]) if at else (0.0, 0.0)
+    return below + (curve[at] - below) * (lever - low) / (levers[at] - low)

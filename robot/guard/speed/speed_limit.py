@@ -1,0 +1,248 @@
+"""Limit of the speed with which the surfaces of an arm may move towards what they could strike. Pure.
+
+One look says how far down the speed slider must go, because the lever of a patch (``permissible_speeds``) stays where
+the slider scales a motion. A motion is looked at where it will be when the slider can have an effect: further on, and
+faster where it still speeds up, but not faster than its program was seen to go at that slider. Down the slider goes at
+once; up again only after motion that would have allowed it, never beyond where a person has put it, and after twice as
+much motion each time that it had to go down again. So it comes to rest where a program repeats itself. Where it has no
+effect the arm is stopped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+from coneskin.robot.arm.model import ArmModel, Joints
+from coneskin.robot.driver.setpoint import SetSpeedSlider
+from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.outputs import Outputs, emit
+
+from .permissible_speeds import PermissibleSpeeds, SurfaceSpeeds
+from .slider_setting import SliderSetting
+
+__all__ = ["SpeedLimit"]
+
+_MARGIN = 0.9  # of the permissible speed, to which the slider goes
+_GROWTH = 1.05  # ratio; from which on an arm speeds up
+_STEADY = 1.02  # ratio; up to which it does not
+_STEADY_TIME = 0.04  # s for which it must not, to tell how fast the program goes
+_FALL = 0.98  # ratio; below, a speed falls
+_LEAD = 0.06  # s that the slider takes to have an effect
+_WINDOW = 0.02  # s over which the growth is taken
+_PATIENCE = 0.3  # s for which a speed above the limit may fall after the slider was set
+_TOLERANCE = 1.05  # of the permissible speed; above, after the patience, the arm is stopped
+_HOLD = 2.0  # s of motion after which the slider may go up again, the first time
+_LONGEST_HOLD = 64.0  # s
+_STEP_UP = 1.2  # ratio; smaller ones are not worth it
+_LEAST = 0.01  # of the slider
+_SLOW = 0.02  # rad/s of the leading joint, below which an arm counts as not moving
+_REMEMBERED = 3.0 * _PATIENCE  # s; an arm that obeys is then as slow as the highest slider since lets its joints be
+_JOINT_MARGIN = 1.25  # of that speed
+
+
+class SpeedLimit:
+    """Limit of one arm.
+
+    Args:
+        model: the arm.
+        speeds: that are permissible.
+
+    Attributes:
+        speeds: that are permissible.
+        setting: of the slider.
+    """
+
+    def __init__(self, model: ArmModel, speeds: PermissibleSpeeds) -> None:
+        self.speeds = speeds
+        self._surfaces = SurfaceSpeeds(model, speeds)
+        self._joint_speed = model.joint_speed
+        self._fastest = max(model.joint_speed)
+        self.setting = SliderSetting()
+        self._sliders: deque[tuple[float, float]] = deque()  # time, and where the slider is from then on
+        self._before: deque[tuple[float, Joints]] = deque()
+        self._over_since: float | None = None
+        self._top = 0.0  # highest ratio since then
+        self._judged_at = -math.inf
+        self._ratio_then = 0.0  # when it was judged last whether the speed falls
+        self._asked: float | None = None  # rad/s of the leading joint, for which the program asks at full slider
+        self._steady_since = math.inf
+        self._hold = _HOLD
+        self._raised = False  # since the slider went down last
+        self._looked_at = math.inf
+        self._moved = 0.0  # s of motion since the slider was set
+        self._demand = 0.0  # highest ratio at full slider in that time
+
+    def sample(self, state: ControllerState, slider: float | None, out: Outputs) -> str:
+        """Take a measured state; return why the arm must be stopped, empty where it must not.
+
+        Args:
+            state: of the arm.
+            slider: where the controller's speed slider is; None where that is not known.
+            out: takes the slider's setting, and an event.
+        """
+        now = state.time
+        self._note_slider(now, slider, out)
+        ahead = self._ahead(now, state)
+        ratio, name = self._surfaces.ratio([q + _LEAD * v for q, v in zip(state.q, ahead, strict=True)], ahead)
+        if ratio <= 1.0:
+            self._over_since = None
+            self._relax(now, ratio, state.speed, out)
+            return ""
+        self._forget_demand()
+        if slider is None:
+            return f"{name} moves at {ratio:.0%} of the permissible speed, and the speed slider is not known"
+        if self._disobeys(now, state.qd):
+            return f"{name} moves at {ratio:.0%} of the permissible speed, and faster than the speed slider allows"
+        if self._over_since is None:
+            self._over_since, self._top = now, ratio
+            self._lower(now, slider, ratio, ahead, state.speed, name, out)
+            return ""
+        self._top = max(self._top, ratio)
+        if now - self._judged_at >= _LEAD:
+            if ratio > _FALL * self._ratio_then:  # it was not enough
+                self._lower(now, slider, ratio, ahead, state.speed, name, out)
+            self._judged_at, self._ratio_then = now, ratio
+        if now - self._over_since > _PATIENCE:
+            measured = self._surfaces.ratio(state.q, state.qd)[0]
+            falls = measured < _FALL * self._top
+            if measured > _TOLERANCE and (not falls or now - self._over_since > 3.0 * _PATIENCE):
+                return f"{name} moves at {measured:.0%} of the permissible speed, and the speed slider has no effect"
+        return ""
+
+    def forget(self) -> None:
+        """Forget what was measured: the arm stood, and moves again."""
+        self._before.clear()
+        self._forget_demand()
+        self._over_since = self._asked = None
+        self.setting.resume()
+
+    def end(self, now: float, slider: float | None, out: Outputs) -> None:
+        """Put the slider back where it was found, unless a stop or a person has moved it since.
+
+        Args:
+            now: host time [s].
+            slider: where it is; None where that is not known.
+            out: takes the slider's setting, and an event.
+        """
+        setting = self.setting
+        found = None if slider is None else setting.found(slider)
+        if found is not None and slider is not None:
+            setting.fraction = None
+            out.append(SetSpeedSlider(found))
+            emit(out, EventName.SPEED_LIMITED, now, slider=found, before=slider, sensor="", ratio=0.0, found=found)
+
+    # ---- what is measured
+
+    def _note_slider(self, now: float, slider: float | None, out: Outputs) -> None:
+        sliders = self._sliders
+        if slider is None:
+            sliders.clear()
+            return
+        if not sliders or sliders[-1][1] != slider:
+            sliders.append((now, slider))
+        while len(sliders) > 1 and now - sliders[1][0] >= _REMEMBERED:
+            sliders.popleft()
+        if self.setting.note(now, slider):  # a person wants it so: begin anew
+            self._hold, self._raised = _HOLD, False
+            self._forget_demand()
+        fraction, ceiling = self.setting.fraction, self.setting.ceiling
+        if fraction is not None and fraction > ceiling:  # it crossed the person's setting on its way
+            self._set(now, ceiling, slider, "", 0.0, out)
+
+    @property
+    def _highest(self) -> float:
+        """Highest slider that may still have an effect."""
+        return max(self.setting.fraction or 0.0, max((slider for _, slider in self._sliders), default=0.0))
+
+    def _ahead(self, now: float, state: ControllerState) -> Sequence[float]:
+        """Return the joint speeds that there will be when the slider can have an effect, where they grow [rad/s]."""
+        qd, leading, before = state.qd, state.speed, self._before
+        before.append((now, qd))
+        while now - before[0][0] > _WINDOW and len(before) > 1 and now - before[1][0] >= _WINDOW:
+            before.popleft()
+        since = now - before[0][0]
+        if not 0.5 * _WINDOW <= since <= 3.0 * _WINDOW:
+            self._steady_since = math.inf
+            return qd
+        change = [_LEAD * (v - old) / since for v, old in zip(qd, before[0][1], strict=True)]
+        self._note_program(now, leading, max(map(abs, change)))
+        ahead = [v + dv if abs(v + dv) > abs(v) else v for v, dv in zip(qd, change, strict=True)]
+        if self._asked is not None:
+            slider = self._sliders[-1][1] if self.setting.fraction is None else self.setting.fraction
+            most, top = max(leading, self._asked * slider), max(map(abs, ahead))
+            if top > most:
+                share = (most - leading) / (top - leading)
+                ahead = [v + share * (new - v) for v, new in zip(qd, ahead, strict=True)]
+        return ahead
+
+    def _note_program(self, now: float, leading: float, change: float) -> None:
+        """Learn how fast the program goes at full slider, wherever it goes at a steady speed."""
+        highest = self._highest
+        if highest <= 0.0:
+            self._asked = None
+            return
+        if self._asked is not None and leading > _STEADY * self._asked * highest:
+            self._asked = None  # faster than ever: nobody knows how fast it will be
+        if leading < _SLOW or change > (_STEADY - 1.0) * leading:
+            self._steady_since = math.inf
+            return
+        self._steady_since = min(self._steady_since, now)
+        if now - self._steady_since >= _STEADY_TIME:
+            self._asked = max(self._asked or 0.0, leading / highest)
+
+    def _disobeys(self, now: float, qd: Joints) -> bool:
+        """Tell whether a joint turns faster than the slider has let it for a while; short strokes show only here."""
+        if now - self._sliders[0][0] < _REMEMBERED:
+            return False
+        top = self._highest
+        return any(abs(v) > _JOINT_MARGIN * top * most + _SLOW for v, most in zip(qd, self._joint_speed, strict=True))
+
+    def _forget_demand(self) -> None:
+        self._looked_at, self._moved, self._demand = math.inf, 0.0, 0.0
+
+    # ---- what is done
+
+    def _lower(
+        self, now: float, slider: float, ratio: float, ahead: Sequence[float], speed: float, name: str, out: Outputs
+    ) -> None:
+        """Put the slider down; farther where the arm still speeds up, as its program may, or as it was seen to."""
+        setting = self.setting
+        before = slider if setting.fraction is None else min(slider, setting.fraction)
+        share, top = _MARGIN / ratio, max(map(abs, ahead))
+        if top > _GROWTH * speed:
+            share *= top / max(top, (self._asked or self._fastest) * before)
+        fraction = min(slider, max(_LEAST, share * before))
+        if self._raised:
+            self._hold, self._raised = min(_LONGEST_HOLD, 2.0 * self._hold), False
+        self._set(now, fraction, slider, name, ratio, out)
+
+    def _relax(self, now: float, ratio: float, speed: float, out: Outputs) -> None:
+        """Let the slider go up again after motion that would have allowed it; a standing arm says nothing."""
+        setting = self.setting
+        if setting.fraction is None or not setting.shown:
+            self._forget_demand()
+            return
+        since, self._looked_at = max(0.0, now - self._looked_at), now
+        if speed < _SLOW:
+            return
+        self._moved += min(since, _WINDOW)
+        self._demand = max(self._demand, ratio / max(_LEAST, setting.fraction))
+        if self._moved < self._hold:
+            return
+        fraction = min(setting.ceiling, _MARGIN / self._demand if self._demand > 0.0 else math.inf)
+        before = setting.fraction
+        self._forget_demand()
+        if fraction <= before or fraction < min(setting.ceiling, _STEP_UP * before):
+            return
+        self._raised = True
+        self._set(now, fraction, before, "", ratio, out)
+
+    def _set(self, now: float, fraction: float, before: float, name: str, ratio: float, out: Outputs) -> None:
+        self.setting.set(now, fraction, before)
+        self._judged_at, self._ratio_then = now, ratio
+        out.append(SetSpeedSlider(fraction))
+        found = self.setting.ceiling
+        emit(out, EventName.SPEED_LIMITED, now, slider=fraction, before=before, sensor=name, ratio=ratio, found=found)
