@@ -8,7 +8,7 @@ give the same events, bit by bit, live and in a replay.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from coneskin.errors import SensorError
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
@@ -18,6 +18,7 @@ from coneskin.skin.detection.untouched.level import UntouchedLevel
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
 
+from .contradictions import Contradictions
 from .events import SkinEvent, SkinFault
 from .fault_diagnosis import DIAGNOSED, FaultDiagnosis
 from .faults import Fault
@@ -35,16 +36,7 @@ if TYPE_CHECKING:  # for replays only
 
 __all__ = ["Detector"]
 
-#: Faults that a contact produces when it changes between the phases of one frame; over the seam it looks like a short.
-_CONTRADICTIONS = frozenset(
-    {
-        *(Fault.GUIDE_DRIVEN, Fault.OUT_OF_RANGE, Fault.GUIDES_DISAGREE, Fault.LEAK),
-        *(Fault.SHORT_UPPER, Fault.SHORT_LOWER),
-    }
-)
-_MAX_CONTRADICTIONS = 2.5  # frames; the third in a row is a fault, two may be a contact that closes slowly
 _RESTARTED = int(Status.RESTARTED)
-_CONTRADICTION_DECAY = 0.1  # frames; each good frame takes so many off the count
 
 
 class Detector:
@@ -67,7 +59,7 @@ class Detector:
         "_above",
         "_began",
         "_below",
-        "_changes",
+        "_contradictions",
         "_currents",
         "_diagnosis",
         "_fed",
@@ -118,7 +110,8 @@ class Detector:
         self._places = TouchPlace(sensor, self.settings, self._currents, self._leak)
         self._told = ReportedTouch(sensor, self.settings)
         self._above = self._below = self._quiet = 0
-        self._began = self._changes = 0.0
+        self._contradictions = Contradictions()
+        self._began = 0.0
         self._lasting = False
 
     def age(self, now: float) -> float:
@@ -159,14 +152,14 @@ class Detector:
         if fault is not None:
             self._places.interrupt()
             self._skip()
-            if not self._is_change(fault):
+            if not self._contradictions.is_change(fault):
                 self._report(events, fault, frame, now)
                 return events
             if whole < self._touch:
                 return events  # the next frames say what it was
         else:
-            if self._changes:
-                self._changes = max(0.0, self._changes - _CONTRADICTION_DECAY)
+            if self._contradictions.count:
+                self._contradictions.forget()
             self.timing.seen_valid(now)
         if self._stuck.take(frame):
             self._report(events, Fault.STUCK, frame, now)
@@ -189,17 +182,6 @@ class Detector:
             self._while_untouched(events, frame, now, level)
         return events
 
-    def _is_change(self, fault: Fault) -> bool:
-        """Tell whether a fault may be a contact that came or went between the phases of this one frame.
-
-        The phases are measured one after the other, so such a frame contradicts itself. A few frames later the contact
-        rests, or has passed the threshold; if they go on, or come more often than now and then, it is a fault.
-        """
-        if fault not in _CONTRADICTIONS or self._changes > _MAX_CONTRADICTIONS:
-            return False
-        self._changes += 1.0
-        return True
-
     @property
     def baseline(self) -> float:
         """Drift of the untouched level that is taken off."""
@@ -208,7 +190,14 @@ class Detector:
     @property
     def settled(self) -> bool:
         """True while a quiet frame changes nothing but what is learned, which ``learn`` does."""
-        waiting = self.touched or self.fault or self._reported or self._above or self._changes or self._diagnosis.active
+        waiting = (
+            self.touched
+            or self.fault
+            or self._reported
+            or self._above
+            or self._contradictions.count
+            or self._diagnosis.active
+        )
         return self.ready and not waiting
 
     def learn(self, frames: QuietFrames, begin: int, end: int, final: bool = True) -> int:
@@ -223,42 +212,14 @@ class Detector:
         Returns:
             ``end``; or the number of the first frame that is not quiet, or may not be. Then nothing was taken.
         """
-        before = self._learned()
-        timing, part = self.timing, slice(begin, end)
-        levels = frames.levels[part]
-        periods = timing.learn(frames.sequences[part], frames.clocks[part], frames.times[part])
-        count = len(periods)
-        taken = self._guides.learn(frames.radial[part][:count], frames.angular[part][:count], levels[:count], periods)
-        taken = self._level.learn(levels[:taken], periods)
-        if taken == end - begin:
-            taken = self._currents.learn(
-                frames.radial_currents[part], frames.angular_currents[part], frames.supplies[part], periods
-            )
-        if taken == end - begin:
-            taken = self._stuck.learn(frames, begin, end)
-        if taken < end - begin or not final:
-            self._restore(before)
-            return begin + taken
-        if self._leak.wants(max(levels)):
-            for number in range(begin, end):
-                self._leak.feed(frames.frame(number), frames.levels[number])
-        self._fed = frames.times[end - 1]
-        self._quiet += end - begin
-        return end
+        from .quiet_learning import QuietLearning
 
-    def _learned(self) -> tuple[Any, ...]:
-        """Return what a quiet frame changes; the leak is learned last, when nothing has to be restored."""
-        states = [[getattr(part, name) for name in part.__slots__] for part in self._learners]
-        return tuple(states)
-
-    @property
-    def _learners(self) -> tuple[Any, ...]:
-        return self.timing, self._guides, self._currents, self._level, self._stuck
-
-    def _restore(self, learned: tuple[Any, ...]) -> None:
-        for part, values in zip(self._learners, learned, strict=True):
-            for name, value in zip(part.__slots__, values, strict=True):
-                setattr(part, name, value)
+        parts = self.timing, self._guides, self._currents, self._level, self._stuck
+        reached = QuietLearning(*parts, self._leak).take(frames, begin, end, final)
+        if reached == end and final:
+            self._fed = frames.times[end - 1]
+            self._quiet += end - begin
+        return reached
 
     def distrust(self, fault: Fault, now: float, detail: str) -> list[SkinEvent]:
         """Report a fault of what this sensor's frames come through: it has to become ready anew.
