@@ -12,6 +12,8 @@ from coneskin.design.jig_plan import JigPlan
 from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
 from coneskin.design.workshop.jig import Collar, CollarPart, jig_collars
+from coneskin.design.workshop.link_excess import LinkExcess
+from coneskin.design.workshop.lip_play import lip_play
 from coneskin.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
@@ -189,6 +191,20 @@ def test_a_collar_turned_by_more_than_its_play_meets_what_stands_out(way: float)
         local = in_part_frame(design, two, pose.apply_all(points))
         solids = [trimesh.Trimesh(part.surface.vertices, part.surface.faces, process=False) for part in two.parts]
         assert any(solid.contains(local).any() for solid in solids) == meets
+
+
+def test_facets_of_a_mesh_do_not_show_where_a_collar_belongs() -> None:
+    """A tube of twelve facets of 1.7 mm; the collar would fit at twelve azimuths, and the link is round."""
+    phi = np.linspace(0.0, 2.0 * math.pi, 13)[:-1]
+    ends = [np.stack([0.05 * np.cos(phi), 0.05 * np.sin(phi), np.full(12, z)], axis=1) for z in (-0.03, 0.25)]
+    faces = [f for k in range(12) for f in ((k, (k + 1) % 12, 12 + k), ((k + 1) % 12, 12 + (k + 1) % 12, 12 + k))]
+    body = make_mesh(np.concatenate(ends), np.array(faces))
+    side, turned = Frustum(0.05, 0.05, 0.2), np.linspace(0.2, 3.0, 161)
+    link = LinkExcess(side, 0.2, 1.0, 0.04, body)
+    lips = [(turned, np.full(161, 0.015), np.zeros(161, bool))]
+    facets = 0.05 * (1.0 - math.cos(math.pi / 12.0))
+    assert lip_play(link, lips, 0.015, 0.3e-3) is not None
+    assert lip_play(link, lips, 0.015, 0.3e-3, facets) is None
 
 
 def test_no_part_has_an_undercut() -> None:

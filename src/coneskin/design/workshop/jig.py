@@ -181,7 +181,8 @@ class _Builder:
             phi = np.linspace(start, stop, len(lengths))
             parts.append(CollarPart(number, start, stop, self._part(phi, lengths, number)))
             lips.append((phi, lengths, self._above_tabs(phi)))
-        play = lip_play(self.link, lips, wanted, self.plan.clearance)
+        facets = 0.0 if self.design.fit is None else self.design.fit.facet_height
+        play = lip_play(self.link, lips, wanted, self.plan.clearance, facets)
         reached = flush and longest > wanted - 1e-9
         before = None if self.room is None else self.room - longest
         return Collar(self.end, tuple(parts), longest, reached, stopped, play, before)
