@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PlacedDevelopable"]
 
+_NORMALS = 360  # by which the middle of a section is found
+
 
 @dataclass(frozen=True, slots=True)
 class PlacedDevelopable(PlacedFrustum):
@@ -98,6 +100,23 @@ class PlacedDevelopable(PlacedFrustum):
         u, phi, distance = self._side.locate_all(back.apply_all(points.reshape(-1, 3)))
         shape = points.shape[:-1]
         return u.reshape(shape), phi.reshape(shape), distance.reshape(shape)
+
+    def centre(self, u: float) -> Vector:
+        """Return the middle of the section at u [m], in the link's frame [m]: the point nearest to its normals.
+
+        It is the centre of an oval, and that of the circle where a part of one is covered.
+        """
+        import numpy as np
+
+        phi = (np.arange(_NORMALS) + 0.5) * self.frustum.wrap / _NORMALS
+        base, way, normal = self._side.rulings(phi)
+        along = way.sum(axis=0) / np.linalg.norm(way.sum(axis=0))
+        level = normal - np.outer(normal @ along, along)
+        level /= np.linalg.norm(level, axis=1)[:, None]
+        across = np.eye(3) - level[:, :, None] * level[:, None, :]
+        points = base + u * way
+        x, y, z = np.linalg.lstsq(across.sum(axis=0), np.einsum("ijk,ik->j", across, points), rcond=1e-9)[0].tolist()
+        return self.link_frustum.apply((x, y, z))
 
     def moved(self, frame: Pose) -> PlacedDevelopable:
         """Return the side in another frame, in which ``frame`` is the pose of the link's."""

@@ -98,6 +98,10 @@ class PlacedFrustum:
         u, phi, distance = np.array(rows, float).reshape(-1, 3).T.reshape(3, *points.shape[:-1])
         return u, phi, distance
 
+    def centre(self, u: float) -> Vector:
+        """Return the middle of the section at u [m], in the link's frame [m]."""
+        return self.link_frustum.apply((0.0, 0.0, u * self.frustum.cos_half_angle))
+
     @property
     def bends(self) -> tuple[Bend, ...]:
         """Strips of a side that is not round; none of a cone."""

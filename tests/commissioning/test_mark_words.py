@@ -14,7 +14,8 @@ from coneskin.commissioning.marks import Mark, plan_marks
 from coneskin.commissioning.misreadings import RIGHT, Place, misfit
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.kinematics import link_poses
+from coneskin.robot.arm.kinematics import link_pose, link_poses
+from coneskin.robot.arm.link_frames import dh_mesh
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.scene import Scene
@@ -50,6 +51,40 @@ def physical_place(where: str, q: tuple[float, ...]) -> tuple[float, np.ndarray]
     distance = re.match(r"(\d+) mm from the axis of the elbow, along the forearm, ", where)
     assert distance, where
     return 1e-3 * int(distance[1]), clock_side(where, along)
+
+
+STADIUM = math.tau * 30.0 + 80.0  # mm; around two flats of 40 mm and half circles of 60 mm, from the middle of one on
+BENDS = [[94.2478 / 2, 90], [40, 0], [94.2478, 180], [40, 0], [94.2478 / 2, 90]]
+
+
+@pytest.mark.parametrize("q", [tuple(START), (0.3, -1.2, 1.1, -0.4, 0.9, 0.2)])
+@pytest.mark.parametrize("turn", [0.0, 70.0])
+def test_the_words_lead_to_the_place_on_a_link_that_is_not_round(q: tuple[float, ...], turn: float) -> None:
+    """The middle of the stadium lies on the link's axis, 20 mm from the axis of the frame in which it is described."""
+    radius = STADIUM / math.tau
+    total = sum(arc for arc, _ in BENDS)
+    wraps, turns = [360.0 * arc / total for arc, _ in BENDS], [angle for _, angle in BENDS]
+    c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    pose = f"xyz_mm = [{c * (50.0 - radius)}, {s * (50.0 - radius)}, 80]\nrpy_deg = [0, 0, {turn}]"
+    text = forearm_scene().replace("xyz_mm = [0, 0, 80]", f"{pose}\nbend_wrap_deg = {wraps}\nbend_turn_deg = {turns}")
+    text = re.sub(r"radius([12])_mm = [\d.]+", rf"radius\1_mm = {radius}", text)
+    here = parse_scene(text)
+    (placed,), (item,) = place_sensors(here), here.sensors
+    found = offer_marks(item.sensor, placed, q)
+    assert len(found) >= 9
+    poses = link_poses(UR5E, q)
+    elbow, wrist = np.array(poses[2].translation), np.array(poses[3].translation)
+    along = (wrist - elbow) / np.linalg.norm(wrist - elbow)
+    for mark in found:
+        distance, side = physical_place(mark.where, q)
+        point, _ = placed.place_in_base(mark.u, mark.phi, q)
+        off = np.array(point) - elbow
+        assert off @ along == pytest.approx(distance, abs=0.6e-3)
+        off -= along * (off @ along)
+        tube = np.array(link_pose(UR5E, q, placed.link).apply(dh_mesh(UR5E, "forearm").apply((0.0, 0.0, 0.2)))) - elbow
+        off -= tube - along * (tube @ along)
+        assert 0.0299 < np.linalg.norm(off) < 0.0501
+        assert math.degrees(math.acos(min(1.0, off @ side / np.linalg.norm(off)))) < 0.1
 
 
 @pytest.mark.long

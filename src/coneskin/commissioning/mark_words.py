@@ -7,8 +7,9 @@ direction of its normal and the model of the arm as well, and not only the wires
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from coneskin.scene.build import place_on_arm
@@ -29,6 +30,8 @@ _JOINTS = ("the floor", "the base", "the shoulder", "the elbow", "wrist 1", "wri
 _TUBES = (2, 3)  # links whose mesh begins on their joint's axis and runs along the link
 _STEPS = (30.0, 15.0, 7.5, 3.75)  # deg; an hour of the clock, and parts of one
 _ENOUGH = 9  # marks to choose from
+_TURN = 2.0 * math.pi  # rad
+_STEPS_AROUND = 720  # of a bent side, between which its azimuths are interpolated
 _ROUND = 0.005  # m; distances are multiples of it
 _FACING = 0.35  # part of a direction from which on it is named
 _UPRIGHT = math.cos(math.radians(30.0))  # from which on a link counts as upright
@@ -73,8 +76,9 @@ def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float
 
     assert placed.model is not None
     cone = sensor.frustum
-    base_frustum = link_pose(placed.model, q, placed.link) @ placed.frustum.link_frustum
-    axis = base_frustum.rotate((0.0, 0.0, 1.0))
+    base_link = link_pose(placed.model, q, placed.link)
+    ends = [base_link.apply(placed.frustum.centre(u)) for u in (0.0, cone.slant)]
+    axis = _times(_sum(ends[1], _times(ends[0], -1.0)), 1.0 / math.dist(*ends))
     from_end1 = _begins_at_end1(placed, q)
     along = axis if from_end1 else _times(axis, -1.0)  # from the joint nearer the base to the farther one
     twelve, reference = _twelve(along)
@@ -83,11 +87,11 @@ def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float
     margin, marks = azimuth_margin(sensor), []
     for u in _rounded(sensor, placed, placed.model):
         distance = _distance(sensor, placed, placed.model, u, from_end1, near)
+        azimuth = _azimuths(placed, u)
         for number in range(round(360.0 / step)):
             angle = math.radians(number * step)
             side = _sum(_times(twelve, math.cos(angle)), _times(right, math.sin(angle)))
-            x, y, _ = base_frustum.inverse().rotate(side)
-            phi = math.atan2(y, x) % (2.0 * math.pi)
+            phi = azimuth(base_link.inverse().rotate(side))
             if margin <= phi <= cone.wrap - margin:
                 where = (
                     f"{distance}, along the {placed.link_name}, at {_clock(angle)} as seen from {near} towards {far} "
@@ -97,6 +101,41 @@ def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float
     return marks
 
 
+def _azimuths(placed: SensorOnArm, u: float) -> Callable[[Vector], float]:
+    """Return what gives the azimuth [rad] of the place at u [m] in a direction from the middle of the link there."""
+    side = placed.frustum
+    back = side.link_frustum.inverse()
+    if not side.bends:
+
+        def azimuth(way: Vector) -> float:
+            x, y, _ = back.rotate(way)
+            return math.atan2(y, x) % _TURN
+
+        return azimuth
+    centre, first = side.centre(u), side.normal(0.0)
+    ahead = _cross(_sum(side.centre(side.frustum.slant), _times(side.centre(0.0), -1.0)), first)
+    length = math.hypot(*ahead)
+
+    def angle(way: Vector) -> float:
+        """Return the angle of a direction about the middle [rad], from the normal of edge 0 on."""
+        y, x = (sum(a * b for a, b in zip(way, one, strict=True)) for one in (_times(ahead, 1.0 / length), first))
+        return math.atan2(y, x)
+
+    steps = [side.frustum.wrap * k / _STEPS_AROUND for k in range(_STEPS_AROUND + 1)]
+    angles = [angle(_sum(side.point(u, phi), _times(centre, -1.0))) for phi in steps]
+
+    def bent_azimuth(way: Vector) -> float:
+        sought = angle(way)
+        for (one, two), (low, high) in zip(pairwise(steps), pairwise(angles), strict=True):
+            span = math.remainder(high - low, _TURN)
+            part = math.remainder(sought - low, _TURN) / span if span else 0.0
+            if 0.0 <= part <= 1.0 and abs(span) < 1.0:
+                return one + part * (two - one)
+        return _TURN  # where no part of the sheet is
+
+    return bent_azimuth
+
+
 def _begins_at_end1(placed: SensorOnArm, q: Sequence[float]) -> bool:
     """Tell whether end 1 of a sensor is nearer the joint at which its link begins."""
     from coneskin.robot.arm.kinematics import link_poses
@@ -104,10 +143,7 @@ def _begins_at_end1(placed: SensorOnArm, q: Sequence[float]) -> bool:
     assert placed.model is not None
     poses = link_poses(placed.model, q)
     joint = poses[max(placed.link - 1, 0)].translation
-    ends = [
-        (poses[placed.link] @ placed.frustum.link_frustum).apply((0.0, 0.0, z))
-        for z in (0.0, placed.frustum.frustum.height)
-    ]
+    ends = [poses[placed.link].apply(placed.frustum.centre(u)) for u in (0.0, placed.frustum.frustum.slant)]
     return math.dist(joint, ends[0]) <= math.dist(joint, ends[1])
 
 
@@ -115,10 +151,8 @@ def _from_joint(placed: SensorOnArm, model: ArmModel, u: float) -> float:
     """Return the distance of a place from the axis of the joint at which a tube begins, along the link [m]."""
     from coneskin.robot.arm.link_frames import dh_mesh
 
-    frustum = placed.frustum
-    middle = frustum.link_frustum.apply((0.0, 0.0, u * frustum.frustum.cos_half_angle))
     mesh: Pose = dh_mesh(model, placed.link_name)
-    return mesh.inverse().apply(middle)[2]
+    return mesh.inverse().apply(placed.frustum.centre(u))[2]
 
 
 def _rounded(sensor: Sensor, placed: SensorOnArm, model: ArmModel) -> list[float]:

@@ -92,7 +92,7 @@ def _draw_arm(axes: Any, item: SensorMarks, placed: SensorOnArm, q: Sequence[flo
         axes.quiver(*point, *normal, length=length, color=_MARK, lw=1.4)
         tip = [p + 1.35 * length * n for p, n in zip(point, normal, strict=True)]
         axes.text(*tip, str(number), color=_MARK, fontsize=11, ha="center", va="center")
-    middle = base_link.apply(placed.frustum.link_frustum.apply((0.0, 0.0, 0.5 * cone.height)))
+    middle = base_link.apply(placed.frustum.centre(0.5 * cone.slant))
     reach = 0.5 * cone.slant + 2.0 * length
     corners = skeleton(placed.model, q)
     for start, end in itertools.pairwise(corners):
