@@ -5,9 +5,10 @@
 
 The bound: hypotheses of cones from many draws; each is fitted with every gate, and a line of revolution is looked for
 from each. All axes that are left, up to hundreds, are surveyed; packings are grown from sixteen starts that lie apart,
-and the best four are made on fine profiles, as what is found is. So the bound is sheets that exist: the best of them
-and of what is found. It shows what the search misses by trying few axes, few starts and few packings; it shares the
-rules of packing, so it does not show what these miss. "area" is that of the sheets over that of the hull, for both.
+and the best four are made on fine profiles and completed, as what is found is. So the bound is sheets that exist: the
+best of them and of what is found. It shows what the search misses by trying few axes, few starts and few packings; it
+shares the rules of packing, so it does not show what these miss. "area" is that of the sheets over that of the hull, for
+both.
 
 An earlier bound was no bound: it kept the first 250 axes of the first draws, grew from five starts that were mostly one
 axis again, and compared areas of whole coarse cells with those of finished sheets, a tenth too much for a short sheet.
@@ -32,12 +33,14 @@ import numpy as np
 from report import head
 
 from coneskin.errors import MeshError
-from coneskin.geometry.fit import hypotheses, plan
-from coneskin.geometry.fit.axis_plan import SheetRequirements
+from coneskin.geometry.fit import hypotheses
+from coneskin.geometry.fit.axis_plan import SheetRequirements, plan_sheets
 from coneskin.geometry.fit.candidates import AxisCandidate
+from coneskin.geometry.fit.coarse_packing import Choice, grown, survey_axes
 from coneskin.geometry.fit.cone_fit import fit_cone
 from coneskin.geometry.fit.cones import LEAST_GAIN, find_cones
 from coneskin.geometry.fit.fitted_sheet import fitted_sheet
+from coneskin.geometry.fit.plan import FineStage
 from coneskin.geometry.fit.revolution_axis import find_revolution_axis
 from coneskin.geometry.fit.surface_samples import SurfaceSamples, sample_surface
 from coneskin.geometry.mesh import Mesh, load_mesh
@@ -86,9 +89,9 @@ def brute_axes(samples: SurfaceSamples) -> list[AxisCandidate]:
     return [found[key] for key, _ in times.most_common(MAX_AXES)]
 
 
-def starts_apart(singles: list[plan._Choice]) -> list[plan._Choice]:
+def starts_apart(singles: list[Choice]) -> list[Choice]:
     """The best plans about one axis each, no two of as many sheets about nearly one axis."""
-    kept: list[plan._Choice] = []
+    kept: list[Choice] = []
     for one in singles:
         frame = one.plan.profile.frame
         for other in kept:
@@ -124,16 +127,17 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
         LEAST_GAIN * whole,
     )
     axes = brute_axes(hull)
-    surveys = plan.survey_axes(mesh, rays, axes, wanted)
+    stage = FineStage(mesh, rays, hull, wanted)
+    surveys = survey_axes(mesh, rays, axes, wanted)
     loose = replace(wanted, tolerance=1.1 * wanted.tolerance, min_length=0.75 * wanted.min_length)
-    alone = [plan.plan_sheets(one.profile, one.lines, loose, sheets) for one in surveys]
-    singles = [plan._Choice(number, one) for number, plans in enumerate(alone) for one in plans]
+    alone = [plan_sheets(one.profile, one.lines, loose, sheets) for one in surveys]
+    singles = [Choice(number, one) for number, plans in enumerate(alone) for one in plans]
     singles.sort(key=lambda choice: -choice.plan.score(loose))
-    packings = [plan._grown([start], surveys, alone, loose) for start in starts_apart(singles)]
+    packings = [grown([start], surveys, alone, loose) for start in starts_apart(singles)]
     packings.sort(key=lambda packing: -sum(choice.plan.score(loose) for choice in packing))
     best = 0.0
     for packing in packings[:FINE]:
-        made = plan._made_fine(mesh, rays, hull, packing, wanted)
+        made = stage.completed(stage.made(packing), surveys)
         if made is not None:
             fitted = [fitted_sheet(about, side, 0, hull, TOLERANCE) for about in made.axes for side in about.sides]
             best = max(best, sum(sheet.frustum.area for sheet in fitted))

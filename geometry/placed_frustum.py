@@ -92,11 +92,12 @@ class PlacedFrustum:
         """
         import numpy as np
 
-        points = np.asarray(points, float)
-        back = self.link_frustum.inverse()
-        rows = [self.frustum.locate(*back.apply((x, y, z))) for x, y, z in points.reshape(-1, 3).tolist()]
-        u, phi, distance = np.array(rows, float).reshape(-1, 3).T.reshape(3, *points.shape[:-1])
-        return u, phi, distance
+        x, y, z = np.moveaxis(self.link_frustum.inverse().apply_all(np.asarray(points, float)), -1, 0)
+        sa, ca = self.frustum.sin_half_angle, self.frustum.cos_half_angle
+        out = np.hypot(x, y) - self.frustum.radius1
+        azimuth, middle = np.arctan2(y, x), 0.5 * self.frustum.wrap
+        phi = azimuth - math.tau * np.round((azimuth - middle) / math.tau)
+        return out * sa + z * ca, phi, out * ca - z * sa
 
     def centre(self, u: float) -> Vector:
         """Return the middle of the section at u [m], in the link's frame [m]."""

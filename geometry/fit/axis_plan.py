@@ -23,6 +23,7 @@ SideLine = tuple[float, float]  #: radius at z = 0 of the profile's frame [m], a
 TURN = 2.0 * math.pi
 _BIN = 0.0005  # m; of the histogram of radii
 _MAX_PEAKS = 3  # radii tried for each slope
+_HARDLY = 0.97  # of the largest side so far: fewer cells near a line hold no larger one
 _APART = 0.002  # m; least distance between two of them
 
 
@@ -184,7 +185,11 @@ def largest_partial_wrap(
         limit = requirements.tolerance * math.hypot(1.0, slope)
         good = free & (profile.radius <= (line + limit)[:, None]) & (floor >= (line - limit)[:, None])
         good &= (line >= requirements.min_radius)[:, None]
-        if int(good.sum()) < rows * columns:
+        filled = good.sum(axis=1)
+        if int(filled.sum()) < rows * columns:
+            continue
+        most = float(filled @ line) * profile.step * TURN / around * math.hypot(1.0, slope)
+        if requirements.weights is None and most < _HARDLY * area:
             continue
         worth = None if requirements.weights is None else profile.weight
         region = largest_region(good, rows, columns, exact, worth)

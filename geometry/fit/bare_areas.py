@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis_plan import AxisPlan, SheetRequirements, plan_sheets
+from .clearance import kept_clear
+from .coarse_packing import AxisSurvey
 from .cone_fit import InfiniteCone
-from .plan import AxisSurvey, SheetPlan, kept_clear
+from .plan import SheetPlan
 from .side import covered_points
 from .surface_samples import SurfaceSamples
 
@@ -42,12 +44,17 @@ class BareArea:
 
 
 def bare_areas(
-    plan: SheetPlan, surveys: list[AxisSurvey], hull: SurfaceSamples, requirements: SheetRequirements
+    plan: SheetPlan,
+    more: AxisPlan | None,
+    surveys: list[AxisSurvey],
+    hull: SurfaceSamples,
+    requirements: SheetRequirements,
 ) -> list[BareArea]:
     """Return what a plan leaves bare, by reason, the largest area first.
 
     Args:
         plan: the sheets.
+        more: a sheet that could be added if one more were allowed; None where it was looked for in vain.
         surveys: of all axes.
         hull: samples of the link.
         requirements: on the sheets.
@@ -62,14 +69,19 @@ def bare_areas(
             found.append(BareArea(reason, share, hull.points[mine]))
             bare[mine] = False
 
+    if more is not None:
+        count = plan.count + 1
+        take(
+            f"a sheet more would cover it: allow {count} sheets with {4 * count} wires",
+            _covered([more], hull, requirements.tolerance),
+        )
     further, hindered = _further_plans(plan, surveys, requirements)
-    if further is not None:
-        seen = _covered([further], hull, requirements.tolerance)
-        if further.area >= requirements.least_gain:
-            take(f"a sheet more would cover it: allow {plan.count + 1} sheets", seen)
-        else:
-            little = "is too small" if requirements.weights is None else "covers too little that counts"
-            take(f"room for a sheet that {little} to be worth its four wires", seen)
+    if further is not None and further.area < requirements.least_gain:
+        little = "is too small" if requirements.weights is None else "covers too little that counts"
+        take(
+            f"room for a sheet that {little} to be worth its four wires",
+            _covered([further], hull, requirements.tolerance),
+        )
     if hindered is not None:
         take(
             "a sheet here would run into another one or reach too far around it",

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
-from .axis_plan import SheetRequirements
+from .axis_plan import AxisPlan, SheetRequirements
 from .bare_areas import BareArea, bare_areas
+from .coarse_packing import AxisSurvey, better_surveys, survey_axes
 from .coverage_notes import bare_lengths, hull_note
 from .fit_options import MOST_TOLERANCE, FitOptions
 from .fitted_sheet import FittedSheet, fitted_sheet
-from .plan import AxisSurvey, SheetPlan, best_plan, better_surveys, survey_axes
+from .plan import FineStage, SheetPlan, best_plan
 from .sampled_link import SampledLink, sample_link
 from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights
@@ -28,7 +29,7 @@ __all__ = ["LEAST_GAIN", "BareLength", "LinkFit", "find_cones", "fit_cones"]
 Floats = NDArray[np.float64]
 
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
-LEAST_GAIN = 0.05  #: share of the hull that a further sheet must add; a fillet adds less
+LEAST_GAIN = 0.04  #: share of the hull that a further sheet must add; a fillet adds less
 _HINT_STEP = 1e-5  # m; a tolerance is advised in hundredths of a millimetre
 
 
@@ -166,6 +167,9 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
             touch_weights=link.weights,
         )
     first = plan.axes[0]
+    further: AxisPlan | None = None
+    if plan.count >= requirements.max_sheets:
+        further = FineStage(mesh, rays, hull, requirements).further(plan.axes, surveys)
     return LinkFit(
         sheets=tuple(
             fitted_sheet(about, side, number, counted, tolerance, worth)
@@ -174,7 +178,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         ),
         nearest=None,
         needed_tolerance=tolerance,
-        bare_areas=tuple(bare_areas(plan, surveys, hull, requirements)),
+        bare_areas=tuple(bare_areas(plan, further, surveys, hull, requirements)),
         bare=tuple(
             BareLength(*item)
             for item in bare_lengths(
@@ -182,7 +186,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
                 first.sides,
                 tolerance,
                 min_length,
-                spare=sum(len(about.sides) for about in plan.axes) < requirements.max_sheets,
+                further,
             )
         ),
         tolerance=tolerance,
@@ -211,7 +215,7 @@ class _Search:
     def plan(self, tolerance: float) -> tuple[SheetPlan | None, str]:
         """Return the best plan within a tolerance [m]; or None and, for a mesh that is a bare hull, the reason."""
         wanted = replace(self.requirements, tolerance=tolerance)
-        plan = best_plan(self.mesh, self.rays, self.hull, self.surveys, wanted)
+        plan = best_plan(FineStage(self.mesh, self.rays, self.hull, wanted), self.surveys)
         area, whole = plan.area if plan else 0.0, self.weighed
         # a requested wrap implies that the shape is known; otherwise sheets should cover some of a convex body
         if area >= HULL_SHARE * whole or (plan and wanted.wrap):

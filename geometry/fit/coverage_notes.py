@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from coneskin.geometry.mesh import Mesh
 
+from .axis_plan import AxisPlan
 from .intervals import longest_intervals
 from .profile import RadialProfile
-from .side import StraightSide
+from .side import StraightSide, azimuth_columns
 from .surface_samples import SurfaceSamples
 
 __all__ = ["bare_lengths", "hull_note"]
@@ -46,7 +47,11 @@ def hull_note(mesh: Mesh, samples: SurfaceSamples) -> str:
 
 
 def bare_lengths(
-    profile: RadialProfile, sides: list[StraightSide], tolerance: float, min_length: float, spare: bool = True
+    profile: RadialProfile,
+    sides: list[StraightSide],
+    tolerance: float,
+    min_length: float,
+    further: AxisPlan | None = None,
 ) -> list[tuple[float, float, str]]:
     """Return the lengths without a sheet: start, end and reason.
 
@@ -57,7 +62,7 @@ def bare_lengths(
         sides: the sheets about the axis.
         tolerance: largest distance between a sheet and the hull [m].
         min_length: smallest length of a sheet [m].
-        spare: False where as many sheets were found as were allowed.
+        further: a sheet that could be added if one more were allowed; None where there is none.
     """
     high, low = profile.bounds(tolerance)
     follows = profile.radius.min(axis=1)
@@ -89,7 +94,7 @@ def bare_lengths(
                 else:
                     text = f"round, and straight over {straight * 1e3:.0f} mm, but " + (
                         "a sheet there would cover too little, or run into another"
-                        if spare
+                        if further is None or not _lies_along(profile, slice(first, k), further)
                         else "no further sheet was allowed: raise the number of sheets or wires"
                     )
             elif kinds[3] > kinds[2]:
@@ -102,6 +107,17 @@ def bare_lengths(
             bare.append((low_end, low_end + length, text))
         first = k
     return bare
+
+
+def _lies_along(profile: RadialProfile, rows: slice, plan: AxisPlan) -> bool:
+    """Tell whether a sheet of a plan covers at least half of the length of some slices."""
+    for side in plan.sides:
+        across = azimuth_columns(plan.profile, side.column, side.columns)
+        z = profile.frame.local(plan.profile.points()[side.first : side.end][:, across].reshape(-1, 3))[:, 2]
+        reach = min(float(z.max()), float(profile.z[rows][-1])) - max(float(z.min()), float(profile.z[rows][0]))
+        if reach >= 0.5 * profile.step * (rows.stop - rows.start):
+            return True
+    return False
 
 
 def _straight_length(

@@ -71,12 +71,25 @@ def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, mi
     slope, which makes the distance from a steep side smaller than the difference in radius.
     """
     usable = (low > 0.0) & np.isfinite(high)  # 0 marks a hole in the slice
+    holes = np.concatenate([np.cumsum(~usable), [0]])
+    heights, tops, bottoms = z.tolist(), high.tolist(), low.tolist()
+    line = (0.0, 0.0)  # the side that was within the tolerance of the last good interval: radius at z = 0, and slope
 
     def good(first: int, end: int) -> bool:
-        window = slice(first, end)
-        if end > len(z) or not usable[window].all():
+        nonlocal line
+        if end > len(z) or holes[end - 1] != holes[first - 1]:
             return False
-        return least_deviation(z[window], high[window], low[window])[0] <= tolerance
+        if end - first > min_slices:  # all but the last slice are known to be within the tolerance of the line
+            radius = line[0] + line[1] * heights[end - 1]
+            limit = tolerance * math.hypot(1.0, line[1])
+            if tops[end - 1] - limit <= radius <= bottoms[end - 1] + limit:
+                return True
+        window = slice(first, end)
+        off, *side = least_deviation(z[window], high[window], low[window])
+        if off > tolerance:
+            return False
+        line = (side[0], side[1])
+        return True
 
     ends: list[int] = []
     stop = 0

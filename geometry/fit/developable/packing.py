@@ -17,7 +17,7 @@ from coneskin.geometry.fit.profile import RadialProfile
 from coneskin.geometry.fit.sampled_link import SampledLink
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.placed_developable import PlacedDevelopable
+from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
 
 from .found_sheet import (
@@ -72,7 +72,12 @@ def with_developables(
     candidates = find_ruling_candidates(link.hull, link.axes)
     coarse = [(one, ruled_profile(mesh, rays, one, _COARSE, options)) for one in candidates]
     say("measuring rulings")
-    alone = _pack(mesh, rays, hull, worth, coarse, options, [], most, least)
+    # where the widest region is that of a cone which is there already, other sheets only go beside the cones
+    regions = _regions(coarse, options, [])
+    known = bool(regions) and any(
+        _lies_on(sheet.placed, coarse[regions[0][1]][1], regions[0][2], tolerance) for sheet in cones.sheets
+    )
+    alone = [] if known else _pack(mesh, rays, hull, worth, coarse, options, [], most, least)
     spare = most - len(cones.sheets) if cones.sheets else 0
     beside = _pack(mesh, rays, hull, worth, coarse, options, list(cones.sheets), spare, least)
     before = sum(sheet.touch_share - least for sheet in cones.sheets)
@@ -115,13 +120,7 @@ def _pack(
     done: list[FittedSheet] = []
     while len(done) < most:
         there = [*others, *done]
-        regions = []
-        for number, (candidate, profile) in enumerate(coarse):
-            free = _kept_clear(profile, there, options)
-            region = widest_region(free, candidate, options)
-            if region is not None:
-                regions.append((_area(free, region), number, region))
-        regions.sort(key=lambda item: -item[0])
+        regions = _regions(coarse, options, there)
         taken = np.zeros(len(hull), bool)
         for sheet in there:
             taken |= covered_samples(sheet.placed, hull, 1.5 * options.tolerance)
@@ -146,13 +145,26 @@ def _pack(
     return done
 
 
+def _regions(
+    coarse: list[tuple[RulingCandidate, RadialProfile]], options: FitOptions, there: list[FittedSheet]
+) -> list[tuple[float, int, RuledRegion]]:
+    """Return the widest region clear of sheets of each profile: area [m2], number, region; the largest first."""
+    regions = []
+    for number, (candidate, profile) in enumerate(coarse):
+        free = _kept_clear(profile, there, options)
+        region = widest_region(free, candidate, options)
+        if region is not None:
+            regions.append((_area(free, region), number, region))
+    return sorted(regions, key=lambda item: -item[0])
+
+
 def _area(profile: RadialProfile, region: RuledRegion) -> float:
     """Return the area of a region [m2], but for the slope of its section."""
     cells = profile.radius[region.first : region.end][:, columns_of(region, len(profile.phi))]
     return float(cells.sum()) * profile.step * TURN / len(profile.phi)
 
 
-def _lies_on(placed: PlacedDevelopable, profile: RadialProfile, region: RuledRegion, tolerance: float) -> bool:
+def _lies_on(placed: PlacedFrustum, profile: RadialProfile, region: RuledRegion, tolerance: float) -> bool:
     """Tell whether a region is that of a side which is known already."""
     step = max(1, (region.end - region.first) // 4)
     rows = slice(region.first, region.end, step)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from coneskin.geometry.fit.axis_plan import AxisPlan
 from coneskin.geometry.fit.cones import find_cones
 from coneskin.geometry.fit.coverage_notes import bare_lengths, hull_note
 from coneskin.geometry.fit.side import StraightSide
@@ -47,22 +48,26 @@ def test_what_stays_bare_is_said() -> None:
 
 
 @pytest.mark.parametrize(
-    ("spare", "words"),
+    ("rows", "words"),
     [
-        (False, "round, and straight over 40 mm, but no further sheet was allowed: raise the number of sheets"),
-        (True, "round, and straight over 40 mm, but a sheet there would cover too little"),
+        ((62, 98), "round, and straight over 40 mm, but no further sheet was allowed: raise the number of sheets"),
+        ((90, 100), "round, and straight over 40 mm, but a sheet there would cover too little"),
+        (None, "round, and straight over 40 mm, but a sheet there would cover too little"),
     ],
 )
-def test_a_straight_side_is_not_blamed_for_being_curved(spare: bool, words: str) -> None:
+def test_a_straight_side_is_blamed_on_the_number_only_where_a_sheet_more_lies_there(
+    rows: tuple[int, int] | None, words: str
+) -> None:
     profile = profile_of(np.full(100, 0.05))
-    ((_, _, told),) = bare_lengths(profile, [StraightSide(0, 60, 0, 31, 0.05, 0.0)], 0.001, 0.025, spare)
+    further = None if rows is None else AxisPlan(profile, [StraightSide(*rows, 0, 31, 0.05, 0.0)])
+    ((_, _, told),) = bare_lengths(profile, [StraightSide(0, 60, 0, 31, 0.05, 0.0)], 0.001, 0.025, further)
     assert words in told
 
 
 def test_a_side_that_curves_is_said_to_curve() -> None:
     z = np.arange(100)
     profile = profile_of(np.where(z < 60, 0.05, 0.05 + 3e-5 * (z - 60) ** 2))
-    ((_, _, told),) = bare_lengths(profile, [StraightSide(0, 61, 0, 31, 0.05, 0.0)], 1e-5, 0.025, False)
+    ((_, _, told),) = bare_lengths(profile, [StraightSide(0, 61, 0, 31, 0.05, 0.0)], 1e-5, 0.025)
     assert told == "round, but it curves away from a straight side"
 
 

@@ -1,0 +1,161 @@
+"""Coarse packings of sheets about one or several axes: which ones cover most without running into each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.ray_casting import RayCaster
+
+from .axis_plan import AxisPlan, SheetRequirements, SideLine, plan_sheets, side_lines
+from .axis_search import search_axis
+from .candidates import AxisCandidate
+from .clearance import kept_clear
+from .cone_fit import InfiniteCone
+from .profile import AxisFrame, RadialProfile, measure_profile
+
+__all__ = ["AxisSurvey", "Choice", "better_surveys", "grown", "packings", "profile_about", "survey_axes"]
+
+Floats = NDArray[np.float64]
+
+_COARSE_GRID = (120, 53)  # slices, and rays in each; odd, so that the rays do not hit facets in step
+_STARTS = 3  # plans of each number of sheets about one axis, none beside another, from which packings are grown
+_SEARCHED = 5  # axes, no two beside each other, from which a better one is looked for
+_BESIDE = (0.005, 0.0005)  # rad, m
+_NEAR = 1.6  # times the tolerance within which an axis is promising
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisSurvey:
+    """An axis with its coarse profile, and the lines near which partial wraps are looked for."""
+
+    profile: RadialProfile
+    lines: list[SideLine]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Sheets about one axis in a packing: number of the axis, and of full and partial wraps, with the coarse sides."""
+
+    axis: int
+    plan: AxisPlan
+
+    @property
+    def kinds(self) -> tuple[int, int]:
+        """Numbers of full and of partial wraps."""
+        full = sum(side.columns == len(self.plan.profile.phi) for side in self.plan.sides)
+        return full, len(self.plan.sides) - full
+
+
+def survey_axes(
+    mesh: Mesh, rays: RayCaster, candidates: list[AxisCandidate], requirements: SheetRequirements
+) -> list[AxisSurvey]:
+    """Measure a coarse profile about every candidate; ``best_plan`` packs sheets on them for any tolerance."""
+    surveys = []
+    for candidate in candidates:
+        frame = AxisFrame.along(candidate.origin, candidate.axis, requirements.seam_direction)
+        profile = profile_about(mesh, rays, frame, _COARSE_GRID, requirements)
+        surveys.append(AxisSurvey(profile, side_lines(profile, candidate.cones)))
+    return surveys
+
+
+def better_surveys(
+    mesh: Mesh, rays: RayCaster, surveys: list[AxisSurvey], requirements: SheetRequirements
+) -> list[AxisSurvey]:
+    """Return surveys about axes near the best ones about which a sheet covers more, within a tolerance.
+
+    Args:
+        mesh: the link.
+        rays: a ray caster of the same mesh.
+        surveys: of the axes, as ``survey_axes`` returns them.
+        requirements: on the sheets.
+    """
+    near = replace(requirements, tolerance=_NEAR * requirements.tolerance)
+    alone = [(plan, one) for one in surveys for plan in plan_sheets(one.profile, one.lines, near, 1)]
+    found: list[AxisSurvey] = []
+    kept: list[AxisFrame] = []
+    for plan, one in sorted(alone, key=lambda pair: -pair[0].area):
+        frame = one.profile.frame
+        if len(kept) == _SEARCHED or any(_beside(frame, other) for other in kept):
+            continue
+        kept.append(frame)
+        (side,) = plan.sides
+        better = search_axis(one.profile, side, one.lines, requirements)
+        if better is not None:
+            profile = profile_about(mesh, rays, better, _COARSE_GRID, requirements)
+            moved = float((better.origin - frame.origin) @ frame.axis)
+            cone = InfiniteCone(better.origin, better.axis, side.radius + side.slope * moved, math.atan(side.slope))
+            found.append(AxisSurvey(profile, side_lines(profile, (cone,))))
+    return found
+
+
+def _beside(frame: AxisFrame, other: AxisFrame) -> bool:
+    """Tell whether two axes are so near each other that a search from one finds what it finds from the other."""
+    gap = frame.origin - other.origin
+    tilt = float(np.linalg.norm(np.cross(frame.axis, other.axis)))
+    return tilt < _BESIDE[0] and float(np.linalg.norm(gap - (gap @ other.axis) * other.axis)) < _BESIDE[1]
+
+
+def packings(surveys: list[AxisSurvey], requirements: SheetRequirements) -> list[list[Choice]]:
+    """Return packings of sheets on coarse profiles, the one that covers most first."""
+    most = requirements.max_sheets
+    alone = [plan_sheets(one.profile, one.lines, requirements, most) for one in surveys]
+    singles = [Choice(number, plan) for number, plans in enumerate(alone) for plan in plans]
+    singles.sort(key=lambda choice: -choice.plan.score(requirements))
+    found: dict[frozenset[tuple[int, tuple[int, int]]], list[Choice]] = {}
+    seen: list[Choice] = []
+    for start in singles:
+        frame = start.plan.profile.frame
+        alike = [other for other in seen if len(other.plan.sides) == len(start.plan.sides)]
+        if len(alike) == _STARTS or any(_beside(frame, other.plan.profile.frame) for other in alike):
+            continue
+        seen.append(start)
+        packing = grown([start], surveys, alone, requirements)
+        key = frozenset((choice.axis, choice.kinds) for choice in packing)
+        if key not in found or _score(packing, requirements) > _score(found[key], requirements):
+            found[key] = packing
+    return sorted(found.values(), key=lambda packing: -_score(packing, requirements))
+
+
+def _score(packing: list[Choice], requirements: SheetRequirements) -> float:
+    return sum(choice.plan.score(requirements) for choice in packing)
+
+
+def grown(
+    packing: list[Choice], surveys: list[AxisSurvey], alone: list[list[AxisPlan]], requirements: SheetRequirements
+) -> list[Choice]:
+    """Return a packing with the sheets about further axes that add most, one axis after another."""
+    while (left := requirements.max_sheets - sum(len(choice.plan.sides) for choice in packing)) > 0:
+        best: Choice | None = None
+        gain = 0.0
+        used = {choice.axis for choice in packing}
+        hopes = [
+            (max((plan.score(requirements) for plan in plans[:left]), default=0.0), number)
+            for number, plans in enumerate(alone)
+            if number not in used
+        ]
+        for hope, number in sorted(hopes, reverse=True):
+            if hope <= gain:  # what is there already can only take from it
+                break
+            profile = kept_clear(surveys[number].profile, [choice.plan for choice in packing], requirements)
+            for plan in plan_sheets(profile, surveys[number].lines, requirements, left):
+                if plan.score(requirements) > gain:
+                    best, gain = Choice(number, plan), plan.score(requirements)
+        if best is None:
+            break
+        packing = [*packing, best]
+    return packing
+
+
+def profile_about(
+    mesh: Mesh, rays: RayCaster, frame: AxisFrame, grid: tuple[int, int], requirements: SheetRequirements
+) -> RadialProfile:
+    """Measure a profile about an axis, of at most so many slices and so many rays in each."""
+    slices, around = grid
+    length = float(np.ptp(frame.local(mesh.vertices)[:, 2]))
+    profile = measure_profile(mesh, rays, frame, max(length / slices, 0.0005), around, requirements.max_bridge)
+    return profile if requirements.weights is None else profile.weighed(requirements.weights)

@@ -1,0 +1,93 @@
+"""Every hint of a fit works: followed, it covers more; where as many sheets were allowed, none asks for them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from coneskin.geometry.fit.cones import LinkFit, find_cones
+from coneskin.geometry.mesh import Mesh, make_mesh
+
+from ..synthetic import barrel, frustum, holed, joined, noisy, placed, revolve, rugby, shoulder
+from .test_cones import link
+
+#: tubes and cones of one axis: one sheet fewer than there are straight sides is one too few
+ZIGZAG = [(0.0, 0.03), (0.1, 0.05), (0.2, 0.03), (0.3, 0.05)]
+STEPS = [(0.0, 0.05), (0.08, 0.05), (0.081, 0.04), (0.16, 0.04), (0.161, 0.03), (0.24, 0.03)]
+
+
+def fine(mesh: Mesh) -> Mesh:
+    """The same surface of four times as many faces."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    d, e, f = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    corners = np.concatenate([a, d, f, d, b, e, f, e, c, d, e, f], axis=1).reshape(-1, 3)
+    return make_mesh(corners, np.arange(len(corners)).reshape(-1, 3), mesh.source)
+
+
+def crossed() -> Mesh:
+    """Two tubes about axes square to each other, as at an elbow."""
+    corners, faces = frustum(0.03, 0.03, 0.12)
+    return placed(joined(frustum(0.05, 0.05, 0.2), (corners @ np.eye(3)[[1, 2, 0]] + [0.0, 0.04, 0.1], faces)))
+
+
+BODIES: dict[str, Callable[[], Mesh]] = {
+    "tube": lambda: placed(frustum(0.05, 0.05, 0.2)),
+    "zigzag": lambda: placed(revolve(ZIGZAG)),
+    "steps": lambda: placed(revolve(STEPS)),
+    "crossed": crossed,
+    "rugby": lambda: placed(noisy(rugby(), 2e-4)),
+    "barrel": lambda: placed(barrel()),
+    "shoulder": lambda: placed(shoulder()),
+    "holed": lambda: placed(holed()),
+    "UR10 upper arm": lambda: link("ur/ur10/collision/upperarm.stl"),
+    "UR5e forearm": lambda: link("ur/ur5e/visual/forearm.dae"),
+    "UR5e forearm, finer": lambda: fine(link("ur/ur5e/visual/forearm.dae")),
+    "UR5e upper arm": lambda: link("ur/ur5e/visual/upperarm.dae"),
+    "UF850 link 4": lambda: link("xarm/uf850_link4.stl"),
+}
+
+
+def area(fit: LinkFit) -> float:
+    return sum(sheet.frustum.area for sheet in fit.sheets)
+
+
+def asked_for(fit: LinkFit) -> list[int]:
+    """Numbers of sheets that a fit advises to allow."""
+    return [int(found[1]) for bare in fit.bare_areas if (found := re.search(r"allow (\d+) sheets", bare.reason))]
+
+
+@pytest.mark.parametrize(
+    "name", ["zigzag", *(pytest.param(n, marks=pytest.mark.long) for n in BODIES if n != "zigzag")]
+)
+def test_a_sheet_more_covers_more_until_none_is_advised(name: str) -> None:
+    mesh = BODIES[name]()
+    fit = find_cones(mesh, max_sheets=1)
+    for count in range(2, 6):
+        hints, lengths = asked_for(fit), [bare for bare in fit.bare if "raise the number" in bare.reason]
+        if not hints and not lengths:
+            break
+        assert hints in ([], [count])
+        more = find_cones(mesh, max_sheets=count, max_wires=4 * count)
+        assert len(more.sheets) == count
+        assert area(more) > 1.01 * area(fit), "the advice works"
+        fit = more
+    again = find_cones(mesh, max_sheets=len(fit.sheets) + 1)
+    if len(again.sheets) < len(fit.sheets) + 1:
+        assert asked_for(again) == [], "as many sheets were allowed already"
+        assert not any("raise the number" in bare.reason for bare in again.bare)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["barrel", "rugby", "UR5e upper arm", "UF850 link 4"])
+def test_the_tolerance_that_is_advised_gives_a_sheet(name: str) -> None:
+    mesh = BODIES[name]()
+    tried = 0
+    for tolerance in (2e-5, 1e-4, 3e-4):
+        fit = find_cones(mesh, tolerance=tolerance)
+        if not fit.sheets and fit.nearest is not None:
+            tried += 1
+            assert find_cones(mesh, tolerance=fit.needed_tolerance).sheets
+    assert tried, "a body on which nothing is advised tests nothing"
