@@ -17,11 +17,13 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
 from .contact_matrix import ContactMatrix, FrameInversion
+from .doubt import CONTRADICTS, MOVES, WEAK
 from .matrix_mean import LONGEST, MatrixMean
 from .matrix_noise import FrameNoise, MatrixNoise
 from .place_estimate import PlaceEstimate, PlaceEstimator, SheetConductances
 from .reading import Reading
-from .seam_contact import SeamPlace, SeamTest
+from .seam_certainty import SeamCertainty
+from .seam_contact import SeamPlace
 from .settings import DetectorSettings
 from .single_contact import SingleContactTest
 from .touch_reading import TouchReading
@@ -29,13 +31,8 @@ from .touch_velocity import TouchVelocity
 
 __all__ = ["TouchPlace"]
 
-_WEAK = "it presses too lightly for a place"
-_CONTRADICTS = "the guides of a phase differ too much for one contact"
-_MOVES = "it has only begun, or moves"
 _MAX_SLIDE = 2.0  # settle distances; a touch that has moved this far is another one, and its evidence begins anew
 
-_BESIDE = 0.02  # P_yy over G; a press over the seam has more, and most touches are told from one by this alone
-_GROWS = 0.05  # ratio by which the conductance may differ from its mean at the seam, where means of products are taken
 _REFRESH = 1.25  # ratio of frames at which the estimate is made anew
 _REST = 8  # frames for which an estimate serves at least; it costs as much as five of them
 _HARDER = 0.1  # ratio by which the conductance may change before it is
@@ -79,15 +76,12 @@ class TouchPlace:
         "_rest",
         "_scale",
         "_seam",
-        "_seam_held",
-        "_seam_place",
         "_settle",
         "_single",
         "_slide",
         "_softer",
         "_told",
         "_velocity",
-        "_wrap",
     )
 
     def __init__(
@@ -97,17 +91,14 @@ class TouchPlace:
         self._inversion, self._of_frame = FrameInversion(sensor), FrameNoise(sensor)
         self._estimator = PlaceEstimator(sensor)
         self._single = SingleContactTest(sensor, settings, currents)
-        self._seam = SeamTest(sensor, settings, self._estimator)
-        self._seam_place: tuple[float, float] | None = None
-        self._seam_held = False
         self._currents, self._drift = currents, settings.current_drift
         self._map, self._leak = sensor.place_map, leak
         self._level = sensor.thresholds.location_level
         self._settle = settings.settle_distance**2
         self._slide = (_MAX_SLIDE * settings.settle_distance) ** 2
         widest = max(cone.radius1, cone.radius2)
-        self._wrap = cone.wrap
         self._scale = self._estimator.length * widest / cone.radius1, cone.wrap * widest
+        self._seam = SeamCertainty(sensor, settings, self._estimator, self._scale[1])
         supply = parts.supply_volts / parts.adc_volts * parts.full_count
         self._count_variance = supply * supply / (1.0 + currents.aspect**4)
         self._mean, self._velocity = MatrixMean(), TouchVelocity(self._estimator)
@@ -126,12 +117,14 @@ class TouchPlace:
 
     def end(self) -> None:
         """Forget the touch: it is over."""
-        self._begun, self._newest, self._seam_place, self._seam_held = False, None, None, False
+        self._begun, self._newest = False, None
+        self._seam.end()
         self._restart()
 
     def interrupt(self) -> None:
         """Note a frame that cannot be believed: the next one follows no other."""
-        self._newest = self._seam_place = None
+        self._newest = None
+        self._seam.interrupt()
 
     def begin(self, frame: Frame, reading: Reading, level: float, now: float) -> TouchReading:
         """Take a frame with which a touch may begin: no estimate is made of it, and so its place is not certain.
@@ -144,13 +137,13 @@ class TouchPlace:
         """
         matrix = self._contacts(reading)
         if matrix is None:
-            return TouchReading(now, level, 0.0, 0.0, False, _WEAK, frame.clock_us, frame.sequence)
+            return TouchReading(now, level, 0.0, 0.0, False, WEAK, frame.clock_us, frame.sequence)
         self._began = now
         self._mean.begin(matrix)
         u, phi = self._estimator.place(matrix.x, matrix.y, 0.0, 0.0)
         if self._map is not None:
             u, phi = self._map.apply(u, phi)
-        doubt = self._doubt(reading, matrix, level, u) or _MOVES
+        doubt = self._doubt(reading, matrix, level, u) or MOVES
         return TouchReading(now, level, u, phi, False, doubt, frame.clock_us, frame.sequence)
 
     def take(self, frame: Frame, reading: Reading, level: float, now: float, period: float) -> TouchReading:
@@ -167,7 +160,7 @@ class TouchPlace:
         if matrix is None or self._leak.conductance:
             matrix = self._contacts(reading)
         if matrix is None:
-            return TouchReading(now, level, 0.0, 0.0, False, _WEAK, frame.clock_us, frame.sequence)
+            return TouchReading(now, level, 0.0, 0.0, False, WEAK, frame.clock_us, frame.sequence)
         mean, noise = self._mean, self._noise
         if not mean.frames:
             self._began = now
@@ -186,8 +179,8 @@ class TouchPlace:
         if self._map is not None:
             u, phi = self._map.apply(u, phi)
         doubt = self._doubt(reading, matrix, level, u)
-        if doubt and self._seam.closes and (seam := self._over_seam(now)) is not None:
-            doubt = self._doubt_seam(seam, reading, matrix)
+        if doubt and self._seam.closes and (seam := self._over_seam(reading, matrix, now)) is not None:
+            doubt = seam.doubt
             return TouchReading(
                 *(now, level, seam.u, seam.phi, not doubt, doubt, frame.clock_us, frame.sequence),
                 *(seam.covariance, None, None, seam.elongation, self._velocity.follow(matrix, self._noise, period)),
@@ -277,7 +270,7 @@ class TouchPlace:
         """Return why the place is not certain; empty where it is."""
         if not reading.location_valid:
             self._newest = None
-            return _WEAK if reading.level < self._level else _CONTRADICTS
+            return WEAK if reading.level < self._level else CONTRADICTS
         x, y, before = matrix.x, matrix.y, self._newest
         along, around = self._scale  # distances are never too small
         off_x, off_y = along * (x - self._first_x), around * (y - self._first_y)
@@ -287,36 +280,16 @@ class TouchPlace:
         self._newest = x, y
         doubt = self._single.take(matrix, level, u)
         if before is None:
-            return doubt or _MOVES
+            return doubt or MOVES
         off_x, off_y = along * (x - before[0]), around * (y - before[1])
-        return doubt or _MOVES if off_x * off_x + off_y * off_y > self._settle else doubt
+        return doubt or MOVES if off_x * off_x + off_y * off_y > self._settle else doubt
 
-    def _over_seam(self, now: float) -> SeamPlace | None:
-        """Return the place of a press over the seam; None where it is none."""
-        whole, _, _, _, _, around = self._mean.values
-        noise = self._noise
-        if around - self._estimator.sheets[1] < _BESIDE * whole:
-            self._seam_place = None
+    def _over_seam(self, reading: Reading, matrix: ContactMatrix, now: float) -> SeamPlace | None:
+        """Return the place of a press over the seam, and why it is not certain; None where it is none."""
+        noise, mean = self._noise, self._mean
+        if noise is None or not self._seam.may_be(mean.values):
+            self._seam.interrupt()
             return None
-        mean, frames = ContactMatrix(*self._mean.values, 0.0, 0.0, 0.0), float(self._mean.frames)
-        seam = None if noise is None else self._seam.place(mean, noise, frames, self._sheets(now))
-        if seam is None:
-            self._seam_place = None
-        elif self._map is not None:
-            wrap = self._map.frustum.wrap
-            seam = seam._replace(u=0.5 * (self._map.apply(seam.u, 0.0)[0] + self._map.apply(seam.u, wrap)[0]))
-        return seam
-
-    def _doubt_seam(self, seam: SeamPlace, reading: Reading, matrix: ContactMatrix) -> str:
-        """Return why the place of a press over the seam is not certain; empty where it is."""
-        before, (u, phi) = self._seam_place, seam[:2]
-        self._seam_place = u, phi
-        if not reading.location_valid:
-            return _CONTRADICTS
-        changes = abs(matrix.conductance / self._mean.values[0] - 1.0) > _GROWS
-        if seam.doubt or before is None or (changes and not self._seam_held):
-            self._seam_held = False
-            return seam.doubt or _MOVES
-        self._seam_held = True  # what was excluded once is not doubted again because the press changes
-        around = math.remainder(phi - before[1], 2.0 * math.pi) * self._scale[1] / self._wrap
-        return _MOVES if (u - before[0]) ** 2 + around * around > self._settle else ""
+        whole = ContactMatrix(*mean.values, 0.0, 0.0, 0.0)
+        frames, sheets = float(mean.frames), self._sheets(now)
+        return self._seam.follow(whole, noise, frames, sheets, matrix.conductance, reading.location_valid)
