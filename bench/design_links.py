@@ -7,8 +7,7 @@ The bound: hypotheses of cones from many draws; each is fitted with every gate, 
 from each. All axes that are left, up to hundreds, are surveyed; packings are grown from sixteen starts that lie apart,
 and the best four are made on fine profiles and completed, as what is found is. So the bound is sheets that exist: the
 best of them and of what is found. It shows what the search misses by trying few axes, few starts and few packings; it
-shares the rules of packing, so it does not show what these miss. "area" is that of the sheets over that of the hull, for
-both.
+shares the rules of packing, so it does not show what these miss. "area" is the sheets over the hull, for both.
 
 An earlier bound was no bound: it kept the first 250 axes of the first draws, grew from five starts that were mostly one
 axis again, and compared areas of whole coarse cells with those of finished sheets, a tenth too much for a short sheet.
