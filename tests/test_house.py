@@ -85,8 +85,8 @@ MAY_IMPORT: dict[str, str] = {
     "commands.demonstration": "replay scene robot.arm robot.guard",
     "commands.terminal": "commissioning skin.detection",
     "commands.arguments": "design geometry geometry.drawing scene.tables skin",
-    "testing": "scene robot.arm robot.driver robot.guard robot.reaction robot.stop robot.ur skin skin.detection "
-    "skin.sources skin.virtual geometry",
+    "testing": "scene robot.arm robot.driver robot.guard robot.guard.speed robot.reaction robot.stop robot.ur skin "
+    "skin.detection skin.sources skin.virtual geometry",
     "testing.field": "skin.field",
     "testing.firmware": "testing scene skin skin.firmware skin.sources skin.virtual",
 }

@@ -21,6 +21,7 @@ from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.reaction_motion import ReactionPlanner
+from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -77,6 +78,7 @@ class GuardRig:
         table: TablePlane | None = None,
         follows: bool = False,
         bits: int = 16,
+        speed_limit: SpeedLimit | None = None,
     ) -> None:
         names = ("one", "two")[:sensors]
         fine = Electronics(adc_bits=bits)  # with 16 a place is certain in the second frame of its touch
@@ -84,7 +86,9 @@ class GuardRig:
         # Foam without delay and ideal resistors: a touch begins and ends in the frames that the tests name.
         at_once = Imperfections(foam=Foam(delayed=0.0))
         self.skin = VirtualSkin(skins, touches, faults=faults, imperfections=at_once, model="ladder")
-        self.core = make_core(skins, reaction or Reaction(kind="retreat"), rules, external, table)
+        self.core = make_core(
+            skins, reaction or Reaction(kind="retreat"), rules, external, table, speed_limit=speed_limit
+        )
         self.arm = MockArm(list(START_Q), [0.0] * 6, obeys)
         self.speed = speed
         self.now = 100.0
@@ -187,6 +191,7 @@ def make_core(
     external: bool = False,
     table: TablePlane | None = None,
     driver: ArmDriver = UR_DRIVER,
+    speed_limit: SpeedLimit | None = None,
 ) -> GuardCore:
     """Return a core for sensors that all lie on the same place of the forearm."""
     limits = MonitoringLimits()
@@ -195,7 +200,6 @@ def make_core(
         for s in sensors
     ]
     paths = EXTERNAL_PATHS if external else INTERNAL_PATHS
-    arm = ArmSupervisor(
-        MODEL, driver, reaction, limits, paths, rules, ReactionPlanner(MODEL, 4.0 if external else None, table)
-    )
+    planner = ReactionPlanner(MODEL, 4.0 if external else None, table)
+    arm = ArmSupervisor(MODEL, driver, reaction, limits, paths, rules, planner, speed_limit=speed_limit)
     return GuardCore(TouchStream(sensors, DetectorSettings(stuck_frames=200)), placed, limits, arm)

@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 from coneskin.physics.joint_program import Waypoints
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.driver.setpoint import SetSpeedSlider
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent
+from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds, SurfaceSpeeds
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
+from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.ur.driver import UR_DRIVER
-from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q
+from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q, GuardRig, touch
 from coneskin.testing.mock_arm import MockArm
 
 LEVERS = (0.1, 0.2, 0.4, 0.8)
@@ -285,3 +287,20 @@ def test_a_setting_that_crosses_a_persons_on_its_way_is_taken_back() -> None:
     loop.run(0.06, speed=0.1)
     assert loop.arm.slider == 0.05
     assert loop.limit.setting.ceiling == 0.05
+
+
+@pytest.mark.parametrize("touched", [False, True])
+def test_a_guard_that_ends_puts_the_slider_back_once_the_arm_stands(touched: bool) -> None:
+    touches = [touch(1.0, 1.1)] if touched else []
+    rig = GuardRig(*touches, reaction=Reaction(kind="stop"), speed=1.0, speed_limit=SpeedLimit(MODEL, ANYWHERE))
+    rig.arm.slider = 0.9
+    rig.run(1.6)
+    assert rig.core.phase is (Phase.LATCHED if touched else Phase.ACTIVE)
+    assert rig.arm.slider < 0.5
+    rig.feed(BlockKind.LOST, b"session\nthe guard was told to end")
+    assert (rig.arm.slider == 0.9) is touched  # it stands already
+    while rig.core.phase is not Phase.LATCHED:
+        assert rig.arm.slider < 0.5
+        rig.run(0.001)
+    assert rig.arm.speed < 0.02
+    assert rig.arm.slider == 0.9
