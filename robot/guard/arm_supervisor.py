@@ -223,8 +223,7 @@ class ArmSupervisor:
         elif self._away.under_way:
             self._move(state, out)
         elif self._speed_limit is not None and self.phase is Phase.ACTIVE:
-            slider = self.speed_reduction.slider if self.speed_reduction.knows(state.time) else None
-            if why := self._speed_limit.sample(state, slider, out):
+            if why := self._speed_limit.sample(state, self.speed_reduction.known(state.time), out):
                 self._stop_now(state.time, why, False, out)
         elif self.phase is Phase.SLOWED:
             self.speed_reduction.sample(state, self._touches.contacts)
@@ -240,7 +239,7 @@ class ArmSupervisor:
         """Decide what only the passing of time shows."""
         if self._stops.under_way:
             self._stops.escalate(now, self._reaction.deceleration, self.state, out)
-            self._note_slider()
+            self.speed_reduction.note_stop(self._stops.used)
         elif self.phase is Phase.SLOWED:
             if why := self.speed_reduction.look(now, bool(self._touches.contacts)):
                 approach = self.speed_reduction.approach
@@ -306,7 +305,7 @@ class ArmSupervisor:
 
     def _begin(self, now: float, phase: Phase, command: StopProgram | EndReaction, out: Outputs) -> None:
         self._stops.send(command, self._watch.insists, out)
-        self._note_slider()
+        self.speed_reduction.note_stop(self._stops.used)
         self._away.end(out)
         state = self.state
         speed = None if state is None or self.silent(now) else state.speed
@@ -360,15 +359,8 @@ class ArmSupervisor:
         if self._stops.unconfirmed(state):
             self._why += "; the controller does not show the protective stop"
         emit(out, EventName.LATCHED, state.time, why=self._why, stop=self.stop_number)
-        if self._ending:
-            self._put_slider_back(state.time, out)
+        self._put_slider_back(state.time, out)
 
     def _put_slider_back(self, now: float, out: Outputs) -> None:
-        if self._speed_limit is not None:
-            slider = self.speed_reduction.slider if self.speed_reduction.knows(now) else None
-            self._speed_limit.end(now, slider, out)
-
-    def _note_slider(self) -> None:
-        """Remember where the slider was before a stop put it to 0; a person's reset puts it back."""
-        if StopPath.SLIDER in self._stops.used:
-            self.speed_reduction.halt()
+        if self._ending and self._speed_limit is not None:
+            self._speed_limit.end(now, self.speed_reduction.known(now), out)

@@ -10,12 +10,13 @@ has priority: it is not put back over it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.journal import EventName
 from coneskin.robot.guard.outputs import Outputs, emit
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
@@ -154,6 +155,10 @@ class SpeedReduction:
         """Tell whether the position of the slider is known at a time [s]."""
         return self.slider is not None and time - self._read_at <= _MAX_SLIDER_AGE
 
+    def known(self, time: float) -> float | None:
+        """Return the position of the slider; None where it is not known at a time [s]."""
+        return self.slider if self.knows(time) else None
+
     def begin(
         self,
         time: float,
@@ -225,8 +230,10 @@ class SpeedReduction:
             out.append(SetSpeedSlider(touch.before))
             self.slider, self._last = touch.before, (time, touch)
 
-    def halt(self) -> None:
-        """Note that a stop puts the slider to 0; where it was is kept until ``release``."""
+    def note_stop(self, used: Collection[StopPath]) -> None:
+        """Take the paths of a stop: one puts the slider to 0; where it was is kept until ``release``."""
+        if StopPath.SLIDER not in used:
+            return
         before = self.slider if self.now is None else self.now.before
         if self._halted_from is None and before is not None and before > _SLIDER_TOLERANCE:
             self._halted_from = before

@@ -4,6 +4,7 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.speed.speed_reduction import HOLD, ReducedSpeedTouch, SpeedReduction
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -102,7 +103,7 @@ def test_a_slider_that_a_stop_has_put_to_0_stays_there_until_the_reset():
     state = ControllerState(10.0, 1.0, (0.0, -1.5, 1.5, -1.5, -1.5, 0.0), ZERO_VELOCITY, True, False, True)
     reduction.note(10.0, 1.0)
     assert reduction.begin(10.0, state, Reaction(kind="slow", slow_to=0.2), MonitoringLimits(), [], out)
-    reduction.halt()
+    reduction.note_stop((StopPath.SLIDER,))
     reduction.put_back(10.02, out)
     reduction.note(10.04, 0.0)
     before, out = out, []
