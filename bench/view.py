@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import os
 import subprocess
 import sys
@@ -173,6 +174,35 @@ def waited(pid: int) -> float:
     return 1e-9 * sum(int((task / "schedstat").read_text().split()[1]) for task in tasks)
 
 
+@contextlib.contextmanager
+def sliding_box(server: PageServer) -> Iterator[None]:
+    """Let a box move to and fro on a page, 30 times a second: the least that a picture can take."""
+    server.scene.configure_environment_map(hdri=None)
+    server.scene.configure_default_lights(enabled=False)
+    server.scene.add_light_directional("/sun", position=(1.0, 1.0, 1.0), cast_shadow=False)
+    box, over = server.scene.add_box("/box", cast_shadow=False, receive_shadow=False), threading.Event()
+
+    def move() -> None:
+        while not over.wait(1.0 / 30.0):
+            box.position = (0.0, math.sin(time.monotonic()), 0.0)
+
+    mover = threading.Thread(target=move, daemon=True)
+    mover.start()
+    try:
+        yield
+    finally:
+        over.set()
+        mover.join()
+
+
+def drawn(name: str, page: Any, seconds: float) -> None:
+    """Print what a browser draws in some seconds."""
+    turns, pictures, spent = drawn_pictures(page, seconds)
+    parts = ", ".join(f"{kind} {1e3 * spent[kind] / max(pictures * seconds, 1.0):.0f} ms" for kind in PROCESSES)
+    rates = f"{turns:.1f} turns, {pictures:.1f} pictures a second"
+    print(f"browser, {name}: {rates}; processor time of each: {parts}", flush=True)
+
+
 def look(url: str, span: Callable[[str], None], moving: Callable[[], Any], seconds: float) -> None:
     """Look at the page in a browser, beside an empty page, and print what it draws."""
     from playwright.sync_api import sync_playwright
@@ -184,14 +214,12 @@ def look(url: str, span: Callable[[str], None], moving: Callable[[], Any], secon
             print(f"browser, {name}: {took:.2f} s until the first picture; processor time: {parts}", flush=True)
             if address == url:
                 break
+            with sliding_box(empty):
+                drawn("a box alone moves", page, seconds)
             browser.close()
         for name, context in (("arm stands", contextlib.nullcontext), ("arm moves", moving)):
             with context():
-                turns, pictures, spent = drawn_pictures(page, seconds)
-            each = {kind: 1e3 * spent[kind] / max(pictures * seconds, 1.0) for kind in PROCESSES}
-            parts = ", ".join(f"{kind} {each[kind]:.0f} ms" for kind in PROCESSES)
-            rates = f"{turns:.1f} turns, {pictures:.1f} pictures a second"
-            print(f"browser, {name}: {rates}; processor time of each: {parts}", flush=True)
+                drawn(name, page, seconds)
         span("page and browser")
         browser.close()
 

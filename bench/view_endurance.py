@@ -1,12 +1,12 @@
 """Server of a page that stays open: its memory while hours of a run go by, faster than they would.
 
-    python bench/view_endurance.py [--hours 3] [--trace]
+    python bench/view_endurance.py [--hours 3] [--late 60] [--trace]
 
 The collision of tests/data is written again and again into a recording, 50 ms at a time; after each, the page looks,
 and every 200 ms of the run it draws. Nothing waits for a clock, and nobody looks at the page, so what is measured is
 its own: the memory of the process after a collection of garbage, the objects that the collector knows, and what the
-page and the library's buffer hold. With `--trace`, where in the source what has come since was allocated.
-Needs the extra `view`.
+page and the library's buffer hold. With `--late`, the page looks seldom, as one that gets no processor.
+With `--trace`, where in the source what has come since was allocated. Needs the extra `view`.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=3.0, help="of the run")
+    parser.add_argument("--late", type=float, default=STEP, help="s of the run between two looks: of a starved page")
     parser.add_argument("--trace", action="store_true", help="tell where memory was allocated, three times slower")
     args = parser.parse_args()
     print(head("viser"), flush=True)
@@ -74,8 +75,9 @@ def follow(args: argparse.Namespace, recorder: Recorder, server: PageServer, liv
         for old in recorder.parts[:-2]:
             old.unlink(missing_ok=True)
         parcel = [block]
-        page.look(due)
-        if steps % DRAWN == 0:
+        if steps % round(args.late / STEP) == 0:
+            page.look(due)
+        if steps % max(DRAWN, round(args.late / STEP)) == 0:
             page.draw(due)
         steps, due = steps + 1, due + STEP
         if due - STEP >= look:

@@ -104,7 +104,7 @@ def served(page: Any, command: list[str], folder: Path, look: Callable[[Any], No
 def look_at_potential(page: Any, target: Path) -> None:
     """Take the picture of the potential on a touched sheet."""
     forward = page.get_by_role("button", name=">", exact=True)
-    for words in ("activated", "stop: touch", "located", "standstill"):
+    for words in ("activated", "touch on", "located"):
         forward.click()
         page.wait_for_function(_SHOWN, arg=words)
     page.get_by_label("potential").first.click()
@@ -164,13 +164,11 @@ def main() -> None:
         browser = driver.chromium.launch(executable_path="/usr/bin/chromium", args=list(FLAGS))
         page = browser.new_page(viewport=SIZE)
         page.set_default_timeout(_PATIENT)
-        if {"view-potential", "view.gif"} & set(wanted):
-            collision(folder)
         if "view.gif" in wanted:
-            film(page, folder / "collision" / "run.rec", args.output / "view.gif")
+            film(page, collision(folder), args.output / "view.gif")
         if "view-potential" in wanted:
             target = args.output / "view-potential.png"
-            served(page, ["view", "collision"], folder, lambda page: look_at_potential(page, target))
+            served(page, ["view", str(RUN.relative_to(ROOT))], ROOT, lambda page: look_at_potential(page, target))
         if "view" in wanted:
             draw_file(page, [RUN], "standstill", args.output / "view.png")
         if "view-two-runs" in wanted:

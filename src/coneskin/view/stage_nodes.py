@@ -58,7 +58,7 @@ def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
     if count == 1:
         server.look_from((-away, -away, 0.6 * reach), (-0.1 * reach, 0.0, 0.3 * reach))  # most arms work to that side
     else:  # from in front, so that none stands before another
-        server.look_from((-away * (0.3 + count), 0.0, 0.7 * reach), (0.0, 0.0, 0.28 * reach))
+        server.look_from((-away * (0.7 + count), 0.0, 0.7 * reach), (0.0, 0.0, 0.28 * reach))
     light_plainly(server.scene)
     lines, faces = floor_lines(reach)
     server.scene.add_mesh_simple(
