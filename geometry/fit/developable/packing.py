@@ -55,7 +55,7 @@ def with_developables(
         say: called with the name of each step.
 
     Returns:
-        ``cones`` where they cover as much, or all but a twentieth of the hull as much; else a fit with developables.
+        ``cones`` where they cover as much, or all but ``LEAST_GAIN`` of the hull as much; else a fit with developables.
     """
     if options.wrap is not None and options.wrap != TURN:
         return cones
