@@ -87,6 +87,15 @@ def measure(seed: int, ways: list[str], made_by: str) -> list[Row]:
     return [replace(play(seed, way)[1], commit=made_by) for way in ways]
 
 
+def rows_of(kept: Path) -> dict[int, dict[str, Row]]:
+    """Return the rows of a file of --keep, by seed and way."""
+    found: dict[int, dict[str, Row]] = {}
+    for line in kept.read_text(encoding="utf-8").splitlines():
+        row = Row(**json.loads(line))
+        found.setdefault(row.seed, {})[row.way] = row
+    return found
+
+
 def measure_all(args: argparse.Namespace, ways: list[str]) -> dict[int, dict[str, Row]]:
     """Measure what --keep does not hold yet; each row keeps the commit that was checked out when its run began."""
     made_by, began = commit(), time.monotonic()
@@ -96,9 +105,7 @@ def measure_all(args: argparse.Namespace, ways: list[str]) -> dict[int, dict[str
         whole = text[: text.rfind("\n") + 1]
         if whole != text:  # the run was ended while it wrote its last line
             args.keep.write_text(whole, encoding="utf-8")
-        for line in whole.splitlines():
-            row = Row(**json.loads(line))
-            found.setdefault(row.seed, {})[row.way] = row
+        found = rows_of(args.keep)
     wanted = {seed: [way for way in ways if way not in found.get(seed, {})] for seed in range(args.collisions)}
     left = {seed: names for seed, names in wanted.items() if names}
     with ProcessPoolExecutor(args.parallel) as pool:

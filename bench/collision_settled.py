@@ -11,11 +11,10 @@ how much of its highest torque the most strained joint bears from the contacts a
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from pathlib import Path
 
-from collision import REACTIONS, Row
+from collision import REACTIONS, rows_of
 from collision_cases import RUN_UP_ACCELERATION, draw
 from report import head
 
@@ -48,15 +47,11 @@ def main() -> None:
     parser.add_argument("--most-n", type=float, default=5.0)
     parser.add_argument("--until", type=float, default=1.5, help="after the first contact [s] (%(default)s)")
     args = parser.parse_args()
-    found: dict[int, dict[str, Row]] = {}
-    for line in args.kept.read_text(encoding="utf-8").splitlines():
-        row = Row(**json.loads(line))
-        found.setdefault(row.seed, {})[row.way] = row
     print(
         f"{head()}\n{'seed':>5} {'body':7}{'way':9}{'stop N':>8}{'way N':>8}   later:{'stop N':>8}{'way N':>8}  torque"
     )
     still, count = 0, 0
-    for seed, rows in sorted(found.items()):
+    for seed, rows in sorted(rows_of(args.kept).items()):
         stop = rows.get("stop")
         ways = [way for way in REACTIONS[1:] if stop and way in rows and rows[way].met]
         for way in [way for way in ways if stop and rows[way].clamp - stop.clamp > args.most_n]:
