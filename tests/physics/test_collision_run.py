@@ -11,6 +11,7 @@ from coneskin.recording import Block
 from coneskin.recording_file.recorder import Recorder
 from coneskin.replay.run import read_run, replay
 from coneskin.robot.guard.journal import BlockKind, EventName, body_places, contact_force
+from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.body import BodyScene
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.scene import Scene
@@ -64,6 +65,9 @@ def test_the_force_of_a_contact_stops_the_arm_through_skin_bytes_and_guard_and_t
     recorded = read_run(path)
     assert [event.name for event in recorded.events] == [event.name for event in run.events]
     assert replay(recorded).same
+    (row,) = judge_run(path)
+    assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 1, 0, 0)
+    assert 0.0 < row["delay_median_ms"] <= 3.0
     (pressed, force, (place,)) = [
         (block, force, body_places(block.payload))
         for block in recorded.select(kinds=frozenset({BlockKind.TRUTH}))

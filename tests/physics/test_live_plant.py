@@ -15,6 +15,7 @@ import pytest
 from coneskin.errors import Collision, MissingExtra, RobotRefused
 from coneskin.replay.run import read_run, replay
 from coneskin.robot.guard.journal import BlockKind, EventName, body_places, contact_force
+from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.scene import Scene
 from coneskin.session.session import guard
@@ -75,6 +76,8 @@ def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(live, tmp_pat
     assert located.details["u"] == pytest.approx(0.13, abs=0.01)
     run = read_run(tmp_path / "run.rec")
     assert replay(run).same
+    (row,) = judge_run(tmp_path / "run.rec")
+    assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 1, 0, 0)
     truths = list(run.select(kinds=frozenset({BlockKind.TRUTH})))
     felt = [(block.time, force) for block in truths if (force := contact_force(block.payload)) is not None]
     assert felt[0][0] == pytest.approx(began, abs=0.004)

@@ -32,6 +32,7 @@ from .impact_outcome import ImpactMeter, ImpactOutcome
 from .joint_program import JointProgram
 from .mujoco_plant import MujocoPlant
 from .scene_plant import currents_of, presses_of, sheets_of
+from .touch_recorder import TouchRecorder
 from .truth_recorder import TruthRecorder
 
 __all__ = ["PROTECTIONS", "CollisionRun"]
@@ -57,8 +58,8 @@ class CollisionRun:
         seed: of the skins' noise.
         sheets: model of the skins' sheets, "ladder" or "field".
         heeds: True where what moves the arm obeys the speed slider; a stream of servo setpoints does not.
-        note: is told each block that the guard takes, each event that it makes, the force of the contacts, and
-            where the bodies are, for a recording.
+        note: is told each block that the guard takes, each event that it makes, the force of the contacts, where
+            the bodies are, and which skin they touch, for a recording.
 
     Attributes:
         plant: the arm among its bodies.
@@ -103,7 +104,7 @@ class CollisionRun:
         self._began = math.nan
         self._steps = 0
         self._note = note
-        self._truth = TruthRecorder(_STEP)
+        self._truth, self._touches = TruthRecorder(_STEP), TouchRecorder()
 
     @property
     def outcome(self) -> ImpactOutcome:
@@ -176,8 +177,10 @@ class CollisionRun:
         plant = self.plant
         rate = max((contact.rate for contact in plant.contacts), default=0.0)
         speed = max(map(abs, plant.qd))
-        if (block := self._truth.take(self.now, plant.force, plant.places)) is not None:
-            self._note(block)
+        touches = self._touches.take(self.now, presses_of(plant, self._skins).values())
+        for block in (self._truth.take(self.now, plant.force, plant.places), touches):
+            if block is not None:
+                self._note(block)
         self.meter.take(self.now, plant.force, rate, plant.peak, plant.deepest, plant.impulse, speed)
 
     # guard

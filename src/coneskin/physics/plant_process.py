@@ -37,6 +37,7 @@ def main(arguments: list[str]) -> int:
 
     from .impact_outcome import ImpactMeter
     from .scene_plant import ScenePlant
+    from .touch_recorder import TouchRecorder
     from .truth_recorder import TruthRecorder
 
     while not (hello := program.receive()) and not program.closed:
@@ -56,7 +57,7 @@ def main(arguments: list[str]) -> int:
     program.send(encode_json({"ready": True}))
     gc.collect()
     gc.freeze()
-    meter, recorder = ImpactMeter(), TruthRecorder(_TRUTH_PERIOD)
+    meter, recorder, touches = ImpactMeter(), TruthRecorder(_TRUTH_PERIOD), TouchRecorder()
     quiet = _RELAXED  # cycles since something pressed
     while not controller.closed and not program.closed:
         ready = wait_readable([program, controller], _PATIENCE)
@@ -67,14 +68,16 @@ def main(arguments: list[str]) -> int:
                 print(f"coneskin physics: {exc}", file=sys.stderr, flush=True)
                 return 1
             controller.send(encode_state(state))
-            presses = [[*key, *press] for key, press in plant.presses().items()]
+            now = time.monotonic()  # before the skin can feel it: no touch begins after what is seen of it
+            presses = plant.presses()
             quiet = 0 if presses else quiet + 1
             if quiet < _RELAXED:
-                skin.send(encode_json({"step": CYCLE, "presses": presses}))
+                pressing = [[*key, *press] for key, press in presses.items()]
+                skin.send(encode_json({"step": CYCLE, "presses": pressing}))
             physics = plant.physics
-            now = time.monotonic()
-            if (truth := recorder.take(now, physics.force, physics.places)) is not None:
-                skin.send(encode_json({"truth": truth.payload.decode(), "time": truth.time}))
+            for truth in (recorder.take(now, physics.force, physics.places), touches.take(now, presses.values())):
+                if truth is not None:
+                    skin.send(encode_json({"truth": truth.payload.decode(), "time": truth.time}))
             rate = max((contact.rate for contact in physics.contacts), default=0.0)
             speed = max(map(abs, state.qd))
             meter.take(now, physics.force, rate, physics.peak, physics.deepest, physics.impulse, speed)

@@ -51,7 +51,20 @@ def test_touches_end_where_all_is_released_and_nothing_told_is_not_untouched(col
     ]
 
 
-@pytest.mark.parametrize("facts", [[], {"touches": [{}]}, {"touches": 5}, {"released": "now"}])
+def test_what_bodies_press_is_told_twice_counts_once_and_is_not_taken_off(collision: Run) -> None:
+    begun, over = touch(collision, 3.0, None), touch(collision, 3.0, 5.0)
+    resting, script = touch(collision, 6.0, None, "b"), touch(collision, 3.5, None, "c")
+    facts = ({"pressed": []}, {"pressed": [begun]}, {"touches": [script]}, {"pressed": [over, resting]})
+    found = true_touches(told(collision, *facts, {"released": collision.start + 6.5}))
+    assert found is not None
+    assert [(one.sensor, pytest.approx(one.start), pytest.approx(one.end)) for one in found] == [
+        (SKIN, 3.0, 5.0),
+        ("c", 3.5, 6.5),
+        ("b", 6.0, math.inf),
+    ]
+
+
+@pytest.mark.parametrize("facts", [[], {"pressed": [{}]}, {"touches": [{}]}, {"touches": 5}, {"released": "now"}])
 def test_a_damaged_word_about_touches_is_refused(collision: Run, facts: Any) -> None:
     with pytest.raises(RecordingError, match="does not say what touched the skin"):
         true_touches(told(collision, facts))

@@ -6,7 +6,7 @@ import json
 import math
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.bounded_file import read_file
 from coneskin.errors import RecordingError
@@ -65,7 +65,7 @@ def read_labels(path: Path) -> list[TouchLabel]:
 
 
 def true_touches(run: Run) -> list[TouchLabel] | None:
-    """Return with what the virtual skin of a run was touched; None where nothing tells.
+    """Return with what the virtual skin of a run was touched, by a script or by bodies; None where nothing tells.
 
     Raises:
         RecordingError: what the recording tells is damaged.
@@ -74,18 +74,24 @@ def true_touches(run: Run) -> list[TouchLabel] | None:
     if not told:
         return None
     labels: list[TouchLabel] = []
+    by_bodies: dict[tuple[str, float], TouchLabel] = {}  # each told as it begins, and again once it is over
     for block in told:
         try:
             facts = json.loads(block.payload)
-            for touch in facts.get("touches", ()):
-                end = math.inf if touch["end"] is None else touch["end"] - run.start
-                labels.append(TouchLabel(touch["start"] - run.start, end, str(touch["sensor"])))
+            labels += [_label(touch, run.start) for touch in facts.get("touches", ())]
+            for one in (_label(touch, run.start) for touch in facts.get("pressed", ())):
+                by_bodies[one.sensor, one.start] = one
             if "released" in facts:  # all that touches at that moment
                 time = facts["released"] - run.start
                 labels = [one._replace(end=time) if one.start < time < one.end else one for one in labels]
         except (ValueError, TypeError, KeyError, AttributeError) as exc:
             raise RecordingError(f"a block of {block.time:.6f} s does not say what touched the skin: {exc}") from exc
-    return sorted(labels)
+    return sorted([*labels, *by_bodies.values()])
+
+
+def _label(touch: dict[str, Any], began: float) -> TouchLabel:
+    end = math.inf if touch["end"] is None else touch["end"] - began
+    return TouchLabel(touch["start"] - began, end, str(touch["sensor"]))
 
 
 def recorded_labels(recorded: Decisions) -> list[TouchLabel]:
