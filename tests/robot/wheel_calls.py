@@ -492,7 +492,8 @@ def remaining_calls(host: str) -> dict[str, Any]:
     out["history"] = len(control.getActualJointPositionsHistory(3))
     out["waypoint"] = control.getTargetWaypoint()
     out["derivative"] = len(control.getJacobianTimeDerivative())
-    out["mass"] = [str(control.getMassMatrix()[0]) for _ in range(5)]  # the first may be from before the call
+    out["mass"] = [control.getMassMatrix() for _ in range(5)][-1]  # the first may be from before the call
+    out["rests"] = receive.getActualQ()
     out["running"] = control.isProgramRunning()
     out["unreachable"] = control.moveL([3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.2, 1.0)
     out["ended"] = not control.isProgramRunning()

@@ -1,8 +1,8 @@
 """URScript functions of the simulated controller: time, kinematics and payload, and those that it inherits.
 
 Every public method of `Builtins`, inherited ones included, is one such function under its URScript name and with its
-argument names; one that takes time is a generator. What only a dynamic model could tell (mass matrix, Coriolis torques,
-joint torques) is NaN.
+argument names; one that takes time is a generator. The mass matrix and the Coriolis torques are those of the bare arm;
+outer joint torques are NaN.
 
 Source: Universal Robots, "The URScript Programming Language", modules motion and internals.
 """
@@ -10,12 +10,15 @@ Source: Universal Robots, "The URScript Programming Language", modules motion an
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from inspect import isgeneratorfunction
 from typing import Any
 
 from coneskin.errors import KinematicsError
+from coneskin.robot.arm.inertia import joint_torques, mass_matrix
 from coneskin.robot.arm.inverse_kinematics import nearest, solutions
 from coneskin.robot.arm.kinematics import forward
+from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
 from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.notices import PopupNotice, TextNotice
@@ -180,15 +183,24 @@ class Builtins(
         arm.tcp = self._arm.tcp if tcp is None else pose_of(tcp)
         return arm
 
-    def get_mass_matrix(self, *_: Any) -> Array:
-        """Return NaN, 6 x 6: not simulated."""
-        return Array(Array(NAN6) for _ in range(6))
+    def get_mass_matrix(self, q: Any = None, include_rotors_inertia: bool = False) -> Array:
+        """Return the mass matrix of the bare arm at joint positions, 6 x 6 [kg m^2]; by default at the present ones."""
+        inertia = self._arm.inertia
+        rotor = inertia.rotor if include_rotors_inertia else ZERO_VELOCITY
+        rows = mass_matrix(self._arm.model, replace(inertia, rotor=rotor), self._posed(q, None).q)
+        return Array(Array(row) for row in rows)
 
-    def get_coriolis_and_centrifugal_torques(self, *_: Any) -> Array:
-        """Return six NaN: not simulated."""
+    def get_coriolis_and_centrifugal_torques(self, q: Any = None, qd: Any = None) -> Array:
+        """Return what joint speeds alone take of torque, of the bare arm [N m]; by default the present ones."""
+        model, inertia, here = self._arm.model, self._arm.inertia, self._posed(q, None).q
+        speeds = self._arm.qd if qd is None else numbers(qd, 6, "qd")
+        moving = joint_torques(model, inertia, here, speeds, ZERO_VELOCITY)
+        standing = joint_torques(model, inertia, here, ZERO_VELOCITY, ZERO_VELOCITY)
+        return Array(a - b for a, b in zip(moving, standing, strict=True))
+
+    def get_joint_torques(self) -> Array:
+        """Return six NaN: outer torques are not simulated."""
         return Array(NAN6)
-
-    get_joint_torques = get_coriolis_and_centrifugal_torques
 
     def is_steady(self) -> bool:
         """Return whether the arm stands."""

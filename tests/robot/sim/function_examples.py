@@ -110,10 +110,14 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "is_within_safety_limits": f"is_within_safety_limits({_Q})",
         "set_tcp": 'set_tcp(p[0, 0, 0.1, 0, 0, 0], "tool")\nget_tcp_offset()[2] == 0.1',
     },
-    "not a number, for want of a dynamic model": {
-        "get_coriolis_and_centrifugal_torques": "a = get_coriolis_and_centrifugal_torques()\na[0] != a[0]",
+    "dynamics of the bare arm": {
+        "get_coriolis_and_centrifugal_torques": "norm(get_coriolis_and_centrifugal_torques()) == 0 and "
+        "norm(get_coriolis_and_centrifugal_torques([0, -1.2, 1.2, 0, 0, 0], [1, 1, 0, 0, 0, 0])) > 0.1",
+        "get_mass_matrix": "a = get_mass_matrix()\n"
+        "b = get_mass_matrix(include_rotors_inertia=True)\na[0, 1] == a[1, 0] and b[5, 5] > a[5, 5] and a[5, 5] > 0",
+    },
+    "not a number, for nothing touches the arm": {
         "get_joint_torques": "a = get_joint_torques()\na[0] != a[0]",
-        "get_mass_matrix": "a = get_mass_matrix()\na[0, 0] != a[0, 0]",
     },
     "payload": {
         "get_target_payload": "set_payload(2)\nget_target_payload() == 2",

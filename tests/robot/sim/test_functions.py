@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from coneskin.robot.arm.model import ZERO_VELOCITY
+from coneskin.robot.arm.ur_inertias import arm_inertia
+from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.functions.builtins import Builtins
 from coneskin.robot.sim.options import Options
@@ -13,6 +18,7 @@ from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
 from coneskin.robot.sim.urscript.published_functions import NOT_SIMULATED
 from coneskin.robot.sim.urscript.translator import translate
 from coneskin.robot.sim.urscript.values import ScriptError
+from coneskin.testing.pinocchio_arm import pin_mass_matrix, pin_torques
 
 from .function_examples import EXAMPLES, NO_EFFECT
 
@@ -34,6 +40,35 @@ def test_the_example_of_each_function_holds(name: str) -> None:
             break
     assert f"{name}(" in _ALL[name]
     assert controller.output_ints[0] == 1
+
+
+@pytest.mark.parametrize("rotors", [False, True])
+def test_the_dynamics_of_the_bare_arm_are_those_of_pinocchio(rotors: bool) -> None:
+    pytest.importorskip("pinocchio")
+    q, qd = [0.3, -1.1, 1.4, -0.6, -1.2, 0.5], [1.0, -0.8, 1.5, 2.0, -1.0, 0.7]
+    text = f"""def p():
+  m = get_mass_matrix({q}, {rotors})
+  n = 0
+  while n < 36:
+    write_output_float_register(n, m[floor(n / 6), n % 6])
+    n = n + 1
+  end
+  c = get_coriolis_and_centrifugal_torques({q}, {qd})
+  while n < 42:
+    write_output_float_register(n, c[n - 36])
+    n = n + 1
+  end
+end
+"""
+    controller = Controller(Options(model="UR10e", start_delay=0.0, start_q=HOME))
+    controller.load(translate(text, Builtins.names(), Builtins.blocking()))
+    for _ in range(20):
+        controller.step()
+    arm, inertia = arm_model("UR10e"), arm_inertia("UR10e")
+    if not rotors:
+        inertia = replace(inertia, rotor=ZERO_VELOCITY)
+    wanted = [*np.ravel(pin_mass_matrix(arm, inertia, q)), *pin_torques(arm, inertia, 0.0, q, qd, [0.0] * 6)]
+    assert controller.output_doubles[:42] == pytest.approx(wanted, abs=1e-12 * max(wanted))
 
 
 def test_every_function_has_an_example_and_none_is_simulated_and_refused_at_once() -> None:
