@@ -82,7 +82,7 @@ MAY_IMPORT: dict[str, str] = {
     "geometry geometry.fit geometry.drawing geometry.solid skin skin.field "
     "skin.firmware skin.sources robot.arm robot.driver robot.guard robot.sim commands.arguments commands.terminal "
     "commands.demonstration",
-    "commands.demonstration": "replay scene robot.arm robot.guard",
+    "commands.demonstration": "replay scene robot.arm robot.guard commands.terminal",
     "commands.terminal": "commissioning skin.detection",
     "commands.arguments": "design geometry geometry.drawing scene.tables skin",
     "testing": "scene robot.arm robot.driver robot.guard robot.guard.speed robot.reaction robot.stop robot.ur skin "

@@ -34,6 +34,7 @@ from .arguments.link import (
     xacro_arguments,
 )
 from .terminal.ending_signals import ending_signals
+from .terminal.hints import print_hint
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
@@ -105,10 +106,12 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
         _print(designs, fit)
         folder = shlex.quote(str(args.output))
         sensor = shlex.quote(str(args.output / ("sensor.toml" if len(designs) == 1 else "sheet-1/sensor.toml")))
-        print(f"real hardware: coneskin firmware {sensor} --to board, then coneskin init {folder} --board uno --help")
+        print_hint(
+            f"real hardware: coneskin firmware {sensor} --to board, then coneskin init {folder} --board uno --help"
+        )
         unnamed = source is None or arm_link(source.name) is None
         which = f" --link LINK, with LINK one of {', '.join(LINK_INDEX)}" if unnamed else ""
-        print(f"next: coneskin init {folder} --simulated{which}")
+        print_hint(f"next: coneskin init {folder} --simulated{which}")
     return 0
 
 

@@ -14,6 +14,7 @@ from coneskin.errors import SceneError
 from coneskin.terminal_text import painted
 
 from .simulated_arm import simulated_arm
+from .terminal.hints import print_hint
 
 if TYPE_CHECKING:
     from coneskin.doctor.doctor import Doctor
@@ -109,8 +110,8 @@ def _agrees() -> bool:
 def _say_next(args: argparse.Namespace, scene: Scene, code: int) -> None:
     name = shlex.quote(str(args.scene))
     if code:
-        print(f"next: mend what is bad, then coneskin doctor {name}")
+        print_hint(f"next: mend what is bad, then coneskin doctor {name}")
     elif scene.moves_away:
-        print(f"next: coneskin commission {name}{' --simulated' if args.simulated else ''}")
+        print_hint(f"next: coneskin commission {name}{' --simulated' if args.simulated else ''}")
     else:
-        print(f"next: coneskin guard {name}{' --simulated' if args.simulated else ''}")
+        print_hint(f"next: coneskin guard {name}{' --simulated' if args.simulated else ''}")

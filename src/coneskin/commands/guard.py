@@ -7,6 +7,7 @@ import contextlib
 import json
 import math
 import queue
+import shlex
 import signal
 import sys
 import time
@@ -20,6 +21,7 @@ from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
 from coneskin.time_argument import positive_seconds
 
 from .simulated_arm import simulated_arm
+from .terminal.hints import print_hint
 from .terminal.typed_lines import typed_lines
 
 if TYPE_CHECKING:
@@ -123,6 +125,8 @@ def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPub
     else:
         if scene.arm is not None and not stands(session.events):
             print(f"coneskin guard: {_last_words(session)}", file=sys.stderr)
+    if session.recording and session.recording.exists() and not args.json:  # none of a guard that did not start
+        print_hint(f"next: coneskin replay {shlex.quote(str(session.recording))} --events")
     return max(work.code, exit_code(session.events, scene.arm is not None))
 
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from coneskin.errors import GeometryError
 from coneskin.robot.sim.options import DEFAULT_MODEL
 
+from .terminal.hints import print_hint
+
 if TYPE_CHECKING:
     from coneskin.design.first_scene import ArmAddress, DesignFolder
     from coneskin.skin.firmware.board_circuit import BoardCircuit
@@ -77,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     arm = f"a {scene.arm.model} at {scene.arm.host}" if scene.arm else "no arm"
     count = len(scene.sensors)
     print(f"{args.output}: {count} sensor{'s' if count != 1 else ''} on the {scene.links[0].name}, {arm}")
-    print(f"next: coneskin doctor {shlex.quote(str(args.output))}{' --simulated' if args.simulated else ''}")
+    print_hint(f"next: coneskin doctor {shlex.quote(str(args.output))}{' --simulated' if args.simulated else ''}")
     return 0
 
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import SceneError
+
+from .terminal.hints import print_hint
 
 if TYPE_CHECKING:
     from coneskin.permissible_speed.speed_map import SpeedMap
@@ -110,5 +114,13 @@ def _print(found: SpeedMap, args: argparse.Namespace) -> None:
             cells = "".join(f"{speed:>8.3f}" for speed in curve.speeds)
             print(f"{f'{name}, {what}':20}{curve.region[:15]:>16}{cells}")
     if args.output is not None:
-        print(f'{args.output}: name it in the [arm] of the scene: speed_limit_from = "{args.output.name}"')
+        name = Path(os.path.relpath(args.output.resolve(), args.scene.resolve().parent)).as_posix()
+        value = json.dumps(name, ensure_ascii=False)  # a string of TOML, too
+        print(f"{args.output}: name it in the [arm] of the scene: speed_limit_from = {value}")
     print("A model with assumed servos and your values: measure on the real arm. No safety assessment.")
+    scene = shlex.quote(str(args.scene))
+    if args.output is not None:
+        print_hint(f"next, once the scene names it: coneskin guard {scene} --check")
+    else:
+        limits = shlex.quote(str(args.limits))
+        print_hint(f"next: coneskin permissible {scene} --limits {limits} -o impact.toml")

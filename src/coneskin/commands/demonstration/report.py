@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coneskin.commands.terminal.hints import print_hint
 from coneskin.robot.guard.journal import BlockKind, EventName, describe_way
 
 if TYPE_CHECKING:
@@ -74,7 +76,7 @@ def collision_facts(run: Run, touched: float) -> dict[str, Any]:
 
 
 def print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
-    """Print the facts of a run in this folder, and what its recording misses.
+    """Print the facts of a run in this folder, what its recording misses, and the next command.
 
     Args:
         facts: of ``collision_facts``, with forces, replay and picture.
@@ -101,3 +103,4 @@ def print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
     if missing:
         print(f"recording: {missing}")
     print(f"written to {folder}: run.rec, scene.toml, summary.json" + (", run.png" if facts["picture"] else ""))
+    print_hint(f"next: coneskin replay {shlex.quote(str(folder))} --events")

@@ -1,0 +1,96 @@
+"""The next command that is printed is one that a shell takes."""
+
+from __future__ import annotations
+
+import io
+import json
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from coneskin.cli import main
+from coneskin.commands.demonstration.report import collision_facts, print_report
+from coneskin.commands.terminal.hints import print_hint
+from coneskin.replay.run import Run
+from coneskin.scene.reader import parse_scene
+
+from ..scene.scenes import SKIN_ONLY
+from .test_guard import FakeSession, events
+from .test_permissible import write
+
+
+@pytest.mark.parametrize(
+    ("encoding", "folder", "printed"),
+    [
+        ("utf-8", "häute/1", True),
+        ("latin-1", "häute/1", True),
+        ("ascii", "häute/1", False),
+        ("ascii", "two words", True),
+        ("utf-8", "\udce4 of no encoding", False),
+        ("utf-8", "an\x1b[2Jescape", False),
+        ("utf-8", "two\nlines", False),
+    ],
+)
+def test_a_hint_is_the_command_or_is_left_out(
+    monkeypatch: pytest.MonkeyPatch, encoding: str, folder: str, printed: bool
+) -> None:
+    raw = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(raw, encoding=encoding, errors="backslashreplace"))
+    print_hint(f"next: coneskin init {shlex.quote(folder)}")
+    words = shlex.split(raw.getvalue().decode(encoding))
+    assert words == (["next:", "coneskin", "init", folder] if printed else [])
+
+
+def test_a_guard_ends_with_the_replay_of_what_it_has_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def check(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, "stdin", [])
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SKIN_ONLY)
+    session = FakeSession(parse_scene(SKIN_ONLY), events("activated"), [], check)
+    monkeypatch.setattr("coneskin.session.session.guard", lambda *_, **__: session)
+    session.recording = tmp_path / "a run" / "run.rec"
+    assert main(["guard", str(scene)]) == 0
+    assert "next:" not in capsys.readouterr().out  # a guard that did not become active leaves no recording
+    session.recording.parent.mkdir()
+    session.recording.write_bytes(b"")
+    assert main(["guard", str(scene)]) == 0
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert shlex.split(said) == ["next:", "coneskin", "replay", str(session.recording), "--events"]
+    assert main(["guard", str(scene), "--json"]) == 0
+    assert "next:" not in capsys.readouterr().out
+
+
+def test_the_demo_ends_with_the_replay_of_its_run(capsys: pytest.CaptureFixture[str]) -> None:
+    folder = Path("runs") / "of two words"
+    facts = collision_facts(Run({}, ()), 0.0)
+    facts |= {"peak_n": None, "clamp_n": None, "same_in_replay": True, "picture": None}
+    print_report(facts, folder, "")
+    said = shlex.split(capsys.readouterr().out.splitlines()[-1])
+    assert said == ["next:", "coneskin", "replay", str(folder), "--events"]
+
+
+@pytest.mark.long
+def test_permissible_speeds_name_the_key_and_the_next_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from coneskin.permissible_speed import speed_map
+
+    monkeypatch.setattr(speed_map, "_MASSES", (1.0, float("inf")))
+    words = write(tmp_path)
+    assert main(words) == 0
+    said = shlex.split(capsys.readouterr().out.splitlines()[-1])
+    assert said == ["next:", "coneskin", *words, "-o", "impact.toml"]
+    (tmp_path / "speeds").mkdir()
+    monkeypatch.chdir(tmp_path / "speeds")
+    assert main([*words, "-o", "impact.toml"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert shlex.split(lines[-1])[-4:] == ["coneskin", "guard", words[1], "--check"]
+    value = next(line for line in lines if "speed_limit_from" in line).split(" = ")[1]
+    assert json.loads(value) == "speeds/impact.toml"  # from the scene's folder, not from where the command runs
