@@ -78,6 +78,11 @@ class Mesh:
         """Return the same mesh in the outer frame of a pose."""
         return Mesh(pose.apply_all(self.vertices), self.faces, self.source, self.unit, self.notes)
 
+    def part(self, chosen: NDArray[np.bool_]) -> Mesh:
+        """Return the mesh of some faces, with the corners that they use; ``chosen`` has the shape (m,)."""
+        used, faces = _numbered_anew(self.faces[chosen], len(self.vertices))
+        return Mesh(self.vertices[used], faces, self.source, self.unit, self.notes)
+
     def embree_intersector(self) -> Callable[[Floats, Floats], Indices] | None:
         """Return a function that casts rays with embree, through trimesh; None without the package embreex.
 
@@ -146,7 +151,7 @@ def load_mesh(
     if turn is not None:
         vertices = vertices @ turn.T
     if metres is None:
-        extent = float((np.ptp(vertices[np.unique(faces)], axis=0) * np.abs(scale)).max())
+        extent = float((np.ptp(vertices[_numbered_anew(faces, len(vertices))[0]], axis=0) * np.abs(scale)).max())
         unit, metres, note = _unit(extent, asset)
         notes.append(note)
     if tuple(scale) != (1.0, 1.0, 1.0):
@@ -224,8 +229,8 @@ def make_mesh(
     faces = faces[keep]
     if len(faces) == 0:
         raise MeshError(f"{source}: no face has an area; the points lie on a line")
-    kept, faces = np.unique(faces, return_inverse=True)
-    welded, faces = welded[kept], faces.reshape(-1, 3)
+    used, faces = _numbered_anew(faces, len(welded))
+    welded = welded[used]
     thin = float(np.ptp((welded - welded.mean(axis=0)) @ _principal(welded).T, axis=0).min())
     if thin < max(MIN_THICKNESS, 1e-4 * longest):
         raise MeshError(
@@ -235,6 +240,13 @@ def make_mesh(
     if len(welded) < len(vertices):
         notes.append(f"welded {len(vertices)} vertices to {len(welded)}")
     return Mesh(welded, faces, source, unit, tuple(notes))
+
+
+def _numbered_anew(faces: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
+    """Return which of so many corners faces use, shape (count,), and the faces, numbered among those."""
+    used = np.zeros(count, bool)
+    used[faces] = True
+    return used, (np.cumsum(used) - 1)[faces]
 
 
 def _principal(points: Floats) -> Floats:

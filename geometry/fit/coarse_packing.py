@@ -156,6 +156,6 @@ def profile_about(
 ) -> RadialProfile:
     """Measure a profile about an axis, of at most so many slices and so many rays in each."""
     slices, around = grid
-    length = float(np.ptp(frame.local(mesh.vertices)[:, 2]))
+    length = float(np.ptp(mesh.vertices @ frame.axis))
     profile = measure_profile(mesh, rays, frame, max(length / slices, 0.0005), around, requirements.max_bridge)
     return profile if requirements.weights is None else profile.weighed(requirements.weights)

@@ -51,6 +51,14 @@ class AxisFrame:
         """Return points in the coordinates of this frame [m], shape (n, 3)."""
         return np.asarray((points - self.origin) @ self.columns)
 
+    def extent(self, points: Floats) -> tuple[float, float, float]:
+        """Return the lowest and the highest height of points on the axis, and the largest distance from it [m].
+
+        A column at a time: a product with a matrix of three columns takes ten times as long.
+        """
+        x, y, z = (points @ np.ascontiguousarray(column) - self.origin @ column for column in self.columns.T)
+        return float(z.min()), float(z.max()), math.sqrt(float((x * x + y * y).max()))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RadialProfile:
@@ -127,13 +135,12 @@ def measure_profile(
         around: number of rays in a slice.
         max_bridge: width and length of the widest hole that a sheet spans rather than follows [m].
     """
-    local = frame.local(mesh.vertices)
-    low, high = float(local[:, 2].min()), float(local[:, 2].max())
+    low, high, reach = frame.extent(mesh.vertices)
     count = max(8, round((high - low) / step))
     step = (high - low) / count
     z = low + step * (np.arange(count) + 0.5)
     phi = np.linspace(0.0, 2.0 * math.pi, around, endpoint=False)
-    start = 1.02 * float(np.hypot(local[:, 0], local[:, 1]).max()) + 1e-3
+    start = 1.02 * reach + 1e-3
     out = frame.columns[:, :2] @ np.stack([np.cos(phi), np.sin(phi)])
     origins = frame.origin + z[:, None, None] * frame.axis + start * out.T[None, :, :]
     ways = np.broadcast_to(-out.T, origins.shape)

@@ -314,3 +314,12 @@ def test_a_file_that_says_more_than_it_holds_is_refused(tmp_path: Path, name: st
     (tmp_path / name).write_bytes(content)
     with pytest.raises(MeshError, match=name.replace(".", r"\.")):
         load_mesh(tmp_path / name)
+
+
+def test_a_part_of_a_mesh_is_the_chosen_faces_and_the_corners_that_they_use() -> None:
+    corners = [(x, y, z) for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.3)]
+    mesh = make_mesh(corners, [(0, 1, 2), (1, 3, 2), (4, 6, 5), (5, 6, 7), (0, 4, 1)])
+    chosen = np.array([False, True, False, False, True])
+    part = mesh.part(chosen)
+    np.testing.assert_array_equal(part.triangles, mesh.triangles[chosen])
+    assert len(part.vertices) == 5, "1 is a corner of both faces"

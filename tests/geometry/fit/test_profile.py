@@ -60,3 +60,13 @@ def test_bolt_holes_are_bridged_and_wide_pits_are_not() -> None:
         profile = measure_profile(mesh, RayCaster(mesh), AxisFrame.along(BASE, AXIS), 0.0015, 149, max_bridge=0.010)
         assert profile.radius.min() < 0.0445
         assert (profile.bridged.min() > 0.0499) == spanned
+
+
+def test_the_extent_of_points_about_an_axis_is_that_of_their_places_in_its_frame() -> None:
+    """Two points of a helix of radius 30 mm about an oblique axis, and one on the axis."""
+    axis = np.array([2.0, 3.0, 6.0]) / 7.0
+    frame = AxisFrame.along(np.array([0.1, -0.2, 0.3]), axis)
+    first, second = frame.columns[:, 0], frame.columns[:, 1]
+    places = [frame.origin - 0.05 * axis + 0.03 * first, frame.origin + 0.4 * axis - 0.03 * second]
+    low, high, reach = frame.extent(np.array([*places, frame.origin]))
+    assert (low, high, reach) == pytest.approx((-0.05, 0.4, 0.03), abs=1e-12)

@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 
 _TURN = 2.0 * math.pi
 _EDGE_STEP = 0.4e-3  # m; between the points at which an edge is looked at
+_BESIDE = 1e-3  # m; before the end of the sheet, and beyond the reach, that is looked at too
 _LEAST_RADIUS = 4e-3  # m; a cone is not followed nearer to its apex
 
 
@@ -45,9 +46,10 @@ class LinkExcess:
 
     def __init__(self, side: Frustum, step: float, sign: float, reach: float, body: Mesh | None) -> None:
         self._side, self._step, self._sign = side, step, sign
-        self._rays = None if body is None else RayCaster(body)
         self._far = 0.0 if body is None else float(np.hypot(*body.vertices[:, :2].T).max()) + 0.01
-        self._edges = None if body is None else self._follow_edges(body, reach)
+        beside = None if body is None else self._beside(body, reach)
+        self._rays = None if beside is None else RayCaster(beside)
+        self._edges = None if beside is None else self._follow_edges(beside, reach)
 
     def cone(self, z: float | Floats) -> Floats:
         """Return the radius of the extended cone at heights on the axis [m]."""
@@ -102,12 +104,19 @@ class LinkExcess:
             for column in (np.floor(x), np.ceil(x)):
                 np.maximum.at(result, (row.astype(int), column.astype(int)), excess)
 
+    def _beside(self, body: Mesh, reach: float) -> Mesh | None:
+        """Return the faces that rays or edges beside the sheet's end can meet; None where there is none."""
+        away = self._sign * (body.vertices[:, 2] - self._step)
+        beyond, before = away[body.faces] > reach + _BESIDE, away[body.faces] < -_BESIDE
+        near = np.asarray(~(beyond.all(axis=1) | before.all(axis=1)))
+        return body.part(near) if near.any() else None
+
     def _follow_edges(self, body: Mesh, reach: float) -> _EdgePoints:
         """Return points along the edges of the link that are beside the sheet's end."""
         edges = np.unique(np.sort(body.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
         first, last = body.vertices[edges[:, 0]], body.vertices[edges[:, 1]]
         a, b = (self._sign * (ends[:, 2] - self._step) for ends in (first, last))
-        low, high = -1e-3, reach + 1e-3
+        low, high = -_BESIDE, reach + _BESIDE
         beside = (np.maximum(a, b) >= low) & (np.minimum(a, b) <= high)
         first, last, a, b = first[beside], last[beside], a[beside], b[beside]
         with np.errstate(divide="ignore", invalid="ignore"):  # the part of each edge that is beside the sheet's end
