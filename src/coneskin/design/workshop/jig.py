@@ -145,12 +145,14 @@ class _Builder:
         self.sign = -1.0 if end == 1 else 1.0
         sheet_end = min(0.0, -lift) if end == 1 else self.side.height + max(0.0, -lift)
         self.step = sheet_end + self.sign * self.plan.clearance
-        moved = None if body is None else body.moved(design.place.link_frustum.inverse())
-        self.link = LinkExcess(self.side, self.step, self.sign, max(_FLUSH, self.plan.grip), moved)
         self.room: float | None = None
         if mesh is not None:
             z = design.place.link_frustum.inverse().apply_all(mesh.vertices)[:, 2]
             self.room = float(self.step - z.min() if end == 1 else z.max() - self.step)
+        self.flush = self.room is not None and _SHORTEST <= self.room <= _FLUSH
+        self.wanted = self.room if self.flush and self.room is not None else self.plan.grip
+        moved = None if body is None else body.moved(design.place.link_frustum.inverse())
+        self.link = LinkExcess(self.side, self.step, self.sign, self.wanted + self.plan.clearance, moved)
 
     def collar(self) -> Collar:
         """Return the collar.
@@ -158,10 +160,7 @@ class _Builder:
         Raises:
             _NoRoomError: the link stands out, or ends, where the lip would be.
         """
-        wanted = self.plan.grip
-        flush = self.room is not None and _SHORTEST <= self.room <= _FLUSH
-        if flush and self.room is not None:
-            wanted = self.room
+        wanted = self.wanted
         taper = self.sign * (self.side.radius2 - self.side.radius1) / self.side.height
         if taper < 0.0:  # the cone ends at its apex
             wanted = min(wanted, (float(self.link.cone(self.step)) - _LEAST_RADIUS) / -taper)
@@ -183,7 +182,7 @@ class _Builder:
             lips.append((phi, lengths, self._above_tabs(phi)))
         facets = 0.0 if self.design.fit is None else self.design.fit.facet_height
         play = lip_play(self.link, lips, wanted, self.plan.clearance, facets)
-        reached = flush and longest > wanted - 1e-9
+        reached = self.flush and longest > wanted - 1e-9
         before = None if self.room is None else self.room - longest
         return Collar(self.end, tuple(parts), longest, reached, stopped, play, before)
 

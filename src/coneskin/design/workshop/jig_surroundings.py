@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from coneskin.design.sheets import SheetDesign
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.mesh import Mesh, make_mesh
+from coneskin.geometry.mesh import Mesh
 
 __all__ = ["meets_neighbour", "with_sheets"]
 
@@ -36,7 +36,7 @@ def with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
         faces.append(np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3))
     if not others:
         return mesh
-    return make_mesh(np.concatenate(corners), np.concatenate(faces), mesh.source, mesh.unit)
+    return Mesh(np.concatenate(corners), np.concatenate(faces), mesh.source, mesh.unit)
 
 
 def _ring(outer: Frustum, u: float, phi: Floats, shift: float) -> Floats:

@@ -113,8 +113,9 @@ class LinkExcess:
 
     def _follow_edges(self, body: Mesh, reach: float) -> _EdgePoints:
         """Return points along the edges of the link that are beside the sheet's end."""
-        edges = np.unique(np.sort(body.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-        first, last = body.vertices[edges[:, 0]], body.vertices[edges[:, 1]]
+        pairs = np.sort(body.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        lower, upper = np.divmod(np.unique(pairs[:, 0] * len(body.vertices) + pairs[:, 1]), len(body.vertices))
+        first, last = body.vertices[lower], body.vertices[upper]
         a, b = (self._sign * (ends[:, 2] - self._step) for ends in (first, last))
         low, high = -_BESIDE, reach + _BESIDE
         beside = (np.maximum(a, b) >= low) & (np.minimum(a, b) <= high)
