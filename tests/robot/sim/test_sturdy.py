@@ -7,12 +7,15 @@ import random
 import socket
 import struct
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from coneskin.robot.sim import compiler
 from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.ports.client_messages import MESSAGE
+from coneskin.robot.sim.ports.robot_state import ROBOT_STATE
 from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
 from coneskin.robot.sim.ports.rtde_session import RtdeSession
 from coneskin.robot.sim.process import free_host
@@ -152,27 +155,50 @@ def test_secondary_programs_share_the_time_of_many_cycles(server: Server, monkey
     assert sum(done) == 100
 
 
+class FullSocket:
+    """Connection whose system takes no more bytes until it is told to: when a real one is full, only it knows."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        self.full = True
+        self._socket = sock
+
+    def send(self, data: bytes) -> int:
+        if self.full:
+            raise BlockingIOError
+        return self._socket.send(data)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._socket, name)
+
+
+def kinds_of(packets: bytes) -> list[int]:
+    kinds = []
+    while packets:
+        kinds.append(packets[4])
+        packets = packets[int.from_bytes(packets[:4], "big") :]
+    return kinds
+
+
 def test_a_client_that_lags_for_a_moment_misses_states_but_no_message(server: Server) -> None:
-    with socket.socket() as client:
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SLOW_READER)
-        client.connect((server.host, PORTS["primary"]))
-        server._poll(1.0)
+    with connect(server, "primary") as client:
+        turn(server, 5)
         (seen,) = server._clients["primary"]
-        seen.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SLOW_READER)
-        since = None
-        while not seen.unsent or seen.stuck_since != since:  # until the system takes nothing more
-            since = seen.stuck_since
-            turn(server, 400)
+        seen.socket = lagging = FullSocket(seen.socket)  # type: ignore[assignment]
+        turn(server, 100)
+        assert kinds_of(seen.unsent) == [ROBOT_STATE]  # two were due
         client.sendall(b"def bad():\n  no_such()\nend\n")
         turn(server, 200)
-        assert len(seen.unsent) < 10_000  # four states were due, and it has not read the one before
-        client.setblocking(False)
+        first, *others = kinds_of(seen.unsent)
+        assert first == ROBOT_STATE
+        assert set(others) == {MESSAGE}  # four states were due meanwhile
+        lagging.full = False
         got = b""
         for _ in range(200):
             turn(server)
             with contextlib.suppress(BlockingIOError):
                 got += client.recv(65536)
         assert b"compile_error_name_not_found:no_such:" in got
+        assert kinds_of(got)[-1] == ROBOT_STATE  # it is up to date again
 
 
 def test_what_is_written_for_one_that_never_reads_has_a_bound(server: Server, reader: Reader) -> None:
