@@ -100,8 +100,8 @@ def test_two_sheets_of_a_rugby_ball_keep_the_gap_and_lead_their_wires_away(tmp_p
     alpha = math.atan2(30, 150)  # outside the faces part by 2 t sin(alpha)
     assert first["gap_to_next_mm"] == {"inner": 2.0, "outer": pytest.approx(2.0 + 12.0 * math.sin(alpha), abs=1e-3)}
     report = (tmp_path / "out" / "report.md").read_text()
-    assert "All four wires leave at end1" in report
-    assert "All four wires leave at end2" in report
+    assert "All four wires leave at end 1." in report
+    assert "All four wires leave at end 2." in report
 
 
 def test_two_sheets_of_a_waist_are_trimmed_until_their_outer_faces_clear(tmp_path):

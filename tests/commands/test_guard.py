@@ -76,7 +76,7 @@ def test_rules_distances_and_limits_are_listed(tmp_path, capsys):
     first, second = (line for line in out.splitlines() if line.startswith("rule "))
     assert first.endswith("where touched on the forearm and level above 0.5")
     assert "slow to 30 %" in second
-    assert "no more than 1 mm farther into the touch" in second
+    assert "no more than 0.5 mm into the touch" in second
     assert second.endswith("where arm faster than 0.8 rad/s")
     assert "program silent for 150 ms: stop" in lines["monitoring"]
     assert "next stop path after 25 ms without slowdown; standing below 0.01 rad/s" in lines["monitoring"]

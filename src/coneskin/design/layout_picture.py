@@ -93,10 +93,13 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Any, cable: CableExit) -> 
             around = [wire.phi + (middle - wire.phi) * k / 24.0 for k in range(25)]
             steps[1:2] = [at(tab + (cable.tie - tab) * k / 24.0, phi) for k, phi in enumerate(around)]
         axes.plot(*zip(*steps, strict=True), **style)
+    axes.plot(*zip(at(cable.tie, middle), at(cable.connector, middle), strict=True), color=INK_COLOUR, lw=2.5)  # as one
     for away, marker, word in ((cable.tie, "s", "cable tie"), (cable.connector, "D", "connector")):
         x, y = at(away, middle)
         axes.plot([x], [y], marker, color=INK_COLOUR, ms=6)
-        axes.text(x - 4.0, y, f"{word}, {1e3 * away:g} mm from the rim", fontsize=8, ha="right", va="center")
+        label = f"{word}, {1e3 * away:g} mm from the rim"
+        style = {"fontsize": 8, "ha": "right", "va": "center"}
+        axes.annotate(label, (x, y), (-8.0, 0.0), textcoords="offset points", **style)  # beside the mark at any scale
 
 
 def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:

@@ -11,6 +11,7 @@ from coneskin.geometry.sector import unroll
 from .layout_picture import INK_COLOUR
 from .sector_text import polar_text
 from .sheets import SheetDesign
+from .workshop.guide_words import side_name
 
 __all__ = ["draw_parts"]
 
@@ -60,6 +61,6 @@ def draw_parts(figure: Any, design: SheetDesign) -> None:
         f"holes of {1e3 * plan.hole:g} mm" if holes else "no holes",
         *holes,
         f"electrodes {1e3 * plan.electrode:g} mm, margin {1e3 * plan.margin:g} mm",
-        f"tabs {1e3 * plan.lead:g} x {1e3 * plan.tab:g} mm at {plan.wires}",
+        f"tabs {1e3 * plan.lead:g} x {1e3 * plan.tab:g} mm at {side_name(plan.wires)}",
     ]
     axes.text(0.0, 0.95, "\n".join(words), va="top", fontsize=8, transform=axes.transAxes)

@@ -169,7 +169,9 @@ def _draw_link(figure: Any, designs: Sequence[SheetDesign], mesh: Mesh | None, a
     middle, least = 0.5 * (low + high), 0.1 * float((high - low).max())  # a flat link needs a box with a volume
     low, high = np.minimum(low, middle - 0.5 * least), np.maximum(high, middle + 0.5 * least)
     limits = dict(zip(("xlim", "ylim", "zlim"), zip(low, high, strict=True), strict=True))
-    axes.set(**limits, xlabel="x [mm]", ylabel="y [mm]")
+    axes.set(**limits)
+    axes.set_xlabel("x [mm]", labelpad=10)
+    axes.set_ylabel("y [mm]", labelpad=10)
     axes.set_zlabel("z [mm]", labelpad=24)
     axes.tick_params("z", pad=6)
     for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), high - low, strict=True):

@@ -17,6 +17,7 @@ from .summary import design_summary, material_rows
 from .workshop.bill_of_materials import bill_of_materials
 from .workshop.build_figures import BuildFigures
 from .workshop.build_guide import guide_lines
+from .workshop.guide_words import side_name
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
@@ -171,7 +172,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         "* Lower sheet: D on the edge phi = 0 (ground), C on the edge phi = wrap (supply), wedges between two rays, "
         f"{width} at the narrow end."
     )
-    yield f"* All four wires leave at {plan.wires}."
+    yield f"* All four wires leave at {side_name(plan.wires)}."
     if plan.wires == "end2" and design.next_joint is not None:
         yield "* The tabs run into the next sheet there: bend them up, or choose another side for the wires."
     yield (

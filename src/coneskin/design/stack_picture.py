@@ -10,6 +10,7 @@ from coneskin.geometry.drawing.outline import Outline
 from .layout_picture import FOIL_COLOUR, INK_COLOUR
 from .sheets import SheetDesign
 from .workshop.build_figures import BuildFigures
+from .workshop.guide_words import side_name
 
 __all__ = ["draw_seam", "draw_stack"]
 
@@ -29,6 +30,7 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
     depth = max(cut.bounds[3] - cut.bounds[1] for cut in design.cuts) * 1e3
     squeeze, lean = 0.38, 0.30
     pitch = squeeze * depth * 0.62 + 0.05 * width
+    right = 0.0
     for level, cut in enumerate(design.cuts):
         lift = level * pitch
 
@@ -41,15 +43,16 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
         for part in cut.parts:
             for stroke in part.strokes:
                 if stroke.kind == "cut":
-                    axes.fill(
-                        *slanted(stroke.outline), facecolor=_FACES[level], edgecolor=INK_COLOUR, lw=0.7, alpha=0.92
-                    )
+                    x, y = slanted(stroke.outline)
+                    right = max(right, *x)
+                    axes.fill(x, y, facecolor=_FACES[level], edgecolor=INK_COLOUR, lw=0.7, alpha=0.92)
             for stroke in part.strokes:
                 colour = {"hole": "#b3007a", "score": "#2040c0", "fold": "#0a7d24"}.get(stroke.kind)
                 if colour:
                     axes.plot(*slanted(stroke.outline), color=colour, lw=0.5)
+    for level, cut in enumerate(design.cuts):  # beside the parts, however far the last of them lean
         label = f"{cut.number}  {cut.name}\n    {cut.material}\n    drawing: {cut.face} up"
-        axes.text(0.56 * width + lean * 0.5 * depth, lift + 0.2 * squeeze * depth, label, fontsize=8, va="center")
+        axes.text(right + 0.03 * width, level * pitch + 0.2 * squeeze * depth, label, fontsize=8, va="center")
     axes.annotate(
         "", (-0.62 * width, 6 * pitch), (-0.62 * width, 0), arrowprops={"arrowstyle": "->", "color": INK_COLOUR}
     )
@@ -132,7 +135,7 @@ def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
     note = f"seen from end 1, at the middle of the slant; thickness enlarged {scale:.1f} times"
     if open_gap > shown_gap:
         note += f"; {open_gap:.0f} mm of the link between the edges are left out"
-    cable = f"setback {set_lower:g} mm, wires leave at {figures.cable.side}"
+    cable = f"setback {set_lower:g} mm, wires leave at {side_name(figures.cable.side)}"
     axes.set_title(f"{design.name}: section of the seam\n{note}; {cable}", fontsize=9)
     axes.axis("off")
 
