@@ -22,7 +22,7 @@ from .controller import Controller
 from .fault_injection import FaultInjector
 from .motion.arm import CYCLE
 from .polyscope.user_interface import UserInterface
-from .ports.client import MAX_MESSAGES, Client
+from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client
 from .ports.publisher import Publisher
 from .services import SCRIPT_PORTS, PortServices
 
@@ -38,7 +38,6 @@ MAX_CLIENTS = 50  #: of each service
 #: bytes of one client that are read at a time. What a client has sent whose connection it resets, as ur_rtde does
 #: after each upload, is lost unless it is read at once; lines of the dashboard are dear, and their clients wait
 READ, READ_OF_DASHBOARD = 65536, 4096
-UNREAD_TIMEOUT = 10.0  #: s; a client that reads nothing for so long is dropped
 
 
 def is_loopback(host: str) -> bool:

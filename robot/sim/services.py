@@ -10,7 +10,7 @@ from .polyscope.dashboard import WELCOME, Dashboard
 from .polyscope.http_message import RequestReader
 from .polyscope.robot_api import RobotApi
 from .polyscope.user_interface import UserInterface
-from .ports.client import Client, LineReader
+from .ports.client import UNREAD_TIMEOUT, Client, LineReader
 from .ports.publisher import Publisher
 from .ports.rtde_outputs import RtdeOutputs
 from .ports.rtde_session import RtdeSession
@@ -40,7 +40,7 @@ class PortServices:
         """Return a new client of a service."""
         if name == "RTDE":
             session = RtdeSession(self._controller, self._outputs)
-            return Client(sock, session.receive, session.close, outputs=session.outputs)
+            return Client(sock, session.receive, session.close, outputs=session.outputs, patience=UNREAD_TIMEOUT)
         if name == "dashboard":
             dashboard = Dashboard(self._interface)
             return Client(sock, LineReader(self._unless_silent(dashboard.answer)), left=lambda: dashboard.left)

@@ -6,11 +6,12 @@ import socket
 import time
 from collections.abc import Callable
 
-__all__ = ["MAX_LINE", "MAX_MESSAGES", "MAX_UNSENT", "Client", "LineReader"]
+__all__ = ["MAX_LINE", "MAX_MESSAGES", "MAX_UNSENT", "UNREAD_TIMEOUT", "Client", "LineReader"]
 
 MAX_LINE = 10_000  #: bytes of a line to the dashboard
 MAX_UNSENT = 1_000_000  #: bytes that a client may leave unread
 MAX_MESSAGES = 100_000  #: bytes that a client may leave unread and still be sent messages
+UNREAD_TIMEOUT = 10.0  #: s; a client of RTDE that reads nothing for so long is dropped, and its inputs are free again
 #: option of a connection -> s of silence before the first question whether the other side lives, s between, questions
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 
@@ -33,10 +34,12 @@ class Client:
         closed: called once the connection is gone.
         outputs: data of a cycle that it is sent without asking; None where it is sent none.
         left: whether the client has taken its leave, so that its connection ends with the answer.
+        patience: for how long what was sent may stay unacknowledged [s]; as the operating system has it where it is
+            None, which is a quarter of an hour on Linux. Other systems know no such option.
 
     Attributes:
         unsent: bytes that the client has not read yet.
-        stuck_since: when it last took any while some waited [s, monotonic].
+        stuck_since: when it last took any, or some began to wait [s, monotonic].
     """
 
     def __init__(
@@ -47,16 +50,22 @@ class Client:
         *,
         outputs: Callable[[], bytes] | None = None,
         left: Callable[[], bool] = _stay,
+        patience: float | None = None,
     ) -> None:
         self.socket, self.receive, self.closed, self.outputs, self.left = sock, receive, closed, outputs, left
         self.unsent = b""
         self.stuck_since = 0.0
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._notice_half_open()
+        self._notice_half_open(patience)
 
-    def _notice_half_open(self) -> None:
-        """Let the operating system close the connection where the other side is gone without a word."""
+    def _notice_half_open(self, patience: float | None) -> None:
+        """Let the operating system close the connection where the other side is gone without a word.
+
+        It asks one that is sent nothing; one that is sent something has to acknowledge it.
+        """
+        if patience is not None and hasattr(socket, "TCP_USER_TIMEOUT"):
+            self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * patience))
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         for name, value in _KEEPALIVE.items():
             if (option := getattr(socket, name, None)) is not None:  # not every system has them
@@ -68,6 +77,7 @@ class Client:
         Raises:
             OSError: it is gone, or has left too much unread.
         """
+        fresh = not self.unsent
         self.unsent += data
         if not self.unsent:
             return
@@ -78,7 +88,7 @@ class Client:
         except BlockingIOError:
             sent = 0
         self.unsent = self.unsent[sent:]
-        if sent or not self.stuck_since:
+        if sent or fresh:
             self.stuck_since = time.monotonic()
 
 

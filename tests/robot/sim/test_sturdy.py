@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import random
 import socket
 import struct
+import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from coneskin.robot.sim import compiler
+from coneskin.robot.sim import compiler, services
+from coneskin.robot.sim import server as server_module
 from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.ports import client as client_module
 from coneskin.robot.sim.ports.client_messages import MESSAGE
 from coneskin.robot.sim.ports.robot_state import ROBOT_STATE
 from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
@@ -199,6 +204,57 @@ def test_a_client_that_lags_for_a_moment_misses_states_but_no_message(server: Se
                 got += client.recv(65536)
         assert b"compile_error_name_not_found:no_such:" in got
         assert kinds_of(got)[-1] == ROBOT_STATE  # it is up to date again
+
+
+def test_one_that_is_seldom_sent_something_has_ten_seconds_to_read_it(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it was sent long ago and has read does not count."""
+    clock = [1000.0]
+    for module in (server_module, client_module):
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    with connect(server, "RTDE") as seldom:
+        seldom.sendall(pack_outputs_request(NAMES, 5.0) + pack_start_request())
+        turn(server, 150)
+        (client,) = server._clients["RTDE"]
+        assert client.stuck_since == 1000.0
+        clock[0] = 1060.0
+        client.socket = lagging = FullSocket(client.socket)  # type: ignore[assignment]
+        turn(server, 150)
+        assert client.unsent
+        assert server._clients["RTDE"] == [client]
+        clock[0] = 1069.9
+        turn(server)
+        assert server._clients["RTDE"] == [client]
+        lagging.full = False
+        turn(server)
+        assert not client.unsent
+        clock[0], lagging.full = 1200.0, True
+        turn(server, 150)
+        clock[0] = 1210.1
+        turn(server)
+        assert server._clients["RTDE"] == []
+
+
+@pytest.mark.skipif(not hasattr(socket, "TCP_USER_TIMEOUT"), reason="an option of Linux")
+def test_one_that_acknowledges_nothing_any_more_gives_its_inputs_back(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the system one that never reads is as one that is gone: before this process has anything left to send."""
+    monkeypatch.setattr(services, "UNREAD_TIMEOUT", 0.1)
+    monkeypatch.setattr(server_module, "UNREAD_TIMEOUT", math.inf)
+    with socket.socket() as gone:
+        gone.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SLOW_READER)
+        gone.connect((server.host, PORTS["RTDE"]))
+        gone.sendall(pack_inputs_request(("input_int_register_0",)))
+        gone.sendall(pack_outputs_request([f"output_double_register_{i}" for i in range(48)]) + pack_start_request())
+        turn(server, 5)
+        assert server.controller.inputs.owners
+        end = time.monotonic() + 20.0
+        while server._clients["RTDE"] and time.monotonic() < end:
+            turn(server)
+        assert server._clients["RTDE"] == []
+        assert server.controller.inputs.owners == {}
 
 
 def test_what_is_written_for_one_that_never_reads_has_a_bound(server: Server, reader: Reader) -> None:
