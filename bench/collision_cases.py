@@ -8,7 +8,6 @@ import random
 from dataclasses import dataclass
 
 from coneskin.geometry.pose import Vector
-from coneskin.physics.scene_description import parts_of
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.link_frames import dh_mesh
 from coneskin.robot.arm.model import ArmModel, Joints
@@ -137,7 +136,7 @@ def _clear(
         q = [a + 0.1 * step * (b - a) for a, b in zip(start, end, strict=True)]
         for item in skins:
             back = item.frustum.link_frustum.inverse() @ link_pose(model, q, item.link).inverse()
-            for part, place in enumerate(parts_of(body)):
+            for part, place in enumerate(body.parts):
                 u, _, distance = item.frustum.frustum.locate(*back.apply(place))
                 beside = max(-u, u - item.frustum.frustum.slant, 0.0)
                 free = math.hypot(beside, max(distance, 0.0)) - size if distance > 0.0 or beside > 0.0 else -size

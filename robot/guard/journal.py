@@ -177,9 +177,10 @@ def force_block(time: float, force: float, places: Sequence[Sequence[float]] = (
 def body_places(payload: bytes) -> tuple[tuple[float, float, float], ...]:
     """Return the places in what ``force_block`` has recorded [m]; none for another truth, and for nonsense."""
     try:
-        return tuple((float(x), float(y), float(z)) for x, y, z in json.loads(payload).get("bodies_m", ()))
-    except (ValueError, TypeError, AttributeError, RecursionError):
+        found = tuple((float(x), float(y), float(z)) for x, y, z in json.loads(payload).get("bodies_m", ()))
+    except (ValueError, TypeError, AttributeError, RecursionError, OverflowError):
         return ()
+    return found if all(math.isfinite(value) for place in found for value in place) else ()
 
 
 def contact_force(payload: bytes) -> float | None:

@@ -40,7 +40,29 @@ def test_a_body_that_nothing_touches_is_told_where_it_moves() -> None:
     assert (block.time, body_places(block.payload)) == (1.2, THERE)
 
 
-@pytest.mark.parametrize("payload", [b"", b"[1]", b'{"bodies_m": [[1, 2]]}', b'{"bodies_m": 3}', b'{"touches": []}'])
+def test_what_was_told_is_told_again_for_who_looks_on_from_later() -> None:
+    """A page that is opened then knows where a body came to rest."""
+    recorder = TruthRecorder(0.01)
+    assert told(recorder, (1.0, 0.0, HERE), (30.0, 0.0, HERE)) == []  # where the scene puts it
+    instants = [(31.0 + k, 0.0, THERE) for k in range(25)]
+    blocks = told(recorder, *instants)
+    assert [(block.time, body_places(block.payload)) for block in blocks] == [
+        (31.0, THERE),
+        (41.0, THERE),
+        (51.0, THERE),
+    ]
+
+
+NONSENSE = [
+    b'{"bodies_m": [[1, 2]]}',
+    b'{"bodies_m": 3}',
+    b'{"bodies_m": [[1, 2, NaN]]}',
+    b'{"bodies_m": [[1, 2, 1e999]]}',
+]
+NONSENSE += [b'{"bodies_m": [[1, 2, 1' + b"0" * 400 + b"]]}"]
+
+
+@pytest.mark.parametrize("payload", [b"", b"[1]", b'{"touches": []}', *NONSENSE])
 def test_nonsense_and_another_truth_have_no_places(payload: bytes) -> None:
     assert body_places(payload) == ()
 

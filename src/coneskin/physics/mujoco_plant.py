@@ -22,7 +22,7 @@ from coneskin.skin.padding import Padding
 
 from .arm_description import body_link
 from .held_body import HeldPart
-from .scene_description import SheetOnLink, describe_scene, parts_of
+from .scene_description import SheetOnLink, describe_scene
 
 __all__ = ["STEP", "BodyContact", "MujocoPlant", "Touch"]
 
@@ -111,7 +111,7 @@ class MujocoPlant:
         self._part_of: dict[int, int] = {}
         self._address: list[int | None] = []  # of a part's first coordinate; None where it does not move
         for number, body in enumerate(bodies):
-            for part, _ in enumerate(parts_of(body)):
+            for part, _ in enumerate(body.parts):
                 name = f"body{number}.{part}"
                 self._part_of[self._m.geom(name).id] = len(self.parts)
                 self._address.append(int(self._m.joint(f"{name}.x").dofadr[0]) if body.gives_way else None)
@@ -123,11 +123,11 @@ class MujocoPlant:
                 self._m.actuator_biasprm[joint] = 0.0
         self._step = step
         self._d.qpos[:_ARM], self._d.qvel[:_ARM] = q, qd
-        self._starts = [place for body in bodies for place in parts_of(body)]
+        self._starts = [place for body in bodies for place in body.parts]
         self._moving = [(number, at) for number, at in enumerate(self._address) if at is not None]
         self._damping = [0.0 if at is None else float(self._m.dof_damping[at]) for at in self._address]
         self._touched: dict[int, float] = {}  # body -> when it was first touched
-        self._body_numbers = [n for n, body in enumerate(bodies) for _ in parts_of(body)]
+        self._body_numbers = [n for n, body in enumerate(bodies) for _ in body.parts]
         self.time = 0.0
         self.contacts: tuple[BodyContact, ...] = ()
         self.impulse = self.deepest = self.peak = self.lost = 0.0

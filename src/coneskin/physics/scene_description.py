@@ -19,7 +19,7 @@ from coneskin.scene.body import BodyScene
 
 from .arm_description import body_link, describe_arm, describe_servos, numbers
 
-__all__ = ["SheetOnLink", "describe_scene", "parts_of"]
+__all__ = ["SheetOnLink", "describe_scene"]
 
 _MARGIN = -1.0  # m; of MuJoCo's own force, so far inside that it makes none
 _GAP = 1.002  # m; beyond the margin, in which it reports contacts all the same: from 2 mm before two surfaces touch
@@ -41,14 +41,6 @@ class SheetOnLink:
     name: str
     link: int
     cone: PlacedFrustum
-
-
-def parts_of(body: BodyScene) -> tuple[Vector, ...]:
-    """Return the places of a body's parts [m]: two of a grip, one of any other."""
-    if body.kind != "grip":
-        return (body.place,)
-    x, y, z = (p + d for p, d in zip(body.place, body.direction, strict=True))
-    return body.place, (x, y, z)
 
 
 def describe_scene(
@@ -74,16 +66,14 @@ def describe_scene(
     for number, sheet in enumerate(sheets):
         meshes += f'<mesh name="mesh{number}" vertex="{numbers(_vertices(model, sheet))}"/>'
         geoms[sheet.link] = geoms.get(sheet.link, "") + f'<geom name="sheet{number}" type="mesh" mesh="mesh{number}"/>'
-    names = [f"body{n}.{part}" for n, body in enumerate(bodies) for part, _ in enumerate(parts_of(body))]
+    names = [f"body{n}.{part}" for n, body in enumerate(bodies) for part, _ in enumerate(body.parts)]
     pairs = "".join(
         f'<pair geom1="sheet{number}" geom2="{name}" margin="{_MARGIN!r}" gap="{_GAP!r}" condim="1"/>'
         for number in range(len(sheets))
         for name in names
     )
     placed = "".join(
-        _body(f"body{n}.{part}", body, place)
-        for n, body in enumerate(bodies)
-        for part, place in enumerate(parts_of(body))
+        _body(f"body{n}.{part}", body, place) for n, body in enumerate(bodies) for part, place in enumerate(body.parts)
     )
     masses = [row[i] for i, row in enumerate(mass_matrix(model, inertia, q))]
     return (

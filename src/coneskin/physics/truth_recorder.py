@@ -11,6 +11,7 @@ from coneskin.robot.guard.journal import force_block
 
 __all__ = ["TruthRecorder"]
 
+_AGAIN = 10.0  # s after which what was told is told again, for who looks on from later
 _MOVED = 1e-4  # m by which a body that nothing touches must have moved
 
 
@@ -41,7 +42,7 @@ class TruthRecorder:
         if not turned and time - self._time < self._period:
             return None
         moved = max(map(math.dist, places, self._places), default=0.0) if self._places else 0.0
-        if force == self._force and moved < _MOVED:
+        if force == self._force and moved < _MOVED and not -math.inf < self._time <= time - _AGAIN:
             if not self._places:
                 self._places = tuple(places)
             return None

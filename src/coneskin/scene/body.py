@@ -56,6 +56,14 @@ class BodyScene:
         return self.kind not in ("wall", "post")
 
     @property
+    def parts(self) -> tuple[Vector, ...]:
+        """Places of its parts [m]: two of a grip, one of any other."""
+        if self.kind != "grip":
+            return (self.place,)
+        x, y, z = (p + d for p, d in zip(self.place, self.direction, strict=True))
+        return self.place, (x, y, z)
+
+    @property
     def axis(self) -> Vector:
         """Unit vector of ``direction``."""
         x, y, z = self.direction

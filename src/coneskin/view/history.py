@@ -10,11 +10,12 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.errors import RecordingError, RobotConnectionError
 from coneskin.recording import Block
-from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, contact_force, decode_event
+from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, body_places, contact_force, decode_event
 
 from .contact_mark import ContactLog, ContactMark
 from .phase_words import UNKNOWN, PhaseWords, phase_after
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from coneskin.geometry.pose import Vector
     from coneskin.robot.arm.model import Joints
     from coneskin.robot.driver.state import ControllerState
     from coneskin.scene.scene import Scene
@@ -66,9 +68,9 @@ class Series:
         index = bisect_right(self.times, time) - 1
         return self.values[index] if index >= 0 else None
 
-    def drop_before(self, time: float) -> None:
-        """Forget what is older than a time."""
-        index = bisect_right(self.times, time)
+    def drop_before(self, time: float, but_last: bool = False) -> None:
+        """Forget what is older than a time, or all but the last of it."""
+        index = max(bisect_right(self.times, time) - but_last, 0)
         del self.times[:index]
         del self.values[:index]
 
@@ -86,6 +88,7 @@ class History:
         levels: by the names of the sensors: touch level.
         channels: by the names of the sensors: fractions of the supply, in the order of ``CHANNELS``.
         forces: between the arm and what it met, where the run was in physics [N].
+        bodies: places of the bodies' parts then, in the base frame: x, y and z of each [m].
         events: the newest.
         phases: when each began.
         since: time of the first block [s, host clock].
@@ -93,7 +96,7 @@ class History:
     """
 
     def __init__(self, scene: Scene, keep: float = math.inf) -> None:
-        self.joints, self.speeds, self.forces = Series(), Series(), Series()
+        self.joints, self.speeds, self.forces, self.bodies = Series(), Series(), Series(), Series()
         self.sensors = [item.sensor for item in scene.sensors]
         self.levels = {sensor.name: Series() for sensor in self.sensors}
         self.channels = {sensor.name: Series() for sensor in self.sensors}
@@ -132,6 +135,9 @@ class History:
         elif block.kind == BlockKind.TRUTH and (force := contact_force(block.payload)) is not None:
             self.forces.times.append(block.time)
             self.forces.values.append((force,))
+            if places := body_places(block.payload):
+                self.bodies.times.append(block.time)
+                self.bodies.values.append(tuple(chain.from_iterable(places)))
 
     def take_all(self, blocks: Iterable[Block]) -> None:
         """Take blocks, and read the skin's bytes among them."""
@@ -150,6 +156,7 @@ class History:
             self.since = self.until - self._keep
             for series in (self.joints, self.speeds, self.forces, *self.levels.values(), *self.channels.values()):
                 series.drop_before(self.since)
+            self.bodies.drop_before(self.since, but_last=True)  # a body that rests is told of no more
 
     def q(self, time: float) -> Joints | None:
         """Return the joint positions at a time [rad]; the first ones before they were measured, None without any."""
@@ -166,6 +173,11 @@ class History:
             return None
         found = self.forces.at(time)
         return 0.0 if found is None else found[0]
+
+    def places(self, time: float) -> tuple[Vector, ...]:
+        """Return where the parts of the bodies are at a time, in the base frame [m]; none where nothing tells."""
+        found = self.bodies.at(time) or ()
+        return tuple(zip(found[::3], found[1::3], found[2::3], strict=True))
 
     def phase(self, time: float) -> PhaseWords:
         """Return the guard's phase at a time."""

@@ -129,7 +129,8 @@ class LivePage:
             self._text(now, [(self._stage.title, UNKNOWN, "")], "", "no guard records a run: what is drawn is at rest")
             return
         at = strand.history.until - strand.zero
-        moment = replace(strand.moment(at), poses=strand.poses(self._playout.time(at, now)))
+        moving = self._playout.time(at, now)
+        moment = replace(strand.moment(at), poses=strand.poses(moving), bodies=strand.bodies(moving))
         assert self._nodes is not None
         with self._server.together():
             self._nodes.show(moment)
@@ -207,7 +208,7 @@ class LivePage:
         look_at_stages(self._server, reach)
         self._nodes = StageNodes(scene, stage, _ROOT)
         levels = {sheet.name: 0.0 for sheet in stage.sheets}
-        self._nodes.show(Moment(0.0, stage.poses(None), levels, [], UNKNOWN, ""))
+        self._nodes.show(Moment(0.0, stage.poses(None), levels, [], UNKNOWN, "", bodies=stage.moved(())))
 
     def _leave(self) -> None:
         if self._run is not None:

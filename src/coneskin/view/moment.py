@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from coneskin.geometry.pose import Pose
+    from coneskin.geometry.pose import Pose, Vector
 
     from .contact_mark import ContactMark
     from .history import History
@@ -28,6 +28,7 @@ class Moment:
         phase: of the guard.
         health: what is wrong; empty where nothing is.
         force: between the arm and what it meets [N]; None where nothing tells.
+        bodies: how far each part of a body is from where the scene puts it [m].
     """
 
     time: float
@@ -37,12 +38,12 @@ class Moment:
     phase: PhaseWords
     health: str
     force: float | None = None
+    bodies: tuple[Vector, ...] = ()
 
 
 def moment_at(stage: Stage, history: History, time: float) -> Moment:
     """Return what is seen at a time [s, host clock]."""
     levels = {sheet.name: history.level(sheet.name, time) for sheet in stage.sheets}
     poses = stage.poses(history.q(time))
-    return Moment(
-        time, poses, levels, history.marks(time), history.phase(time), history.health(time), history.force(time)
-    )
+    seen = history.marks(time), history.phase(time), history.health(time), history.force(time)
+    return Moment(time, poses, levels, *seen, stage.moved(history.places(time)))

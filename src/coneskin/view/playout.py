@@ -1,15 +1,15 @@
 """Playout of a run that is followed: from parcels that come now and then to a motion in even steps.
 
-A recorder hands over what it has every 50 ms, in which an arm moves in jerks. So its poses are shown a little late, by
-a clock that runs as evenly as the computer's own. Only the poses: what touches and what the guard does is shown at
-once.
+A recorder hands over what it has every 50 ms, in which an arm moves in jerks. So its poses, and the bodies that it
+meets, are shown a little late, by a clock that runs as evenly as the computer's own. Only these: what touches and what
+the guard does is shown at once.
 """
 
 from __future__ import annotations
 
 __all__ = ["DELAY", "Playout"]
 
-DELAY = 0.07  #: s by which poses are late: a parcel of the recorder's, and the wait for the next
+DELAY = 0.07  #: s by which poses and bodies are late: a parcel of the recorder's, and the wait for the next
 _FORGETS = 0.01  # s for each second; by which the offset of the two clocks may shrink
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .contact_mark import ContactMark
     from .moment import Moment
     from .page_server import PageServer
+    from .stage.solid import Solid
     from .stage.stage import Stage
 
 __all__ = ["StageNodes", "light_plainly", "look_at_stages"]
@@ -81,15 +82,11 @@ class StageNodes:
         scene.add_frame(root, show_axes=False, position=offset)
         self._frames = {link: scene.add_frame(f"{root}/link {link}", show_axes=False) for link in stage.links}
         for solid in stage.solids:
-            scene.add_mesh_simple(
-                f"{root}/link {solid.link}/{_node(solid.name)}",
-                _single(solid.vertices),
-                solid.faces,
-                color=solid.colour,
-                side="front" if solid.closed else "double",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            _add_solid(scene, f"{root}/link {solid.link}/{_node(solid.name)}", solid)
+        self._bodies = []
+        for number, body in enumerate(stage.bodies):
+            self._bodies.append(scene.add_frame(f"{root}/body {number}", show_axes=False))
+            _add_solid(scene, f"{root}/body {number}/{_node(body.name)}", body)
         self._sheets = {}
         self._colours: dict[str, tuple[int, int, int]] = {}
         for number, sheet in enumerate(stage.sheets):
@@ -124,6 +121,8 @@ class StageNodes:
         for link, frame in self._frames.items():
             pose = moment.poses[link]
             frame.wxyz, frame.position = quaternion(pose), pose.translation
+        for frame, moved in zip(self._bodies, moment.bodies, strict=True):
+            frame.position = moved
         for sheet in self._stage.sheets:
             colour = level_colour(moment.levels[sheet.name], sheet.touch_level)
             if colour != self._colours[sheet.name]:
@@ -168,6 +167,18 @@ class _MarkNodes:
         self._scene.add_mesh_simple(
             f"{self._name}/uncertainty", patch, fan, color=colour, opacity=0.55 * (shade or 1.0), side="double"
         )
+
+
+def _add_solid(scene: Any, name: str, solid: Solid) -> None:
+    scene.add_mesh_simple(
+        name,
+        _single(solid.vertices),
+        solid.faces,
+        color=solid.colour,
+        side="front" if solid.closed else "double",
+        cast_shadow=False,
+        receive_shadow=False,
+    )
 
 
 def _arrow() -> tuple[NDArray[np.float32], NDArray[np.int64]]:

@@ -52,6 +52,10 @@ class Strand:
         """Return the poses of the links' frames at a time on the page's clock [s]."""
         return self.stage.poses(self.history.q(self.zero + time))
 
+    def bodies(self, time: float) -> tuple[Vector, ...]:
+        """Return how far each part of a body is from where the scene puts it at a time on the page's clock [m]."""
+        return self.stage.moved(self.history.places(self.zero + time))
+
 
 class EventLine(NamedTuple):
     """Event in words.

@@ -1,4 +1,4 @@
-"""Solids of the bodies that a scene has around the arm: where the scene puts them, whatever has pushed them since."""
+"""Solids of the bodies that a scene has around the arm, where the scene puts them; a page moves them from there."""
 
 from __future__ import annotations
 
@@ -25,13 +25,11 @@ _ARCS = 24  # straight pieces of a ball's profile
 
 
 def body_solids(bodies: Sequence[BodyScene]) -> list[Solid]:
-    """Return the solids of bodies, in the base frame."""
+    """Return the solids of bodies in the base frame, one for each of their ``parts``."""
     found = []
     for number, body in enumerate(bodies, 1):
-        found.append(_solid(f"body {number}, {body.kind}", body, body.place))
-        if body.kind == "grip":
-            x, y, z = (p + d for p, d in zip(body.place, body.direction, strict=True))
-            found.append(_solid(f"body {number}, second hand", body, (x, y, z)))
+        names = body.kind, "second hand"
+        found += [_solid(f"body {number}, {name}", body, place) for name, place in zip(names, body.parts, strict=False)]
     return found
 
 

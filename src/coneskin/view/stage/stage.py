@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from coneskin.geometry.pose import Pose
+from coneskin.geometry.pose import Pose, Vector
 
 from .body_solids import body_solids
 from .sheet_surface import SheetSurface, sheet_surfaces
@@ -31,14 +31,18 @@ class Stage:
     Attributes:
         title: for people.
         model: of the arm; None where the scene has none.
-        solids: of the arm, and of the bodies around it.
+        solids: of the arm.
         sheets: on it.
+        bodies: around it, part by part, in the base frame where the scene puts them.
+        starts: the places of those parts there [m].
     """
 
     title: str
     model: ArmModel | None
     solids: tuple[Solid, ...]
     sheets: tuple[SheetSurface, ...]
+    bodies: tuple[Solid, ...] = ()
+    starts: tuple[Vector, ...] = ()
 
     @property
     def links(self) -> tuple[int, ...]:
@@ -54,10 +58,10 @@ class Stage:
 
     def same_shape(self, other: Stage) -> bool:
         """Tell whether another stage is drawn with the same nodes."""
-        if self.model != other.model or len(self.solids) != len(other.solids) or len(self.sheets) != len(other.sheets):
+        here: list[Solid | SheetSurface] = [*self.solids, *self.bodies, *self.sheets]
+        there: list[Solid | SheetSurface] = [*other.solids, *other.bodies, *other.sheets]
+        if self.model != other.model or len(here) != len(there) or len(self.sheets) != len(other.sheets):
             return False
-        here: list[Solid | SheetSurface] = [*self.solids, *self.sheets]
-        there: list[Solid | SheetSurface] = [*other.solids, *other.sheets]
         return all(
             (a.name, a.link, a.vertices.shape) == (b.name, b.link, b.vertices.shape)
             and bool((a.vertices == b.vertices).all())
@@ -72,6 +76,12 @@ class Stage:
 
         found = link_poses(self.model, REST if q is None else q)
         return {link: found[link] for link in self.links}
+
+    def moved(self, places: Sequence[Vector]) -> tuple[Vector, ...]:
+        """Return how far each part of a body is from where the scene puts it [m]: nowhere, unless all are told."""
+        if len(places) != len(self.starts):
+            return ((0.0, 0.0, 0.0),) * len(self.starts)
+        return tuple((x - x0, y - y0, z - z0) for (x, y, z), (x0, y0, z0) in zip(places, self.starts, strict=True))
 
 
 def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: bool = False) -> Stage:
@@ -88,8 +98,9 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
         MeshError: a mesh cannot be read.
     """
     sheets = sheet_surfaces(placed, [item.sensor for item in scene.sensors])
+    bodies, starts = tuple(body_solids(scene.bodies)), tuple(place for body in scene.bodies for place in body.parts)
     if scene.arm is None:
-        return Stage(title, None, tuple(body_solids(scene.bodies)), sheets)
+        return Stage(title, None, (), sheets, bodies, starts)
     from coneskin.robot.arm.ur_models import arm_model
 
     from .arm_solids import arm_solids
@@ -102,7 +113,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     if meshes:
         own = _link_meshes(scene, model)
         solids = (*(solid for solid in solids if solid.link not in {mesh.link for mesh in own}), *own)
-    return Stage(title, model, (*solids, *body_solids(scene.bodies)), sheets)
+    return Stage(title, model, tuple(solids), sheets, bodies, starts)
 
 
 def _link_meshes(scene: Scene, model: ArmModel) -> list[Solid]:
