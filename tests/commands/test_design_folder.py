@@ -1,5 +1,6 @@
 """Folder of ``coneskin design``: a person's files in it stay, signals leave nothing, names may be no text."""
 
+import argparse
 import itertools
 import json
 import math
@@ -7,14 +8,18 @@ import os
 import signal
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from coneskin import cli
 from coneskin.cli import main
+from coneskin.commands import design as command
 from coneskin.design import files as design_files
+from coneskin.design.link import LinkMesh
+from coneskin.geometry.fit.cones import LinkFit
 
 CYLINDER = ["--radius1-mm", "54", "--height-mm", "200"]
 Triangle = tuple[tuple[float, float, float], ...]
@@ -139,6 +144,29 @@ def test_what_a_sheet_spans_is_said_beside_its_deviation(tmp_path: Path, capsys:
     assert design(str(tmp_path / "tube.stl"), "-o", str(tmp_path / "out")) == 0
     line = capsys.readouterr().out.splitlines()[0]
     assert "% of it spans holes and grooves, down to 1." in line
+
+
+@pytest.mark.parametrize(("holes", "said"), [(1, False), (3, True)])
+def test_no_share_is_said_that_prints_as_none(
+    holes: int, said: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beside holes over 0.02 % of a sheet each."""
+    write_stl(tmp_path / "tube.stl", list(turned([(0.0, 0.05), (0.2, 0.05)])))
+    found = command._load_and_fit
+
+    def with_holes(args: argparse.Namespace, say: Callable[[str], None]) -> tuple[LinkMesh, LinkFit]:
+        source, fit = found(args, say)
+        sheets = (replace(sheet, bridged_share=0.0002 * holes, bridged_depth=0.05) for sheet in fit.sheets)
+        return source, replace(fit, sheets=tuple(sheets))
+
+    monkeypatch.setattr(command, "_load_and_fit", with_holes)
+    assert design(str(tmp_path / "tube.stl"), "-o", str(tmp_path / "out")) == 0
+    assert ("spans holes" in capsys.readouterr().out) == said
+
+
+@pytest.mark.parametrize(("value", "text"), [(0.00412, "0.0041"), (0.0996, "0.10"), (0.5, "0.50"), (12.3, "12")])
+def test_a_small_count_keeps_two_digits(value: float, text: str) -> None:
+    assert command._two_digits(value) == text
 
 
 def test_a_step_file_that_cannot_be_written_is_refused_before_the_search(

@@ -92,7 +92,7 @@ def ruled_region(
 
 def _obliquity(radius: Floats, good: NDArray[np.bool_]) -> Floats:
     """Return by how much a distance along a ray exceeds that square to the surface, for each column, shape (p,)."""
-    shown = np.where(good, radius, np.nan)
+    shown = np.where(good & (radius > 0.0), radius, np.nan)  # a hole that is spanned may have no surface
     around = radius.shape[1]
     section = np.ones(around)
     for column in range(around):

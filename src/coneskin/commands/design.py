@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 __all__ = ["add_arguments", "run"]
 
 _NO_FIT_EXIT_CODE = 3
+_SHOWN = 0.0005  # of a sheet that spans holes; less would print as 0.0 %
 
 
 def run(args: argparse.Namespace) -> int:
@@ -173,7 +174,14 @@ def _nothing_fits(source: LinkMesh, fit: LinkFit) -> int:
 def _count_size(design: SheetDesign) -> str:
     """Return the size of one count on the active area at its worst place."""
     steps = design.forecasts()
-    return f"{1e3 * max(s.along for s in steps):.2f} mm along, {1e3 * max(s.around for s in steps):.2f} mm around"
+    along, around = (_two_digits(1e3 * max(sizes)) for sizes in zip(*((s.along, s.around) for s in steps), strict=True))
+    return f"{along} mm along, {around} mm around"
+
+
+def _two_digits(value: float) -> str:
+    """Return a positive number with two significant digits, and no exponent."""
+    rounded = float(f"{value:.1e}")
+    return f"{rounded:.{max(0, 1 - math.floor(math.log10(rounded)))}f}"
 
 
 def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
@@ -191,7 +199,7 @@ def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
             line += f", deviation {worst * 1e3:.3f} mm at most, {rms * 1e3:.3f} mm rms"
             if design.fit.facet_height > 0.0:
                 line += f", of which the facets of the mesh are up to {design.fit.facet_height * 1e3:.3f} mm"
-            if design.fit.bridged_share > 0.0:
+            if design.fit.bridged_share >= _SHOWN:
                 line += (
                     f", but {design.fit.bridged_share:.1%} of it spans holes and grooves, down to "
                     f"{design.fit.bridged_depth * 1e3:.2f} mm"
