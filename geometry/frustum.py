@@ -2,6 +2,8 @@
 
 Symbols (docs/conventions.md): rho1, rho2 radii, h height, s slant, a half angle;
 d = rho2 - rho1 = s sin a, h = s cos a.
+A method in the singular takes numbers, one place, and loads no numpy: the live loop calls it. ``points``, ``normals``
+and ``flat_points`` take arrays; ``PlacedFrustum.locate_all`` is the inverse for arrays.
 Everything is written in the surface coordinates (u, phi), not in the polar coordinates (r, theta) of the flat sector,
 because r grows without bound as a cone becomes a cylinder and real links are mostly cylinders. In (u, phi) the
 cylinder, the cone with its apex, the disc and the narrowing cone are ordinary values of one formula.
@@ -51,6 +53,7 @@ class Frustum:
             object.__setattr__(self, name, float(value))
         if not 0.0 < self.wrap <= _TURN:
             raise GeometryError(f"wrap must be above 0 and at most a full turn (2 pi rad), got {self.wrap!r} rad")
+        object.__setattr__(self, "wrap", float(self.wrap))
         if self.radius1 == self.radius2 == 0.0:
             raise GeometryError("radius1 and radius2 must not both be 0: the side has no area")
         if self.slant == 0.0:
@@ -87,7 +90,7 @@ class Frustum:
         return ((s - u) * self.radius1 + u * self.radius2) / s
 
     def point(self, u: float, phi: float) -> tuple[float, float, float]:
-        """Return the point of the side at surface coordinates.
+        """Return the point of the side at surface coordinates, which are numbers; ``points`` takes arrays.
 
         Args:
             u: slant distance from end 1 [m].
@@ -100,12 +103,14 @@ class Frustum:
         return rho * math.cos(phi), rho * math.sin(phi), u * self.cos_half_angle
 
     def normal(self, phi: float) -> tuple[float, float, float]:
-        """Return the outward unit normal of the side at azimuth phi [rad]; it does not depend on u."""
+        """Return the outward unit normal of the side at azimuth phi [rad], a number; u does not matter."""
         ca = self.cos_half_angle
         return ca * math.cos(phi), ca * math.sin(phi), -self.sin_half_angle
 
     def locate(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """Return the surface coordinates of the foot of a point, the inverse of ``point``.
+        """Return the surface coordinates of the foot of a point, the inverse of ``point``; of one point, not of arrays.
+
+        Many points at once: ``PlacedFrustum.locate_all``.
 
         Args:
             x: first coordinate in the frame of the frustum [m].
@@ -128,6 +133,8 @@ class Frustum:
     def flat_point(self, u: float, phi: float) -> tuple[float, float]:
         """Return the point of the flat pattern, isometric to the side and regular for every half angle.
 
+        Of one place; ``flat_points`` takes arrays.
+
         Args:
             u: slant distance from end 1 [m].
             phi: azimuth [rad].
@@ -143,7 +150,7 @@ class Frustum:
     def locate_flat(self, x: float, y: float) -> tuple[float, float]:
         """Return the surface coordinates (u [m], phi [rad]) of a point of the flat pattern.
 
-        The inverse of ``flat_point``.
+        The inverse of ``flat_point``, for one point.
 
         Args:
             x: as ``flat_point`` returns it [m].

@@ -35,15 +35,15 @@ class PlacedFrustum:
     link_frustum: Pose = field(default_factory=Pose)
 
     def point(self, u: float, phi: float) -> Vector:
-        """Return the point of the side at (u [m], phi [rad]), in the link's frame [m]."""
+        """Return the point of the side at (u [m], phi [rad]), numbers, in the link's frame [m]; ``place``: arrays."""
         return self.link_frustum.apply(self.frustum.point(u, phi))
 
     def normal(self, phi: float) -> Vector:
-        """Return the outward unit normal at azimuth phi [rad], in the link's frame."""
+        """Return the outward unit normal at azimuth phi [rad], a number, in the link's frame; ``place``: of arrays."""
         return self.link_frustum.rotate(self.frustum.normal(phi))
 
     def locate(self, p_link: Vector) -> Vector:
-        """Return u [m], phi [rad] and the signed distance [m] of a point of the link's frame (``Frustum.locate``)."""
+        """Return u [m], phi [rad] and the signed distance [m] of one point of the link; ``locate_all``: of many."""
         return self.frustum.locate(*self.link_frustum.inverse().apply(p_link))
 
     def place(self, u: ArrayLike, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

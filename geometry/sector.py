@@ -40,6 +40,7 @@ class Sector:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise GeometryError(f"{name} must be finite and not negative, got {value!r}")
+            object.__setattr__(self, name, float(value))
         if self.slant == 0.0 or self.arc1 == self.arc2 == 0.0:
             raise GeometryError(f"a sector needs a slant and an arc above 0 m, got slant {self.slant!r} m")
         if self.theta0 > 2.0 * math.pi:

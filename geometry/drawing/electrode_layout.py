@@ -61,8 +61,8 @@ class ElectrodePlan:
         for name in ("electrode", "setback", "lead", "clearance", "margin", "tab", "hole"):
             value, may_be_none = getattr(self, name), name in ("margin", "tab", "hole")
             if not (math.isfinite(value) and (value > 0.0 or (may_be_none and value == 0.0))):
-                rule = "not negative" if may_be_none else "above 0"
-                raise GeometryError(f"{name} must be finite and {rule} mm, got {value * 1e3:.4g} mm")
+                rule = "not negative" if may_be_none else "above 0 mm"
+                raise GeometryError(f"{name} must be finite and {rule}, got {value * 1e3:.4g} mm")
         if self.wires not in get_args(SheetSide):
             raise GeometryError(f"wires must leave at one of {', '.join(get_args(SheetSide))}, got {self.wires!r}")
         if self.setback > self.margin:

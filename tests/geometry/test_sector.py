@@ -60,3 +60,15 @@ def test_impossible_sectors_are_refused():
         Sector.from_polar(0.1, 0.1, 1.0)
     with pytest.raises(GeometryError, match="wrap must be at least theta0"):
         roll_up(Sector.from_polar(0.1, 0.2, 2.0), 1.0)
+
+
+def test_numbers_of_numpy_become_floats() -> None:
+    """So a sector is printed as the numbers it is, and the live loop computes with no slower type."""
+    import numpy as np
+
+    frustum = Frustum(np.float64(0.04), np.float32(0.0625), np.int64(1), np.float64(2.0))
+    assert repr(frustum) == "Frustum(radius1=0.04, radius2=0.0625, height=1.0, wrap=2.0)"
+    assert "np." not in repr(unroll(frustum))
+    sector = Sector.from_polar(np.float64(0.25), np.float64(0.5), np.float64(1.0))
+    assert repr(sector) == "Sector(slant=0.25, arc1=0.25, arc2=0.5, theta0=1.0)"
+    assert "np." not in repr(roll_up(sector, np.float64(2.0)))

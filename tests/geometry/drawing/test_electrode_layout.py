@@ -194,7 +194,7 @@ def test_mistakes_are_said():
         lay_out_sheet(Frustum(0.002, 0.05, 0.1), ElectrodePlan(wires="end2"))
     with pytest.raises(GeometryError, match="cannot reach an apex"):
         lay_out_sheet(Frustum(0.0, 0.05, 0.1))
-    with pytest.raises(GeometryError, match="margin must be finite and not negative mm, got -1 mm"):
+    with pytest.raises(GeometryError, match="margin must be finite and not negative, got -1 mm"):
         ElectrodePlan(margin=-1e-3)
     with pytest.raises(GeometryError, match="electrode must be finite and above 0 mm, got nan mm"):
         ElectrodePlan(electrode=math.nan)

@@ -33,6 +33,19 @@ def test_places_are_read_in_millimetres_and_the_nearest_counts(tmp_path: Path) -
     assert there.tolist() == [1.0, 0.25, LEAST_WEIGHT]
 
 
+@pytest.mark.parametrize("largest", [5e-324, 1e-310, 1.0, 1e308, 1.7976931348623157e308])
+def test_only_the_ratio_of_weights_counts(largest: float, tmp_path: Path) -> None:
+    """Up to the largest number and down to the smallest: no sum of them, no unit."""
+    file = tmp_path / "map.csv"
+    file.write_text(f"{HEAD}0,0,0,{largest!r}\n50,0,0,{largest!r}\n100,0,0,0\n", encoding="utf-8")
+    weights = read_touch_weights(file)
+    assert weights.at(np.array([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0], [0.1, 0.0, 0.0]])).tolist() == [
+        1.0,
+        1.0,
+        LEAST_WEIGHT,
+    ]
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
