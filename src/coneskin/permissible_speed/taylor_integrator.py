@@ -3,33 +3,39 @@
 The equations of ``two_mass_contact`` are polynomials between events: contact, bottoming out, closing of the layers, the
 beginning and the end of braking, separation. There the Taylor coefficients follow from each other by products of
 series, so that a step of order 18 costs little more than a dozen evaluations, and an event is a root of a polynomial
-that is there already. No step is ever repeated, and none has to creep across a kink. Where the arm stands and the
-vibration has died away the rest is its equilibrium.
+that is there already. No step of it is ever repeated, and none has to creep across a kink.
 
-Source of the step's length: Jorba and Zou, "A software package for the numerical integration of ODEs by means of
-high-order Taylor methods", Experimental Mathematics 14 (2005).
+Where friction has had the time to end the fastest motion, as that of a body of grams that stays pressed, an implicit
+step is tried (``collocation``), which is a polynomial, too, and events are located on it in the same way. Where the arm
+stands and the vibration has died away the rest is its equilibrium.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from operator import mul
 
+from .collocation import POINTS, collocate
 from .contact_course import ContactCourse, Stretch
+from .contact_state import ContactState
 from .polynomial import evaluate, first_fall, greatest
+from .taylor_series import expand, reach
 from .two_mass_contact import TwoMassContact
 
 __all__ = ["HORIZON", "integrate"]
 
 #: s after which a contact is no transient one any more; ISO/TS 15066, 5.5.5.3
 HORIZON = 0.5
-_ORDER = 18
-_TOLERANCE = 1e-14  # of the last coefficients of a step, relative to the largest
+_TAIL = 1e-9  # of the last term of an implicit step, relative to the largest
+_GAIN = 12.0  # times as long as one of the series an implicit step must be: so much more it costs
+_FADED = 20.0  # the fastest motion is over when it has fallen by this exponent
+_PATIENCE = 24  # steps without an event before an implicit one is tried
 _MAX_STEPS = 2_000_000
 _SETTLED = 1e-11  # of the force at rest, below which a vibration is over
 _SETTLED_COARSE = 1e-4  # the same, where only peak and rest are asked for
 _FREE, _SOFT, _HARD, _RELEASED = range(4)  #: apart; padding; bottomed out; receding faster than the padding follows
+
+_Step = tuple[Sequence[Sequence[float]], float, tuple[float, float, float, float] | None]
 
 
 def integrate(
@@ -55,8 +61,7 @@ class _Integration:
     def __init__(self, model: TwoMassContact, horizon: float, keep: bool, stop_above: float) -> None:
         self.model, self.horizon, self.keep, self.stop_above = model, horizon, keep, stop_above
         arm, body, law = model.arm, model.body, model.law
-        self.arm_mobility = 0.0 if math.isinf(arm.mass) else 1.0 / arm.mass
-        self.body_mobility = 0.0 if math.isinf(body.mass) else 1.0 / body.mass
+        self.arm_mobility, self.body_mobility = 1.0 / arm.mass, 1.0 / body.mass  # 0 of an infinite mass
         self.law = law
         self.time = 0.0
         self.s, self.w, self.x, self.v = 0.0, arm.speed, 0.0, 0.0
@@ -67,49 +72,52 @@ class _Integration:
             self._close()
         self.peak = self.peak_time = self.deepest = self.impulse = self.last = 0.0
         self.stretches: list[Stretch] = []
+        self.pace = self.faded = self.ahead = 0.0
+        self.calm, self.patience = 0, _PATIENCE
 
     # one step
 
-    def _series(self) -> tuple[list[float], list[float], list[float], list[float], list[float]]:
-        """Return the Taylor coefficients of compression, rate, place, speed and force."""
-        arm, body, law = self.model.arm, self.model.body, self.law
-        m1, m2, k2, c2 = self.arm_mobility, self.body_mobility, body.support, body.damping
-        k1, c1, loss = arm.stiffness, arm.damping, law.loss
-        s, w, x, v = [self.s], [self.w], [self.x], [self.v]
-        way = (self.way, self.drive, -0.5 * self.braking)
-        drive = (self.drive, -self.braking)
-        touching = self.mode in (_SOFT, _HARD)
-        slope = law.soft if self.mode == _SOFT else law.hard
-        e = [law.soft * self.s if self.mode == _SOFT else law.end_force + law.hard * (self.s - law.end)]
-        f: list[float] = []
-        for n in range(_ORDER):
-            if touching:
-                if n:
-                    e.append(slope * s[n])
-                f.append(e[n] + loss * sum(map(mul, e, reversed(w))) if loss else e[n])
-            else:
-                f.append(0.0)
-            if m1:
-                p_n, d_n = way[n] if n < 3 else 0.0, drive[n] if n < 2 else 0.0
-                a1 = m1 * (k1 * (p_n - s[n] - x[n]) + c1 * (d_n - w[n] - v[n]) - f[n])
-            else:
-                a1 = -self.braking if n == 0 else 0.0
-            a2 = m2 * (f[n] - k2 * x[n] - c2 * v[n]) if m2 else 0.0
-            s.append(w[n] / (n + 1))
-            x.append(v[n] / (n + 1))
-            w.append((a1 - a2) / (n + 1))
-            v.append(a2 / (n + 1))
-        return s, w, x, v, f
+    def _state(self) -> ContactState:
+        """Return the state; without contact no force and no slope of it."""
+        law = self.law
+        elastic, slope = 0.0, 0.0
+        if self.mode == _SOFT:
+            elastic, slope = law.soft * self.s, law.soft
+        elif self.mode == _HARD:
+            elastic, slope = law.end_force + law.hard * (self.s - law.end), law.hard
+        return ContactState(self.s, self.w, self.x, self.v, self.way, self.drive, self.braking, elastic, slope)
 
-    def _length(self, s: Sequence[float], w: Sequence[float], x: Sequence[float], v: Sequence[float]) -> float:
-        """Return the length of a step [s]: until the last two terms would count."""
-        longest = math.inf
-        for series in (s, w, x, v):
-            scale = max(abs(series[0]), abs(series[1]) * 1e-9, 1e-12)
-            for power in (_ORDER, _ORDER - 1):
-                if last := abs(series[power]):
-                    longest = min(longest, (_TOLERANCE * scale / last) ** (1.0 / power))
-        return longest
+    def _by_series(self, room: float) -> _Step:
+        """Return the step of the Taylor series."""
+        start = self._state()
+        series = expand(self.model, start)
+        self.pace = reach(series)
+        h = min(self.pace, room)
+        self.calm += 1
+        self.faded += 0.5 * h * self._friction(start.elastic)
+        return series, h, None
+
+    def _friction(self, elastic: float) -> float:
+        """Return the rate at which the fastest motion loses speed [1/s]."""
+        pad, arm, body = self.law.loss * elastic, self.model.arm, self.model.body
+        return (arm.damping + pad) / arm.mass + (body.damping + pad) / body.mass
+
+    def _by_collocation(self, room: float) -> _Step | None:
+        """Return a step of many times the length, where the fastest motion has died away; None where it has not."""
+        if self.mode not in (_SOFT, _HARD) or (not self.ahead and (self.calm < self.patience or self.faded < _FADED)):
+            return None
+        start = self._state()
+        tried = self.ahead or _GAIN * self.pace  # shorter ones cost more than the series
+        while (h := min(tried, room)) >= _GAIN * self.pace:
+            found = collocate(self.model, start, h)
+            better = 0.85 * h * (_TAIL / max(found.tail, 1e-30)) ** (1.0 / POINTS) if found else 0.1 * h
+            if found and found.tail <= _TAIL:
+                self.ahead = max(min(better, 4.0 * h), h if h < tried else 0.0)
+                return found.series, h, found.end
+            tried = min(better, 0.5 * h)
+        if self.pace < room:
+            self.ahead, self.calm, self.patience = 0.0, 0, 2 * self.patience
+        return None
 
     def _bounds(
         self, s: Sequence[float], w: Sequence[float], f: Sequence[float]
@@ -142,21 +150,21 @@ class _Integration:
         return self._outcome()
 
     def _step(self) -> None:
-        s, w, x, v, f = self._series()
         end = min(t for t in (self.horizon, self.braked, self.stands) if t > self.time)
         room = end - self.time
-        h = min(self._length(s, w, x, v), room)
+        series, h, after = self._by_collocation(room) or self._by_series(room)
+        s, w, x, v, f = series
         event = ""
-        for name, series, sign in self._bounds(s, w, f):
-            at = first_fall([sign * c for c in series], h)
+        for name, bound, sign in self._bounds(s, w, f):
+            at = first_fall([sign * c for c in bound], h)
             if at is not None and (at < h or not event):
                 h, event = at, name
-        if h >= room:
-            h = room
+        if event:
+            after, self.calm, self.faded, self.patience, self.ahead = None, 0, 0.0, _PATIENCE, 0.0
         self._note(s, f, h)
         if self.keep:
             self.stretches.append(Stretch(self.time, h, tuple(s), tuple(w), tuple(x), tuple(v), tuple(f)))
-        self.s, self.w, self.x, self.v = evaluate(s, h), evaluate(w, h), evaluate(x, h), evaluate(v, h)
+        self.s, self.w, self.x, self.v = after or (evaluate(s, h), evaluate(w, h), evaluate(x, h), evaluate(v, h))
         self.last = max(0.0, evaluate(f, h))
         self.way += h * (self.drive - 0.5 * self.braking * h)
         self.drive -= self.braking * h
