@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -12,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from coneskin.channel import Channel, pair, wait_readable
 from coneskin.errors import Collision, MissingExtra, RobotRefused
 from coneskin.replay.run import read_run, replay
 from coneskin.robot.guard.journal import BlockKind, EventName, body_places, contact_force
@@ -103,6 +106,72 @@ def test_physics_that_dies_or_falls_behind_is_said_and_stops_everything(live, ha
         assert not any(event.name == EventName.STANDSTILL for event in session.events)  # nobody has measured one
         with pytest.raises(RobotRefused):
             session.reset()
+
+
+class Relay(threading.Thread):
+    """Line between physics and controller that passes on all, until it is told to answer for the physics."""
+
+    def __init__(self, physics: socket.socket) -> None:
+        super().__init__()
+        self.controller, own = pair()
+        self._physics, self._own = Channel(physics), Channel(own)
+        self._answer: bytes | None = None
+
+    def answer(self, message: bytes) -> None:
+        """Answer once, from now on, what the physics would not."""
+        self._answer = message
+
+    def run(self) -> None:
+        while not (self._physics.closed or self._own.closed):
+            ready = wait_readable([self._physics, self._own], 0.5)
+            for one, other in ((self._physics, self._own), (self._own, self._physics)):
+                for message in one.receive() if one in ready else ():
+                    wrong, self._answer = self._answer, None
+                    if wrong is not None and other is self._own:
+                        message = wrong
+                    elif wrong is not None:
+                        self._answer = wrong
+                    other.send(message)
+        self._physics.close()
+        self._own.close()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (b"\xff" * 144, "position of joint 1 that is not a number"),
+        (struct.pack("<18d", *START, 1e9, *(0.0,) * 11), "speed of joint 1 of 1e+09 rad/s"),
+        (b"nothing of the kind", "answered 19 bytes"),
+    ],
+)
+def test_a_guarded_arm_whose_physics_talks_nonsense_is_in_a_fault_without_power(answer: bytes, said: str) -> None:
+    host = free_host()
+    scene = scene_at(host)
+    with LivePlant(scene, START) as plant:
+        relay = Relay(plant.controller)
+        relay.start()
+        with (
+            SimulatedController("UR5e", host, START, plant=relay.controller) as controller,
+            guard(scene, pressed_by=plant.skin) as session,
+        ):
+            timer = threading.Timer(0.1, relay.answer, [answer])
+            timer.start()
+            with pytest.raises(RobotRefused, match=r"safety system|fault|NOT confirmed"):
+                session.arm.move_j(GOAL, speed=0.2, acceleration=1.0)
+            timer.join()
+            rest = controller.state()
+            assert said in rest["plant_lost"]
+            assert (rest["safety"], rest["robot_mode"], rest["runtime"]) == ("FAULT", "POWER_OFF", "STOPPED")
+            assert not any(event.name == EventName.STANDSTILL for event in session.events)  # nobody has measured one
+            with pytest.raises(RobotRefused):
+                session.reset()
+            later = controller.state()
+            assert later["cycle"] > rest["cycle"]
+            assert later["q"] == rest["q"]
+            assert math.isclose(later["q"][0], START[0], abs_tol=0.3)  # far from its goal
+        relay.join(10.0)
+        assert not relay.is_alive()
 
 
 def test_a_scene_without_an_arm_has_no_physics() -> None:
