@@ -137,7 +137,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     say("measuring profiles")
     surveys = survey_axes(mesh, rays, candidates, requirements)
     surveys += better_surveys(mesh, rays, surveys, requirements)
-    search = _Search(mesh, rays, hull, weighed, surveys, requirements)
+    search = _Search(mesh, rays, hull, weighed, surveys, requirements, options.allow_hull)
     plan, refusal = search.plan(tolerance)
     name = "" if link.weights is None else link.weights.name
     nearest, needed, length = None, math.inf, _longest(hull)
@@ -211,6 +211,7 @@ class _Search:
     weighed: float  # area of the hull, by the weights [m2]
     surveys: list[AxisSurvey]
     requirements: SheetRequirements
+    allow_hull: bool
 
     def plan(self, tolerance: float) -> tuple[SheetPlan | None, str]:
         """Return the best plan within a tolerance [m]; or None and, for a mesh that is a bare hull, the reason."""
@@ -218,7 +219,7 @@ class _Search:
         plan = best_plan(FineStage(self.mesh, self.rays, self.hull, wanted), self.surveys)
         area, whole = plan.area if plan else 0.0, self.weighed
         # a requested wrap implies that the shape is known; otherwise sheets should cover some of a convex body
-        if area >= HULL_SHARE * whole or (plan and wanted.wrap):
+        if self.allow_hull or area >= HULL_SHARE * whole or (plan and wanted.wrap):
             return plan, ""
         hulled = hull_note(self.mesh, self.hull)
         if hulled:

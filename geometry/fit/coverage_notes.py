@@ -42,7 +42,7 @@ def hull_note(mesh: Mesh, samples: SurfaceSamples) -> str:
         return ""
     return (
         f"{100.0 * share:.0f} % of the surface lies on the convex hull, as in simplified collision bodies, which have "
-        "lost the tubes; use the visual mesh of the link"
+        "lost the tubes; use the visual mesh of the link, or allow_hull (--allow-hull) if this is the visual mesh"
     )
 
 

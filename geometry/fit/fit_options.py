@@ -40,6 +40,7 @@ class FitOptions:
         gap: smallest distance between sheets about different axes, and between partial wraps [m].
         weights: what areas count, where touches are likelier on some than on others; None for all the same.
         exposure: True to weigh areas by how much of the space above them is free (``exposure_weights``).
+        allow_hull: True where the visual mesh itself is convex: a mesh like a collision hull is not refused.
 
     Raises:
         GeometryError: a value is out of range.
@@ -59,6 +60,7 @@ class FitOptions:
     gap: float = 0.001
     weights: TouchWeights | None = None
     exposure: bool = False
+    allow_hull: bool = False
 
     def __post_init__(self) -> None:
         for name, most in (("tolerance", MOST_TOLERANCE), ("min_length", math.inf), ("max_bridge", _MOST_BRIDGE)):

@@ -87,7 +87,8 @@ def with_developables(
     if not best or gain < (least if best is alone else 0.0):
         return cones
     # a bare convex hull has rulings of its own that the link has not
-    if sum(sheet.area_share for sheet in best) < _CONVEX_SHARE and hull_note(mesh, link.hull):
+    scarce = sum(sheet.area_share for sheet in best) < _CONVEX_SHARE
+    if scarce and not options.allow_hull and hull_note(mesh, link.hull):
         return cones
     shares = [f"{sum(sheet.area_share for sheet in sheets):.0%}" for sheets in (cones.sheets, best)]
     kinds = " and ".join(sorted({f"a {sheet.placed.kind}" for sheet in best if sheet.placed.bends}))

@@ -138,6 +138,7 @@ def _load_and_fit(args: argparse.Namespace, say: Callable[[str], None]) -> tuple
         seam_direction=seam_direction(args),
         weights=_touch_weights(args),
         exposure=args.exposure,
+        allow_hull=args.allow_hull,
         round_only=args.round_only,
     )
 

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from coneskin.errors import GeometryError
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
-from coneskin.geometry.mesh import Mesh, load_mesh
+from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
 
 from ...sweep import sweep
 from ..synthetic import (
@@ -210,9 +211,23 @@ def test_a_box_is_refused_and_the_nearest_thing_shown() -> None:
     fit = find_cones(placed(box(0.1, 0.12, 0.3)))
     assert fit.sheets == ()
     assert "100 % of the surface lies on the convex hull" in fit.reason
+    assert "allow_hull (--allow-hull) if this is the visual mesh" in fit.reason
     assert fit.nearest is not None
     assert fit.nearest.max_deviation > 0.005
     assert [bare.reason for bare in fit.bare] == [fit.reason]
+
+
+@pytest.mark.long
+def test_a_convex_visual_mesh_is_taken_where_that_is_allowed() -> None:
+    """A stadium 0.6 m wide: its two half tubes of 30 mm are 11 % of it, too little for what may be a collision hull."""
+    phi = np.linspace(0.0, math.pi, 25)
+    arc = np.stack([0.3 + 0.03 * np.sin(phi), 0.03 * np.cos(phi)], axis=1)
+    rings = [np.column_stack([np.concatenate([arc, -arc]), np.full(50, z)]) for z in (0.0, 0.2)]
+    hull = ConvexHull(np.concatenate(rings))
+    body = make_mesh(hull.points, hull.simplices)
+    assert find_cones(body).sheets == ()
+    sheets = find_cones(body, allow_hull=True).sheets
+    assert [sheet.frustum.radius1 for sheet in sheets] == pytest.approx([0.03, 0.03], abs=2e-4)
 
 
 def test_a_link_shorter_than_a_sheet_is_told_so() -> None:

@@ -103,6 +103,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_quantity(add, "tolerance-mm", 1.0, "largest distance between sheet and mesh")
     add("--max-sheets", type=int, default=2, metavar="N", help="largest number of sheets (default 2)")
     add("--round-only", action="store_true", help="use cones only, no sides of another section")
+    add("--allow-hull", action="store_true", help="take a convex mesh of few faces: it is the link, no collision hull")
     add("--max-wires", type=int, metavar="N", help="largest number of wires, four for each sheet (default: any)")
     _add_quantity(add, "min-length-mm", 25.0, "smallest length of a sheet along the axis")
     _add_quantity(add, "min-wrap-deg", 150.0, "smallest partial wrap")
