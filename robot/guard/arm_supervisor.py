@@ -23,6 +23,7 @@ from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.guard.heartbeats.controller_clock import ControllerClock
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import Done, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -30,7 +31,6 @@ from coneskin.robot.stop.standstill import WATCH, StandstillWatch
 
 from .activation import arm_blockers
 from .contact import Contact
-from .controller_clock import ControllerClock
 from .journal import EventName
 from .motion_away import MotionAway
 from .outputs import Outputs, emit
@@ -40,7 +40,8 @@ from .stop_escalation import StopEscalation
 from .touch_record import TouchRecord
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
-    from .controller_heartbeat import ControllerHeartbeat
+    from coneskin.robot.guard.heartbeats.controller_heartbeat import ControllerHeartbeat
+
     from .reaction_motion import ReactionPlanner
     from .speed.speed_limit import SpeedLimit
 

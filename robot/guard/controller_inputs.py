@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from coneskin.recording import Block
+from coneskin.robot.guard.heartbeats.companion_monitor import CompanionMonitor
 
-from .companion_monitor import CompanionMonitor
 from .fault_register import FaultRegister
 from .journal import EventName
 from .outputs import Outputs, emit

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 from coneskin.recording import Block
 from coneskin.robot.driver.messages import StatusReport
+from coneskin.robot.guard.heartbeats.companion_monitor import CompanionMonitor
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEvent
 from coneskin.skin.detection.stream import TouchStream
 
 from .activation import Activation, ActivationStep
-from .companion_monitor import CompanionMonitor
 from .contact import GuardedSensor
 from .controller_inputs import ControllerInputs
 from .event_folding import EventFolding

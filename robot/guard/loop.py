@@ -18,10 +18,10 @@ from coneskin.errors import ConeSkinError, SkinTimeout
 from coneskin.recording import Block, encode_block
 from coneskin.robot.driver.messages import HEARTBEAT_PERIOD, Heartbeat, Shutdown
 from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SpeedSlider, StopConnections
+from coneskin.robot.guard.heartbeats.controller_heartbeat import heartbeat_count
 from coneskin.skin.sources.source import Source
 from coneskin.skin.sources.source_reopening import SourceReopening
 
-from .controller_heartbeat import heartbeat_count
 from .core import GuardCore
 from .journal import BlockKind
 from .outbox import Outbox

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 from coneskin.errors import RobotConnectionError
 from coneskin.recording import Block
 from coneskin.robot.driver.messages import StatusReport
+from coneskin.robot.guard.heartbeats.heartbeat_monitor import HELD_UP
 from coneskin.skin.detection.quiet_frames import QuietFrames, find_quiet_frames
 from coneskin.skin.frame_batch import find_frames
 
 from .core import GuardCore
-from .heartbeat_monitor import HELD_UP
 from .journal import BlockKind
 
 if TYPE_CHECKING:

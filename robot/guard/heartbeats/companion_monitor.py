@@ -16,7 +16,7 @@ from coneskin.robot.stop.limits import MonitoringLimits
 from .heartbeat_monitor import HeartbeatMonitor
 
 if TYPE_CHECKING:
-    from .arm_supervisor import ArmSupervisor
+    from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 
 __all__ = ["CompanionMonitor"]
 

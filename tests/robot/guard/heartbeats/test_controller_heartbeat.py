@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.robot.guard.controller_heartbeat import PERIOD, ControllerHeartbeat, heartbeat_count
+from coneskin.robot.guard.heartbeats.controller_heartbeat import PERIOD, ControllerHeartbeat, heartbeat_count
 from coneskin.robot.ur.heartbeat_registers import decode_echo, program_lines
 from coneskin.robot.ur.rtde_codec import Recipe
 

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coneskin.robot.guard.controller_clock import ControllerClock
+from coneskin.robot.guard.heartbeats.controller_clock import ControllerClock
 
 CYCLE = 0.002
 
