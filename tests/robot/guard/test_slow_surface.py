@@ -94,7 +94,10 @@ def test_a_place_that_comes_late_counts_from_the_beginning_of_the_touch():
     per_radian = way_into(FOREARM, q, (1e-6, *q[1:])) / 1e-6
     for way, exceeded in ((0.0004, 0), (0.0006, 1)):
         approach = ContactApproach(arm_model("UR10e"), q, still, 10.0, 0.0005)
-        approach.note(q, still, [replace(FOREARM, location_valid=False)])
+        vague = replace(FOREARM, location_valid=False)
+        approach.note(q, still, [vague])
+        approach.note((0.5 * way / per_radian, *q[1:]), still, [vague])
+        assert not approach.exceeded
         approach.note((way / per_radian, *q[1:]), still, [FOREARM])
         assert approach.exceeded == exceeded
     assert approach.way == pytest.approx(0.0006, rel=0.01)
