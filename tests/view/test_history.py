@@ -55,6 +55,9 @@ def test_the_mark_is_where_the_touch_was_read_and_fades_when_it_is_over(strand: 
     assert list(mark.normal) == located.details["normal"]
     assert mark.located
     assert mark.strength == 1.0
+    over = event(strand, EventName.TOUCH_ENDED).time
+    assert strand.history.marks(over + 0.5 * FADING)[0].strength == pytest.approx(0.5)
+    assert strand.history.marks(over + FADING) == []
 
 
 def touch(name: EventName, time: float, number: int = 1, **details: object) -> GuardEvent:
@@ -63,7 +66,10 @@ def touch(name: EventName, time: float, number: int = 1, **details: object) -> G
 
 
 def test_a_touch_that_is_over_fades() -> None:
-    log = ContactLog().take_all([touch(EventName.CONTACT, 1.0), touch(EventName.TOUCH_ENDED, 2.0)])
+    ended = GuardEvent(EventName.TOUCH_ENDED, 2.0, {"sensor": "s"})  # as the guard tells it: one touch on a sensor
+    log = ContactLog().take_all([touch(EventName.CONTACT, 1.0), touch(EventName.CONTACT, 1.5, 2, sensor="t"), ended])
+    assert [(mark.sensor, mark.strength) for mark in log.marks(2.0 + FADING)] == [("t", 1.0)]
+    log = ContactLog().take_all([touch(EventName.CONTACT, 1.0), ended, GuardEvent(ended.name, 3.0, ended.details)])
     assert [mark.strength for mark in log.marks(2.0)] == [1.0]
     assert log.marks(2.0 + 0.5 * FADING)[0].strength == pytest.approx(0.5)
     assert log.marks(2.0 + FADING) == []

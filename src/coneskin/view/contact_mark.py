@@ -67,6 +67,11 @@ class ContactLog:
 
     def take(self, event: GuardEvent) -> None:
         """Take an event; those that tell of no touch are passed over."""
+        if event.name == EventName.TOUCH_ENDED:
+            for touch in self._touches.values():
+                if touch.places[-1].mark.sensor == event.details.get("sensor"):
+                    touch.ended = min(touch.ended, event.time)
+            return
         number = event.details.get("number")
         if not isinstance(number, int):
             return
@@ -74,8 +79,6 @@ class ContactLog:
             self._touches.setdefault(number, _Touch()).places.append(_Place(event.time, mark))
             while len(self._touches) > _KEPT:
                 del self._touches[next(iter(self._touches))]
-        elif event.name == EventName.TOUCH_ENDED and number in self._touches:
-            self._touches[number].ended = event.time
 
     def take_all(self, events: Iterable[GuardEvent]) -> ContactLog:
         """Take events in their order, and return itself."""

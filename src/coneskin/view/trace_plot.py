@@ -40,7 +40,7 @@ class TracePlot:
         """Draw another stretch of time."""
         self._since, self._until = since, until
         found = self._traces()
-        self._plot.data = (found.times, *found.values)
+        self._plot.data, self._plot.scales = (found.times, *found.values), _scales(found)
 
     def remove(self) -> None:
         """Take the plot off the page."""
@@ -66,7 +66,17 @@ class TracePlot:
         return self._gui.add_uplot(
             (found.times, *found.values),
             tuple(series),
-            scales={"x": {"time": False, "auto": True}, "y": {"auto": True}},
+            scales=_scales(found),
             legend={"show": True},
             aspect=1.7,
         )
+
+
+def _scales(found: Traces) -> dict[str, Any]:
+    """Return the axes of a plot; one that looks for its own range finds none where a value is missing (NaN)."""
+    import numpy as np
+
+    known = found.values[np.isfinite(found.values)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    margin = 0.05 * (high - low) or 0.5
+    return {"x": {"time": False, "auto": True}, "y": {"auto": False, "range": (low - margin, high + margin)}}

@@ -59,9 +59,9 @@ def test_steps(figures: BuildFigures, folder: str) -> Iterator[str]:
         "untouched frame must read as in the table below, within 3 % once the measured sheets are in the sensor file."
     )
     yield (
-        "Write the scene (`coneskin init`), and let `coneskin commission` read where a person touches the nine marks: "
-        "it finds a turned, mirrored or exchanged sheet. Until then the arm only stops at a touch, and does not "
-        "retreat."
+        "Write the scene (`coneskin init`), and let `coneskin commission` read where a person touches the marks that "
+        "it asks for: it finds a turned, mirrored or exchanged sheet. Until then the arm only stops at a touch, and "
+        "does not retreat."
     )
 
 
@@ -83,5 +83,5 @@ def reading_lines(figures: BuildFigures) -> Iterator[str]:
     yield ""
     yield (
         "The model of the sensor ends at its electrodes, the sheets do not: until the measured sheets are in the file, "
-        f"radial_current reads {1.0 / radial - 1.0:+.0%} and angular_current {1.0 / angular - 1.0:+.0%} of these."
+        f"radial_current reads {1.0 / radial:.0%} and angular_current {1.0 / angular:.0%} of these."
     )

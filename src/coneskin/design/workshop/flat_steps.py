@@ -83,7 +83,7 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     )
     yield (
         f"Prick the centres of the nine crosses of part 7 ({cuts[6].face} up) through with a needle, and write their "
-        "numbers on the outside: `coneskin calibrate` and `coneskin commission` ask for them. *Check:* on the outside, "
+        "numbers on the outside: `coneskin calibrate` asks for them. *Check:* on the outside, "
         "end 1 down, numbers 1, 2, 3 run along end 1 from edge 0 at the left, 4 to 6 come back above them, and 7 to 9 "
         "go on along end 2; the table of coordinates below has their places."
     )

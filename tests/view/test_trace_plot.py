@@ -1,0 +1,45 @@
+"""Plot of traces: its axes hold what is known, whatever is missing."""
+
+from contextlib import nullcontext
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coneskin.view.strand import Strand, read_strands
+from coneskin.view.trace_plot import TracePlot
+
+RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+
+
+class Gui:
+    """What a plot needs of viser's panel."""
+
+    def add_folder(self, _label: str) -> Any:
+        return nullcontext()
+
+    def add_uplot(self, data: Any, series: Any, scales: Any, **_options: Any) -> SimpleNamespace:
+        return SimpleNamespace(data=data, series=series, scales=scales)
+
+
+@pytest.fixture(scope="module")
+def strand() -> Strand:
+    return read_strands([RUN])[0]
+
+
+def test_a_plot_has_a_range_where_frames_are_missing(strand: Strand) -> None:
+    since, until = strand.span
+    plot = TracePlot(Gui(), [strand], since, until, fixed=True)
+    levels = strand.history.levels["forearm skin"].values
+    shown = plot._plot
+    low, high = shown.scales["y"]["range"]
+    assert np.isfinite([low, high]).all()
+    assert low < min(row[0] for row in levels) <= max(row[0] for row in levels) < high
+    plot.move(since - 5.0, since - 4.0)  # before the run: nothing is known
+    assert np.isnan(shown.data[1]).all()
+    assert shown.scales["y"]["range"] == pytest.approx((-0.05, 1.05))
+    plot.move(since - 1.0, until)  # a second without frames before them, which gives uPlot's own search no range
+    assert np.isnan(shown.data[1]).any()
+    assert shown.scales["y"]["range"][1] == pytest.approx(high)
