@@ -29,9 +29,12 @@ class _Approach:
     """Way into one touch [m]."""
 
     q: Joints  # where the arm was when it began [rad]
+    link: int
     made: float = 0.0
+    earlier: float = 0.0  # what was blind in the touches before that this one goes on from [m]
     blind: float = 0.0  # way of any point, while its place was not certain yet [m]
     placed: bool = False
+    over: bool = False
 
 
 class ContactApproach:
@@ -67,11 +70,16 @@ class ContactApproach:
     def note(self, q: Joints, qd: Joints, contacts: Sequence[ContactOnLink]) -> None:
         """Take measured joint positions [rad] and speeds [rad/s], and the touches there are by their newest frames."""
         speeds = []
+        now = {contact.number for contact in contacts}
+        for number, one in self._touches.items():
+            one.over = number not in now
         for contact in contacts:
-            touch = self._touches.setdefault(contact.number, _Approach(self._q))
+            touch = self._touches.get(contact.number)
+            if touch is None:
+                touch = self._touches[contact.number] = self._begin(contact)
             placed = contact.location_valid
             if placed and not touch.placed:  # only now it shows how far it has gone into it
-                touch.placed, touch.blind, since = True, 0.0, touch.q
+                touch.placed, touch.blind, since = True, touch.earlier, touch.q
             else:
                 since = self._q
             bound, speed, _ = self._motion(contact, since, q, qd, placed)
@@ -91,6 +99,13 @@ class ContactApproach:
             before, now = max(map(abs, self._qd)), max(map(abs, qd))
             self.speed = self.speed * now / before if before > 0.0 else self.speed
         self._q, self._qd = q, qd
+
+    def _begin(self, contact: ContactOnLink) -> _Approach:
+        """Return a new touch; one that flickers is one, and goes on from the ways into those over on its link."""
+        ended = [one for one in self._touches.values() if one.link == contact.link and one.over]
+        made = max((one.made for one in ended), default=0.0)
+        blind = max((one.blind for one in ended), default=0.0)
+        return _Approach(self._q, contact.link, made, blind, blind)
 
     def _stop(self, speed: float, qd: Joints) -> float:
         """Return the way of a surface in a stop [m], from its speed into the touch [m/s] and the joints' [rad/s]."""

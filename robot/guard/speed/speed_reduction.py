@@ -189,7 +189,10 @@ class SpeedReduction:
         if approach.exceeded:
             return False
         if self._last is not None and time - self._last[0] < HOLD:  # slider and speed may not yet be as before
-            before, top = self._last[1].before, self._last[1].top
+            last = self._last[1]
+            top = last.top
+            if last.puts_back(before):  # else a person has moved it since
+                before = last.before
         budget = limits.stop_budget(state.speed, reaction.deceleration)
         longest, slow = reaction.time_budget, reaction.slow_speed
         self.now = ReducedSpeedTouch(time, top, before, reaction.slow_to, budget, longest, slow)

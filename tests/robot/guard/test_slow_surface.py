@@ -119,3 +119,29 @@ def way_into(contact, q, later):
     before, after = link_pose(model, q, contact.link), link_pose(model, later, contact.link)
     change = [b - a for a, b in zip(before.apply(contact.point), after.apply(contact.point), strict=True)]
     return sum(n * c for n, c in zip(before.rotate(contact.normal), change, strict=True))
+
+
+@pytest.mark.parametrize(("on", "off"), [(0.02, 0.01), (0.05, 0.03)])
+def test_a_touch_that_flickers_is_pressed_no_farther_than_a_steady_one(on, off):
+    """4.5 to 9 mm before, each flicker being a new touch with a way of its own."""
+    flicker = [touch(1.0 + (on + off) * n, 1.0 + (on + off) * n + on) for n in range(int(2.0 / (on + off)))]
+    rig = GuardRig(*flicker, reaction=Reaction("slow"), speed=0.08, follows=True).run(1.0)
+    at, normal = rig.point(), rig.normal()
+    rig.run(3.0)
+    assert sum((a - b) * n for a, b, n in zip(rig.point(), at, normal, strict=True)) < 0.001
+    assert rig.core.phase is Phase.LATCHED
+
+
+def test_ways_into_touches_of_one_link_add_up_whether_their_places_were_certain_or_not():
+    """Blind flickers between certain ones do not begin anew, and another link's touch has a way of its own."""
+    model = arm_model("UR5e")
+    q, qd = (0.0, -1.2, 1.2, 0.0, 0.0, 0.0), (0.02, 0.0, 0.0, 0.0, 0.0, 0.0)
+    approach = ContactApproach(model, q, qd, 10.0, 1.0)
+    for number in range(1, 40):
+        contact = replace(FOREARM, number=number, location_valid=number % 2 == 0)
+        q = (q[0] + 1e-3, *q[1:])
+        approach.note(q, qd, [contact])
+    blind = approach._touches[39].blind
+    other = replace(FOREARM, link=2, number=100, location_valid=False)
+    approach.note((q[0] + 1e-3, *q[1:]), qd, [other])
+    assert blind > 15.0 * approach._touches[100].blind > 0.0

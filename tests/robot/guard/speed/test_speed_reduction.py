@@ -1,5 +1,7 @@
 """An arm that goes on slowly while it is touched."""
 
+import pytest
+
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.setpoint import SetSpeedSlider
@@ -9,6 +11,7 @@ from coneskin.robot.guard.speed.speed_reduction import HOLD, ReducedSpeedTouch, 
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES
+from coneskin.testing.guard_rig import GuardRig, touch
 
 SLOW = 0.05  # m/s
 
@@ -110,3 +113,17 @@ def test_a_slider_that_a_stop_has_put_to_0_stays_there_until_the_reset():
     reduction.release(out)
     assert [one for one in before if isinstance(one, SetSpeedSlider)] == [SetSpeedSlider(0.2)]
     assert out == [SetSpeedSlider(1.0)]
+
+
+@pytest.mark.parametrize("setting", [0.1, 0.3])
+def test_a_person_who_slows_the_arm_between_two_touches_is_heard(setting):
+    """0.9 before: what a slow arm had before the first touch was put back after the second."""
+    rig = GuardRig(
+        touch(1.0, 1.2, phi=4.71), touch(1.9, 2.2, phi=4.71), reaction=Reaction("slow"), speed=0.3, follows=True
+    )
+    rig.arm.slider = 0.9
+    rig.run(1.8)
+    rig.arm.slider, before = setting, len(rig.outputs)
+    rig.run(3.0)
+    set_to = [output.fraction for output in rig.outputs[before:] if isinstance(output, SetSpeedSlider)]
+    assert max(set_to, default=0.0) <= setting
