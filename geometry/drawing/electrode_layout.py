@@ -27,6 +27,7 @@ from .surface_shape import ShapeCorner, ShapeTab, SheetSide, SurfaceShape
 
 __all__ = ["ElectrodePlan", "SheetLayout", "SurfaceRectangle", "edge_room", "lay_out_sheet"]
 
+_LEAST = 1e-4  # m; no cutter makes a narrower strip or gap
 _MIN_WEB = 1e-3  # m; least width of material around a hole
 
 
@@ -45,7 +46,7 @@ class ElectrodePlan:
         wires: the side where all four wires leave: end1 (u = 0), end2, edge0 (phi = 0) or edge1 (phi = wrap).
 
     Raises:
-        GeometryError: a width is negative, or the hole or a tab does not fit.
+        GeometryError: a width is below 0.1 mm (where 0 does not mean none), or the hole or a tab does not fit.
     """
 
     margin: float = 6e-3
@@ -60,9 +61,9 @@ class ElectrodePlan:
     def __post_init__(self) -> None:
         for name in ("electrode", "setback", "lead", "clearance", "margin", "tab", "hole"):
             value, may_be_none = getattr(self, name), name in ("margin", "tab", "hole")
-            if not (math.isfinite(value) and (value > 0.0 or (may_be_none and value == 0.0))):
-                rule = "not negative" if may_be_none else "above 0 mm"
-                raise GeometryError(f"{name} must be finite and {rule}, got {value * 1e3:.4g} mm")
+            if not (_LEAST <= value < math.inf or (may_be_none and value == 0.0)):
+                rule = f"{'0 or ' if may_be_none else ''}finite and at least {_LEAST * 1e3:g} mm"
+                raise GeometryError(f"{name} must be {rule}, got {value * 1e3:.4g} mm")
         if self.wires not in get_args(SheetSide):
             raise GeometryError(f"wires must leave at one of {', '.join(get_args(SheetSide))}, got {self.wires!r}")
         if self.setback > self.margin:

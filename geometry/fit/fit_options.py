@@ -18,6 +18,9 @@ TURN = 2.0 * math.pi
 MOST_TOLERANCE = 0.020  #: m; a sheet that stands off further does not follow the link
 _MOST_BRIDGE = 0.100  # m; over a wider hole a sheet sags
 _WIRES = 4  # of a sheet
+_MOST_SHEETS = 100
+_LEAST_SAMPLES, _MOST_SAMPLES = 100, 10_000_000
+_SHORTEST = 1e-100  # of a direction, so that its square is neither 0 nor infinite
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,19 +73,18 @@ class FitOptions:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:g} mm")
-        if self.max_sheets < 1:
-            raise GeometryError(f"max_sheets must be at least 1, got {self.max_sheets!r}")
-        if self.max_wires is not None and self.max_wires < _WIRES:
-            raise GeometryError(f"max_wires must be at least 4, the wires of one sheet, got {self.max_wires!r}")
+        _check_count("max_sheets", self.max_sheets, 1, _MOST_SHEETS)
+        _check_count("samples", self.samples, _LEAST_SAMPLES, _MOST_SAMPLES)
+        if self.max_wires is not None:  # four for one sheet
+            _check_count("max_wires", self.max_wires, _WIRES, _WIRES * _MOST_SHEETS)
         for name, angle in (("wrap", TURN if self.wrap is None else self.wrap), ("min_wrap", self.min_wrap)):
             if not 0.0 < angle <= TURN:
                 raise GeometryError(
                     f"{name} must be above 0 and at most a full turn of 360 deg, got {math.degrees(angle):g} deg"
                 )
-        size = math.hypot(*self.seam_direction)
-        if not (math.isfinite(size) and size > 0.0):
-            facing = tuple(self.seam_direction)
-            raise GeometryError(f"the direction of the seam must be finite and not zero, got {facing}")
+        facing = tuple(self.seam_direction)
+        if len(facing) != 3 or not _SHORTEST < math.hypot(*facing) < 1.0 / _SHORTEST:
+            raise GeometryError(f"the direction of the seam must be three numbers, finite and not zero, got {facing}")
         if self.weights is not None and self.exposure:
             raise GeometryError("weights of touches come from a map or from the exposure, not from both")
 
@@ -96,6 +98,11 @@ class FitOptions:
         """Unit vector in which the seam of a full wrap faces, shape (3,)."""
         facing = np.asarray(self.seam_direction, float)
         return np.asarray(facing / np.linalg.norm(facing))
+
+
+def _check_count(name: str, value: int, least: int, most: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise GeometryError(f"{name} must be a whole number from {least} to {most}, got {value!r}")
 
 
 def _check_length(name: str, value: float, most: float) -> None:

@@ -13,6 +13,7 @@ from enum import IntEnum, StrEnum
 from typing import Any, NamedTuple
 
 from coneskin.errors import RecordingError
+from coneskin.json_text import read_json
 from coneskin.recording import Block
 
 __all__ = [
@@ -177,8 +178,8 @@ def force_block(time: float, force: float, places: Sequence[Sequence[float]] = (
 def body_places(payload: bytes) -> tuple[tuple[float, float, float], ...]:
     """Return the places in what ``force_block`` has recorded [m]; none for another truth, and for nonsense."""
     try:
-        found = tuple((float(x), float(y), float(z)) for x, y, z in json.loads(payload).get("bodies_m", ()))
-    except (ValueError, TypeError, AttributeError, RecursionError, OverflowError):
+        found = tuple((float(x), float(y), float(z)) for x, y, z in read_json(payload).get("bodies_m", ()))
+    except (ValueError, TypeError, AttributeError):
         return ()
     return found if all(math.isfinite(value) for place in found for value in place) else ()
 
@@ -186,8 +187,8 @@ def body_places(payload: bytes) -> tuple[tuple[float, float, float], ...]:
 def contact_force(payload: bytes) -> float | None:
     """Return the force in what ``force_block`` has recorded [N]; None for another truth, and for nonsense."""
     try:
-        force = json.loads(payload).get("contact_force_N")
-    except (ValueError, AttributeError, RecursionError):
+        force = read_json(payload).get("contact_force_N")
+    except (ValueError, AttributeError):
         return None
     known = isinstance(force, int | float) and math.isfinite(force) and force >= 0.0
     return float(force) if known else None
@@ -200,11 +201,11 @@ def decode_event(block: Block) -> GuardEvent:
         RecordingError: the block holds none.
     """
     try:
-        text, details = json.loads(block.payload)
+        text, details = read_json(block.payload)
         name = EventName(text)
         if block.kind != BlockKind.EVENT or not isinstance(details, dict):
             raise ValueError(f"kind {block.kind}")
-    except (ValueError, TypeError, RecursionError) as exc:
+    except (ValueError, TypeError) as exc:
         raise RecordingError(
             f"a block of {block.time:.6f} s holds no event that this version of coneskin knows: {exc}"
         ) from exc

@@ -180,7 +180,7 @@ def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
             "a bed is from 50 to 10000 mm wide and deep, with gaps from 0 to 100",
         ),
         ([*CYLINDER, "--bed-mm", "600", "nan"], "a bed is from 50 to 10000 mm wide and deep"),
-        ([*CYLINDER, "--tab-mm", "nan"], "tab must be finite and not negative, got nan mm"),
+        ([*CYLINDER, "--tab-mm", "nan"], "tab must be 0 or finite and at least 0.1 mm, got nan mm"),
         (["nowhere.stl", "--radius1-mm", "5"], "a mesh and --radius1-mm cannot go together"),
     ],
 )

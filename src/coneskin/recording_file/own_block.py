@@ -7,6 +7,7 @@ import struct
 from typing import Any
 
 from coneskin.errors import RecordingError
+from coneskin.json_text import read_json
 from coneskin.recording import END, Block, is_time
 
 from .defect import Defect, DefectKind
@@ -62,12 +63,12 @@ def decode_drop(block: Block) -> Defect:
         RecordingError: it says nothing that can be.
     """
     try:
-        facts: dict[str, Any] = json.loads(block.payload)
+        facts: dict[str, Any] = read_json(block.payload)
         since, until, blocks, size = (facts[key] for key in ("since", "until", "blocks", "bytes"))
         kinds = frozenset(facts["kinds"])
         whole = all(type(count) is int and count >= 0 for count in (blocks, size, *kinds))
         if block.kind != DROPPED or not whole or not (is_time(since) and is_time(until)):
             raise ValueError("a time or a number cannot be")
-    except (ValueError, TypeError, KeyError, RecursionError) as exc:
+    except (ValueError, TypeError, KeyError) as exc:
         raise RecordingError(f"the block of {block.time:.6f} s does not say what was dropped: {exc}") from exc
     return Defect(DefectKind.DROPPED, since, until, size=size, blocks=blocks, kinds=kinds)

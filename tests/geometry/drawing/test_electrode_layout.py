@@ -194,10 +194,13 @@ def test_mistakes_are_said():
         lay_out_sheet(Frustum(0.002, 0.05, 0.1), ElectrodePlan(wires="end2"))
     with pytest.raises(GeometryError, match="cannot reach an apex"):
         lay_out_sheet(Frustum(0.0, 0.05, 0.1))
-    with pytest.raises(GeometryError, match="margin must be finite and not negative, got -1 mm"):
+    with pytest.raises(GeometryError, match=r"margin must be 0 or finite and at least 0\.1 mm, got -1 mm"):
         ElectrodePlan(margin=-1e-3)
-    with pytest.raises(GeometryError, match="electrode must be finite and above 0 mm, got nan mm"):
+    with pytest.raises(GeometryError, match=r"electrode must be finite and at least 0\.1 mm, got nan mm"):
         ElectrodePlan(electrode=math.nan)
+    for name in ("electrode", "setback", "lead", "clearance", "margin", "tab", "hole"):  # 1 nm of lead has no outline
+        with pytest.raises(GeometryError, match=f"{name} must be .*at least"):
+            ElectrodePlan(**{name: 1e-9})
     with pytest.raises(GeometryError, match=r"setback must be at most the margin \(6 mm\), got 7 mm"):
         ElectrodePlan(setback=7e-3)
     with pytest.raises(GeometryError, match="hole must be at most margin - setback - 2 mm = 3 mm, got 4 mm"):

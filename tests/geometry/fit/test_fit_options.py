@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -34,7 +36,7 @@ def test_sheets_are_limited_by_their_wires_too(sheets: int, wires: int | None, m
 
 def test_the_seam_is_a_unit_vector_of_any_direction_but_none() -> None:
     assert np.allclose(FitOptions(seam_direction=(0.0, -2.0, 0.0)).seam, [0.0, -1.0, 0.0])
-    with pytest.raises(GeometryError, match="the direction of the seam must be finite and not zero"):
+    with pytest.raises(GeometryError, match="the direction of the seam must be three numbers, finite and not zero"):
         FitOptions(seam_direction=(0.0, 0.0, 0.0))
 
 
@@ -43,3 +45,16 @@ def test_too_loose_a_tolerance_and_an_unknown_name_are_refused() -> None:
         FitOptions(tolerance=0.021)
     with pytest.raises(TypeError, match="max_sheet"):
         find_cones(placed(frustum(0.05, 0.05, 0.2)), max_sheet=2)
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (1e308, 1e308, 0.0), (1e-320, 0.0, 0.0), (math.nan, 0.0, 0.0)])
+def test_a_seam_that_faces_nowhere_is_refused(direction: tuple[float, ...]) -> None:
+    with pytest.raises(GeometryError, match="the direction of the seam must be three numbers"):
+        FitOptions(seam_direction=direction)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["max_sheets", "max_wires", "samples"])
+@pytest.mark.parametrize("value", [math.nan, 150.5, "200", True, 0, -5, 10**12])
+def test_counts_are_whole_numbers_in_their_range(name: str, value: object) -> None:
+    with pytest.raises(GeometryError, match=f"{name} must be a whole number from"):
+        FitOptions(**{name: value})  # type: ignore[arg-type]

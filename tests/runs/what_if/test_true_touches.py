@@ -64,10 +64,25 @@ def test_what_bodies_press_is_told_twice_counts_once_and_is_not_taken_off(collis
     ]
 
 
-@pytest.mark.parametrize("facts", [[], {"pressed": [{}]}, {"touches": [{}]}, {"touches": 5}, {"released": "now"}])
+HUGE, SKINS = 10**400, {"sensor": SKIN}
+DAMAGED = [
+    *([], {}, {"toches": []}, {"contact_force_N": -3}, {"contact_force_N": HUGE}, {"touches": 5}),
+    *({"pressed": [{}]}, {"touches": [{}]}, {"released": "now"}, {"released": math.nan}, {"released": HUGE}),
+    *({"touches": [SKINS | {"start": start, "end": 2.0}]} for start in (3.0, HUGE, math.nan, "1", True)),
+    *({"pressed": [SKINS | {"start": 1.0, "end": end}]} for end in (0.5, math.nan, "2")),
+]
+
+
+@pytest.mark.parametrize("facts", DAMAGED, ids=range(len(DAMAGED)))
 def test_a_damaged_word_about_touches_is_refused(collision: Run, facts: Any) -> None:
     with pytest.raises(RecordingError, match="does not say what touched the skin"):
         true_touches(told(collision, facts))
+
+
+def test_words_about_touches_that_are_nested_without_end_are_refused(collision: Run) -> None:
+    block = Block(BlockKind.TRUTH, collision.start + 1.0, b'{"touches":' + b"[" * 100_000)
+    with pytest.raises(RecordingError, match="nested too deep"):
+        true_touches(replace(collision, blocks=(block, *collision.blocks)))
 
 
 def judged(path: Path, run: Run, touches: Sequence[dict[str, Any]]) -> dict[str, Any]:

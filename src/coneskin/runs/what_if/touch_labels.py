@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import tomllib
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.bounded_file import read_file
 from coneskin.errors import RecordingError
+from coneskin.json_text import read_json
 from coneskin.recording import is_time
 from coneskin.robot.guard.journal import BlockKind, EventName, contact_force
 from coneskin.runs.decisions import Decisions
@@ -21,6 +21,7 @@ __all__ = ["TouchLabel", "label_path", "read_labels", "recorded_labels", "true_t
 
 _MAX_SIZE = 1 << 24  # bytes
 _TRUTH = frozenset({BlockKind.TRUTH})
+_TELLS = {"touches", "pressed", "released"}  # of what touched the skin
 _EARLY = 0.25  # s before a recorded contact in which a more sensitive guard may see the same touch
 
 
@@ -77,11 +78,15 @@ def true_touches(run: Run) -> list[TouchLabel] | None:
     by_bodies: dict[tuple[str, float], TouchLabel] = {}  # each told as it begins, and again once it is over
     for block in told:
         try:
-            facts = json.loads(block.payload)
+            facts = read_json(block.payload)
+            if not _TELLS & facts.keys():
+                raise ValueError(f"none of {', '.join(sorted(_TELLS))} in it")
             labels += [_label(touch, run.start) for touch in facts.get("touches", ())]
             for one in (_label(touch, run.start) for touch in facts.get("pressed", ())):
                 by_bodies[one.sensor, one.start] = one
             if "released" in facts:  # all that touches at that moment
+                if not is_time(facts["released"]):
+                    raise ValueError(f"released at {facts['released']} s")
                 time = facts["released"] - run.start
                 labels = [one._replace(end=time) if one.start < time < one.end else one for one in labels]
         except (ValueError, TypeError, KeyError, AttributeError) as exc:
@@ -90,8 +95,10 @@ def true_touches(run: Run) -> list[TouchLabel] | None:
 
 
 def _label(touch: dict[str, Any], began: float) -> TouchLabel:
-    end = math.inf if touch["end"] is None else touch["end"] - began
-    return TouchLabel(touch["start"] - began, end, str(touch["sensor"]))
+    start, end = touch["start"], math.inf if touch["end"] is None else touch["end"]
+    if not (is_time(start) and isinstance(end, int | float) and start <= end):
+        raise ValueError(f"a touch from {start} to {end} s")
+    return TouchLabel(start - began, end - began, str(touch["sensor"]))
 
 
 def recorded_labels(recorded: Decisions) -> list[TouchLabel]:
