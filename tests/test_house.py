@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 FOLDERS = ("geometry", "skin", "robot")
 #: modules at the bottom of src/coneskin, which every folder may import
 GROUND = {
-    *("coneskin", "errors", "finding", "arrays", "bounded_file", "draft_file"),
+    *("coneskin", "errors", "finding", "arrays", "bounded_file", "draft_file", "json_text"),
     *("recording", "channel", "child_process", "terminal_text", "picture_file", "time_argument"),
 }
 #: arrows between folders: what each may import, beside itself and the ground; robot -> skin -> geometry, never back.
@@ -142,8 +142,8 @@ HOT = {
     "robot/ur": "driver_process state_reader ur_rtde",
 }
 
-MOST_LINES, MEDIAN_LINES = 400, 110  # of a file; of half of them
-MOST_FILES = 30  # of a folder
+MOST_LINES, MEDIAN_LINES = 368, 110  # of a file; of half of them
+MOST_FILES = 27  # of a folder
 
 
 @cache

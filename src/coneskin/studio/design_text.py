@@ -29,7 +29,7 @@ def design_facts(designs: Sequence[SheetDesign]) -> str:
             ("theta0", f"{math.degrees(sector.theta0):.2f} deg"),
             ("radii", f"{1e3 * cone.radius1:.2f} and {1e3 * cone.radius2:.2f} mm"),
             ("height, wrap", f"{1e3 * cone.height:.1f} mm, {math.degrees(cone.wrap):.1f} deg"),
-            ("active area", f"{1e4 * design.active.frustum.area:.1f} cm2"),
+            ("active area on the link", f"{1e4 * design.layout.active.area(cone):.1f} cm2"),
             ("one count", f"{1e3 * min(coarse):.3f} to {1e3 * max(coarse):.3f} mm"),
         )
         body = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in rows)
