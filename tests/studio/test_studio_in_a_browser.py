@@ -37,7 +37,7 @@ def test_a_person_designs_a_sheet_and_then_one_for_another_link(tmp_path: Path) 
             thumb.press("ArrowRight")
         page.wait_for_function("(before) => document.querySelector('#coneskin-facts').innerText !== before", arg=before)
         page.get_by_role("button", name="write").click()
-        wait_for_text(page, "#coneskin-said", "written")
+        wait_for_text(page, "#coneskin-told", "written")
         written = tomllib.loads((folder / "sensor.toml").read_text(encoding="utf-8"))
         assert written
         with page.expect_file_chooser() as chooser:

@@ -1,6 +1,7 @@
 """Workbench of the studio: what its handles do, and that it writes what ``coneskin design`` writes."""
 
 import math
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from coneskin.design.link import LinkMesh
+from coneskin.design.link_design import design_link
 from coneskin.design.sheets import DesignOptions
 from coneskin.errors import GeometryError
 from coneskin.geometry.bend import Bend
@@ -26,6 +28,7 @@ from coneskin.studio.workbench import Handles, Workbench, adjusted
 from coneskin.testing.ruled_tube import oval_tube
 from coneskin.view.page_server import PageServer
 
+from ..geometry.fit.test_seam_place import tube_with_wing
 from ..geometry.synthetic import placed, revolve
 
 FULL = PlacedFrustum(Frustum(0.04, 0.06, 0.20), Pose.from_xyz_rpy((0.1, -0.2, 0.3), (0.4, 0.5, -0.6)))
@@ -81,6 +84,20 @@ def test_an_oval_link_is_found_shown_and_written(tmp_path: Path) -> None:
     )
     (item,) = load_scene(tmp_path / "scene.toml").links[0].sensors
     assert item.placed.point(0.03, 1.0) == pytest.approx(made.designs[0].active.point(0.03, 1.0), abs=1e-6)
+
+
+@pytest.mark.long
+def test_what_nobody_touched_is_written_as_by_design(tmp_path: Path) -> None:
+    """A tube with a wing at its foot, behind which the seam goes."""
+    link = LinkMesh("wing", tube_with_wing(0.7), "its own", ())
+    made = Workbench.of(link)
+    assert any("the link itself shields" in note for note in made.link.notes)
+    made.write(tmp_path / "studio", pictures=False)
+    design_link(link.mesh, tmp_path / "design", pictures=False)
+    written = [tomllib.loads((tmp_path / name / "sensor.toml").read_text()) for name in ("studio", "design")]
+    for one in written:
+        one.pop("name", None)
+    assert written[0] == written[1]
 
 
 def test_a_partial_wrap_is_not_turned_beyond_what_was_found() -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
 
-__all__ = ["LinkMesh", "fit_link", "fit_mesh", "load_link"]
+__all__ = ["LinkMesh", "fit_link", "fit_mesh", "load_link", "with_seams"]
 
 _RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
 
@@ -122,7 +122,7 @@ def fit_link(
         fit = find_sheets(source.mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
         source = _with_notes(source, fit)
         if fit.sheets:
-            return (source, fit) if facing else _with_seams(source, fit, progress, search.get("weights"))
+            return (source, fit) if facing else with_seams(source, fit, progress, search.get("weights"))
         tries.append((source, fit))
     return tries[0]
 
@@ -136,7 +136,7 @@ def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **sea
     facing = search.pop("seam_direction", None)
     fit = find_sheets(mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
     source = _with_notes(source, fit)
-    return (source, fit) if facing or not fit.sheets else _with_seams(source, fit, progress, search.get("weights"))
+    return (source, fit) if facing or not fit.sheets else with_seams(source, fit, progress, search.get("weights"))
 
 
 def _with_notes(source: LinkMesh, fit: LinkFit) -> LinkMesh:
@@ -144,8 +144,8 @@ def _with_notes(source: LinkMesh, fit: LinkFit) -> LinkMesh:
     return replace(source, notes=(*source.notes, *(note for note in fit.notes if note not in source.mesh.notes)))
 
 
-def _with_seams(
-    source: LinkMesh, fit: LinkFit, progress: Callable[[str], None], weights: TouchWeights | None
+def with_seams(
+    source: LinkMesh, fit: LinkFit, progress: Callable[[str], None], weights: TouchWeights | None = None
 ) -> tuple[LinkMesh, LinkFit]:
     """Return a link with its seams at the places that it shields, and with a note of each reason."""
     from coneskin.geometry.fit.seam_place import place_seams

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import shlex
 import tempfile
 import threading
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +66,7 @@ class StudioPage:
         self._facts = gui.add_html("")
         self._write = gui.add_button(f"write {folder}")
         self._write.on_click(lambda _event: self._written())
+        self._told = gui.add_html("")  # where a person looks who has pressed the button
         self._stand()
 
     def _stand(self) -> None:
@@ -179,20 +182,29 @@ class StudioPage:
         self._say(f"{file.name}: {len(bench.fit.sheets)} sheets")
 
     def _written(self) -> None:
+        self._write.disabled = True
+        self._tell(f"writing {self._folder} ... (drawings and pictures take some seconds)")
         try:
             with self._lock:
                 files = self._bench.write(self._folder, self._overwrite)
         except ConeSkinError as exc:
-            self._say(str(exc))
+            self._tell(str(exc))
         else:
-            self._say(f"written: {len(files)} files in {self._folder}; next: coneskin init {self._folder} --simulated")
+            next_step = f"coneskin init {shlex.quote(str(self._folder))} --simulated"
+            self._tell(f"written: {len(files)} files in {self._folder}; next: {next_step}")
+        finally:
+            self._write.disabled = False
 
     def _say(self, text: str) -> None:
-        from html import escape
+        self._said.content = _note("coneskin-said", text)
 
-        self._said.content = (
-            f'<div id="coneskin-said" style="font-size:13px;margin:4px 10px"><b>{escape(text)}</b></div>'
-        )
+    def _tell(self, text: str) -> None:
+        self._told.content = _note("coneskin-told", text)
+
+
+def _note(name: str, text: str) -> str:
+    """Return a line for the panel, with a name by which a browser finds it."""
+    return f'<div id="{name}" style="font-size:13px;margin:4px 10px"><b>{escape(text)}</b></div>'
 
 
 def electrode_lines(design: SheetDesign) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from coneskin.design.folder import write_design
-from coneskin.design.link import LinkMesh
+from coneskin.design.link import LinkMesh, with_seams
 from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
 from coneskin.errors import GeometryError
 from coneskin.geometry.fit.cones import LinkFit
@@ -113,6 +113,8 @@ class Workbench:
             MeshError: no face of the mesh is visible from outside.
         """
         fit = find_sheets(link.mesh, tolerance=tolerance, progress=progress)
+        if fit.sheets:
+            link, fit = with_seams(link, fit, progress or (lambda _step: None))
         made = cls(link, fit, replace(options or DesignOptions(), link=link.name))
         made.handles = [Handles() for _ in fit.sheets]
         made.update()
