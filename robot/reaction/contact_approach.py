@@ -70,9 +70,9 @@ class ContactApproach:
     def note(self, q: Joints, qd: Joints, contacts: Sequence[ContactOnLink]) -> None:
         """Take measured joint positions [rad] and speeds [rad/s], and the touches there are by their newest frames."""
         speeds = []
-        now = {contact.number for contact in contacts}
+        lasting = {contact.number for contact in contacts}
         for number, one in self._touches.items():
-            one.over = number not in now
+            one.over = number not in lasting
         for contact in contacts:
             touch = self._touches.get(contact.number)
             if touch is None:
