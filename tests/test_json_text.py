@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from coneskin.json_text import read_json
@@ -21,6 +21,7 @@ def test_what_json_writes_is_read_as_it_was(value: Any) -> None:
 
 
 @given(st.integers(-(10**99), 10**99))
+@example(-(10**99))
 def test_whole_numbers_of_a_hundred_digits_are_exact(value: int) -> None:
     found = read_json(str(value))
     assert (type(found), found) == (int, value)

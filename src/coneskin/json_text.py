@@ -23,4 +23,4 @@ def read_json(data: bytes | str) -> Any:
 
 
 def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits) <= _DIGITS else float(digits)
+    return int(digits) if len(digits.lstrip("-")) <= _DIGITS else float(digits)

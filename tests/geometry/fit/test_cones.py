@@ -338,7 +338,7 @@ def test_what_is_advised_works_when_followed() -> None:
         mesh = placed(body)
         fit = find_cones(mesh)
         assert fit.sheets == ()
-        assert find_cones(mesh, float(f"{1e3 * fit.needed_tolerance:.2f}") * 1e-3).sheets
+        assert find_cones(mesh, tolerance=float(f"{1e3 * fit.needed_tolerance:.2f}") * 1e-3).sheets
 
 
 def test_a_cone_is_covered_up_to_the_smallest_radius_and_not_to_its_apex() -> None:
