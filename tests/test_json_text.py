@@ -12,29 +12,42 @@ from coneskin.json_text import read_json
 from coneskin.recording import Block
 from coneskin.robot.guard.journal import BlockKind, body_places, contact_force, decode_event
 
+ANY_TEXT = st.text(st.characters())  # half pairs of UTF-16 among them
 VALUES = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(), st.lists)
 
 
 @given(VALUES)
 def test_what_json_writes_is_read_as_it_was(value: Any) -> None:
-    assert read_json(json.dumps(value)) == value
+    assert read_json(json.dumps(value).encode()) == value
 
 
 @given(st.integers(-(10**99), 10**99))
 @example(-(10**99))
 def test_whole_numbers_of_a_hundred_digits_are_exact(value: int) -> None:
-    found = read_json(str(value))
+    found = read_json(b"%d" % value)
     assert (type(found), found) == (int, value)
 
 
 def test_longer_whole_numbers_are_floats() -> None:
-    assert read_json("1" + "0" * 200) == 1e200
-    assert read_json("1" * 400) == math.inf
-    assert read_json("[-" + "1" * 5000 + "]") == [-math.inf]
+    assert read_json(b"1" + b"0" * 200) == 1e200
+    assert read_json(b"1" * 400) == math.inf
+    assert read_json(b"[-" + b"1" * 5000 + b"]") == [-math.inf]
 
 
-@pytest.mark.parametrize("text", [b"", b"{", b"\xff\xfe", b"[" * 100_000, "nothing"])
-def test_whatever_is_wrong_is_a_value_error(text: bytes | str) -> None:
+@given(st.recursive(ANY_TEXT, lambda inner: st.lists(inner) | st.dictionaries(ANY_TEXT, inner)))
+@example("\udcff")
+@example({"\ud800": ["\udfff"]})
+def test_every_string_can_be_written_as_utf_8(value: Any) -> None:
+    found = json.dumps(read_json(json.dumps(value).encode()), ensure_ascii=False)
+    assert found.encode().decode() == found  # a lone half would raise
+
+
+def test_half_a_pair_is_written_out_and_a_whole_one_is_its_letter() -> None:
+    assert read_json(rb'["a\udcffb", "\\udcff", "\ud83e\udd16"]') == [r"a\udcffb", r"\udcff", "\N{ROBOT FACE}"]
+
+
+@pytest.mark.parametrize("text", [b"", b"{", b"\xff\xfe", b"[" * 100_000, b"nothing", b'"\xed\xa0\x80"'])
+def test_whatever_is_wrong_is_a_value_error(text: bytes) -> None:
     with pytest.raises(ValueError, match=r"."):
         read_json(text)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Mapping
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.bounded_file import read_file
 from coneskin.commissioning.marks import Mark
 from coneskin.errors import SceneError
+from coneskin.json_text import read_json
 from coneskin.scene.tables.cone_keys import CONE_KEYS
 
 from .marks import place_words
@@ -59,7 +59,7 @@ def find_design(sensor_file: Path) -> Mapping[str, Any] | None:
         path = place / _DESIGN
         if path.is_file():
             try:
-                sheets = json.loads(read_file(path, _MAX_BYTES))["sheets"]
+                sheets = read_json(read_file(path, _MAX_BYTES))["sheets"]
                 return dict(sheets[number])
             except (OSError, ValueError, TypeError, LookupError) as exc:
                 raise SceneError([f"the marks of {path} cannot be read: {exc}"], path.name) from exc

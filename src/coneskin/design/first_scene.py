@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.bounded_file import read_file
 from coneskin.errors import GeometryError, KinematicsError
+from coneskin.json_text import read_json
 from coneskin.robot.arm.link_frames import LINK_INDEX, link_index
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.tables.sensor_table import build_sensor
@@ -87,7 +88,7 @@ def read_design(folder: Path) -> DesignFolder:
         GeometryError: the folder is no design.
     """
     try:
-        data = json.loads(read_file(folder / DESIGN_FILE, _MAX_BYTES))
+        data = read_json(read_file(folder / DESIGN_FILE, _MAX_BYTES))
         frame, source, count = str(data["frame"]), str(data["link"]), len(data["sheets"])
         if not count:
             raise ValueError("it has no sheet")

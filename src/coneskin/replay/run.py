@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.code_version import recorded_version, running_version
 from coneskin.errors import RecordingError
+from coneskin.json_text import read_json
 from coneskin.recording import Block, is_time
 from coneskin.recording_file.defect import Defect, DefectKind
 from coneskin.recording_file.reader import RecordedBlocks, read_recording
@@ -182,13 +182,13 @@ def read_run(path: Path | str, progress: Callable[[float], None] | None = None) 
     if first is None:
         raise RecordingError(f"{path} has no header: the run ended before it began")
     try:
-        header = json.loads(first.payload)
+        header = read_json(first.payload)
         if wrong := [key for key, kind in _HEADER.items() if not isinstance(header[key], kind)]:
             raise ValueError(f"{', '.join(wrong)} of another kind")
         if not is_time(header["clocks"]["monotonic"]):
             raise ValueError("clocks.monotonic is no time in seconds")
         Commissioning.from_message(header.get("commissioning"))
-    except (ValueError, TypeError, KeyError, RecursionError) as exc:
+    except (ValueError, TypeError, KeyError) as exc:
         raise RecordingError(f"{path} has a header that this coneskin cannot read: {exc}") from exc
     blocks: Iterable[Block] = recording.blocks
     if isinstance(blocks, RecordedBlocks):

@@ -10,6 +10,7 @@ from typing import Any
 
 from coneskin.bounded_file import read_file
 from coneskin.errors import RecordingError
+from coneskin.json_text import read_json
 from coneskin.recording import is_time
 from coneskin.robot.guard.journal import SESSION_EVENTS, EventName, GuardEvent
 
@@ -56,10 +57,10 @@ def parse_events(facts: Any, start: float, where: str) -> list[GuardEvent]:
 def read_events(path: Path, start: float) -> list[GuardEvent]:
     """Return the events in a file; arguments and errors as of ``parse_events``."""
     try:
-        facts = json.loads(read_file(path, _MAX_SIZE))
+        facts = read_json(read_file(path, _MAX_SIZE))
     except OSError as exc:
         raise RecordingError(f"cannot read the events {path}: {exc.strerror or exc}") from exc
-    except (ValueError, RecursionError) as exc:
+    except ValueError as exc:
         raise RecordingError(f"{path} is no JSON: {exc}") from exc
     return parse_events(facts, start, str(path))
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.bounded_file import read_file
 from coneskin.errors import ConeSkinError, SceneError
+from coneskin.json_text import read_json
 
 from .sensor_facts import round_facts, sensor_facts
 from .whole_file import write_whole
@@ -135,14 +136,14 @@ def read_calibrations(path: Path, device_id: int) -> tuple[CalibrationRecord, ..
         ValueError: it cannot be read, is no calibration file, or is that of another device; the message says why.
     """
     try:
-        table = json.loads(read_file(path, _MAX_BYTES))
+        table = read_json(read_file(path, _MAX_BYTES))
         device, rows = table["device"], table["calibrations"]
         records = tuple(_record(row) for row in rows)
     except FileNotFoundError:
         raise
     except OSError as exc:
         raise ValueError(f"{path} cannot be read: {exc.strerror or exc}") from exc
-    except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as exc:
+    except (ValueError, TypeError, AttributeError, KeyError) as exc:
         raise ValueError(f"{path} is no calibration file: {exc}") from exc
     if device != device_id:
         raise ValueError(f"{path} has the calibrations of device {device}, and not of device {device_id}")

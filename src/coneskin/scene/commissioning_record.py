@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import SceneError
+from coneskin.json_text import read_json
 
 from .scene import Commissioning
 from .sensor_facts import round_facts, sensor_facts
@@ -161,11 +162,11 @@ def read_record(path: Path) -> CommissioningRecord:
     if len(data) > _MAX_BYTES:
         raise ValueError(f"it has more than {_MAX_BYTES} bytes")
     try:
-        table = json.loads(data)
+        table = read_json(data)
         marks = tuple(MarkResult(**mark) for mark in table.pop("marks"))
         record = CommissioningRecord(**table, marks=marks)
         datetime.fromisoformat(record.date)
-    except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as exc:
+    except (ValueError, TypeError, AttributeError, KeyError) as exc:
         raise ValueError(f"it is no commissioning record: {exc}") from exc
     return record
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from coneskin.errors import RecordingError
+from coneskin.json_text import read_json
 
 if TYPE_CHECKING:
     import numpy as np
@@ -60,13 +61,13 @@ def _decode(block: Block) -> tuple[str, NDArray[np.float64]]:
 
     head, _, body = block.payload.partition(b"\n")
     try:
-        facts: dict[str, Any] = json.loads(head)
+        facts: dict[str, Any] = read_json(head)
         name, shape = facts["sensor"], (facts["rows"], facts["columns"])
         if not all(type(count) is int and 2 <= count <= _MAX_NODES for count in shape):
             raise ValueError(f"its grid has {shape[0]!r} x {shape[1]!r} nodes")
         heights = np.frombuffer(body, "<f8").reshape(shape)
         if not isinstance(name, str) or not np.isfinite(heights).all():
             raise ValueError("its name is no text, or a height is not finite")
-    except (ValueError, TypeError, KeyError, RecursionError) as exc:
+    except (ValueError, TypeError, KeyError) as exc:
         raise RecordingError(f"the block of {block.time:.6f} s holds no surface of a sensor: {exc}") from exc
     return name, heights

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from coneskin.errors import RecordingError
+from coneskin.json_text import read_json
 from coneskin.recording import Block
 from coneskin.replay.run import Run
 from coneskin.robot.guard.journal import BlockKind
@@ -103,7 +103,7 @@ def _header(blocks: Iterable[Block], path: Path) -> dict[str, Any]:
     for block in blocks:
         if block.kind == BlockKind.HEADER:
             try:
-                header = json.loads(block.payload)
+                header = read_json(block.payload)
             except ValueError as exc:
                 raise RecordingError(f"the header of {path} is damaged: {exc}") from exc
             if isinstance(header, dict) and isinstance(header.get("scene"), str):

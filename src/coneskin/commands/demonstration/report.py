@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
 from collections.abc import Iterable
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.commands.terminal.hints import print_hint
+from coneskin.json_text import read_json
 from coneskin.robot.guard.journal import BlockKind, EventName, describe_way
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def hold_up(blocks: Iterable[Block]) -> str:
     newest: dict[int, float] = {}
     for block in blocks:
         if block.kind == BlockKind.OVERRUN:
-            name, late = "the guard", float(json.loads(block.payload)["late"])
+            name, late = "the guard", float(read_json(block.payload)["late"])
         elif (kind := BlockKind(block.kind) if block.kind in _FLOW else None) is not None:
             name, late = _FLOW[kind], block.time - newest.get(kind, block.time)
             newest[kind] = block.time
