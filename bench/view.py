@@ -1,12 +1,12 @@
 """The page beside a guard: first picture, touch to viewer, pictures a second, ten viewers, and what the guard feels.
 
-    python bench/view.py [--seconds 8] [--touches 8]
+    python bench/view.py [--seconds 8] [--touches 8] [--rounds 3]
 
-One guard, one run: a simulated UR5e, a virtual skin of 1 kHz. It is guarded without a page, then with a page and one
-browser, then with ten viewers. How late a frame is at the guard is its host time less the device's clock, less the
-least such difference of the run. What is the browser's part is told by an empty page of viser's, and by a viewer that
-takes all that is sent and draws nothing; what is that of a busy machine, by how long the page's process was ready and
-got no processor. Needs the extra `view`, playwright and chromium, which draws in software here.
+One guard, one run: a simulated UR5e, a virtual skin of 1 kHz. First what a viewer has of the page, then what the guard
+feels of it (`view_guard.py`): how late a frame is at the guard, which is its host time less the device's clock, less
+the least such difference of the run. What is the browser's part is told by a page of viser's with a box, and by viewers
+that take all that is sent and draw nothing; what is that of a busy machine, by how long the page's process was ready
+and got no processor. Needs the extra `view`, playwright and chromium, which draws in software here.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-import math
-import os
 import subprocess
 import sys
 import tempfile
@@ -27,18 +25,18 @@ from typing import Any, NamedTuple
 
 from report import head, quantile
 from view_browser import PROCESSES, drawn_pictures, first_picture, resident
+from view_guard import guard_rounds, print_lateness
+from view_viewer import Viewer, processor_time, waited
 
 from coneskin.errors import ConeSkinError
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind, EventName
+from coneskin.robot.guard.journal import EventName
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
-from coneskin.skin.wire import FrameDecoder
 from coneskin.testing.forearm import START, forearm_scene
-from coneskin.view.page_server import PageServer
 
 LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000"
+VIRTUAL = '"virtual"\nrate_hz = 1000'
 MOVED = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # rad, between the two ends of the motion
 
 
@@ -49,54 +47,6 @@ def page_of(recording: Path) -> tuple[subprocess.Popen[str], str, float]:
     child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert child.stdout is not None
     return child, json.loads(child.stdout.readline())["url"], time.monotonic() - began
-
-
-class Viewer:
-    """Viewer that takes all that is sent, as a browser does, and draws nothing.
-
-    Attributes:
-        touched: when the words came that the arm stops [s, monotonic]; None until then.
-        messages: that came.
-        active: the newest words are that the guard is active.
-        pictures: parcels in which a link has turned.
-        waited: how long the page's process had got no processor when the words came [s].
-    """
-
-    def __init__(self, url: str, pid: int) -> None:
-        self.touched: float | None = None
-        self.messages, self.pictures, self.waited, self.active = 0, 0, 0.0, False
-        self._pid = pid
-        self._url, self._over = url, threading.Event()
-        self._thread = threading.Thread(target=self._view, daemon=True)
-        self._thread.start()
-
-    def _view(self) -> None:
-        import viser
-        import zstandard
-        from websockets.exceptions import ConnectionClosed
-        from websockets.sync.client import connect
-
-        protocol: Any = f"viser-v{viser.__version__}"
-        with (
-            contextlib.suppress(ConnectionClosed),  # the page has ended
-            connect(self._url.replace("http", "ws"), subprotocols=[protocol], max_size=None) as socket,
-        ):
-            while not self._over.is_set():
-                data = socket.recv()
-                came = time.monotonic()
-                assert isinstance(data, bytes)
-                size, packed = (int.from_bytes(data[at : at + 8], "little") for at in (0, 8))
-                inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], size)
-                self.messages += 1
-                self.pictures += b"SetOrientationMessage" in inner
-                if b"coneskin-phase" in inner:
-                    self.active = b">active<" in inner
-                    if self.touched is None and (b">stopping<" in inner or b">latched" in inner):
-                        self.touched, self.waited = came, waited(self._pid)
-
-    def end(self) -> None:
-        """Leave."""
-        self._over.set()
 
 
 class Told(NamedTuple):
@@ -149,50 +99,17 @@ def moving(session: Session) -> Iterator[None]:
         mover.join(20.0)
 
 
-def lateness(recording: Path, spans: dict[str, tuple[float, float]]) -> dict[str, list[float]]:
-    """How late the frames of each span were at the guard [ms]."""
-    decoder, late = FrameDecoder(), []
-    for block in read_run(recording).select(kinds=frozenset({BlockKind.SKIN})):
-        late += [(block.time, block.time - 1e-6 * frame.clock_us) for frame in decoder.feed(block.payload)]
-    least = min(value for _, value in late)
-    return {
-        name: [1e3 * (value - least) for at, value in late if since <= at < until]
-        for name, (since, until) in spans.items()
-    }
-
-
-def processor_time(pid: int) -> float:
-    """Time that a process has run [s]."""
-    return sum(map(int, Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13])) / os.sysconf(
-        "SC_CLK_TCK"
-    )
-
-
-def waited(pid: int) -> float:
-    """How long the threads of a process were ready and got no processor, together [s]."""
-    tasks = Path(f"/proc/{pid}/task").iterdir()
-    return 1e-9 * sum(int((task / "schedstat").read_text().split()[1]) for task in tasks)
-
-
 @contextlib.contextmanager
-def sliding_box(server: PageServer) -> Iterator[None]:
-    """Let a box move to and fro on a page, 30 times a second: the least that a picture can take."""
-    server.scene.configure_environment_map(hdri=None)
-    server.scene.configure_default_lights(enabled=False)
-    server.scene.add_light_directional("/sun", position=(1.0, 1.0, 1.0), cast_shadow=False)
-    box, over = server.scene.add_box("/box", cast_shadow=False, receive_shadow=False), threading.Event()
-
-    def move() -> None:
-        while not over.wait(1.0 / 30.0):
-            box.position = (0.0, math.sin(time.monotonic()), 0.0)
-
-    mover = threading.Thread(target=move, daemon=True)
-    mover.start()
+def served_box() -> Iterator[str]:
+    """Serve the page with a box: its address."""
+    program = Path(__file__).with_name("view_box.py")
+    child = subprocess.Popen([sys.executable, str(program)], stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None
     try:
-        yield
+        yield child.stdout.readline().strip()
     finally:
-        over.set()
-        mover.join()
+        child.kill()
+        child.wait()
 
 
 def drawn(name: str, page: Any, seconds: float) -> None:
@@ -203,25 +120,58 @@ def drawn(name: str, page: Any, seconds: float) -> None:
     print(f"browser, {name}: {rates}; processor time of each: {parts}", flush=True)
 
 
-def look(url: str, span: Callable[[str], None], moving: Callable[[], Any], seconds: float) -> None:
-    """Look at the page in a browser, beside an empty page, and print what it draws."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver, PageServer("empty", port=18400) as empty:
-        for name, address in (("an empty page of viser's", empty.url), ("the page", url)):
-            browser, page, took, spent = first_picture(driver, address, phase=address == url)
-            parts = ", ".join(f"{kind} {1e3 * spent[kind]:.0f} ms" for kind in PROCESSES)
-            print(f"browser, {name}: {took:.2f} s until the first picture; processor time: {parts}", flush=True)
-            if address == url:
-                break
-            with sliding_box(empty):
-                drawn("a box alone moves", page, seconds)
-            browser.close()
-        for name, context in (("arm stands", contextlib.nullcontext), ("arm moves", moving)):
-            with context():
-                drawn(name, page, seconds)
-        span("page and browser")
+def look(driver: Any, box_url: str, url: str, moving: Callable[[], Any], seconds: float) -> None:
+    """Look at the page in a browser, beside a page with a box, and print what it draws."""
+    for name, address in (("a page of viser's with a box", box_url), ("the page", url)):
+        browser, page, took, spent = first_picture(driver, address, phase=address == url)
+        parts = ", ".join(f"{kind} {1e3 * spent[kind]:.0f} ms" for kind in PROCESSES)
+        print(f"browser, {name}: {took:.2f} s until the first picture; processor time: {parts}", flush=True)
+        if address == url:
+            drawn("arm stands", page, seconds)
+            with moving():
+                drawn("arm moves", page, seconds)
+        else:
+            drawn("a box alone moves", page, seconds)
         browser.close()
+
+
+@contextlib.contextmanager
+def served(recording: Path) -> Iterator[tuple[int, str]]:
+    """Serve the page for a while: its process and its address."""
+    child, url, took = page_of(recording)
+    print(f"page: served {took:.2f} s after its start", flush=True)
+    try:
+        yield child.pid, url
+    finally:
+        child.terminate()
+        child.wait(60)
+
+
+def look_without_drawing(session: Session, pid: int, url: str, seconds: float, touches: int) -> None:
+    """Look at the page without a browser, and print what comes and when."""
+    viewer = Viewer(url, pid)
+    session.wait_for(("none",), 1.0)
+    told = viewer.pictures
+    with moving(session):
+        session.wait_for(("none",), seconds)
+    print(f"a viewer that draws nothing, arm moves: {(viewer.pictures - told) / seconds:.1f} pictures a second")
+    found = [touch_to_viewer(session, viewer, pid) for _ in range(touches)]
+    for name, times in zip(("touch to the words at a viewer", "... of which until the guard stops",
+                            "... of which the page's process was ready and got no processor"),
+                           zip(*found, strict=True), strict=True):  # fmt: skip
+        words = ", ".join(f"{1e3 * quantile(times, share):.0f}" for share in (0.0, 0.5, 0.99))
+        print(f"{name}: {words} ms (least, median, most of {len(times)})", flush=True)
+    before, cpu = resident(pid), processor_time(pid)
+    crowd = [viewer, *(Viewer(url, pid) for _ in range(9))]
+    told = sum(one.messages for one in crowd)
+    session.wait_for(("none",), seconds)
+    spent = processor_time(pid) - cpu
+    told = sum(one.messages for one in crowd) - told
+    print(f"ten viewers: {100.0 * spent / seconds:.0f} % of a core for the page's process, "
+          f"{told / 10.0 / seconds:.1f} messages a second each, {before} kB before, "
+          f"{resident(pid)} kB after {seconds:g} s")  # fmt: skip
+    for one in crowd:
+        one.end()
 
 
 def main() -> None:
@@ -229,57 +179,34 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=8.0)
     parser.add_argument("--touches", type=int, default=8)
+    parser.add_argument("--rounds", type=int, default=3, help="of what the guard feels of whom (0: leave it out)")
     parser.add_argument("--no-browser", action="store_true", help="measure without chromium")
     args = parser.parse_args()
     print(head("viser", "playwright"), flush=True)
-    host = free_host()
-    spans: dict[str, tuple[float, float]] = {}
-    folder = tempfile.TemporaryDirectory()
-    recording = Path(folder.name) / "run.rec"
-    scene = parse_scene(forearm_scene(host, limits=LIMITS).replace('"virtual"', '"virtual"\nrate_hz = 1000'))
-
-    def span(name: str) -> None:
-        began = time.monotonic()
-        session.wait_for(("none",), args.seconds)
-        spans[name] = began, time.monotonic()
-
-    with SimulatedController("UR5e", host, START), guard(scene, recording=recording) as session:
-        span("no page")
-        child, url, started = page_of(recording)
-        print(f"page: served {started:.2f} s after its start", flush=True)
+    scene = parse_scene(forearm_scene(host := free_host(), limits=LIMITS).replace('"virtual"', VIRTUAL))
+    with contextlib.ExitStack() as stack:
+        recording = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "run.rec"
+        driver, box_url = None, ""
         if not args.no_browser:
-            look(url, span, lambda: moving(session), args.seconds)
-        viewer = Viewer(url, child.pid)
-        session.wait_for(("none",), 1.0)
-        told = viewer.pictures
-        with moving(session):
-            session.wait_for(("none",), args.seconds)
-        print(
-            f"a viewer that draws nothing, arm moves: {(viewer.pictures - told) / args.seconds:.1f} pictures a second"
-        )
-        found = [touch_to_viewer(session, viewer, child.pid) for _ in range(args.touches)]
-        for name, times in zip(("touch to the words at a viewer", "... of which until the guard stops",
-                                "... of which the page's process was ready and got no processor"),
-                               zip(*found, strict=True), strict=True):  # fmt: skip
-            words = ", ".join(f"{1e3 * quantile(times, share):.0f}" for share in (0.0, 0.5, 0.99))
-            print(f"{name}: {words} ms (least, median, most of {len(times)})", flush=True)
-        before, cpu = resident(child.pid), processor_time(child.pid)
-        crowd = [viewer, *(Viewer(url, child.pid) for _ in range(9))]
-        told = sum(one.messages for one in crowd)
-        span("ten viewers")
-        spent = processor_time(child.pid) - cpu
-        told = sum(one.messages for one in crowd) - told
-        print(f"ten viewers: {100.0 * spent / args.seconds:.0f} % of a core for the page's process, "
-              f"{told / 10.0 / args.seconds:.1f} messages a second each, {before} kB before, "
-              f"{resident(child.pid)} kB after {args.seconds:g} s")  # fmt: skip
-        for one in crowd:
-            one.end()
-        child.terminate()
-        child.wait(20)
-    for name, late in lateness(recording, spans).items():
-        print(f"a frame at the guard, {name}: {quantile(late, 0.5):.2f} ms (median), {quantile(late, 0.99):.2f} (p99), "
-              f"{max(late):.1f} (most) of {len(late)}")  # fmt: skip
-    folder.cleanup()
+            from playwright.sync_api import sync_playwright
+
+            driver = stack.enter_context(sync_playwright())
+            box_url = stack.enter_context(served_box())
+        with SimulatedController("UR5e", host, START), guard(scene, recording=recording) as session:
+            with served(recording) as (pid, url):
+                if driver is not None:
+                    look(driver, box_url, url, lambda: moving(session), args.seconds)
+                look_without_drawing(session, pid, url, args.seconds, args.touches)
+            with moving(session):
+                spans = guard_rounds(
+                    driver,
+                    box_url,
+                    lambda: served(recording),
+                    lambda seconds: session.wait_for(("none",), seconds),
+                    args.rounds,
+                    args.seconds,
+                )
+        print_lateness(recording, spans)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ __all__ = [
     "FLAGS",
     "PROCESSES",
     "PROGRAM",
+    "browser_processes",
     "drawn_pictures",
     "first_picture",
     "memory_of",
@@ -21,15 +22,23 @@ __all__ = [
 PROGRAM = "/usr/bin/chromium"
 FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
 PROCESSES = ("renderer", "gpu-process")  # of the browser: the first runs the page, the second draws
-#: counts what is drawn by what begins a picture: the clearing of the canvas
+#: counts what is drawn by what begins a picture: the clearing of the canvas; and the corners of the fullest picture
 COUNT = """() => {
-  window.pictures = 0;
-  const clear = WebGL2RenderingContext.prototype.clear;
+  window.pictures = window.corners = 0;
+  let corners = 0;
+  const { clear, drawElements } = WebGL2RenderingContext.prototype;
   WebGL2RenderingContext.prototype.clear = function (...given) {
     window.pictures += 1;
+    corners = 0;
     return clear.apply(this, given);
   };
+  WebGL2RenderingContext.prototype.drawElements = function (mode, count, ...more) {
+    corners += count;
+    window.corners = Math.max(window.corners, corners);
+    return drawElements.call(this, mode, count, ...more);
+  };
 }"""
+_ARM = 3000  # corners that the first picture of a page with an arm has at least; an empty one has a few
 #: what the browser offers to a page: turns of requestAnimationFrame in some seconds
 TURNS = """(seconds) => new Promise((done) => {
   let turns = 0;
@@ -48,17 +57,26 @@ def resident(pid: int) -> int:
     return int(next(li for li in Path(f"/proc/{pid}/status").read_text().splitlines() if "VmRSS" in li).split()[1])
 
 
-def _browsers() -> dict[str, list[int]]:
-    """The browser's processes below this one, by their types."""
+def _below() -> list[list[str]]:
+    """Processes below this one: id, id of the parent, command."""
     listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
     rows = [line.split(None, 2) for line in listing.splitlines()[1:]]
     below, more = {os.getpid()}, {os.getpid()}
     while more:
         more = {int(row[0]) for row in rows if int(row[1]) in more} - below
         below |= more
-    return {
-        kind: [int(row[0]) for row in rows if int(row[0]) in below and f"--type={kind}" in row[2]] for kind in PROCESSES
-    }
+    return [row for row in rows if int(row[0]) in below]
+
+
+def browser_processes() -> list[int]:
+    """All processes of the browsers that were started by this one."""
+    return [int(row[0]) for row in _below() if "chrom" in row[2].split()[0]]
+
+
+def _browsers() -> dict[str, list[int]]:
+    """The browser's processes below this one, by their types."""
+    rows = _below()
+    return {kind: [int(row[0]) for row in rows if f"--type={kind}" in row[2]] for kind in PROCESSES}
 
 
 def memory_of() -> dict[str, int]:
@@ -84,7 +102,7 @@ def first_picture(driver: Any, url: str, phase: bool) -> tuple[Any, Any, float, 
     Args:
         driver: playwright's.
         url: of the page.
-        phase: wait for the phase of a guard as well.
+        phase: wait for the phase of a guard and for its arm as well.
 
     Returns:
         browser, page, how long it took from the address to the picture [s], and its processor time until then [s].
@@ -96,7 +114,9 @@ def first_picture(driver: Any, url: str, phase: bool) -> tuple[Any, Any, float, 
     began, before = time.monotonic(), _processor_times()
     page.goto(url)
     page.wait_for_function(
-        f"() => window.pictures > 0 && (!{str(phase).lower()} || document.querySelector('.coneskin-phase'))"
+        "([phase, arm]) => window.pictures > 0 && "
+        "(!phase || (document.querySelector('.coneskin-phase') && window.corners > arm))",
+        arg=[phase, _ARM],
     )
     page.evaluate(_TWICE)
     after = _processor_times()
