@@ -22,7 +22,7 @@ TO_Z_UP = {
 
 @dataclass(frozen=True, slots=True)
 class ColladaAsset:
-    """The asset element of a COLLADA file.
+    """The asset element of a COLLADA document.
 
     Attributes:
         unit: name of the unit.
@@ -46,14 +46,20 @@ def read_collada_asset(path: Path, data: bytes) -> ColladaAsset:
         MeshError: malformed XML, a unit that is no length, an unknown axis.
     """
     asset = ColladaAsset()
+    within: list[str] = []
     try:
-        for _, element in ElementTree.iterparse(io.BytesIO(data), ("end",)):
-            tag = element.tag.rpartition("}")[2]
-            if tag == "unit":
+        for event, element in ElementTree.iterparse(io.BytesIO(data), ("start", "end")):
+            if event == "start":
+                within.append(element.tag.rpartition("}")[2])
+                continue
+            # a tool's own unit may stand in an extra inside, and parts of the document have assets of their own
+            inside = within[1:]
+            within.pop()
+            if inside == ["asset", "unit"]:
                 asset = replace(asset, unit=element.get("name", "unit"), metres=float(element.get("meter", "1")))
-            elif tag == "up_axis":
+            elif inside == ["asset", "up_axis"]:
                 asset = replace(asset, up_axis=(element.text or asset.up_axis).strip())
-            elif tag == "asset":
+            elif inside == ["asset"]:
                 break
     except ElementTree.ParseError as error:
         raise MeshError(f"{path}: malformed XML: {error}") from error

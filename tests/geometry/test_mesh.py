@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coneskin.errors import MeshError, MissingExtra
-from coneskin.geometry.collada_asset import TO_Z_UP
+from coneskin.geometry.collada_asset import TO_Z_UP, ColladaAsset, read_collada_asset
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.urdf import urdf_links
@@ -111,6 +111,21 @@ def test_collada_unit_is_applied(tmp_path: Path) -> None:
     )
     assert mesh.size[2] == pytest.approx(0.3, abs=1e-6)
     assert any("centimeter (0.01 m), from the COLLADA file" in note for note in mesh.notes)
+
+
+def test_only_the_asset_of_the_document_says_the_unit_of_a_collada_file() -> None:
+    extra = (
+        '<extra><technique profile="tool"><unit name="inch" meter="0.0254"/><up_axis>X_UP</up_axis></technique></extra>'
+    )
+    own = '<unit name="millimeter" meter="0.001"/><up_axis>Z_UP</up_axis>'
+    other = '<asset><unit meter="0.0254"/><up_axis>X_UP</up_axis></asset>'
+    part = f"<library_geometries>{other}</library_geometries>"
+    for inside in (extra + own, own + extra):  # COLLADA puts the extra last, and some exporters do not
+        for text in (f"<asset>{inside}</asset>", f"<asset>{inside}</asset>{part}", f"{part}<asset>{inside}</asset>"):
+            data = f'<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">{text}</COLLADA>'.encode()
+            assert read_collada_asset(Path("a.dae"), data) == ColladaAsset("millimeter", 0.001, "Z_UP")
+    data = f"<COLLADA><asset>{extra}</asset></COLLADA>".encode()
+    assert read_collada_asset(Path("a.dae"), data) == ColladaAsset("m", 1.0, "Y_UP")  # COLLADA's own defaults
 
 
 def test_a_collada_tag_of_metres_on_millimetres_is_not_believed(tmp_path: Path) -> None:
