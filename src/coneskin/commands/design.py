@@ -18,6 +18,7 @@ from coneskin.design.folder import write_design
 from coneskin.design.link import LinkMesh, fit_link
 from coneskin.design.seam_strip import cover_seams
 from coneskin.design.sheets import SheetDesign, design_sheets
+from coneskin.design.small_active_area import small_active_area
 from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.solid.step import require_step_writer
@@ -214,6 +215,8 @@ def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
             f"{shunt_ohms(parts):.3g} ohm, {parts.adc_bits} bits: a count is {_count_size(design)} "
             "(--upper-sheet-ohm and so on change it)"
         )
+        if small := small_active_area(design):
+            print(f"  warning: {small}")
     if fit is not None and fit.weights:
         share = sum(sheet.touch_share for sheet in fit.sheets)
         print(f"weighed by {fit.weights}, the sheets cover {share:.0%} of the hull")

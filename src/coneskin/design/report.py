@@ -13,6 +13,7 @@ from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
 from .files import sheet_folder
 from .sector_text import sector_text
 from .sheets import SheetDesign
+from .small_active_area import small_active_area
 from .summary import design_summary, material_rows
 from .workshop.bill_of_materials import bill_of_materials
 from .workshop.build_figures import BuildFigures
@@ -54,6 +55,7 @@ def report_text(
     lines = [f"# Sensor for {link}", ""]
     lines += [f"* {note}" for note in notes]
     lines += _coverage(fit) if fit else []
+    lines += [f"* **Warning: {small}**" for small in map(small_active_area, designs) if small]
     for caption, file in pictures:
         lines += ["", f"![{caption}]({file})", "", caption]
     for index, design in enumerate(designs):
