@@ -218,7 +218,7 @@ def _version(text: str) -> Version:
 
 def _plant(descriptor: int, options: Options) -> RemotePlant:
     try:
-        return RemotePlant(Channel(socket.socket(fileno=descriptor)), options.start_q)
+        return RemotePlant(Channel(socket.socket(fileno=descriptor)), options.start_q, arm_model(options.model))
     except OSError as exc:
         raise RobotRefused(f"--plant-descriptor {descriptor} is no line to a plant: {exc.strerror}") from exc
 

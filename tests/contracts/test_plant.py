@@ -10,6 +10,7 @@ from itertools import pairwise
 import pytest
 
 from coneskin.channel import Channel, pair
+from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
@@ -36,7 +37,7 @@ class ServedPlant(RemotePlant):
 
     def __init__(self) -> None:
         ours, theirs = pair()
-        super().__init__(Channel(ours), START)
+        super().__init__(Channel(ours), START, arm_model("UR5e"))
         self._other, self._served = Channel(theirs), physics()
 
     def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:

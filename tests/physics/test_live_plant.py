@@ -144,6 +144,7 @@ class Relay(threading.Thread):
     [
         (b"\xff" * 144, "position of joint 1 that is not a number"),
         (struct.pack("<18d", *START, 1e9, *(0.0,) * 11), "speed of joint 1 of 1e+09 rad/s"),
+        (struct.pack("<18d", START[0] + 25.0, *START[1:], *(0.0,) * 12), "a way in 2 ms of joint 1 of 25 rad"),
         (b"nothing of the kind", "answered 19 bytes"),
     ],
 )

@@ -2,7 +2,7 @@
 
 Each cycle its targets are sent, and what has come back is taken: what is measured is a cycle old where the plant keeps
 up, and older where it does not. A plant that is gone, `LONGEST_BEHIND` behind or ahead of its targets is lost, and so
-is one that measures what no arm does.
+is one that measures what no arm does: also a joint that jumps from one answer to the next.
 
 A message of targets is 12 doubles, q [rad] and qd [rad/s]; the answer 18: measured q, qd and current [A].
 """
@@ -14,6 +14,8 @@ import struct
 from collections.abc import Sequence
 
 from coneskin.channel import Channel
+from coneskin.robot.arm.kinematics import JOINTS
+from coneskin.robot.arm.model import ArmModel
 
 from .arm import CYCLE
 from .plant import PlantLost, PlantState
@@ -22,8 +24,11 @@ __all__ = ["LONGEST_BEHIND", "RemotePlant", "decode_targets", "encode_state"]
 
 #: s that a plant may be behind; as long as a pseudo-terminal on a busy computer can stall
 LONGEST_BEHIND = 0.25
-#: what no arm that is whole measures: joints turn twice at most, and wrists at 2 pi rad/s. A blow of 7 kN takes 800 A
-_MOST = (("position", 8.0 * math.pi, "rad"), ("speed", 100.0, "rad/s"), ("current", 1e4, "A"))
+#: what no arm that is whole measures: joints turn twice at most. A blow of 7 kN takes 800 A
+_MOST_POSITION, _MOST_CURRENT = 8.0 * math.pi, 1e4  # rad, A
+#: of the highest speed of a joint, which no blow exceeds: in 72 collisions of bench/collision.py without any
+#: protection the fastest joint was flung to 3.2 of it
+_MOST_SPEED = 10.0
 _TARGETS = struct.Struct("<12d")
 _STATE = struct.Struct("<18d")
 
@@ -45,33 +50,19 @@ def decode_targets(message: bytes) -> tuple[tuple[float, ...], tuple[float, ...]
     return values[:6], values[6:]
 
 
-def _decode(message: bytes) -> PlantState:
-    """Return what a plant has measured; raise PlantLost for what it cannot have."""
-    if len(message) != _STATE.size:
-        raise PlantLost(f"the plant has answered {len(message)} bytes, not {_STATE.size}")
-    values = _STATE.unpack(message)
-    state = PlantState(values[:6], values[6:12], values[12:])
-    for (name, most, unit), own in zip(_MOST, state, strict=True):
-        for joint, value in enumerate(own, 1):
-            if not math.isfinite(value):
-                raise PlantLost(f"the plant has measured a {name} of joint {joint} that is not a number")
-            if abs(value) > most:
-                what = f"a {name} of joint {joint} of {value:.3g} {unit}"
-                raise PlantLost(f"the plant has measured {what}; at most {most:.3g} is possible")
-    return state
-
-
 class RemotePlant:
     """Plant at the other end of a channel; methods as of `Plant`.
 
     Args:
         channel: to its process.
         q: joint positions at the start [rad].
+        model: the arm, whose joints bound what can be measured.
     """
 
-    def __init__(self, channel: Channel, q: Sequence[float]) -> None:
+    def __init__(self, channel: Channel, q: Sequence[float], model: ArmModel) -> None:
         self._channel = channel
-        self._state = PlantState(tuple(q), (0.0,) * 6, (0.0,) * 6)
+        self._fastest = [_MOST_SPEED * speed for speed in model.joint_speed]
+        self._state = PlantState(tuple(q), (0.0,) * JOINTS, (0.0,) * JOINTS)
         self._behind = 0  # cycles that are not answered yet
 
     def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
@@ -79,7 +70,7 @@ class RemotePlant:
         self._channel.send(_TARGETS.pack(*q, *qd))
         self._behind += 1
         for message in self._channel.receive():
-            self._state = _decode(message)
+            self._state = self._measured(message)
             self._behind -= 1
             if self._behind < 0:
                 raise PlantLost("the plant has answered targets that it was not sent")
@@ -95,3 +86,24 @@ class RemotePlant:
     def close(self) -> None:
         """End the conversation; the process then ends."""
         self._channel.close()
+
+    def _measured(self, message: bytes) -> PlantState:
+        """Return what an answer says; raise PlantLost for what no arm can have measured after the last."""
+        if len(message) != _STATE.size:
+            raise PlantLost(f"the plant has answered {len(message)} bytes, not {_STATE.size}")
+        values = _STATE.unpack(message)
+        state = PlantState(values[:6], values[6:12], values[12:])
+        ways = [after - before for before, after in zip(self._state.q, state.q, strict=True)]
+        for what, own, most, unit in (
+            ("a position", state.q, [_MOST_POSITION] * JOINTS, "rad"),
+            ("a speed", state.qd, self._fastest, "rad/s"),
+            ("a current", state.current, [_MOST_CURRENT] * JOINTS, "A"),
+            (f"a way in {1e3 * CYCLE:g} ms", ways, [CYCLE * speed for speed in self._fastest], "rad"),
+        ):
+            for joint, (value, bound) in enumerate(zip(own, most, strict=True), 1):
+                if not math.isfinite(value):
+                    raise PlantLost(f"the plant has measured {what} of joint {joint} that is not a number")
+                if abs(value) > bound:
+                    said = f"{what} of joint {joint} of {value:.3g} {unit}"
+                    raise PlantLost(f"the plant has measured {said}; at most {bound:.3g} is possible")
+        return state

@@ -9,6 +9,7 @@ import struct
 import pytest
 
 from coneskin.channel import Channel, pair
+from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.controller_state import describe
 from coneskin.robot.sim.motion.arm import CYCLE
@@ -24,6 +25,8 @@ ELSEWHERE = PlantState(
     (0.1, -1.0, 1.0, -1.0, -1.0, 0.2), (0.3, 0.0, 0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)
 )
 QD = [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]
+MODEL = arm_model("UR3e")  # whose wrists are faster than its base
+FARTHEST = [10.0 * CYCLE * speed for speed in MODEL.joint_speed]  # that a joint can go in a cycle [rad]
 
 
 class OddPlant:
@@ -92,7 +95,7 @@ def test_without_its_plant_the_arm_has_no_power_and_nothing_says_that_it_stands(
 def remote():  # type: ignore[no-untyped-def]
     ours, theirs = pair()
     other = Channel(theirs)
-    plant = RemotePlant(Channel(ours), START_Q)
+    plant = RemotePlant(Channel(ours), ELSEWHERE.q, MODEL)
     yield plant, other
     plant.close()
     other.close()
@@ -100,7 +103,7 @@ def remote():  # type: ignore[no-untyped-def]
 
 def test_targets_arrive_and_the_answer_is_measured_in_the_next_cycle(remote) -> None:  # type: ignore[no-untyped-def]
     plant, other = remote
-    assert plant.advance(START_Q, QD).q == START_Q
+    assert plant.advance(START_Q, QD).q == ELSEWHERE.q  # its start
     (message,) = other.receive()
     assert decode_targets(message) == (START_Q, tuple(QD))
     other.send(encode_state(ELSEWHERE))
@@ -117,8 +120,8 @@ def test_targets_arrive_and_the_answer_is_measured_in_the_next_cycle(remote) -> 
             "position of joint 2 of 1e[+]30 rad; at most",
         ),
         (
-            encode_state(ELSEWHERE._replace(qd=(*ELSEWHERE.qd[:5], -101.0))),
-            "speed of joint 6 of -101 rad/s; at most 100",
+            encode_state(ELSEWHERE._replace(qd=(*ELSEWHERE.qd[:5], -63.0))),
+            "speed of joint 6 of -63 rad/s; at most 62.8 is possible",
         ),
         (encode_state(ELSEWHERE._replace(current=(1e5,) * 6)), "current of joint 1 of 1e[+]05 A"),
         (None, "has ended"),
@@ -132,6 +135,37 @@ def test_a_plant_that_is_gone_or_says_nonsense_is_lost(remote, answer, said) -> 
     else:
         other.send(answer)
     with pytest.raises(PlantLost, match=said):
+        plant.advance(START_Q, QD)
+
+
+def moved(joint: int, way: float) -> PlantState:
+    return ELSEWHERE._replace(q=tuple(q + (way if n == joint else 0.0) for n, q in enumerate(ELSEWHERE.q)))
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_a_joint_that_jumps_is_no_arm(remote, joint: int) -> None:  # type: ignore[no-untyped-def]
+    """As far as a blow could fling it within one cycle is believed, and no farther, in each cycle."""
+    plant, other = remote
+    for share in (0.99, 0.0, -0.99, -1.98):  # each 0.99 or less from the one before
+        other.send(encode_state(moved(joint, share * FARTHEST[joint])))
+        assert plant.advance(START_Q, QD) == moved(joint, share * FARTHEST[joint])
+    other.send(encode_state(moved(joint, -0.97 * FARTHEST[joint])))
+    with pytest.raises(PlantLost, match=f"a way in 2 ms of joint {joint + 1} of"):
+        plant.advance(START_Q, QD)
+
+
+def test_a_joint_that_jumps_by_four_turns_is_said_with_how_far_it_could_go(remote) -> None:  # type: ignore[no-untyped-def]
+    plant, other = remote
+    other.send(encode_state(moved(1, 25.0)))
+    with pytest.raises(PlantLost, match=r"a way in 2 ms of joint 2 of 25 rad; at most 0\.0628 is possible"):
+        plant.advance(START_Q, QD)
+
+
+def test_a_plant_that_stands_elsewhere_at_the_start_is_lost(remote) -> None:  # type: ignore[no-untyped-def]
+    """Physics and controller must begin at one place: the arm is not carried from one to the other."""
+    plant, other = remote
+    other.send(encode_state(ELSEWHERE._replace(q=START_Q)))
+    with pytest.raises(PlantLost, match="a way in 2 ms of joint"):
         plant.advance(START_Q, QD)
 
 
