@@ -45,10 +45,11 @@ MAY_IMPORT: dict[str, str] = {
     "robot.reaction": "robot.arm geometry",
     "robot.stop": "robot.arm robot.driver",
     "robot.ur": "robot.arm robot.driver geometry",
-    "robot.guard": "robot.guard.heartbeats robot.guard.speed robot.arm robot.driver robot.reaction robot.stop skin "
-    "skin.detection skin.sources geometry",
+    "robot.guard": "robot.guard.heartbeats robot.guard.motion robot.guard.speed robot.arm robot.driver robot.reaction "
+    "robot.stop skin skin.detection skin.sources geometry",
     "robot.guard.heartbeats": "robot.guard robot.driver robot.stop",
-    "robot.guard.speed": "robot.guard robot.arm robot.driver robot.reaction robot.stop geometry",
+    "robot.guard.motion": "robot.guard robot.arm robot.driver robot.reaction robot.stop",
+    "robot.guard.speed": "robot.guard robot.guard.motion robot.arm robot.driver robot.reaction robot.stop geometry",
     "robot.sim": "robot.sim.functions robot.sim.motion robot.sim.polyscope robot.sim.ports robot.sim.urscript "
     "robot.arm robot.ur",
     "robot.sim.functions": "robot.sim robot.sim.motion robot.sim.urscript robot.arm robot.ur geometry",
@@ -56,8 +57,8 @@ MAY_IMPORT: dict[str, str] = {
     "robot.sim.polyscope": "robot.sim robot.sim.ports robot.sim.urscript",
     "robot.sim.ports": "robot.sim robot.sim.motion robot.sim.urscript robot.arm robot.ur geometry",
     "robot.sim.urscript": "geometry",
-    "scene": "scene.tables robot.arm robot.driver robot.guard robot.guard.heartbeats robot.guard.speed robot.reaction "
-    "robot.stop skin skin.detection skin.sources skin.virtual geometry",
+    "scene": "scene.tables robot.arm robot.driver robot.guard robot.guard.heartbeats robot.guard.motion "
+    "robot.guard.speed robot.reaction robot.stop skin skin.detection skin.sources skin.virtual geometry",
     "scene.tables": "scene robot.arm robot.reaction robot.stop skin skin.detection skin.sources skin.virtual geometry",
     "calibration": "commissioning scene scene.tables session skin skin.detection geometry.drawing",
     "commissioning": "scene session robot.arm robot.driver skin skin.detection skin.sources geometry",
@@ -86,8 +87,8 @@ MAY_IMPORT: dict[str, str] = {
     "commands.demonstration": "replay scene robot.arm robot.guard commands.terminal",
     "commands.terminal": "commissioning skin.detection",
     "commands.arguments": "design geometry geometry.drawing scene.tables skin",
-    "testing": "scene robot.arm robot.driver robot.guard robot.guard.speed robot.reaction robot.stop robot.ur skin "
-    "skin.detection skin.sources skin.virtual geometry",
+    "testing": "scene robot.arm robot.driver robot.guard robot.guard.motion robot.guard.speed robot.reaction "
+    "robot.stop robot.ur skin skin.detection skin.sources skin.virtual geometry",
     "testing.field": "skin.field",
     "testing.firmware": "testing scene skin skin.firmware skin.sources skin.virtual",
 }
@@ -136,7 +137,9 @@ HOT = {
     "skin/detection": "stream detector reading timing events",
     "robot/arm": "kinematics compiled_kinematics damped_least_squares joint_limits",
     "robot/reaction": "retreat types",
-    "robot/guard": "core skin_contacts loop ports outbox arm_supervisor motion_away stop_escalation journal",
+    "robot/guard": "core skin_contacts arm_stop arm_supervisor loop ports outbox port_losses preconditions "
+    "stop_escalation journal",
+    "robot/guard/motion": "motion_away reaction_motion",
     "robot/guard/heartbeats": "companion_monitor heartbeat_monitor controller_heartbeat controller_clock",
     "robot/stop": "monitor",
     "robot/ur": "driver_process state_reader ur_rtde",

@@ -160,7 +160,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
         | SIMULATOR
         | {
             "coneskin.robot.ur.stop_sockets",
-            "coneskin.robot.guard.reaction_motion",
+            "coneskin.robot.guard.motion.reaction_motion",
             "coneskin.robot.ur.rtde_codec",
             "coneskin.robot.ur.speed_slider",
             "coneskin.robot.ur.state_reader",
@@ -192,7 +192,7 @@ def test_a_scene_without_an_arm_loads_no_kinematics_and_no_reaction(tmp_path: Pa
 
 @pytest.mark.parametrize("scene", [_STOP, _NO_MESH_FRAME], ids=["a stop", "a retreat without a commissioning"])
 def test_a_reaction_that_only_stops_loads_no_retreat(scene: str, tmp_path: Path) -> None:
-    unneeded = {"guard.reaction_motion", "reaction.motion", "reaction.retreat"}
+    unneeded = {"guard.motion.reaction_motion", "reaction.motion", "reaction.retreat"}
     unneeded |= {"reaction.admittance", "reaction.backtrack", "arm.workspace", "ur.setpoint_program"}
     unneeded |= {"ur.setpoint_writer"}
     loaded = modules(scene, _BUILD, tmp_path / "scene.toml", "")

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING
 
 from .journal import EventName
 from .outputs import Outputs, emit
 
-if TYPE_CHECKING:  # a guard without an arm loads neither
-    from coneskin.robot.arm.model import ArmModel
-    from coneskin.robot.driver.state import ControllerState
-
-__all__ = ["Activation", "ActivationStep", "arm_blockers"]
+__all__ = ["Activation", "ActivationStep"]
 
 _REPORT_PERIOD = 0.5  # s between two lists of what the guard waits for
 _RELEASE_TIMEOUT = 4.0  # s; a driver process may first have to start its program on the controller again
@@ -106,19 +101,3 @@ class Activation:
         elif blockers != self._waiting_for and now - self._reported_at >= _REPORT_PERIOD:
             self._reported_at, self._waiting_for = now, blockers
             emit(out, EventName.WAITING, now, reasons=blockers)
-
-
-def arm_blockers(model: ArmModel, state: ControllerState) -> list[str]:
-    """Return why an arm in this state must not be put under guard, one line each; empty where it may.
-
-    Whether a program runs does not matter: a guard may be there before the program is.
-    """
-    blockers = []
-    if state.stopped_by_safety:
-        blockers.append("the controller's own safety system holds the arm: see its screen")
-    if not state.powered:
-        blockers.append("the arm is not powered, or its brakes are not released")
-    for number, (q, low, high) in enumerate(zip(state.q, model.joint_lower, model.joint_upper, strict=True), 1):
-        if not low <= q <= high:
-            blockers.append(f"joint {number} must be within {low:.3f} to {high:.3f} rad, it is at {q:.3f} rad")
-    return blockers

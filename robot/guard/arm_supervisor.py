@@ -27,22 +27,21 @@ from coneskin.robot.guard.heartbeats.controller_clock import ControllerClock
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import Done, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.robot.stop.standstill import WATCH, StandstillWatch
 
-from .activation import arm_blockers
+from .arm_stop import ArmStop
 from .contact import Contact
+from .controller_needs import ControllerNeeds
 from .journal import EventName
-from .motion_away import MotionAway
+from .motion.motion_away import MotionAway
 from .outputs import Outputs, emit
 from .phase import Phase
 from .speed.speed_reduction import SpeedReduction
-from .stop_escalation import StopEscalation
 from .touch_record import TouchRecord
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
     from coneskin.robot.guard.heartbeats.controller_heartbeat import ControllerHeartbeat
 
-    from .reaction_motion import ReactionPlanner
+    from .motion.reaction_motion import ReactionPlanner
     from .speed.speed_limit import SpeedLimit
 
 __all__ = ["ArmSupervisor"]
@@ -64,13 +63,13 @@ class ArmSupervisor:
         speed_limit: of the skins' surfaces; None where nothing limits them.
 
     Attributes:
+        model: the arm.
         phase: where it is.
         state: newest measured state, or None before the first.
         driver: of the arm's controller.
         backup_ready: True once the process that stops the arm without this one is ready: driver process or watchdog.
         heartbeat: supervision of the program that moves the arm; None where that is the driver process.
         internal_control: True where the driver process moves the arm.
-        stop_number: of the newest stop, counted from 1; a motion away and its end belong to the stop before.
         speed_reduction: of the slow reaction; it has to know where the controller's speed slider is.
 
     Raises:
@@ -95,39 +94,38 @@ class ArmSupervisor:
         self.backup_ready = False
         self.heartbeat = heartbeat
         self.internal_control = StopPath.DRIVER in paths
-        self._model = model
+        self.model = model
         self._rules = RuleSet(reaction, rules)
         self._plain = not rules and reaction.kind in ("stop", "retreat")
         self._touches = TouchRecord(self._rules)
         self._speed_limit = speed_limit
-        self.speed_reduction = SpeedReduction(model, self.needs_slider)
+        self.speed_reduction = SpeedReduction(model, self._needs_slider)
         if planner is None and self._rules.move:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
         self._limits = limits
         self._away = MotionAway(planner, self.internal_control)
         self._clock = ControllerClock()
-        self._stops = StopEscalation(limits, paths)
+        self._stop = ArmStop(limits, paths)
         self._reaction = reaction  # the one that is under way
         self._fresh = -math.inf  # host time of the newest state that was a new one
-        self._why = ""
         self._ending = False
-        self._watch = StandstillWatch(limits.standstill)
-        self.stop_number = 0  # of the newest stop, counted since the guard's start
 
     @property
-    def needs_slider(self) -> bool:
-        """True where a reaction, or the limit of the speed, may use the controller's speed slider."""
+    def stop_number(self) -> int:
+        """Number of the newest stop, counted since the guard's start; 0 before the first."""
+        return self._stop.number
+
+    @property
+    def needs(self) -> ControllerNeeds:
+        """What it needs of the controller."""
+        heartbeat = None if self.heartbeat is None else self.heartbeat.required
+        by_slider = StopPath.SLIDER in self._stop.escalation.paths
+        setpoints = self._rules.move and not self.internal_control
+        return ControllerNeeds(self._needs_slider, by_slider, setpoints, heartbeat)
+
+    @property
+    def _needs_slider(self) -> bool:
         return "slow" in self._rules.kinds or self._speed_limit is not None
-
-    @property
-    def stops_by_slider(self) -> bool:
-        """True where the speed slider is one of the stop paths."""
-        return StopPath.SLIDER in self._stops.paths
-
-    @property
-    def needs_setpoints(self) -> bool:
-        """True where a reaction may move an externally controlled arm, through a setpoint program."""
-        return self._rules.move and not self.internal_control
 
     def release(self, number: int, out: Outputs) -> None:
         """Ask the process that moves or holds the arm to let the program move it, and to acknowledge this number."""
@@ -141,7 +139,7 @@ class ArmSupervisor:
     def activate(self, out: Outputs) -> None:
         """React from now on; the program may move the arm."""
         self.phase, self._reaction = Phase.ACTIVE, self._rules.default
-        self._watch.forget()
+        self._stop.watch.forget()
         if self._speed_limit is not None:
             self._speed_limit.forget()
         self.speed_reduction.release(out)
@@ -200,7 +198,7 @@ class ArmSupervisor:
             self._halt(now, why, out)
             self._away.permitted = False
         elif self.phase.stopping:
-            self._why, self._away.permitted = self._again(why), False
+            self._stop.why, self._away.permitted = self._stop.again(why), False
 
     def end(self, now: float, out: Outputs) -> None:
         """Leave the speed slider as it was found once the arm stands latched: the guard ends, at a host time [s]."""
@@ -210,16 +208,16 @@ class ArmSupervisor:
 
     def lose(self, paths: frozenset[StopPath], now: float, for_good: bool = True) -> None:
         """Drop stop paths that are lost, or that this stop must not count on, and use the next one at once."""
-        self._stops.lose(paths, now, for_good)
+        self._stop.escalation.lose(paths, now, for_good)
 
     def sample(self, state: ControllerState, out: Outputs) -> None:
         """Take a measured state."""
         if self.state is None or state.controller_time != self.state.controller_time:
             self._fresh = state.time
         self.state = state
-        measured_at = self._clock.measured_at(state.time, state.controller_time)
+        stop, measured_at = self._stop, self._clock.measured_at(state.time, state.controller_time)
         self._away.note(measured_at, state)
-        if self._stops.under_way:
+        if stop.escalation.under_way:
             self._follow(state, measured_at, out)
         elif self._away.under_way:
             self._move(state, out)
@@ -228,19 +226,20 @@ class ArmSupervisor:
                 self._stop_now(state.time, why, False, out)
         elif self.phase is Phase.SLOWED:
             self.speed_reduction.sample(state, self._touches.contacts)
-        elif self._watch.moved(state, bool(self._touches.contacts)):
-            self._stop_now(state.time, self._again(self._watch.why), False, out)
-        elif self._watch.under_way and self._away.undecided:
+        elif stop.watch.moved(state, bool(self._touches.contacts)):
+            self._stop_now(state.time, stop.again(stop.watch.why), False, out)
+        elif stop.watch.under_way and self._away.undecided:
             self._decide(state, out)
-        elif self._watch.under_way and self.phase is not Phase.LATCHED:
-            self._stops.insist(state, self._reaction.deceleration, out)
+        elif stop.watch.under_way and self.phase is not Phase.LATCHED:
+            stop.escalation.insist(state, self._reaction.deceleration, out)
             self._latch(state, out)
 
     def look(self, now: float, out: Outputs) -> None:
         """Decide what only the passing of time shows."""
-        if self._stops.under_way:
-            self._stops.escalate(now, self._reaction.deceleration, self.state, out)
-            self.speed_reduction.note_stop(self._stops.used)
+        stop = self._stop
+        if stop.escalation.under_way:
+            stop.escalation.escalate(now, self._reaction.deceleration, self.state, out)
+            self.speed_reduction.note_stop(stop.escalation.used)
         elif self.phase is Phase.SLOWED:
             if why := self.speed_reduction.look(now, bool(self._touches.contacts)):
                 approach = self.speed_reduction.approach
@@ -249,15 +248,15 @@ class ArmSupervisor:
                 self.phase = Phase.ACTIVE
                 self.speed_reduction.put_back(now, out)
                 emit(out, EventName.RESUMED, now, slider=self.speed_reduction.slider)
-        elif self._watch.under_way and self.silent(now):
-            self._stop_now(now, self._again("the controller fell silent"), False, out)
+        elif stop.watch.under_way and self.silent(now):
+            self._stop_now(now, stop.again("the controller fell silent"), False, out)
 
     def quiet_until(self) -> float:
         """Return the host time before which a moving arm under guard makes nothing happen [s]; -inf in another phase.
 
         That is as long as its states show the same of power, safety system and program.
         """
-        at_work = self._stops.under_way or self._away.under_way or self._watch.under_way
+        at_work = self._stop.escalation.under_way or self._away.under_way or self._stop.watch.under_way
         heard = self.heartbeat is None or self.heartbeat.silent
         if self.phase is not Phase.ACTIVE or at_work or not heard or self._speed_limit is not None:
             return -math.inf
@@ -267,74 +266,49 @@ class ArmSupervisor:
         """Tell whether the controller's newest state is too old; one that repeats itself is."""
         return now - self._fresh > self._limits.arm_silence
 
-    def blockers(self, now: float) -> list[str]:
-        """Return why the guard must not become active, one line each."""
-        blockers = []
-        if not self.backup_ready:
-            process = "the arm's driver" if self.internal_control else "the guard watchdog"
-            blockers.append(f"{process} is not ready")
-        if self.needs_slider and not self.speed_reduction.knows(now):
-            blockers.append("the position of the controller's speed slider is not known")
-        if self.heartbeat is not None and (blocker := self.heartbeat.blocker()):
-            blockers.append(blocker)
-        if self.state is None or self.silent(now):
-            return [*blockers, "the controller is silent"]
-        return blockers + arm_blockers(self._model, self.state)
-
     # ---- what it does
-
-    def _again(self, what: str) -> str:
-        """Return why an arm is stopped, once there is another reason: the first, which is the cause, and the newest."""
-        return f"{self._why.partition('; then ')[0]}; then {what}"
 
     def _stop_now(self, now: float, why: str, may_move: bool, out: Outputs, contact: Contact | None = None) -> None:
         self._begin(now, Phase.STOPPING, StopProgram(self._reaction.deceleration), out)
-        self._why = why
         self._touches.placed = ()
         self._away.prepare(self.state, may_move)
-        self.stop_number += 1
-        self._report_stop(now, why, contact, out)
+        self._stop.number += 1
+        self._stop.report(now, why, contact, out)
 
     def _halt(self, now: float, why: str, out: Outputs, contact: Contact | None = None) -> None:
         self._begin(now, Phase.HALTING, EndReaction(self._reaction.deceleration), out)
-        self._why = why
-        self._report_stop(now, why, contact, out)
-
-    def _report_stop(self, now: float, why: str, contact: Contact | None, out: Outputs) -> None:
-        named = {} if contact is None else {"contact": contact.summary()}
-        emit(out, EventName.STOPPING, now, why=why, stop=self.stop_number, **named)
+        self._stop.report(now, why, contact, out)
 
     def _begin(self, now: float, phase: Phase, command: StopProgram | EndReaction, out: Outputs) -> None:
-        self._stops.send(command, self._watch.insists, out)
-        self.speed_reduction.note_stop(self._stops.used)
+        self._stop.send(command, out)
+        self.speed_reduction.note_stop(self._stop.escalation.used)
         self._away.end(out)
         state = self.state
         speed = None if state is None or self.silent(now) else state.speed
-        self._stops.begin(now, speed, command.deceleration)
-        self._watch.end()
+        self._stop.begin(now, speed, command.deceleration)
         self.phase = phase
 
     def _follow(self, state: ControllerState, measured_at: float, out: Outputs) -> None:
-        if not self._stops.sample(state, measured_at, out):
-            return
-        self.speed_reduction.put_back(state.time, out)
-        self._away.await_place(state.time)
-        self._watch.begin(state.time, math.inf)
-        self._decide(state, out)
+        if self._stop.stands(state, measured_at, out):
+            self.speed_reduction.put_back(state.time, out)
+            self._away.await_place(state.time)
+            self._decide(state, out)
 
     def _decide(self, state: ControllerState, out: Outputs) -> None:
         """Decide what the standing arm does; the place of a touch may need a while to become certain."""
-        stopping, enough = self.phase is Phase.STOPPING, self._stops.first_was_enough
+        stopping, enough = self.phase is Phase.STOPPING, self._stop.escalation.first_was_enough
         decision = self._away.decide(state, self._reaction, stopping, enough, self._touches, out)
         self._reaction = decision.reaction
         if decision.waits:
             return
-        self._watch.end()
+        self._stop.watch.end()
         if decision.begun:
             self.phase = Phase.RETREATING
             self._move(state, out)
         else:
-            self._stay(state.time, f"{self._why}; {decision.refusal}" if decision.refusal else self._why, out)
+            why = self._stop.why
+            self._stop.stay(f"{why}; {decision.refusal}" if decision.refusal else why, state)
+            self._latch(state, out)
 
     def _move(self, state: ControllerState, out: Outputs) -> None:
         over = self._away.step(state, self._touches.contacts, out)
@@ -343,24 +317,12 @@ class ArmSupervisor:
 
     def _end_motion(self, now: float, over: Done, out: Outputs) -> None:
         self._begin(now, Phase.HALTING, EndReaction(self._reaction.deceleration), out)
-        self._why += f"; {self._away.report(now, over, out)}"
-
-    def _stay(self, now: float, why: str, out: Outputs) -> None:
-        """Latch, at once where no other program can start, else at the end of a watch."""
-        assert self.state is not None
-        self._why = why
-        watched = not self.internal_control or self._stops.unconfirmed(self.state)
-        self._watch.begin(now, WATCH if watched else 0.0)
-        self._latch(self.state, out)
+        self._stop.why += f"; {self._away.report(now, over, out)}"
 
     def _latch(self, state: ControllerState, out: Outputs) -> None:
-        if not (self._watch.confirmed or state.stopped_by_safety):
-            return
-        self.phase = Phase.LATCHED
-        if self._stops.unconfirmed(state):
-            self._why += "; the controller does not show the protective stop"
-        emit(out, EventName.LATCHED, state.time, why=self._why, stop=self.stop_number)
-        self._put_slider_back(state.time, out)
+        if self._stop.latched(state, out):
+            self.phase = Phase.LATCHED
+            self._put_slider_back(state.time, out)
 
     def _put_slider_back(self, now: float, out: Outputs) -> None:
         if self._ending and self._speed_limit is not None:

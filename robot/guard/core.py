@@ -21,11 +21,14 @@ from coneskin.skin.detection.stream import TouchStream
 from .activation import Activation, ActivationStep
 from .contact import GuardedSensor
 from .controller_inputs import ControllerInputs
+from .controller_needs import ControllerNeeds
 from .event_folding import EventFolding
 from .fault_register import FaultRegister
 from .journal import BlockKind, EventName
 from .outputs import Outputs, emit
 from .phase import Phase
+from .port_losses import PortLosses
+from .preconditions import arm_blockers, skin_blockers
 from .skin_connection import SkinConnection
 from .skin_contacts import SkinContacts
 
@@ -66,18 +69,18 @@ class GuardCore:
         self._companions = CompanionMonitor(limits, arm)
         self._faults = FaultRegister(arm, self._folding)
         self._controller = None if arm is None else ControllerInputs(arm, self._companions, self._faults)
-        self._lost: dict[str, str] = {}  # what is gone; only a skin may be opened again
         self._connection = SkinConnection(stream)
+        self._losses = PortLosses(arm, self._connection, self._companions, self._faults, self._folding)
         self._activation = Activation(limits.settle)
         self._takers: dict[int, Callable[[Block, Outputs], None]] = {
             BlockKind.SKIN: self._take_skin,
             BlockKind.DRIVER: self._take_driver,
             BlockKind.RESET: self._take_reset,
-            BlockKind.LOST: self._take_lost,
+            BlockKind.LOST: self._losses.take_lost,
             BlockKind.PROGRAM: self._take_program,
-            BlockKind.ABSENT: self._take_absent,
+            BlockKind.ABSENT: self._losses.take_absent,
             BlockKind.SUSPENDED: self._take_suspended,
-            BlockKind.REOPENED: self._take_reopened,
+            BlockKind.REOPENED: self._losses.take_reopened,
         }
         if self._controller is not None:
             self._takers[BlockKind.ARM] = self._controller.take_arm
@@ -100,25 +103,9 @@ class GuardCore:
         return self._arm
 
     @property
-    def needs_slider(self) -> bool:
-        """True where a reaction may use the controller's speed slider."""
-        return self._arm is not None and self._arm.needs_slider
-
-    @property
-    def stops_by_slider(self) -> bool:
-        """True where the slider is one of the stop paths; the guard does without it where another client has it."""
-        return self._arm is not None and self._arm.stops_by_slider
-
-    @property
-    def heartbeat_required(self) -> bool | None:
-        """True where a program must depend on the guard's heartbeat; None where no other program moves the arm."""
-        heartbeat = None if self._arm is None else self._arm.heartbeat
-        return None if heartbeat is None else heartbeat.required
-
-    @property
-    def needs_setpoints(self) -> bool:
-        """True where a reaction may move an arm that another program moves."""
-        return self._arm is not None and self._arm.needs_setpoints
+    def needs(self) -> ControllerNeeds:
+        """What it needs of the arm's controller."""
+        return ControllerNeeds() if self._arm is None else self._arm.needs
 
     def take(self, block: Block, out: Outputs) -> None:
         """Take one input.
@@ -135,17 +122,10 @@ class GuardCore:
 
     def blockers(self, now: float) -> list[str]:
         """Return why the guard cannot become active, one line each; empty where it can."""
-        blockers = list(dict.fromkeys([*self._lost.values(), *self._faults.messages, *self._companions.blockers]))
+        blockers = list(dict.fromkeys([*self._losses.blockers, *self._faults.messages, *self._companions.blockers]))
         blockers += self._connection.blockers
-        for detector in self._stream.detectors:
-            name = detector.sensor.name
-            if detector.age(now) > self._limits.skin_silence:
-                blockers.append(f"{name}: no valid frame" + (f" ({detector.fault.value})" if detector.fault else ""))
-            elif detector.touched:
-                blockers.append(f"{name}: it is touched, or its layers are stuck together")
-            elif not detector.ready:
-                blockers.append(f"{name}: {detector.fault.value if detector.fault else 'settling'}")
-        return blockers if self._arm is None else blockers + self._arm.blockers(now)
+        blockers += skin_blockers(self._stream.detectors, now, self._limits.skin_silence)
+        return blockers if self._arm is None else blockers + arm_blockers(self._arm, now)
 
     def quiet_until(self) -> float:
         """Return the host time before which nothing is decided [s], whatever quiet input comes (``quiet_inputs``)."""
@@ -215,32 +195,6 @@ class GuardCore:
 
     def _take_program(self, block: Block, _: Outputs) -> None:
         self._companions.note_program(block.time)
-
-    def _take_lost(self, block: Block, out: Outputs) -> None:
-        what, _, why = block.payload.decode("utf-8", "replace").partition("\n")
-        self._lost[what] = why
-        self._companions.lose(what, block.time)
-        if self._arm is not None and what == "slider":
-            self._arm.speed_reduction.note(block.time, None)
-        self._faults.react(block.time, why, out)
-        if what == "session":
-            self._folding.flush(block.time, out)
-            if self._arm is not None:
-                self._arm.end(block.time, out)
-        emit(out, EventName.ENDING if what == "session" else EventName.FAULT, block.time, what=why)
-
-    def _take_reopened(self, block: Block, out: Outputs) -> None:
-        """Take a skin that is open again; only the reset of a latched arm makes the guard active with it."""
-        if block.payload != b"skin" or "skin" not in self._lost or self.phase is not Phase.LATCHED:
-            return
-        del self._lost["skin"]
-        self._connection.reopen(block.time)
-        emit(out, EventName.MESSAGE, block.time, what="the skin's port is open again; a reset is needed")
-
-    def _take_absent(self, block: Block, out: Outputs) -> None:
-        what, _, why = block.payload.decode("utf-8", "replace").partition("\n")
-        self._companions.lose(what, block.time)
-        emit(out, EventName.MESSAGE, block.time, what=f"a stop path is missing, {what}: {why}")
 
     def _take_suspended(self, block: Block, out: Outputs) -> None:
         """Stop an arm that nobody has guarded for a while: what came meanwhile is lost, or is too old."""

@@ -62,9 +62,9 @@ def test_a_scene_takes_the_speeds_from_the_file_and_its_guard_needs_the_slider(t
     assert len(scene.speed_limit.patches) == 8
     core = build_core(scene)
     assert core.phase is Phase.STARTING
-    assert core.needs_slider
+    assert core.needs.slider
     assert any("slider" in why for why in core.blockers(100.0))
-    assert not build_core(parse_scene(SCENE)).needs_slider
+    assert not build_core(parse_scene(SCENE)).needs.slider
 
 
 def test_the_text_of_the_scene_carries_the_speeds(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES
 
 if TYPE_CHECKING:  # a scene without a slow reaction does not load it
-    from coneskin.robot.guard.joint_current import JointCurrentMonitor
+    from coneskin.robot.guard.motion.joint_current import JointCurrentMonitor
     from coneskin.robot.reaction.contact_approach import ContactApproach
 
 __all__ = ["HOLD", "ReducedSpeedTouch", "SpeedReduction"]
@@ -134,7 +134,7 @@ class SpeedReduction:
     def __init__(self, model: ArmModel, used: bool) -> None:
         self._model = model
         if used:  # here, so that no touch waits for it
-            from coneskin.robot.guard.joint_current import JointCurrentMonitor
+            from coneskin.robot.guard.motion.joint_current import JointCurrentMonitor
             from coneskin.robot.reaction.contact_approach import ContactApproach
 
             self._approach_of, self._monitor_of = ContactApproach, JointCurrentMonitor

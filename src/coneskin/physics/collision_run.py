@@ -195,7 +195,7 @@ class CollisionRun:
         self._unread = b"".join([next(self._packets)[1] for _ in self._device.sensors])
         assert self._core is not None
         if not first:
-            if self._steps % 20 == 0 and self._core.needs_slider:
+            if self._steps % 20 == 0 and self._core.needs.slider:
                 self._feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
             self._feed(BlockKind.ARM, self.arm.packet(self.plant.q, self.plant.qd, currents_of(self.plant)))
         self._feed(BlockKind.TICK)

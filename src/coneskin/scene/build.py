@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from coneskin.robot.arm.model import ArmModel
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.guard.core import GuardCore
-    from coneskin.robot.guard.reaction_motion import ReactionPlanner
+    from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 
     from .scene import Scene
@@ -147,7 +147,7 @@ def _angle(a: Vector, b: Vector) -> float:
 
 def _planner(scene: Scene, arm: ArmModel) -> ReactionPlanner:
     from coneskin.robot.arm.workspace import TablePlane
-    from coneskin.robot.guard.reaction_motion import ReactionPlanner
+    from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
 
     assert scene.arm is not None
     table = None if scene.arm.table_z is None else TablePlane(scene.arm.table_z)

@@ -60,27 +60,27 @@ def run_guard(
             ports.driver = other
         else:
             ports.watchdog = other
-        arm = arm_model(scene.arm.model)
+        arm, needs = arm_model(scene.arm.model), core.needs
         driver, host = load_driver(arm.family), scene.arm.host
         stack.enter_context(ArmLock(host))
         driver.check_model(arm, host)
-        if core.needs_setpoints:
+        if needs.setpoints:
             ports.reader = ports.setpoints = stack.enter_context(driver.setpoint_writer(host))
         else:
             ports.reader = stack.enter_context(driver.state_reader(host))
         ports.stops = stack.enter_context(driver.stop_connections(host))
-        if core.needs_slider:
+        if needs.slider:
             ports.slider = stack.enter_context(driver.speed_slider(host))
-        elif core.stops_by_slider:
+        elif needs.stops_by_slider:
             try:
                 ports.slider = stack.enter_context(driver.speed_slider(host))
             except RobotRefused as exc:  # a program has it
                 ports.absent = {"slider": str(exc)}
-        if core.heartbeat_required is not None:
+        if needs.heartbeat is not None:
             try:
                 ports.heartbeat = stack.enter_context(driver.heartbeat_writer(host))
             except RobotRefused as exc:  # a program has the register
-                if core.heartbeat_required:
+                if needs.heartbeat:
                     raise
                 ports.absent = {**ports.absent, "heartbeat": str(exc)}
     lifeline.hold()

@@ -21,8 +21,8 @@ from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.contact import GuardedSensor
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.journal import BlockKind, GuardEvent
+from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.reaction_motion import ReactionPlanner
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -185,7 +185,7 @@ class CollisionRig:
             if data := self._unread.popleft():
                 self._feed(BlockKind.SKIN, data)
         if self._steps % 2 == 0:
-            if self._steps % 20 == 0 and self.core.needs_slider:
+            if self._steps % 20 == 0 and self.core.needs.slider:
                 self._feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
             self._feed(BlockKind.ARM, self.arm.step())
         self._feed(BlockKind.TICK)

@@ -19,8 +19,8 @@ from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.contact import Contact, GuardedSensor
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.journal import BlockKind, GuardEvent
+from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.reaction_motion import ReactionPlanner
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
@@ -150,7 +150,7 @@ class GuardRig:
             if not self.mute_skin and data:
                 self.feed(BlockKind.SKIN, data)
             if step % 2 == 0:
-                if step % 20 == 0 and self.core.needs_slider:
+                if step % 20 == 0 and self.core.needs.slider:
                     self.feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
                 if self.core.phase is Phase.ACTIVE and self.arm.target is None:
                     self.arm.go([self.speed, 0, 0, 0, 0, 0], 4.0)

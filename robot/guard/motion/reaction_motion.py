@@ -14,6 +14,8 @@ from coneskin.robot.arm.workspace import TablePlane, Workspace
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.guard.journal import EventName, describe_way
+from coneskin.robot.guard.outputs import Outputs, emit
 from coneskin.robot.reaction.backtrack import PathHistory
 from coneskin.robot.reaction.contact_supervision import ContactSupervision
 from coneskin.robot.reaction.motion import ReactionMotion, plan_answer, plan_reaction_motion
@@ -21,8 +23,6 @@ from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reactio
 
 from .following_error import FollowingErrorMonitor
 from .joint_current import JointCurrentMonitor
-from .journal import EventName, describe_way
-from .outputs import Outputs, emit
 
 __all__ = ["MotionStream", "ReactionPlanner"]
 
