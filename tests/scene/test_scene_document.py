@@ -20,7 +20,7 @@ from coneskin.scene.tables import (
     motion_table,
     reaction_table,
     schema,
-    sensor_table,
+    sensor_keys,
     source_table,
     speed_limit_table,
     touch_table,
@@ -35,7 +35,7 @@ EXAMPLES = re.findall(r"```toml.*?\n(.*?)```", DOCUMENT, re.DOTALL)
 SECTIONS: dict[str, tuple[Key, ...]] = {
     "[arm]": arm_table.ARM_KEYS,
     "[[link]]": link_tables.LINK_KEYS,
-    "[[link.sensor]]": (Key("file", str, None), Key("calibration", str, None), *sensor_table.SENSOR_KEYS),
+    "[[link.sensor]]": (Key("file", str, None), Key("calibration", str, None), *sensor_keys.SENSOR_KEYS),
     "[source]": source_table.source_keys(),
     "[[source.touch]]": touch_table.TOUCH_KEYS,
     "[reaction]": reaction_table.REACTION_KEYS,

@@ -18,7 +18,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.tables.cone_keys import CONE_KEYS, DOUBLE_CONE_KEYS, LINK_CONE_KEYS
 from coneskin.scene.tables.schema import Key, check
-from coneskin.scene.tables.sensor_table import SENSOR_KEYS
+from coneskin.scene.tables.sensor_keys import SENSOR_KEYS
 
 SOURCE = Path(coneskin.__file__).parent
 NAMES = {key.name for key in DOUBLE_CONE_KEYS}

@@ -16,7 +16,7 @@ from coneskin.geometry.drawing.layer_stack import PAPER_STACK, AssemblyMode, Lay
 from coneskin.geometry.drawing.pdf import PageSize
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.scene.tables.cone_keys import DOUBLE_CONE_KEYS
-from coneskin.scene.tables.sensor_table import SENSOR_KEYS
+from coneskin.scene.tables.sensor_keys import SENSOR_KEYS
 from coneskin.skin.matched_electronics import GivenElectronics
 
 from .dimensions import add_dimension_options, add_setting_option
