@@ -34,7 +34,8 @@ MAY_IMPORT: dict[str, str] = {
     "skin": "geometry",
     "skin.firmware": "skin",
     "skin.sources": "skin",
-    "skin.detection": "skin skin.detection.untouched",
+    "skin.detection": "skin skin.detection.place skin.detection.untouched",
+    "skin.detection.place": "skin skin.detection skin.detection.untouched",
     "skin.detection.untouched": "skin skin.detection",
     "skin.diagnosis": "skin",
     "skin.field": "",
@@ -58,7 +59,8 @@ MAY_IMPORT: dict[str, str] = {
     "robot.sim.ports": "robot.sim robot.sim.motion robot.sim.urscript robot.arm robot.ur geometry",
     "robot.sim.urscript": "geometry",
     "scene": "scene.tables robot.arm robot.driver robot.guard robot.guard.heartbeats robot.guard.motion "
-    "robot.guard.speed robot.reaction robot.stop skin skin.detection skin.sources skin.virtual geometry",
+    "robot.guard.speed robot.reaction robot.stop skin skin.detection skin.detection.place skin.sources skin.virtual "
+    "geometry",
     "scene.tables": "scene robot.arm robot.reaction robot.stop skin skin.detection skin.sources skin.virtual geometry",
     "calibration": "commissioning scene scene.tables session skin skin.detection geometry.drawing",
     "commissioning": "scene session robot.arm robot.driver skin skin.detection skin.sources geometry",
@@ -135,6 +137,7 @@ HOT = {
     "skin": "wire sensor",
     "skin/sources": "source serial_port kinds",
     "skin/detection": "stream detector reading timing events",
+    "skin/detection/place": "touch_place place_estimate single_contact seam_contact seam_certainty",
     "robot/arm": "kinematics compiled_kinematics damped_least_squares joint_limits",
     "robot/reaction": "retreat types",
     "robot/guard": "core skin_contacts arm_stop arm_supervisor loop ports outbox port_losses preconditions "

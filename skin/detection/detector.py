@@ -11,6 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from coneskin.errors import SensorError
+from coneskin.skin.detection.place.touch_place import TouchPlace
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.detection.untouched.guides import UntouchedGuides
 from coneskin.skin.detection.untouched.leak import UntouchedLeak
@@ -28,7 +29,6 @@ from .self_test import FrameSelfTest
 from .settings import DetectorSettings
 from .stuck_values import StuckValues
 from .timing import FrameTiming
-from .touch_place import TouchPlace
 from .touch_reading import TouchReading
 
 if TYPE_CHECKING:  # for replays only

@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
-from coneskin.skin.detection.matrix_noise import FrameNoise
+from coneskin.skin.detection.place.matrix_noise import FrameNoise
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.field.coupling import Coupling
 from coneskin.skin.field.disc import Disc

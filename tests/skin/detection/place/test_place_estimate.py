@@ -7,8 +7,8 @@ import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.contact_matrix import FrameInversion
-from coneskin.skin.detection.matrix_noise import FrameNoise
-from coneskin.skin.detection.place_estimate import PlaceEstimator, SheetConductances
+from coneskin.skin.detection.place.matrix_noise import FrameNoise
+from coneskin.skin.detection.place.place_estimate import PlaceEstimator, SheetConductances
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet

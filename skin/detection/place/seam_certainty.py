@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
+from coneskin.skin.detection.contact_matrix import ContactMatrix
+from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 
-from .contact_matrix import ContactMatrix
 from .doubt import CONTRADICTS, MOVES
 from .matrix_noise import MatrixNoise
 from .place_estimate import PlaceEstimator, SheetConductances
 from .seam_contact import SeamPlace, SeamTest
-from .settings import DetectorSettings
 
 __all__ = ["SeamCertainty"]
 

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from coneskin.skin.detection.contact_matrix import ContactMatrix
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
-
-from .contact_matrix import ContactMatrix
 
 __all__ = ["FrameNoise", "MatrixNoise"]
 

@@ -11,22 +11,22 @@ from __future__ import annotations
 
 import math
 
+from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
+from coneskin.skin.detection.reading import Reading
+from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.touch_reading import TouchReading
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.detection.untouched.leak import UntouchedLeak
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
-from .contact_matrix import ContactMatrix, FrameInversion
 from .doubt import CONTRADICTS, MOVES, WEAK
 from .matrix_mean import LONGEST, MatrixMean
 from .matrix_noise import FrameNoise, MatrixNoise
 from .place_estimate import PlaceEstimate, PlaceEstimator, SheetConductances
-from .reading import Reading
 from .seam_certainty import SeamCertainty
 from .seam_contact import SeamPlace
-from .settings import DetectorSettings
 from .single_contact import SingleContactTest
-from .touch_reading import TouchReading
 from .touch_velocity import TouchVelocity
 
 __all__ = ["TouchPlace"]

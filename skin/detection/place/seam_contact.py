@@ -16,12 +16,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from coneskin.skin.detection.contact_matrix import ContactMatrix
+from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 
-from .contact_matrix import ContactMatrix
 from .matrix_noise import MatrixNoise
 from .place_estimate import PlaceEstimator, SheetConductances
-from .settings import DetectorSettings
 from .single_contact import DANGEROUS_ANGLE
 
 __all__ = ["SeamPlace", "SeamTest"]

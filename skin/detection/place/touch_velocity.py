@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from .contact_matrix import ContactMatrix
+from coneskin.skin.detection.contact_matrix import ContactMatrix
+
 from .matrix_noise import MatrixNoise
 from .place_estimate import PlaceEstimator
 

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import math
 
+from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
+from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
-
-from .contact_matrix import ContactMatrix, FrameInversion
-from .settings import DetectorSettings
 
 __all__ = ["DANGEROUS_ANGLE", "SingleContactTest", "frames_until_certain", "weakest_pair_excluded"]
 

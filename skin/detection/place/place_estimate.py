@@ -18,10 +18,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from coneskin.skin.detection.contact_matrix import ContactMatrix
 from coneskin.skin.robin_function import RobinFunction
 from coneskin.skin.sensor import Sensor
 
-from .contact_matrix import ContactMatrix
 from .dipole_strength import DipoleStrength, weigh_dipole
 from .matrix_noise import MatrixNoise
 

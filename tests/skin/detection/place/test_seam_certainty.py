@@ -6,10 +6,10 @@ import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.contact_matrix import ContactMatrix
-from coneskin.skin.detection.doubt import CONTRADICTS, MOVES
-from coneskin.skin.detection.place_estimate import PlaceEstimator
-from coneskin.skin.detection.seam_certainty import SeamCertainty
-from coneskin.skin.detection.seam_contact import SeamPlace
+from coneskin.skin.detection.place.doubt import CONTRADICTS, MOVES
+from coneskin.skin.detection.place.place_estimate import PlaceEstimator
+from coneskin.skin.detection.place.seam_certainty import SeamCertainty
+from coneskin.skin.detection.place.seam_contact import SeamPlace
 from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 

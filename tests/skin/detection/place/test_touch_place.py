@@ -10,11 +10,11 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import TouchBegan, TouchMoved
-from coneskin.skin.detection.place_estimate import PlaceEstimator
+from coneskin.skin.detection.place.place_estimate import PlaceEstimator
+from coneskin.skin.detection.place.single_contact import SingleContactTest
+from coneskin.skin.detection.place.touch_place import TouchPlace
 from coneskin.skin.detection.reading import read
 from coneskin.skin.detection.settings import DetectorSettings
-from coneskin.skin.detection.single_contact import SingleContactTest
-from coneskin.skin.detection.touch_place import TouchPlace
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.detection.untouched.leak import UntouchedLeak
 from coneskin.skin.electronics import Electronics, Polarity
@@ -23,7 +23,7 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.wire import Frame
 
-from ..bench_top import UR10, measured
+from ...bench_top import UR10, measured
 
 SENSOR = Sensor(UR10, name="forearm")
 COUNTS = Frame._fields[6:-1]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .contact_matrix import ContactMatrix
+from coneskin.skin.detection.contact_matrix import ContactMatrix
+
 from .matrix_noise import MatrixNoise
 
 __all__ = ["LONGEST", "MatrixMean"]
