@@ -20,8 +20,9 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
 
 from .contradictions import Contradictions
-from .events import SkinEvent, SkinFault
+from .events import SkinEvent
 from .fault_diagnosis import DIAGNOSED, FaultDiagnosis
+from .fault_reports import FaultReports
 from .faults import Fault
 from .reading import read
 from .reported_touch import ReportedTouch
@@ -50,7 +51,6 @@ class Detector:
         sensor: the sensor.
         ready: a run of valid untouched frames was seen, and no fault since: silence now means "no touch".
         touched: a touch lasts.
-        fault: why the sensor cannot be believed at present, or None.
         reading_now: the newest valid frame while the sensor is touched, else None.
         timing: sequence and clocks; counts of what was missing.
     """
@@ -62,6 +62,7 @@ class Detector:
         "_contradictions",
         "_currents",
         "_diagnosis",
+        "_faults",
         "_fed",
         "_guides",
         "_lasting",
@@ -70,12 +71,10 @@ class Detector:
         "_places",
         "_quiet",
         "_release",
-        "_reported",
         "_self_test",
         "_stuck",
         "_told",
         "_touch",
-        "fault",
         "reading_now",
         "ready",
         "sensor",
@@ -94,13 +93,12 @@ class Detector:
             )
         self.timing = FrameTiming(self.settings.timing)
         self.ready = self.touched = False
-        self.fault: Fault | None = None
         self.reading_now: TouchReading | None = None
-        self._reported: set[Fault | str] = set()
         self._fed = -math.inf
         self._currents = UntouchedCurrents(sensor, self.settings.current_drift)
         self._guides = UntouchedGuides(self._currents)
         self._diagnosis = FaultDiagnosis(sensor, self._currents)
+        self._faults = FaultReports(sensor.name, self._diagnosis)
         self._touch, self._release = sensor.thresholds.touch_level, sensor.thresholds.release_level
         self._level = UntouchedLevel(self.settings, self._release)
         self._stuck = StuckValues(self.settings.stuck_frames)
@@ -183,6 +181,11 @@ class Detector:
         return events
 
     @property
+    def fault(self) -> Fault | None:
+        """Why the sensor cannot be believed at present; None where it can."""
+        return self._faults.present
+
+    @property
     def baseline(self) -> float:
         """Drift of the untouched level that is taken off."""
         return self._level.value
@@ -192,8 +195,8 @@ class Detector:
         """True while a quiet frame changes nothing but what is learned, which ``learn`` does."""
         waiting = (
             self.touched
-            or self.fault
-            or self._reported
+            or self._faults.present
+            or self._faults.reported
             or self._above
             or self._contradictions.count
             or self._diagnosis.active
@@ -245,7 +248,7 @@ class Detector:
         """
         age = self.timing.age(now)
         events: list[SkinEvent] = []
-        if age > longest and (self.fault is None or now - self._fed > longest):
+        if age > longest and (self._faults.present is None or now - self._fed > longest):
             frame_clock, sequence = self.timing.clock_us, self.timing.sequence
             detail = f"{age * 1e3:.1f} ms" if math.isfinite(age) else "none at all"
             self._put_fault(events, Fault.SILENT, now, frame_clock, sequence, detail)
@@ -271,8 +274,8 @@ class Detector:
         if changed is not None:
             self._report(events, changed[0], frame, now, changed[1])
         if self._quiet >= settings.settle_frames and self._currents.frames:
-            self.ready, self.fault = True, None
-            self._reported.clear()
+            self.ready = True
+            self._faults.forget()
         self._level.follow(level, self.timing.period)
 
     def _before_touch(self, events: list[SkinEvent], touch: TouchReading) -> None:
@@ -325,11 +328,5 @@ class Detector:
     ) -> None:
         self._quiet = self._above = 0
         self._currents.restart()
-        if fault in DIAGNOSED:
-            fault = self._diagnosis.rename(fault)
         self.ready = False
-        self.fault = fault
-        told = detail if detail and detail == self._diagnosis.words else fault
-        if told not in self._reported:  # each once until the sensor is ready again, though they may alternate
-            self._reported |= {told, fault}
-            events.append(SkinFault(self.sensor.name, now, clock_us, sequence, fault, detail))
+        self._faults.add(events, fault, now, clock_us, sequence, detail)
