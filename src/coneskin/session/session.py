@@ -10,7 +10,7 @@ channel. The death of a child shows as the end of its channel, and ends in a sto
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -30,12 +30,12 @@ from .deferred_interrupt import defer_interrupts
 from .event_log import EventLog, discard_recording, new_recording
 from .fallback_stop import FallbackStop
 from .guard_monitor import GuardMonitor
+from .manual_reset import ManualReset, latched_stop
 from .outcome import (
     activation_error,
     await_outcome,
     braking_time,
     exit_error,
-    reasons,
     stands,
     stop_error,
 )
@@ -112,7 +112,7 @@ class Session:
         self._heartbeat: ProgramHeartbeat | None = None
         self._processes = ChildProcesses()
         self._arm: ArmClient | None = None
-        self._requests = 0  # resets, each of which has a number
+        self._reset = ManualReset(self._send_guard)
 
     @property
     def events(self) -> list[GuardEvent]:
@@ -196,27 +196,13 @@ class Session:
             RobotConnectionError: the guard hangs, or is gone.
         """
         self.check_guard()
-        if stop is None:
-            stop = self.latched_stop
-        if stop == 0:
-            raise RobotRefused("reset refused: no stop that has latched the arm was reported to this program")
-        self._requests += 1
-        request, seen = self._requests, len(self._log.events)
-        assert self._processes.guard is not None
-        self._processes.guard.send(b"reset %d %d" % (stop, request))
-        answers = (EventName.ACTIVATED, EventName.REFUSED)
-        event = self._log.wait_for(answers, timeout, seen, lambda event: event.details.get("request") == request)
-        if event is None or event.name != EventName.ACTIVATED:
-            listed = ["the guard did not become active in time"] if event is None else reasons(event)
-            line = self._log.line.describe(self.scene, listed)
-            why = "; ".join([*([line] if line else []), *listed])
-            raise RobotRefused(f"reset refused: {why}")
+        stop = self.latched_stop if stop is None else stop
+        self._reset.request(self._log, stop, timeout, self._describe_line)
 
     @property
     def latched_stop(self) -> int:
         """Number of the newest stop that has latched the arm and was reported to this program; 0 before the first."""
-        latched = (event for event in reversed(self._log.events) if event.name == EventName.LATCHED)
-        return next((int(event.details["stop"]) for event in latched), 0)
+        return latched_stop(self._log.events)
 
     def touch(self, u: float, phi: float, force: float = 5.0, duration: float = 0.3, sensor: str | int = "") -> float:
         """Touch the scene's virtual skin now.
@@ -292,6 +278,14 @@ class Session:
         if self._on_event is not None:
             self._on_event(event)
 
+    def _describe_line(self, reasons: Sequence[str]) -> str:
+        """Return what is wrong with the skin's line, given why the guard waits or refuses."""
+        return self._log.line.describe(self.scene, reasons)
+
+    def _send_guard(self, message: bytes) -> None:
+        assert self._processes.guard is not None
+        self._processes.guard.send(message)
+
     # ---- how it starts
 
     def _open(self) -> None:
@@ -314,7 +308,7 @@ class Session:
             self._arm = UrRtdeArm(program, self.check, arm_model(scene.arm.model), scene.arm.host)
         elif scene.arm is not None:
             fallback = FallbackStop(scene)
-        self._monitor = GuardMonitor(self._log, channel, fallback, lambda why: self._log.line.describe(scene, why))
+        self._monitor = GuardMonitor(self._log, channel, fallback, self._describe_line)
         self._monitor.start()
         self._heartbeat = ProgramHeartbeat(channel)
         self._heartbeat.start()
@@ -331,4 +325,4 @@ class Session:
                 self.wait_for((EventName.FAULT, EventName.GUARD_EXITED), _REASON_TIMEOUT)
                 break
         self.check_guard()
-        raise activation_error(self._log.events, lambda why: self._log.line.describe(self.scene, why))
+        raise activation_error(self._log.events, self._describe_line)
