@@ -1,4 +1,4 @@
-"""Adapter of the ur_rtde wheel: the only file that imports it. It runs in the driver process and nowhere else.
+"""Motions of a UR arm by the ur_rtde wheel. They run in the driver process and nowhere else.
 
 The wheel can block a call for 301 s, report success for what never ran, and end the process (docs/safety.md). So no
 stop depends on it: the guard monitors measured joint speed and has other stop paths.
@@ -14,14 +14,13 @@ What is avoided here, and why:
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from enum import Enum
-from typing import Any
 
-from coneskin.errors import MissingExtra, RobotConnectionError, RobotRefused
+from coneskin.errors import RobotRefused
 from coneskin.robot.driver.waypoint import Waypoint
+
+from .control_program import ControlProgram, rtde_errors
 
 __all__ = [
     "MIN_ACCELERATION",
@@ -38,11 +37,8 @@ SERVO_DECELERATION = 2.0  #: rad/s2, of the stop before servo positions
 MIN_ACCELERATION = 0.1  #: rad/s2 or m/s2
 _STOP_MARGIN = 0.3  # s for a stop to begin and to be confirmed
 _FASTEST = 3.5  # rad/s, of any joint; a stop takes this divided by the deceleration at most
-_START_TIMEOUT = 2.0  # s for the control program to start; ur_rtde itself allows 5
 _NO_TOOL = [0.0, 0.0, 1e-12, 0.0, 0.0, 0.0]  # m and rad; the wheel sends a packet of a wrong size for exact zeros
 _LONGEST_STOP = 3.0  # s; ur_rtde waiting longer for a stop counts as a hang, however gentle the stop is
-_REGISTER_DELAY = 0.02  # s, ten control cycles, until a register that was written has surely been read
-
 
 #: questions to the controller that move nothing, by the wheel's names
 QUESTIONS = (
@@ -67,20 +63,6 @@ class Mode(Enum):
     SERVO = "servo"
 
 
-@contextmanager
-def rtde_errors(doing: str) -> Iterator[None]:
-    """Convert the wheel's errors: it raises bare RuntimeError for everything.
-
-    Raises:
-        RobotConnectionError: the wheel raised while doing this.
-    """
-    try:
-        yield
-    except RuntimeError as exc:
-        why = "another program controls the arm, a second coneskin perhaps" if "already in use" in str(exc) else exc
-        raise RobotConnectionError(f"{doing}: {why}") from exc
-
-
 class UrArm:
     """Arm behind RTDEControlInterface; open it in a ``with``.
 
@@ -96,62 +78,29 @@ class UrArm:
     def __init__(self, host: str, watchdog_hz: float) -> None:
         self.host = host
         self.mode = Mode.IDLE
-        self._watchdog_hz = watchdog_hz
-        self._control: Any = None
-        self._wheel: Any = None
+        self._program = ControlProgram(host, watchdog_hz)
 
     def __enter__(self) -> UrArm:
-        try:
-            import rtde_control  # type: ignore[import-not-found,unused-ignore]
-        except ImportError as exc:
-            raise MissingExtra("ur-rtde", "moving a UR arm (wheels exist for Python 3.11 and 3.12)") from exc
-        self._wheel = rtde_control
-        with rtde_errors(f"connecting ur_rtde to {self.host}"):
-            self._control = rtde_control.RTDEControlInterface(self.host)
-            if not self._control.setWatchdog(self._watchdog_hz):
-                raise RobotRefused(f"the controller {self.host} did not accept a watchdog of {self._watchdog_hz:g} Hz")
+        self._program.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._control is not None:
-            control, self._control = self._control, None
-            with rtde_errors(f"disconnecting from {self.host}"):
-                control.stopScript()
-                control.disconnect()
+        self._program.__exit__()
 
     def kick(self) -> None:
         """Kick the controller's watchdog: this process is alive."""
-        with rtde_errors("kicking the controller's watchdog"):
-            if self._control.isProgramRunning():
-                self._control.kickWatchdog()
+        self._program.kick()
 
     def revive(self) -> None:
         """Start the control program again where something else has ended it; the arm does not move meanwhile.
-
-        The register of the last command is still there, and a new program would execute it at once: after speedJ the
-        arm would start by itself. So command 0 is written first: a kick without a program does nothing else.
 
         Raises:
             RobotRefused: the controller does not start it.
         """
         with rtde_errors("starting the control program again"):
-            if self._control.isProgramRunning():
-                return
-            self.mode = Mode.IDLE
-            self._control.kickWatchdog()
-            time.sleep(_REGISTER_DELAY)
-            running = self._control.reuploadScript() and self._await_program(_START_TIMEOUT)
-            if not (running and self._control.setWatchdog(self._watchdog_hz)):
-                raise RobotRefused(f"the controller {self.host} does not start ur_rtde's program again")
-
-    def _await_program(self, seconds: float) -> bool:
-        """Wait for the control program to run: uploading it only sends it."""
-        end = time.monotonic() + seconds
-        while not self._control.isProgramRunning():
-            if time.monotonic() > end:
-                return False
-            time.sleep(0.005)
-        return True
+            if not self._program.runs:
+                self.mode = Mode.IDLE
+                self._program.restart()
 
     def move_j(self, q: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a move in joint space to q [rad], with the leading joint's speed [rad/s] and acceleration [rad/s2].
@@ -160,7 +109,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._end_streaming(acceleration)
-        self._started(self._control.moveJ(list(q), speed, acceleration, True), "moveJ", Mode.MOVE)
+        self._started(self._program.calls.moveJ(list(q), speed, acceleration, True), "moveJ", Mode.MOVE)
 
     def move_l(self, pose: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a straight move of the tool to a pose (x, y, z [m], rotation vector [rad]), in m/s and m/s2.
@@ -169,7 +118,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._end_streaming(MOVE_L_DECELERATION)
-        self._started(self._control.moveL(list(pose), speed, acceleration, True), "moveL", Mode.MOVE)
+        self._started(self._program.calls.moveL(list(pose), speed, acceleration, True), "moveL", Mode.MOVE)
 
     def move_l_fk(self, q: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a straight move of the tool to where it is at joint positions q [rad]; as ``move_l``.
@@ -178,7 +127,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._end_streaming(MOVE_L_DECELERATION)
-        self._started(self._control.moveL_FK(list(q), speed, acceleration, True), "moveL_FK", Mode.MOVE)
+        self._started(self._program.calls.moveL_FK(list(q), speed, acceleration, True), "moveL_FK", Mode.MOVE)
 
     def move_j_ik(self, pose: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a move in joint space to a pose of the tool (x, y, z [m], rotation vector [rad]); as ``move_j``.
@@ -187,7 +136,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._end_streaming(acceleration)
-        self._started(self._control.moveJ_IK(list(pose), speed, acceleration, True), "moveJ_IK", Mode.MOVE)
+        self._started(self._program.calls.moveJ_IK(list(pose), speed, acceleration, True), "moveJ_IK", Mode.MOVE)
 
     def move_path(self, waypoints: Sequence[Waypoint]) -> None:
         """Start a move along way points. It takes some 0.1 s before the arm moves, in which nothing can be stopped.
@@ -197,15 +146,15 @@ class UrArm:
             ValueError: a speed, an acceleration or a blend is not within the wheel's limits.
         """
         self._end_streaming(MOVE_L_DECELERATION)
-        entry, path = self._wheel.PathEntry, self._wheel.Path()
+        entry, path = self._program.wheel.PathEntry, self._program.wheel.Path()
         for point in waypoints:
             kind = {"j": entry.MoveJ, "l": entry.MoveL, "p": entry.MoveP}[point.kind]
             position = entry.PositionJoints if point.joints else entry.PositionTcpPose
             values = [*point.target, point.speed, point.acceleration, point.blend]
             path.addEntry(entry(kind, position, values))
         with rtde_errors("movePath"):
-            self._started(self._control.movePath(path, True), "movePath", Mode.MOVE)
-            if not self._control.setWatchdog(self._watchdog_hz):
+            self._started(self._program.calls.movePath(path, True), "movePath", Mode.MOVE)
+            if not self._program.set_watchdog():
                 self.stop(MOVE_L_DECELERATION)
                 raise RobotRefused(f"the controller {self.host} did not take the watchdog of a path: it was stopped")
 
@@ -234,7 +183,7 @@ class UrArm:
         if self.mode not in (Mode.IDLE, Mode.SPEED):  # a speed thread beside another live thread aborts the program
             self.stop(acceleration, at_once=False)
         # one cycle: without a time URScript's speedj returns when the speed is reached, and takes no new target before
-        self._started(self._control.speedJ(list(qd), acceleration, 0.002), "speedJ", Mode.SPEED)
+        self._started(self._program.calls.speedJ(list(qd), acceleration, 0.002), "speedJ", Mode.SPEED)
 
     def speed_l(self, twist: Sequence[float], acceleration: float) -> None:
         """Move the tool at a velocity [m/s, rad/s] until the next command, with an acceleration [m/s2].
@@ -244,7 +193,7 @@ class UrArm:
         """
         if self.mode not in (Mode.IDLE, Mode.SPEED):
             self.stop(MOVE_L_DECELERATION, at_once=False)
-        self._started(self._control.speedL(list(twist), acceleration, 0.002), "speedL", Mode.SPEED)
+        self._started(self._program.calls.speedL(list(twist), acceleration, 0.002), "speedL", Mode.SPEED)
 
     def servo_j(self, q: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
         """Follow joint positions q [rad], one each control cycle.
@@ -253,7 +202,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._begin_servo()
-        self._started(self._control.servoJ(list(q), 0.0, 0.0, 0.002, lookahead, gain), "servoJ", Mode.SERVO)
+        self._started(self._program.calls.servoJ(list(q), 0.0, 0.0, 0.002, lookahead, gain), "servoJ", Mode.SERVO)
 
     def servo_l(self, pose: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
         """Follow poses of the tool (x, y, z [m], rotation vector [rad]), one each control cycle.
@@ -262,7 +211,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._begin_servo()
-        self._started(self._control.servoL(list(pose), 0.0, 0.0, 0.002, lookahead, gain), "servoL", Mode.SERVO)
+        self._started(self._program.calls.servoL(list(pose), 0.0, 0.0, 0.002, lookahead, gain), "servoL", Mode.SERVO)
 
     def moving(self) -> bool:
         """Tell whether a move that was started here still runs; False in the other modes."""
@@ -273,7 +222,7 @@ class UrArm:
         if self.mode is not Mode.MOVE:
             return None
         with rtde_errors("asking for progress"):
-            status = self._control.getAsyncOperationProgressEx()
+            status = self._program.calls.getAsyncOperationProgressEx()
             if status.isAsyncOperationRunning():
                 return int(status.progress())
         self.mode = Mode.IDLE
@@ -294,9 +243,9 @@ class UrArm:
         self._stand_for(name)
         with rtde_errors(name):
             if name == "getForwardKinematics" and values:
-                tool = list(values[1]) if len(values) > 1 else self._control.getTCPOffset()  # type: ignore[call-overload]
+                tool = list(values[1]) if len(values) > 1 else self._program.calls.getTCPOffset()  # type: ignore[call-overload]
                 values = (values[0], tool if any(tool) else _NO_TOOL)
-            return getattr(self._control, name)(*values)
+            return getattr(self._program.calls, name)(*values)
 
     def stop(self, deceleration: float, at_once: bool = True) -> None:
         """Stop what was started here, by the stop of its mode, and wait until the wheel returns.
@@ -312,20 +261,20 @@ class UrArm:
         mode, self.mode = self.mode, Mode.IDLE
         if not at_once and mode is not Mode.IDLE:
             with rtde_errors("stopping"):
-                self._control.setWatchdog(min(self._watchdog_hz, 1.0 / stop_time(deceleration)))
+                self._program.set_watchdog(stop_time(deceleration))
                 self._stop(mode, deceleration)
-                self._control.setWatchdog(self._watchdog_hz)
+                self._program.set_watchdog()
             return
         with rtde_errors("stopping"):
             self._stop(mode, deceleration)
 
     def _stop(self, mode: Mode, deceleration: float) -> None:
         if mode is Mode.SPEED:
-            self._control.speedStop(deceleration)
+            self._program.calls.speedStop(deceleration)
         elif mode is Mode.SERVO:
-            self._control.servoStop(deceleration)
+            self._program.calls.servoStop(deceleration)
         else:  # also when idle: a move may have been started by a call whose answer was lost
-            self._control.stopJ(deceleration)
+            self._program.calls.stopJ(deceleration)
 
     def _end_streaming(self, deceleration: float) -> None:
         if self.mode is not Mode.IDLE:
@@ -344,7 +293,7 @@ class UrArm:
         """Call a setter of the wheel."""
         self._stand_for(name)
         with rtde_errors(name):
-            accepted = getattr(self._control, name)(*values)
+            accepted = getattr(self._program.calls, name)(*values)
         if not accepted:
             raise RobotRefused(f"the controller {self.host} did not take {name}{values}")
 
