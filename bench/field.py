@@ -33,7 +33,8 @@ import numpy as np
 from field_tables import Run, draw, print_agreement, print_table, print_work, show_time
 from report import head
 
-from coneskin.testing.field.problems import Problem, port_solution
+from coneskin.testing.field.port_solution import port_solution
+from coneskin.testing.field.problems import Problem
 from coneskin.testing.field.reference import Reference, load_references, provenance
 from coneskin.testing.field.solution import solve_discs, solve_general
 

@@ -20,12 +20,12 @@ from pathlib import Path
 import numpy as np
 
 from coneskin.testing.field.ngsolve_peer import solve
+from coneskin.testing.field.port_solution import port_solution
 from coneskin.testing.field.problems import (
     Array,
     Problem,
     general_problems,
     hard_problems,
-    port_solution,
     random_problems,
     standard_problems,
 )

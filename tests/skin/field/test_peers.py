@@ -20,7 +20,8 @@ import pytest
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.maps import FieldMap
-from coneskin.testing.field.problems import port_solution, random_problems, standard_problems
+from coneskin.testing.field.port_solution import port_solution
+from coneskin.testing.field.problems import random_problems, standard_problems
 from coneskin.testing.field.reference import PATH, Reference, load_references, provenance
 from coneskin.testing.field.solution import field_model, solve_discs, solve_general
 

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from .problems import Array, CircularPatch, PeerSolution, Problem
+from .port_solution import PeerSolution
+from .problems import Array, CircularPatch, Problem
 
 __all__ = ["LIMITS", "NAME", "make_mesh", "solve"]
 

@@ -14,7 +14,8 @@ import time
 
 import numpy as np
 
-from .problems import PeerSolution, Problem
+from .port_solution import PeerSolution
+from .problems import Problem
 from .skfem_peer import FlatMesh, make_mesh
 
 __all__ = ["LIMITS", "NAME", "make_mesh", "solve"]

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .problems import Array, CircularPatch, EllipticPatch, PortSolution, Problem, port_solution
+from .port_solution import PortSolution, port_solution
+from .problems import Array, CircularPatch, EllipticPatch, Problem
 
 __all__ = ["PATH", "Reference", "encode_reference", "load_references", "provenance"]
 

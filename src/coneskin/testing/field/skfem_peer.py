@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from .problems import Array, PeerSolution, Problem
+from .port_solution import PeerSolution
+from .problems import Array, Problem
 
 __all__ = ["LIMITS", "NAME", "FlatMesh", "make_mesh", "solve"]
 

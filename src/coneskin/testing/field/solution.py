@@ -11,7 +11,8 @@ from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.patch import ContactPatch, solve_patch
 from coneskin.skin.field.sheet import SectorSheet
 
-from .problems import Array, CircularPatch, PortSolution, Problem
+from .port_solution import PortSolution
+from .problems import Array, CircularPatch, Problem
 
 __all__ = ["contact_patch", "disc_arrays", "field_model", "solve_discs", "solve_general"]
 
