@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.ray_casting import RayCaster
 
-__all__ = ["DeviationBand", "deviation_bands"]
+__all__ = ["BAND_COLOURS", "HOLE_COLOUR", "DeviationBand", "deviation_bands"]
 
-#: from the mesh far below the side, over on it, to far above
-_COLOURS = (
+#: of a deviation, from the mesh far below the side, over on it, to far above
+BAND_COLOURS = (
     (33, 102, 172),
     (103, 169, 207),
     (176, 214, 205),
@@ -25,7 +25,7 @@ _COLOURS = (
     (239, 138, 98),
     (178, 24, 43),
 )
-_HOLE = (90, 90, 90)
+HOLE_COLOUR = (90, 90, 90)  #: of what spans a hole
 _ROWS, _COLUMNS = 40, 96
 _ABOVE = 0.0004  # m; so that the mesh does not shine through
 
@@ -66,16 +66,16 @@ def deviation_bands(rays: RayCaster, placed: PlacedFrustum, tolerance: float) ->
     corners = (points + _ABOVE * normals).reshape(-1, 3)
     index = np.arange(len(corners)).reshape(_ROWS + 1, _COLUMNS + 1)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    limits = tolerance * np.linspace(-1.0, 1.0, len(_COLOURS) + 1)
+    limits = tolerance * np.linspace(-1.0, 1.0, len(BAND_COLOURS) + 1)
     hole = ~np.isfinite(heights) | (heights < -tolerance)
-    band = np.clip(np.searchsorted(limits, heights) - 1, 0, len(_COLOURS) - 1)
-    band[hole] = len(_COLOURS)
+    band = np.clip(np.searchsorted(limits, heights) - 1, 0, len(BAND_COLOURS) - 1)
+    band[hole] = len(BAND_COLOURS)
     found = []
-    for number, colour in enumerate((*_COLOURS, _HOLE)):
+    for number, colour in enumerate((*BAND_COLOURS, HOLE_COLOUR)):
         here = band == number
         if not here.any():
             continue
-        low, high = (np.nan, np.nan) if number == len(_COLOURS) else (limits[number], limits[number + 1])
+        low, high = (np.nan, np.nan) if number == len(BAND_COLOURS) else (limits[number], limits[number + 1])
         faces = np.concatenate(
             [np.column_stack([a[here], b[here], c[here]]), np.column_stack([a[here], c[here], d[here]])]
         )

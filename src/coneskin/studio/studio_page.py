@@ -12,22 +12,23 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.design.link import LinkMesh, load_link
-from coneskin.design.sheets import SheetDesign
 from coneskin.errors import ConeSkinError
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.view.page_server import PageServer
 from coneskin.view.stage_nodes import light_plainly
 
-from .design_text import design_facts, flat_drawing, warning_list
+from .design_text import design_facts, flat_drawing, legend, warning_list
 from .deviation_bands import deviation_bands
+from .electrode_marks import ELECTRODE_COLOURS, electrode_marks
+from .first_view import first_view
 from .workbench import Handles, Workbench
 
 __all__ = ["StudioPage"]
 
 _LINK = (205, 208, 214)
-_ELECTRODES = {"A": (220, 38, 38), "B": (217, 119, 6), "C": (37, 99, 235), "D": (13, 148, 136)}
 _SUFFIXES = {".stl", ".obj", ".dae", ".ply"}
-_LEGEND = "Green: the sheet lies on the link. Red: the link stands out. Blue: it is below. Grey: a hole is spanned."
+_LETTER = 1.6  # of viser's own size of letters, 12 pixels
+_SHOWN_FIRST = "lower conductive"  # layer of the flat drawing that says most
 _STEP = 0.5  # mm and deg of the handles
 
 
@@ -54,9 +55,9 @@ class StudioPage:
         self._lock = threading.Lock()  # the page's callbacks come from several threads
         self._handles: list[Any] = []
         gui = server.gui
-        gui.add_html(f'<div style="font-size:12px;margin:4px 10px">{_LEGEND}</div>')
+        self._legend = gui.add_html("")
         self._said = gui.add_html("")
-        self._upload = gui.add_upload_button("another link (STL, OBJ, DAE, PLY)", mime_type="*/*")
+        self._upload = gui.add_upload_button("another link (STL, OBJ, DAE, PLY), or drop it here", mime_type="*/*")
         self._upload.on_upload(lambda _event: self._take_upload())
         self._layer = gui.add_dropdown("layer", ["none"], initial_value="none")
         self._layer.on_update(lambda _event: self._draw_flat())
@@ -76,12 +77,9 @@ class StudioPage:
         scene.set_up_direction("+z")
         light_plainly(scene)
         vertices = bench.link.mesh.vertices
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        middle, size = 0.5 * (low + high), float((high - low).max())
-        self._server.look_from(
-            (float(middle[0] + 1.1 * size), float(middle[1] - 0.95 * size), float(middle[2] + 0.55 * size)),
-            (float(middle[0]), float(middle[1]), float(middle[2])),
-        )
+        self._rays = RayCaster(bench.link.mesh)
+        self._server.look_from(*first_view(bench.designs, self._rays, vertices))
+        self._legend.content = legend(bench.fit.tolerance)
         scene.add_mesh_simple(
             "/link",
             vertices.astype("float32"),
@@ -98,7 +96,6 @@ class StudioPage:
         with self._folder_of_handles:
             for number, sheet in enumerate(bench.fit.sheets):
                 self._handles += self._handles_of(gui, number, sheet.frustum.height, sheet.frustum.wrap)
-        self._rays = RayCaster(bench.link.mesh)
         self._draw()
 
     def _handles_of(self, gui: Any, number: int, height: float, wrap: float) -> list[Any]:
@@ -140,13 +137,24 @@ class StudioPage:
                         cast_shadow=False,
                         receive_shadow=False,
                     )
-                for letter, points in electrode_lines(design).items():
-                    scene.add_line_segments(f"{name}/{letter}", points, colors=_ELECTRODES[letter], thickness=0.002)
+                for mark in electrode_marks(design):
+                    colour, line = ELECTRODE_COLOURS[mark.letter], f"{name}/{mark.letter}"
+                    scene.add_line_segments(line, mark.segments, colors=colour, thickness=0.002)
+                    for place, at in enumerate(mark.letters.tolist()):
+                        scene.add_label(
+                            f"{line}/letter {place}",
+                            mark.letter,
+                            position=at,
+                            font_screen_scale=_LETTER,
+                            depth_test=True,
+                            anchor="center-center",
+                        )
         self._facts.content = design_facts(bench.designs)
         self._warnings.content = warning_list(bench.warnings() or ([bench.fit.reason] if bench.fit.reason else []))
         layers = [f"{design.name}: {cut.name}" for design in bench.designs for cut in design.cuts] or ["none"]
         if list(self._layer.options) != layers:
             self._layer.options = layers
+            self._layer.value = next((layer for layer in layers if layer.endswith(_SHOWN_FIRST)), layers[0])
         self._draw_flat()
 
     def _draw_flat(self) -> None:
@@ -205,23 +213,3 @@ class StudioPage:
 def _note(name: str, text: str) -> str:
     """Return a line for the panel, with a name by which a browser finds it."""
     return f'<div id="{name}" style="font-size:13px;margin:4px 10px"><b>{escape(text)}</b></div>'
-
-
-def electrode_lines(design: SheetDesign) -> dict[str, Any]:
-    """Return the middle lines of the electrodes on the side of a sheet, as line segments [m], by their letters."""
-    import numpy as np
-
-    side, box, half = design.place.frustum, design.layout.field, 0.5 * design.layout.plan.electrode
-    turn = half / min(side.radius1, side.radius2)
-    along, around = np.linspace(box.u1, box.u2, 20), np.linspace(box.phi1, box.phi2, 90)
-    found = {}
-    for letter, u, phi in (
-        ("B", np.full(90, box.u1 - half), around),
-        ("A", np.full(90, box.u2 + half), around),
-        ("D", along, np.full(20, box.phi1 - turn)),
-        ("C", along, np.full(20, box.phi2 + turn)),
-    ):
-        points, normals = design.place.place(u, phi)
-        points = (points + 0.001 * normals).astype("float32")
-        found[letter] = np.stack([points[:-1], points[1:]], axis=1)
-    return found

@@ -16,6 +16,7 @@ from typing import Any
 from coneskin.errors import ConeSkinError, MissingExtra
 
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
+from .file_drop import with_file_drop
 from .software_drawing import with_plain_edges
 
 __all__ = ["LOOPBACK", "PageServer", "page_client"]
@@ -78,7 +79,8 @@ class PageServer:
 
         hosts = LOOPBACK | {host} if host in LOOPBACK else None
         allowed = ALLOWED | UPLOADS if uploads else ALLOWED
-        self.gate = ConnectionGate(decode, hosts, page_client(), allowed, **({"largest": _UPLOAD} if uploads else {}))
+        page = with_file_drop(page_client()) if uploads else page_client()
+        self.gate = ConnectionGate(decode, hosts, page, allowed, **({"largest": _UPLOAD} if uploads else {}))
         _check_address(host)
         with _starting, _gated(self.gate), contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
