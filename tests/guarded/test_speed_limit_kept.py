@@ -6,6 +6,7 @@ import pytest
 import tomli_w
 
 from coneskin.scene.reader import load_scene, parse_scene
+from coneskin.scene.tables.speed_limit_check import limit_digest
 from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START
@@ -37,6 +38,7 @@ def limited_scene(simulated, folder):
     bare = parse_scene(text)
     (sensor,) = bare.sensors
     patch = {"sensor": sensor.sensor.name, "curve": 0, "any_curve": 0}
+    ends = 0.0, 1e3 * sensor.sensor.frustum.slant
     limit = {
         "format": 1,
         "fingerprint": limit_fingerprint(bare),
@@ -48,12 +50,11 @@ def limited_scene(simulated, folder):
         "measured_by": "a test",
         "reaction_ms": 10.0,
         "deceleration_rad_s2": 8.0,
-        "curves": 1,
-        "patches": 8,
         "levers_mm": [100.0, 200.0, 400.0],
         "curve": [{"region": "hand", "speeds_mm_s": [200.0, 200.0, 200.0]}],
-        "patch": [{**patch, "u_mm": u, "phi_deg": phi} for u in (0.0, 260.0) for phi in (0.0, 90.0, 180.0, 270.0)],
+        "patch": [{**patch, "u_mm": u, "phi_deg": phi} for u in ends for phi in (0.0, 90.0, 180.0, 270.0)],
     }
+    limit["digest"] = limit_digest(limit)
     (folder / "impact.toml").write_text(tomli_w.dumps({"speed_limit": limit}), encoding="utf-8")
     named = text.replace('model = "UR5e"', 'model = "UR5e"\nspeed_limit_from = "impact.toml"')
     (folder / "scene.toml").write_text(named, encoding="utf-8")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,12 +19,27 @@ from coneskin.scene.build import _speed_limit, build_core, place_on_arm
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.scene import Scene
 from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
+from coneskin.scene.tables.speed_limit_check import limit_digest
 from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.testing.forearm import forearm_scene
 
 SCENE = forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n"
 LIMITED = SCENE.replace('model = "UR5e"', 'model = "UR5e"\nspeed_limit_from = "impact.toml"')
 NAME = parse_scene(SCENE).sensors[0].sensor.name
+SLANT = 1e3 * parse_scene(SCENE).sensors[0].sensor.frustum.slant  # mm
+
+
+def patch(**changes: object) -> dict[str, object]:
+    return {"sensor": NAME, "u_mm": 0.0, "phi_deg": 0.0, "curve": 0, "any_curve": 0} | changes
+
+
+def around(*degrees: float) -> list[dict[str, object]]:
+    """Patches at both ends of the sheet."""
+    return [patch(u_mm=u, phi_deg=phi) for u in (0.0, SLANT) for phi in degrees]
+
+
+def curve(*speeds: float) -> dict[str, object]:
+    return {"curve": [{"region": "hand", "speeds_mm_s": list(speeds)}]}
 
 
 def table(**changes: object) -> dict[str, object]:
@@ -36,20 +54,16 @@ def table(**changes: object) -> dict[str, object]:
         "measured_by": "a test",
         "reaction_ms": 10.0,
         "deceleration_rad_s2": 9.0,
-        "curves": 1,
-        "patches": 8,
         "levers_mm": [100.0, 200.0, 400.0],
         "curve": [{"region": "hand", "speeds_mm_s": [50.0, 100.0, 200.0]}],
-        "patch": [
-            {"sensor": NAME, "u_mm": u, "phi_deg": phi, "curve": 0, "any_curve": 0}
-            for u in (0.0, 260.0)
-            for phi in (0.0, 90.0, 180.0, 270.0)
-        ],
+        "patch": around(0.0, 90.0, 180.0, 270.0),
     }
-    return {"speed_limit": values | changes}
+    values |= changes
+    return {"speed_limit": {"digest": limit_digest(values)} | values}
 
 
 def load(folder: Path, text: str = LIMITED, **changes: object) -> Scene:
+    """Load a scene with a table whose digest is right."""
     (folder / "impact.toml").write_text(tomli_w.dumps(table(**changes)), encoding="utf-8")
     (folder / "scene.toml").write_text(text, encoding="utf-8")
     return load_scene(folder / "scene.toml")
@@ -108,20 +122,65 @@ def test_a_slow_reaction_is_refused_beside_it(tmp_path: Path) -> None:
         ({"lowest_deg": [0.0] * 6}, "six numbers each, or none"),
         ({"levers_mm": [float("nan")]}, "levers_mm"),
         ({"fingerprint": 7}, "fingerprint must be text"),
+        ({"patch": [*around(0, 90, 180, 270), patch(curve=9)]}, "patch 8 needs a curve that there is, 0 to 0"),
+        ({"patch": [*around(0, 90, 180, 270), patch(any_curve=1)]}, "patch 8 needs a curve that there is"),
+        ({"patch": [patch(sensor="?")]}, rf"{NAME}: not in both the scene and the speeds"),
+        ({"patch": [*around(0, 90, 180, 270), patch(sensor="?")]}, r"[?]: not in both the scene and the speeds"),
+        ({"patch": [*around(0, 90, 180, 270), patch(u_mm=260.1)]}, "u_mm = 260.1 is off the sheet, .* at 260 mm"),
+        ({"patch": [patch(u_mm=0.0), patch(u_mm=130.0)]}, "no patch from 0 to 360 deg at its end u_mm = 0"),
+        ({"patch": around(0, 90, 180, 270)[:4]}, "no patch at its end u_mm = 260"),
+        ({"patch": around(0, 90, 180, 270)[4:]}, "no patch at its end u_mm = 0"),
+        ({"patch": around(0, 90, 180)}, "no patch from 180 to 360 deg at its end u_mm = 0"),
+        ({"patch": around(0, 90, 180.1, 270)}, "no patch from 90 to 180.1 deg"),
+        ({"patch": [*around(0, 90, 180, 270)[:7]]}, "no patch from 180 to 360 deg at its end u_mm = 260"),
+        (curve(100.0, 99.0, 200.0), "curve 0: speeds_mm_s must not fall with a longer lever, got 99 mm/s after 100"),
+        (curve(50.0, 106.0, 200.0), "curve 0: speeds_mm_s must not grow more than the lever does, from 100 to 200 mm"),
+        (curve(0.0, 0.0, 0.0), "last of speeds_mm_s must be above 0 mm/s"),
+        (curve(50.0, 60.0, 70.0, 80.0), "curve 0 needs one speed for each of levers_mm: 3, got 4"),
         (
-            {"patch": [{"sensor": NAME, "u_mm": 0.0, "phi_deg": 0.0, "curve": 9, "any_curve": 0}]},
-            "a curve that there is",
+            {"lowest_deg": [-90.0] * 6, "highest_deg": [*[90.0] * 5, -90.1]},
+            "joint 6 has a lowest_deg of -90 deg, above its highest_deg of -90.1 deg",
         ),
-        (
-            {"patch": [{"sensor": "?", "u_mm": 0.0, "phi_deg": 0.0, "curve": 0, "any_curve": 0}], "patches": 1},
-            "not in both",
-        ),
-        ({"curves": 2}, "was cut or changed"),
+        ({"lowest_deg": [-364.0] * 6, "highest_deg": [0.0] * 6}, "lowest_deg"),
+        ({"patch": [*around(0, 90, 180, 270), patch(phi_deg=361.0)]}, "phi_deg"),
+        ({"reaction_ms": -1.0}, "reaction_ms"),
     ],
 )
 def test_a_table_with_a_mistake_is_refused(tmp_path: Path, changes: dict[str, object], message: str) -> None:
-    with pytest.raises(SceneError, match=message):
+    with pytest.raises(SceneError, match=message) as refused:
         load(tmp_path, **changes)
+    assert "run `coneskin permissible`" in str(refused.value) or "must be" in str(refused.value)
+
+
+def test_what_a_search_leaves_of_a_curve_is_no_mistake(tmp_path: Path) -> None:
+    """It ends within 1 % of the fastest speed, and may find none for a short lever."""
+    for speeds in ((50.0, 101.9, 205.0), (0.0, 0.0, 30.0), (80.0, 80.0, 80.0), (1.0, 2.01, 4.03)):
+        load(tmp_path, **curve(*speeds))
+    load(tmp_path, lowest_deg=[5.0] * 6, highest_deg=[5.0] * 6)
+
+
+def test_a_part_of_a_turn_needs_patches_at_both_its_edges(tmp_path: Path) -> None:
+    part = LIMITED.replace("height_mm", "wrap_deg = 120\nheight_mm", 1)
+    of_part = {"fingerprint": limit_fingerprint(parse_scene(part.replace('speed_limit_from = "impact.toml"\n', "")))}
+    load(tmp_path, part, patch=around(0, 60, 120), **of_part)
+    for degrees, gap in (((0, 60), "from 60 to 120"), ((60, 120), "from 0 to 60"), ((0, 120), "from 0 to 120")):
+        with pytest.raises(SceneError, match=f"no patch {gap} deg"):
+            load(tmp_path, part, patch=around(*degrees), **of_part)
+    with pytest.raises(SceneError, match="phi_deg = 121 is off the sheet, which ends at 120 deg"):
+        load(tmp_path, part, patch=around(0, 60, 120, 121), **of_part)
+
+
+def test_a_skin_on_the_base_needs_no_speed(tmp_path: Path) -> None:
+    """It does not move, and `coneskin permissible` computes none."""
+    base = LIMITED.replace(
+        "[padding]",
+        '[[link]]\nname = "base"\n[[link.sensor]]\nid = 9\nname = "foot"\nradius1_mm = 75\nradius2_mm = 75\n'
+        "height_mm = 60\nxyz_mm = [0, 0, 10]\n[padding]",
+    )
+    bare = base.replace('speed_limit_from = "impact.toml"\n', "")
+    scene = load(tmp_path, base, fingerprint=limit_fingerprint(parse_scene(bare)))
+    assert {item.sensor.name for item in scene.sensors} == {NAME, "foot"}
+    assert build_core(scene).needs_slider
 
 
 @pytest.mark.parametrize(
@@ -182,9 +241,27 @@ def test_no_place_is_faster_than_its_patches_are_held_to_be(bends: str) -> None:
         assert fastest <= limit.between * seen + 1e-9
 
 
-def test_a_file_that_was_cut_at_a_row_is_refused(tmp_path: Path) -> None:
-    rows = table()["speed_limit"]["patch"]
-    for left in range(1, len(rows)):  # what is left is TOML, and every row in it is whole
-        with pytest.raises(SceneError, match="the file was cut or changed"):
-            load(tmp_path, patch=rows[:left])
-    load(tmp_path, patch=rows)
+def test_a_file_that_was_cut_or_changed_is_refused(tmp_path: Path) -> None:
+    """At any line or within one: what is left may be TOML with every key in range, and less than was written."""
+    rows = [{"region": "hand", "speeds_mm_s": [50.0, 100.0, 200.0]} for _ in range(11)]
+    patches = around(0.0, 90.0, 180.0, 270.0)
+    patches[-1]["any_curve"] = 10
+    load(tmp_path, curve=rows, patch=patches)
+    path = tmp_path / "impact.toml"
+    content = tomllib.loads(path.read_text(encoding="utf-8"))["speed_limit"]
+    whole = tomli_w.dumps({"speed_limit": {key: value for key, value in content.items() if key != "patch"}})
+    for row in content["patch"]:
+        whole += "[[speed_limit.patch]]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in row.items())
+    assert whole.endswith("any_curve = 10\n")
+    within = range(len(whole) - 40, len(whole) - 1)
+    for end in {*within, *(match.start() for match in re.finditer(r"\[\[", whole))}:
+        path.write_text(whole[:end], encoding="utf-8")
+        with pytest.raises(SceneError):
+            load_scene(tmp_path / "scene.toml")
+    for old, new in (("phi_deg = 90.0", "phi_deg = 91.0"), ("100.0,\n", "101.0,\n"), ('"other"', '"another"')):
+        assert old in whole
+        path.write_text(whole.replace(old, new, 1), encoding="utf-8")
+        with pytest.raises(SceneError, match="digest is not that of the table: the file was cut, or changed by hand"):
+            load_scene(tmp_path / "scene.toml")
+    path.write_text(whole, encoding="utf-8")
+    load_scene(tmp_path / "scene.toml")

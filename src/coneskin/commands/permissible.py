@@ -87,6 +87,7 @@ def _plain(found: SpeedMap) -> dict[str, Any]:
     from coneskin.permissible_speed.speed_map_file import map_table
 
     table: dict[str, Any] = map_table(found)["speed_limit"]
+    del table["digest"]  # of the file; this has more
     for row, patch, mass in zip(table["patch"], found.patches, found.masses, strict=True):
         row["link"] = patch.link
         row["mass_kg"] = None if math.isinf(mass) else mass

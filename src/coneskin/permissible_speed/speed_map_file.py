@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.errors import SceneError
+from coneskin.scene.tables.speed_limit_check import limit_digest
 from coneskin.scene.whole_file import write_whole
 
 from .speed_map import SpeedMap
@@ -38,7 +39,6 @@ def map_table(found: SpeedMap) -> dict[str, Any]:
         values["lowest_deg"] = [math.degrees(q) for q in table.lowest]
         values["highest_deg"] = [math.degrees(q) for q in table.highest]
     values["levers_mm"] = [1e3 * lever for lever in table.levers]
-    values |= {"curves": len(found.curves), "patches": len(table.patches)}  # a file that was cut at a row shows it
     values["curve"] = [
         {"region": curve.region}
         | ({} if math.isinf(curve.mass) else {"mass_kg": curve.mass})
@@ -55,7 +55,7 @@ def map_table(found: SpeedMap) -> dict[str, Any]:
         }
         for patch in table.patches
     ]
-    return {"speed_limit": values}
+    return {"speed_limit": {"digest": limit_digest(values)} | values}
 
 
 def write_map(found: SpeedMap, path: Path) -> None:

@@ -12,7 +12,6 @@ import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +20,7 @@ from coneskin.scene.sensor_facts import round_facts
 from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
 
 from .schema import Key, check
+from .speed_limit_check import limit_digest, uncovered, unfit
 
 if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -37,9 +37,11 @@ __all__ = [
 _FORMAT = 1  # to be raised where the model changes, so that old files are void
 _MAX_BYTES = 1 << 20  # of a file; a map of ten sheets has 100 kB
 _MAX_ROWS = 20_000
+_MAX_LINES = 10  # of mistakes
 HOW_TO = "run `coneskin permissible`, and name what it writes"
 SPEED_LIMIT_KEYS = (
     Key("format", int, low=1, high=1000),
+    Key("digest", str),
     Key("fingerprint", str),
     Key("date", str),
     Key("coneskin", str),
@@ -52,8 +54,6 @@ SPEED_LIMIT_KEYS = (
     Key("lowest_deg", list, (), low=-363.0, high=363.0),
     Key("highest_deg", list, (), low=-363.0, high=363.0),
     Key("levers_mm", list, low=0.1, high=10_000.0),
-    Key("curves", int, low=1, high=_MAX_ROWS),
-    Key("patches", int, low=1, high=_MAX_ROWS),
     Key("curve", dict),
     Key("patch", dict),
 )
@@ -144,34 +144,25 @@ def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLim
     if "speed_limit" not in tables:
         return None
     lines: list[str] = []
-    values = check(tables["speed_limit"], SPEED_LIMIT_KEYS, "speed_limit", lines)
-    counts = [values.pop(key, None) for key in ("curves", "patches")]
+    table = tables["speed_limit"]
+    values = check(table, SPEED_LIMIT_KEYS, "speed_limit", lines)
+    digest = values.pop("digest", "")
     rows = values.pop("curve", ())[:_MAX_ROWS]
     curves = [check(row, _CURVE, f"speed_limit.curve {n}", lines) for n, row in enumerate(rows)]
     rows = values.pop("patch", ())[:_MAX_ROWS]
     patches = [check(row, _PATCH, f"speed_limit.patch {n}", lines) for n, row in enumerate(rows)]
-    levers = values.get("levers", ())
+    found = None
     if not lines:
-        if values["format"] != _FORMAT:
-            lines.append(f"speed_limit.format must be {_FORMAT}, got {values['format']}: {HOW_TO}")
-        if counts != [len(curves), len(patches)]:
-            lines.append(
-                f"speed_limit: curves = {counts[0]} and patches = {counts[1]} were written, there are {len(curves)} "
-                f"and {len(patches)}: the file was cut or changed; {HOW_TO}"
-            )
-        if not levers or any(b <= a for a, b in pairwise(levers)):
-            lines.append("speed_limit.levers_mm must rise")
-        if not curves or any(len(curve["speeds"]) != len(levers) for curve in curves):
-            lines.append("speed_limit.curve: each needs one speed for each of levers_mm, and there must be one")
-        if not patches or any(max(row["curve"], row["any_curve"]) >= len(curves) for row in patches):
-            lines.append("speed_limit.patch: each needs a curve that there is, and there must be one")
-        if {len(values["lowest"]), len(values["highest"])} not in ({0}, {6}):
-            lines.append("speed_limit: lowest_deg and highest_deg have six numbers each, or none")
-    problems += lines[:10]
-    if lines:
-        return None
-    found = tuple(LimitedPatch(row["sensor"], row["u"], row["phi"], row["curve"], row["any_curve"]) for row in patches)
-    return SpeedLimitScene(curves=tuple(tuple(curve["speeds"]) for curve in curves), patches=found, **values)
+        speeds = tuple(tuple(curve["speeds"]) for curve in curves)
+        limited = tuple(LimitedPatch(*(row[key.plain] for key in _PATCH)) for row in patches)
+        found = SpeedLimitScene(curves=speeds, patches=limited, **values)
+        lines += unfit(found)
+        if found.format != _FORMAT:
+            lines.insert(0, f"speed_limit.format must be {_FORMAT}, got {found.format}")
+        elif digest != limit_digest(table):
+            lines.insert(0, "speed_limit.digest is not that of the table: the file was cut, or changed by hand")
+    problems += [f"{line}; {HOW_TO}" for line in lines[:_MAX_LINES]]
+    return None if lines else found
 
 
 def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None:
@@ -182,6 +173,8 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
         recorded: it comes from a recording, and was checked when the guard began.
         problems: every mistake is added here.
     """
+    from coneskin.robot.arm.link_frames import link_index
+
     limit = scene.speed_limit
     if limit is None:
         return
@@ -200,6 +193,14 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
             f"padding or reactions are others now; {HOW_TO}"
         )
         return
-    names = {item.sensor.name for item in scene.sensors}
-    if missing := names ^ {patch.sensor for patch in limit.patches}:
-        problems.append(f"arm.speed_limit_from: {', '.join(sorted(missing))}: not in both the scene and the speeds")
+    sheets = {item.sensor.name: item.placed for link in scene.links if link_index(link.name) for item in link.sensors}
+    of_sheet: dict[str, list[LimitedPatch]] = {name: [] for name in sheets}
+    strange: list[LimitedPatch] = []
+    for patch in limit.patches:
+        of_sheet.get(patch.sensor, strange).append(patch)
+    names = sorted({patch.sensor for patch in strange} | {name for name, patches in of_sheet.items() if not patches})
+    lines = [f"{name}: not in both the scene and the speeds" for name in names]
+    lines = lines or [
+        line for name, placed in sheets.items() for line in uncovered(name, placed.frustum, of_sheet[name])
+    ]
+    problems += [f"arm.speed_limit_from: {line}; {HOW_TO}" for line in lines[:_MAX_LINES]]
