@@ -31,7 +31,6 @@ __all__ = [
     "pack",
     "pack_inputs_request",
     "pack_outputs_request",
-    "pack_pause_request",
     "pack_start_request",
     "pack_version_request",
     "split",
@@ -216,11 +215,6 @@ def pack_inputs_request(names: Sequence[str]) -> bytes:
 def pack_start_request() -> bytes:
     """Return the request to start the stream of data; the reply's payload is one byte, 1 for accepted."""
     return pack(PacketKind.START)
-
-
-def pack_pause_request() -> bytes:
-    """Return the request to pause the stream of data; the reply's payload is one byte, 1 for accepted."""
-    return pack(PacketKind.PAUSE)
 
 
 def split_names(text: bytes) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from .order import FIRST, LADDER, higher, resolution
 from .rim import near_apex, solve_rims
 from .sheet import SectorSheet
 
-__all__ = ["FieldModel", "solve", "solve_many"]
+__all__ = ["FieldModel", "solve"]
 
 Floats = NDArray[np.float64]
 
@@ -193,17 +193,4 @@ def _numbers(coupling: Coupling) -> Floats:
 def solve(model: FieldModel, discs: Sequence[Disc], *phases: DrivePhase) -> tuple[Readings, ...]:
     """Return the readings of one scene of discs in each phase."""
     coupling = model.discs(discs)
-    return tuple(model.read(coupling, phase) for phase in phases)
-
-
-def solve_many(
-    model: FieldModel,
-    u: ArrayLike,
-    phi: ArrayLike,
-    radius: ArrayLike,
-    conductance: ArrayLike,
-    *phases: DrivePhase,
-) -> tuple[Readings, ...]:
-    """Return the readings of n single contacts in each phase; arguments as for `FieldModel.contacts`."""
-    coupling = model.contacts(u, phi, radius, conductance)
     return tuple(model.read(coupling, phase) for phase in phases)

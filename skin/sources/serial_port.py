@@ -24,7 +24,6 @@ from .source import Source
 __all__ = ["SerialPort"]
 
 _MAX_READ = 4096  # bytes in one read
-_DISCONNECTED = {errno.EIO, errno.ENXIO, errno.ENODEV, errno.EBADF, errno.ECONNRESET, errno.ENOTCONN}
 
 
 class SerialPort(Source):

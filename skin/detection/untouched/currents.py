@@ -145,8 +145,8 @@ class UntouchedCurrents:
         self._blocks = min(self._blocks + 1, _LONGEST)
         self.frames = self._blocks * BLOCK
         most = self._drift * BLOCK * period if self._blocks > _FREE else math.inf
-        self.radial += _bounded(step1 / self._blocks, most * self.radial)
-        self.angular += _bounded(step2 / self._blocks, most * self.angular)
+        self.radial += bounded(step1 / self._blocks, most * self.radial)
+        self.angular += bounded(step2 / self._blocks, most * self.angular)
         if self.noise > self._noisiest:
             return Fault.NOISE, f"{self.noise:.1f} counts, at most {self._noisiest:.1f}"
         return None
@@ -162,5 +162,6 @@ class UntouchedCurrents:
         self.bias = 2.0 / math.pi * math.exp(-2.0 * math.pi * math.pi * noise) * math.sqrt(scale)
 
 
-def _bounded(step: float, most: float) -> float:
+def bounded(step: float, most: float) -> float:
+    """Return a step, or the largest that is allowed in its direction."""
     return most if step > most else -most if step < -most else step

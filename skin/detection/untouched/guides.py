@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from coneskin.skin.wire import Frame
 
-from .currents import UntouchedCurrents
+from .currents import UntouchedCurrents, bounded
 
 __all__ = ["JUMP", "UntouchedGuides"]
 
@@ -57,9 +57,9 @@ class UntouchedGuides:
                 step1, step2, split1 / supply, split2 / supply, supply
             )
         most = _FOLLOWED * period
-        self._radial += _bounded(step1, most)
-        self._angular += _bounded(step2, most)
-        self._level += _bounded(0.1 * (level - self._level), most)  # a step of the noise is not followed
+        self._radial += bounded(step1, most)
+        self._angular += bounded(step2, most)
+        self._level += bounded(0.1 * (level - self._level), most)  # a step of the noise is not followed
         return False
 
     def learn(
@@ -94,7 +94,3 @@ class UntouchedGuides:
         noise = _DEVIATIONS * self._currents.noise / supply
         step, split = min(max(0.7 * noise, JUMP), _MOST), min(max(1.4 * noise, JUMP), _MOST)
         return step1 > step or step2 > step or abs(split1) > split or abs(split2) > split
-
-
-def _bounded(step: float, most: float) -> float:
-    return most if step > most else -most if step < -most else step

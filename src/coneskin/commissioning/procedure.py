@@ -218,7 +218,6 @@ class Procedure:
         said = wrong or f"it reads {_text(read)}, {distance:.0f} mm from the mark at {_text(mark.place)}"
         if not passed and self._attempts < _ATTEMPTS and not item.failed:
             return [Notice("remark", f"{said}; touch the same mark once more")]
-        marks = [mark.place]
         u_mm, phi_deg = _in_file_units(mark.place)
         read_u, read_phi = (0.0, 0.0) if wrong else _in_file_units(read)
         result = MarkResult(

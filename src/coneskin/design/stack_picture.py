@@ -15,7 +15,6 @@ from .workshop.guide_words import side_name
 __all__ = ["draw_seam", "draw_stack"]
 
 _FACES = ("#e8d9c0", FOIL_COLOUR, "#55585e", "#cfe3f1", "#55585e", FOIL_COLOUR, "#e8d9c0")
-_LAYER_OF_PART = (0, 1, 1, 2, 3, 3, 4)
 
 
 def draw_stack(figure: Any, design: SheetDesign) -> None:

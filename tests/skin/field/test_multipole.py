@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from coneskin.errors import FieldError
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.fourport import angular_phase, radial_phase
-from coneskin.skin.field.model import FieldModel, solve, solve_many
+from coneskin.skin.field.model import FieldModel, solve
 from coneskin.skin.field.sheet import SectorSheet
 
 from ...sweep import sweep
@@ -125,7 +125,8 @@ def test_batch_equals_singles_and_broadcasts() -> None:
         assert np.allclose(batch.matrix()[i], single.matrix()[0], rtol=1e-12)
     scenes = model.contacts(np.array([[0.02, 0.05], [0.03, 0.06]]), 0.7, 0.004, 1e3)
     assert len(scenes) == 2
-    radial, angular = solve_many(model, u, phi, 0.004, 1e3, radial_phase(), angular_phase())
+    coupling = model.contacts(u, phi, 0.004, 1e3)
+    radial, angular = model.read(coupling, radial_phase()), model.read(coupling, angular_phase())
     assert radial.terminals.shape == angular.currents.shape == (3, 4)
     assert solve(model, [Disc(0.02, 0.2, 0.004, 1e3)], radial_phase())[0].terminals[0] == pytest.approx(
         radial.terminals[0], rel=1e-13
