@@ -40,7 +40,7 @@ class ControlProgram:
         watchdog_hz: the controller stops the program when this process is silent for longer than 1 / watchdog_hz.
 
     Attributes:
-        calls: the wheel's RTDEControlInterface; None outside the ``with``.
+        control: the wheel's RTDEControlInterface; None outside the ``with``.
         wheel: its module.
 
     Raises:
@@ -50,7 +50,7 @@ class ControlProgram:
 
     def __init__(self, host: str, watchdog_hz: float) -> None:
         self.host = host
-        self.calls: Any = None
+        self.control: Any = None
         self.wheel: Any = None
         self._watchdog_hz = watchdog_hz
 
@@ -61,32 +61,32 @@ class ControlProgram:
             raise MissingExtra("ur-rtde", "moving a UR arm (wheels exist for Python 3.11 and 3.12)") from exc
         self.wheel = rtde_control
         with rtde_errors(f"connecting ur_rtde to {self.host}"):
-            self.calls = rtde_control.RTDEControlInterface(self.host)
+            self.control = rtde_control.RTDEControlInterface(self.host)
             if not self.set_watchdog():
                 raise RobotRefused(f"the controller {self.host} did not accept a watchdog of {self._watchdog_hz:g} Hz")
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self.calls is not None:
-            calls, self.calls = self.calls, None
+        if self.control is not None:
+            control, self.control = self.control, None
             with rtde_errors(f"disconnecting from {self.host}"):
-                calls.stopScript()
-                calls.disconnect()
+                control.stopScript()
+                control.disconnect()
 
     @property
     def runs(self) -> bool:
         """True while the controller runs it."""
-        return bool(self.calls.isProgramRunning())
+        return bool(self.control.isProgramRunning())
 
     def set_watchdog(self, silence: float = 0.0) -> bool:
         """Let the controller allow this silence [s], or that of ``watchdog_hz`` if it is longer; True where it does."""
-        return bool(self.calls.setWatchdog(min(self._watchdog_hz, 1.0 / silence) if silence else self._watchdog_hz))
+        return bool(self.control.setWatchdog(min(self._watchdog_hz, 1.0 / silence) if silence else self._watchdog_hz))
 
     def kick(self) -> None:
         """Kick the controller's watchdog: this process is alive."""
         with rtde_errors("kicking the controller's watchdog"):
             if self.runs:
-                self.calls.kickWatchdog()
+                self.control.kickWatchdog()
 
     def restart(self) -> None:
         """Start it again where something else has ended it; the arm does not move meanwhile.
@@ -97,9 +97,9 @@ class ControlProgram:
         Raises:
             RobotRefused: the controller does not start it.
         """
-        self.calls.kickWatchdog()
+        self.control.kickWatchdog()
         time.sleep(_REGISTER_DELAY)
-        running = self.calls.reuploadScript() and self._await_start()
+        running = self.control.reuploadScript() and self._await_start()
         if not (running and self.set_watchdog()):
             raise RobotRefused(f"the controller {self.host} does not start ur_rtde's program again")
 

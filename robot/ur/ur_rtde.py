@@ -109,7 +109,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._end_streaming(acceleration)
-        self._started(self._program.calls.moveJ(list(q), speed, acceleration, True), "moveJ", Mode.MOVE)
+        self._started(self._program.control.moveJ(list(q), speed, acceleration, True), "moveJ", Mode.MOVE)
 
     def move_l(self, pose: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a straight move of the tool to a pose (x, y, z [m], rotation vector [rad]), in m/s and m/s2.
@@ -118,7 +118,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._end_streaming(MOVE_L_DECELERATION)
-        self._started(self._program.calls.moveL(list(pose), speed, acceleration, True), "moveL", Mode.MOVE)
+        self._started(self._program.control.moveL(list(pose), speed, acceleration, True), "moveL", Mode.MOVE)
 
     def move_l_fk(self, q: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a straight move of the tool to where it is at joint positions q [rad]; as ``move_l``.
@@ -127,7 +127,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._end_streaming(MOVE_L_DECELERATION)
-        self._started(self._program.calls.moveL_FK(list(q), speed, acceleration, True), "moveL_FK", Mode.MOVE)
+        self._started(self._program.control.moveL_FK(list(q), speed, acceleration, True), "moveL_FK", Mode.MOVE)
 
     def move_j_ik(self, pose: Sequence[float], speed: float, acceleration: float) -> None:
         """Start a move in joint space to a pose of the tool (x, y, z [m], rotation vector [rad]); as ``move_j``.
@@ -136,7 +136,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._end_streaming(acceleration)
-        self._started(self._program.calls.moveJ_IK(list(pose), speed, acceleration, True), "moveJ_IK", Mode.MOVE)
+        self._started(self._program.control.moveJ_IK(list(pose), speed, acceleration, True), "moveJ_IK", Mode.MOVE)
 
     def move_path(self, waypoints: Sequence[Waypoint]) -> None:
         """Start a move along way points. It takes some 0.1 s before the arm moves, in which nothing can be stopped.
@@ -153,7 +153,7 @@ class UrArm:
             values = [*point.target, point.speed, point.acceleration, point.blend]
             path.addEntry(entry(kind, position, values))
         with rtde_errors("movePath"):
-            self._started(self._program.calls.movePath(path, True), "movePath", Mode.MOVE)
+            self._started(self._program.control.movePath(path, True), "movePath", Mode.MOVE)
             if not self._program.set_watchdog():
                 self.stop(MOVE_L_DECELERATION)
                 raise RobotRefused(f"the controller {self.host} did not take the watchdog of a path: it was stopped")
@@ -183,7 +183,7 @@ class UrArm:
         if self.mode not in (Mode.IDLE, Mode.SPEED):  # a speed thread beside another live thread aborts the program
             self.stop(acceleration, at_once=False)
         # one cycle: without a time URScript's speedj returns when the speed is reached, and takes no new target before
-        self._started(self._program.calls.speedJ(list(qd), acceleration, 0.002), "speedJ", Mode.SPEED)
+        self._started(self._program.control.speedJ(list(qd), acceleration, 0.002), "speedJ", Mode.SPEED)
 
     def speed_l(self, twist: Sequence[float], acceleration: float) -> None:
         """Move the tool at a velocity [m/s, rad/s] until the next command, with an acceleration [m/s2].
@@ -193,7 +193,7 @@ class UrArm:
         """
         if self.mode not in (Mode.IDLE, Mode.SPEED):
             self.stop(MOVE_L_DECELERATION, at_once=False)
-        self._started(self._program.calls.speedL(list(twist), acceleration, 0.002), "speedL", Mode.SPEED)
+        self._started(self._program.control.speedL(list(twist), acceleration, 0.002), "speedL", Mode.SPEED)
 
     def servo_j(self, q: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
         """Follow joint positions q [rad], one each control cycle.
@@ -202,7 +202,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._begin_servo()
-        self._started(self._program.calls.servoJ(list(q), 0.0, 0.0, 0.002, lookahead, gain), "servoJ", Mode.SERVO)
+        self._started(self._program.control.servoJ(list(q), 0.0, 0.0, 0.002, lookahead, gain), "servoJ", Mode.SERVO)
 
     def servo_l(self, pose: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
         """Follow poses of the tool (x, y, z [m], rotation vector [rad]), one each control cycle.
@@ -211,7 +211,7 @@ class UrArm:
             RobotRefused: the controller did not take it.
         """
         self._begin_servo()
-        self._started(self._program.calls.servoL(list(pose), 0.0, 0.0, 0.002, lookahead, gain), "servoL", Mode.SERVO)
+        self._started(self._program.control.servoL(list(pose), 0.0, 0.0, 0.002, lookahead, gain), "servoL", Mode.SERVO)
 
     def moving(self) -> bool:
         """Tell whether a move that was started here still runs; False in the other modes."""
@@ -222,7 +222,7 @@ class UrArm:
         if self.mode is not Mode.MOVE:
             return None
         with rtde_errors("asking for progress"):
-            status = self._program.calls.getAsyncOperationProgressEx()
+            status = self._program.control.getAsyncOperationProgressEx()
             if status.isAsyncOperationRunning():
                 return int(status.progress())
         self.mode = Mode.IDLE
@@ -243,9 +243,9 @@ class UrArm:
         self._stand_for(name)
         with rtde_errors(name):
             if name == "getForwardKinematics" and values:
-                tool = list(values[1]) if len(values) > 1 else self._program.calls.getTCPOffset()  # type: ignore[call-overload]
+                tool = list(values[1]) if len(values) > 1 else self._program.control.getTCPOffset()  # type: ignore[call-overload]
                 values = (values[0], tool if any(tool) else _NO_TOOL)
-            return getattr(self._program.calls, name)(*values)
+            return getattr(self._program.control, name)(*values)
 
     def stop(self, deceleration: float, at_once: bool = True) -> None:
         """Stop what was started here, by the stop of its mode, and wait until the wheel returns.
@@ -270,11 +270,11 @@ class UrArm:
 
     def _stop(self, mode: Mode, deceleration: float) -> None:
         if mode is Mode.SPEED:
-            self._program.calls.speedStop(deceleration)
+            self._program.control.speedStop(deceleration)
         elif mode is Mode.SERVO:
-            self._program.calls.servoStop(deceleration)
+            self._program.control.servoStop(deceleration)
         else:  # also when idle: a move may have been started by a call whose answer was lost
-            self._program.calls.stopJ(deceleration)
+            self._program.control.stopJ(deceleration)
 
     def _end_streaming(self, deceleration: float) -> None:
         if self.mode is not Mode.IDLE:
@@ -293,7 +293,7 @@ class UrArm:
         """Call a setter of the wheel."""
         self._stand_for(name)
         with rtde_errors(name):
-            accepted = getattr(self._program.calls, name)(*values)
+            accepted = getattr(self._program.control, name)(*values)
         if not accepted:
             raise RobotRefused(f"the controller {self.host} did not take {name}{values}")
 

@@ -22,8 +22,9 @@ from coneskin.robot.driver.messages import (
     decode_command,
 )
 from coneskin.robot.driver.waypoint import Waypoint
+from coneskin.robot.ur.control_program import rtde_errors
 from coneskin.robot.ur.driver_process import DriverProcess
-from coneskin.robot.ur.ur_rtde import Mode, UrArm, rtde_errors
+from coneskin.robot.ur.ur_rtde import Mode, UrArm
 
 finite = st.floats(allow_nan=False)
 
@@ -173,8 +174,8 @@ class FakeEntry:
 
 def arm(accepts=True):
     made = UrArm("test", 4.0)
-    made._wheel = SimpleNamespace(Path=FakePath, PathEntry=FakeEntry)
-    made._control = FakeWheel(accepts)
+    made._program.wheel = SimpleNamespace(Path=FakePath, PathEntry=FakeEntry)
+    made._program.control = FakeWheel(accepts)
     return made
 
 
@@ -200,7 +201,7 @@ def test_each_mode_has_its_own_stop(start, stop):
     a = arm()
     start(a)
     a.stop(5.0)
-    assert stops(a._control)[-1] == stop
+    assert stops(a._program.control)[-1] == stop
     assert a.mode is Mode.IDLE
 
 
@@ -210,15 +211,15 @@ def test_no_motion_starts_on_a_live_thread_of_another_kind():
     a.speed_j([0.0] * 6, 1.0)
     a.servo_j([0.0] * 6)
     a.move_l([0.0] * 6, 1.0, 1.0)
-    assert stops(a._control) == ["moveJ", "stopJ", "speedJ", "speedStop", "servoJ", "servoStop", "moveL"]
-    a._control.calls.clear()
+    assert stops(a._program.control) == ["moveJ", "stopJ", "speedJ", "speedStop", "servoJ", "servoStop", "moveL"]
+    a._program.control.calls.clear()
     a.speed_l([0.0] * 6, 1.0)
     a.speed_j([0.0] * 6, 1.0)  # one thread of the wheel's program does both
     a.servo_l([0.0] * 6)
     a.speed_l([0.0] * 6, 1.0)
     a.move_path([Waypoint.move_l([0.0] * 6)])
     a.servo_j([0.0] * 6)
-    assert stops(a._control) == [
+    assert stops(a._program.control) == [
         *("stopJ", "speedL", "speedJ", "speedStop", "servoL", "servoStop", "speedL", "speedStop"),
         *("movePath", "stopJ", "servoJ"),
     ]
@@ -250,8 +251,8 @@ def test_tool_and_payload_are_set_only_while_nothing_moves(start):
     a.stop(5.0)
     a.set_tcp([0.1] * 6)
     a.set_payload(1.5, [0.0, 0.0, 0.04])
-    assert a._control.calls[-2:] == [("setTcp", *[0.1] * 6), ("setPayload", 1.5, 0.0, 0.0, 0.04)]
-    a._control.accepts = False
+    assert a._program.control.calls[-2:] == [("setTcp", *[0.1] * 6), ("setPayload", 1.5, 0.0, 0.0, 0.04)]
+    a._program.control.accepts = False
     with pytest.raises(RobotRefused, match="did not take setPayload"):
         a.set_payload(1.0, [0.0] * 3)
 
@@ -289,11 +290,11 @@ def test_the_program_is_refused_until_the_guard_clears_it(driver):
     move(program)
     assert served.step(0.0)
     assert answers(program)[0]["stopped"] is True
-    assert "moveJ" not in stops(made._control)
+    assert "moveJ" not in stops(made._program.control)
     guard.send(Release(7).encode())
     move(program)
     served.step(0.0)
-    assert stops(made._control) == ["moveJ"]
+    assert stops(made._program.control) == ["moveJ"]
 
 
 def test_a_stop_comes_before_what_the_program_asked_and_ends_its_wait(driver):
@@ -305,7 +306,7 @@ def test_a_stop_comes_before_what_the_program_asked_and_ends_its_wait(driver):
     move(program)
     guard.send(StopProgram(9.0).encode())
     served.step(0.0)
-    assert stops(made._control) == ["moveJ", "stopJ"]
+    assert stops(made._program.control) == ["moveJ", "stopJ"]
     assert [answer["stopped"] for answer in answers(program)] == [True, True]
     assert StatusReport("done").encode() in guard.receive()
 
@@ -315,7 +316,7 @@ def test_the_end_of_a_move_is_told(driver):
     guard.send(Release(7).encode())
     move(program)
     served.step(0.0)
-    made._control.running = False
+    made._program.control.running = False
     served.step(0.0)
     assert answers(program) == [{"number": 1, "ok": True}]
 
@@ -330,13 +331,13 @@ def test_a_tool_is_set_for_the_program_unless_the_guard_forbids_it(driver):
     ask(program, do="set_payload", mass=2.0, centre=[0.0] * 3, number=2)
     served.step(0.0)
     assert answers(program) == [{"number": 1, "ok": True}, {"number": 2, "ok": True}]
-    assert stops(made._control) == ["setTcp", "setPayload"]
+    assert stops(made._program.control) == ["setTcp", "setPayload"]
     ask(program, do="move_j_ik", pose=[0.1] * 6, speed=1.0, acceleration=2.0, number=3)
     ask(program, do="set_tcp", pose=[0.2] * 6, number=4)
     served.step(0.0)
     (refused,) = answers(program)
     assert (refused["number"], refused["ok"], refused["stopped"]) == (4, False, False)
-    assert stops(made._control)[-1] == "moveJ_IK"
+    assert stops(made._program.control)[-1] == "moveJ_IK"
 
 
 def test_a_retreat_and_its_halt(driver):
@@ -345,7 +346,7 @@ def test_a_retreat_and_its_halt(driver):
     served.step(0.0)
     guard.send(EndReaction(8.0).encode())
     served.step(0.0)
-    assert stops(made._control) == ["speedJ", "speedStop"]
+    assert stops(made._program.control) == ["speedJ", "speedStop"]
 
 
 @pytest.mark.parametrize("side", ["guard", "program"])
@@ -356,12 +357,12 @@ def test_when_either_side_ends_the_arm_is_stopped(driver, side):
     served.step(0.0)
     (guard if side == "guard" else program).close()
     served.run()
-    assert stops(made._control)[-1] == "stopJ"
+    assert stops(made._program.control)[-1] == "stopJ"
 
 
 def test_an_error_of_the_wheel_goes_to_the_guard(driver):
     served, made, guard, _ = driver
-    made._control.accepts = False
+    made._program.control.accepts = False
     guard.send(SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0).encode())
     served.step(0.0)
     notes = [StatusReport.decode(message) for message in guard.receive()]
@@ -386,29 +387,29 @@ def test_a_number_beyond_all_floats_is_answered_and_does_not_end_the_driver(driv
     ask(program, do="move_j", q=[0.0] * 6, speed=1.0, acceleration=10**400)
     assert served.step(0.0)
     assert answers(program)[0]["ok"] is False
-    assert "moveJ" not in stops(made._control)
+    assert "moveJ" not in stops(made._program.control)
 
 
 def test_the_program_starts_again_only_after_command_0(driver):
     """The register of a latched speedJ is still there: a new program would execute it at once (see test_lifecycle)."""
     served, made, guard, _ = driver
     served.step(0.0)
-    made._control.playing = False
-    made._control.calls.clear()
+    made._program.control.playing = False
+    made._program.control.calls.clear()
     served._kicked = -1.0
     served.step(0.0)
-    assert made._control.calls == []  # no kick without a program: each would be a line on the terminal
+    assert made._program.control.calls == []  # no kick without a program: each would be a line on the terminal
     guard.send(Release(7).encode())
     served.step(0.0)
-    assert [call[0] for call in made._control.calls] == ["kick", "reuploadScript", "setWatchdog"]
+    assert [call[0] for call in made._program.control.calls] == ["kick", "reuploadScript", "setWatchdog"]
     guard.send(Release(7).encode())
     served.step(0.0)
-    assert "reuploadScript" not in [call[0] for call in made._control.calls[3:]]
+    assert "reuploadScript" not in [call[0] for call in made._program.control.calls[3:]]
 
 
 def test_a_program_that_does_not_start_again_is_an_error(driver):
     served, made, guard, program = driver
-    made._control.playing = made._control.accepts = False
+    made._program.control.playing = made._program.control.accepts = False
     guard.send(Release(7).encode())
     served.step(0.0)
     assert "does not start ur_rtde's program again" in StatusReport.decode(guard.receive()[-1]).text
@@ -426,13 +427,13 @@ def test_a_silent_guard_counts_as_dead(driver, now):
         now[0] += 0.05
         guard.send(Heartbeat().encode())
         served.step(0.0)
-    assert "stopJ" not in stops(made._control)
+    assert "stopJ" not in stops(made._program.control)
     now[0] += HEARTBEAT_TIMEOUT - 0.01
     served.step(0.0)
-    assert "stopJ" not in stops(made._control)
+    assert "stopJ" not in stops(made._program.control)
     now[0] += 0.02
     served.step(0.0)
-    assert stops(made._control)[-1] == "stopJ"
+    assert stops(made._program.control)[-1] == "stopJ"
     assert "silent" in answers(program)[0]["why"]
     assert "silent" in StatusReport.decode(guard.receive()[-1]).text
     guard.send(Heartbeat().encode())
@@ -446,17 +447,17 @@ def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(dr
     for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0)):
         guard.send(message.encode())
     served.step(0.0)
-    before = len(stops(made._control))
+    before = len(stops(made._program.control))
     now[0] += SETPOINT_TIMEOUT - 0.01
     served.step(0.0)
-    assert len(stops(made._control)) == before
+    assert len(stops(made._program.control)) == before
     now[0] += 0.02
     served.step(0.0)
-    assert stops(made._control)[before:] == ["speedStop"]
+    assert stops(made._program.control)[before:] == ["speedStop"]
     assert f"silent for {SETPOINT_TIMEOUT:g} s" in StatusReport.decode(guard.receive()[-1]).text
     now[0] += 100.0  # the arm stands, and no heartbeat is due any more
     served.step(0.0)
-    assert stops(made._control)[before:] == ["speedStop"]
+    assert stops(made._program.control)[before:] == ["speedStop"]
 
 
 def test_a_sign_of_life_is_no_new_speed(driver, now):
@@ -464,12 +465,12 @@ def test_a_sign_of_life_is_no_new_speed(driver, now):
     for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0)):
         guard.send(message.encode())
     served.step(0.0)
-    before = len(stops(made._control))
+    before = len(stops(made._program.control))
     for _ in range(4):
         now[0] += 0.03
         guard.send(Heartbeat().encode())
         served.step(0.0)
-    assert stops(made._control)[before:] == ["speedStop"]
+    assert stops(made._program.control)[before:] == ["speedStop"]
 
 
 def test_speeds_that_waited_are_overtaken_by_what_came_later(driver):
@@ -482,30 +483,30 @@ def test_speeds_that_waited_are_overtaken_by_what_came_later(driver):
     ):
         guard.send(message.encode())
     served.step(0.0)
-    assert [call[2] for call in made._control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
+    assert [call[2] for call in made._program.control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
     for message in (*[SetJointVelocity((0.1 * k,) * 6, 4.0) for k in range(9)], EndReaction(10.0)):
         guard.send(message.encode())
     served.step(0.0)
-    assert [call[0] for call in made._control.calls if call[0].startswith("speed")] == ["speedJ", "speedStop"]
+    assert [call[0] for call in made._program.control.calls if call[0].startswith("speed")] == ["speedJ", "speedStop"]
 
 
 def test_it_ends_on_request_and_first_limits_its_own_end(driver):
     served, made, guard, program = driver
     order = []
-    served._on_end = lambda: order.append([call[0] for call in made._control.calls])
+    served._on_end = lambda: order.append([call[0] for call in made._program.control.calls])
     guard.send(Release(7).encode())
     move(program)
     served.step(0.0)
     served.end()
     served.run()
     assert order == [["moveJ", "kick"]]  # before the stop, which may block for minutes
-    assert stops(made._control)[-1] == "stopJ"
+    assert stops(made._program.control)[-1] == "stopJ"
 
 
 def test_the_watchdog_is_kicked(driver):
     served, made, _, _ = driver
     served.step(0.0)
-    assert ("kick",) in made._control.calls
+    assert ("kick",) in made._program.control.calls
 
 
 def test_a_stop_of_the_program_that_fails_leaves_no_stream_going_on(driver):
@@ -518,32 +519,32 @@ def test_a_stop_of_the_program_that_fails_leaves_no_stream_going_on(driver):
     def fail(_):
         raise RuntimeError("the wheel has lost it")
 
-    made._control.speedStop = fail
+    made._program.control.speedStop = fail
     ask(program, do="stop", acceleration=2.0, number=2)
     served.step(0.0)
-    assert stops(made._control) == ["speedJ", "stopJ"]
+    assert stops(made._program.control) == ["speedJ", "stopJ"]
     (note,) = (StatusReport.decode(message) for message in guard.receive())
     assert (note.kind, "a stop of the program has failed" in note.text) == ("error", True)
     move(program)
     served.step(0.0)
     assert [answer["ok"] for answer in answers(program)] == [True, False, False]
-    assert stops(made._control) == ["speedJ", "stopJ"]
+    assert stops(made._program.control) == ["speedJ", "stopJ"]
 
 
 def test_a_stop_does_not_wait_behind_all_that_threads_have_asked_for(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
-    taken = made._control.speedJ
+    taken = made._program.control.speedJ
 
     def take(*values):
         guard.send(StopProgram(9.0).encode())  # while the first of them is carried out
         return taken(*values)
 
-    made._control.speedJ = take
+    made._program.control.speedJ = take
     for number in range(1, 4):
         ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=0.5, number=number)
     served.step(0.0)
-    assert stops(made._control) == ["speedJ", "speedStop"]
+    assert stops(made._program.control) == ["speedJ", "speedStop"]
     assert [(answer["number"], answer["ok"]) for answer in answers(program)] == [(1, True), (2, False), (3, False)]
 
 
@@ -559,11 +560,11 @@ def test_a_request_from_later_holds_no_longer_than_one_from_now(driver, now, sen
     now[0] += 0.49
     guard.send(Heartbeat().encode())
     served.step(0.0)
-    assert stops(made._control) == ["speedJ"]
+    assert stops(made._program.control) == ["speedJ"]
     now[0] += 0.02
     guard.send(Heartbeat().encode())
     served.step(0.0)
-    assert "speedStop" in stops(made._control)
+    assert "speedStop" in stops(made._program.control)
 
 
 def test_a_request_that_has_waited_for_long_is_void_and_says_its_number(driver, now):
@@ -577,7 +578,7 @@ def test_a_request_that_has_waited_for_long_is_void_and_says_its_number(driver, 
     told = answers(program)
     assert [(answer["number"], answer["ok"]) for answer in told] == [(41, False), (42, False), (43, True)]
     assert "it is void: it was sent 3.00 s ago" in told[1]["why"]
-    assert stops(made._control) == ["stopJ"]
+    assert stops(made._program.control) == ["stopJ"]
 
 
 @pytest.mark.parametrize(
@@ -598,21 +599,21 @@ def test_speeds_and_positions_are_not_kept_for_a_program_that_sends_no_more(driv
         now[0] += 0.4
         guard.send(Heartbeat().encode())
         served.step(0.0)
-    assert stop not in stops(made._control)
+    assert stop not in stops(made._program.control)
     guard.receive()
     now[0] += 0.11
     guard.send(Heartbeat().encode())
     served.step(0.0)
-    assert stops(made._control)[-1] == stop
+    assert stops(made._program.control)[-1] == stop
     reports = [StatusReport.decode(message) for message in guard.receive()]
     assert any(report.kind == "remark" and "no new speed or servo command" in report.text for report in reports)
-    count = len(stops(made._control))
+    count = len(stops(made._program.control))
     now[0] += 0.1
     served.step(0.0)
-    assert len(stops(made._control)) == count  # once
+    assert len(stops(made._program.control)) == count  # once
     ask(program, sent=now[0], **request_)  # the program may go on
     served.step(0.0)
-    assert stops(made._control)[-1] == start
+    assert stops(made._program.control)[-1] == start
 
 
 @pytest.mark.parametrize(
@@ -640,7 +641,7 @@ def test_a_request_that_is_refused_does_not_renew_what_is_under_way(driver, now,
     assert [answer["ok"] for answer in answers(program)] == [True, False]
     now[0] += 0.21
     served.step(0.0)
-    assert stops(made._control)[-1] == "speedStop"
+    assert stops(made._program.control)[-1] == "speedStop"
 
 
 def test_the_retreat_of_the_guard_does_not_end_with_the_speeds_of_the_program(driver, now):
@@ -652,7 +653,7 @@ def test_the_retreat_of_the_guard_does_not_end_with_the_speeds_of_the_program(dr
     served.step(0.0)
     now[0] += 0.09
     served.step(0.0)
-    assert "speedStop" not in stops(made._control)
+    assert "speedStop" not in stops(made._program.control)
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, 10.1, float("nan"), None, "x"])
@@ -662,7 +663,7 @@ def test_a_duration_that_cannot_be_moves_nothing(driver, duration):
     ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=duration)
     served.step(0.0)
     assert answers(program)[0]["ok"] is False
-    assert "speedJ" not in stops(made._control)
+    assert "speedJ" not in stops(made._program.control)
 
 
 def test_a_release_is_acknowledged_by_its_number_and_not_where_the_program_does_not_start(driver):
@@ -670,7 +671,7 @@ def test_a_release_is_acknowledged_by_its_number_and_not_where_the_program_does_
     guard.send(Release(41).encode())
     served.step(0.0)
     assert StatusReport("released", "41").encode() in guard.receive()
-    made._control.playing = made._control.accepts = False
+    made._program.control.playing = made._program.control.accepts = False
     guard.send(Release(42).encode())
     served.step(0.0)
     assert StatusReport("released", "42").encode() not in guard.receive()
@@ -698,8 +699,8 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
     guard.send(Release(7).encode())
     path(program)
     served.step(0.0)
-    assert [call[0] for call in made._control.calls] == ["movePath", "setWatchdog", "kick"]
-    (_, *entries), _ = made._control.calls[-3:-1]
+    assert [call[0] for call in made._program.control.calls] == ["movePath", "setWatchdog", "kick"]
+    (_, *entries), _ = made._program.control.calls[-3:-1]
     assert entries == [
         ("movej", "joints", [1.05, 1.4, 0.02]),
         ("movel", "pose", [0.3, 1.2, 0.0]),
@@ -707,7 +708,7 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
     ]
     assert [StatusReport.decode(m).kind for m in guard.receive()][-2:] == ["restarts", "restarted"]
     assert answers(program) == []  # it waits
-    made._control.running = False
+    made._program.control.running = False
     served.step(0.0)
     assert answers(program) == [{"number": 1, "ok": True}]
 
@@ -715,10 +716,10 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
 def test_a_path_that_gets_no_watchdog_is_stopped_and_not_reported_as_restarted(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
-    made._control.setWatchdog = lambda frequency: False
+    made._program.control.setWatchdog = lambda frequency: False
     path(program)
     served.step(0.0)
-    assert stops(made._control) == ["movePath", "stopJ"]
+    assert stops(made._program.control) == ["movePath", "stopJ"]
     (answer,) = answers(program)
     assert "did not take the watchdog of a path: it was stopped" in answer["why"]
     assert "restarted" not in [StatusReport.decode(m).kind for m in guard.receive()]
@@ -727,18 +728,18 @@ def test_a_path_that_gets_no_watchdog_is_stopped_and_not_reported_as_restarted(d
 def test_a_stop_that_came_while_a_path_was_taken_is_the_next_thing_that_is_done(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
-    taken = made._control.movePath
+    taken = made._program.control.movePath
 
     def take(entries, asynchronous):
         guard.send(StopProgram(9.0).encode())
         return taken(entries, asynchronous)
 
-    made._control.movePath = take
+    made._program.control.movePath = take
     path(program)
     served.step(0.0)
     assert answers(program) == []
     served.step(0.0)
-    assert stops(made._control) == ["movePath", "stopJ"]
+    assert stops(made._program.control) == ["movePath", "stopJ"]
     assert [answer["stopped"] for answer in answers(program)] == [True]
 
 
@@ -752,7 +753,7 @@ def test_a_path_that_cannot_be_moves_nothing(driver, waypoints):
     ask(program, do="move_path", waypoints=waypoints)
     served.step(0.0)
     assert answers(program)[0]["ok"] is False
-    assert "movePath" not in stops(made._control)
+    assert "movePath" not in stops(made._program.control)
 
 
 def test_progress_is_told_and_several_may_wait_for_the_end(driver):
@@ -767,7 +768,7 @@ def test_progress_is_told_and_several_may_wait_for_the_end(driver):
         {"number": 1, "ok": True},
         {"number": 2, "ok": True, "waypoint": 2, "mode": "move"},
     ]
-    made._control.running = False
+    made._program.control.running = False
     served.step(0.0)
     ask(program, do="progress", number=5)
     ask(program, do="wait", number=6)
@@ -812,7 +813,7 @@ def test_a_question_is_answered_while_nothing_moves_with_the_tool_that_is_set(dr
     assert [a["ok"] for a in told] == [True, False, True, False]
     assert "stopScript is not a question" in told[1]["why"]
     assert "must wait until the arm has arrived or was stopped" in told[3]["why"]
-    (call,) = [call for call in made._control.calls if call[0] == "getForwardKinematics"]
+    (call,) = [call for call in made._program.control.calls if call[0] == "getForwardKinematics"]
     assert call[1] == [0.1] * 6
     assert call[2] == pytest.approx([0.0] * 6, abs=1e-11)
     assert any(call[2]), "exact zeros make the wheel send a packet of a wrong size"
@@ -826,13 +827,13 @@ def test_a_stop_that_the_program_asks_for_is_not_ended_by_the_watchdog_and_one_o
         ({"do": "stop", "acceleration": 2.0}, {"do": "servo_j", "q": [0.0] * 6, "duration": 1.0})
     ):
         ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=1.0)
-        made._control.calls.clear()
+        made._program.control.calls.clear()
         ask(program, number=2, **end)
         served.step(0.0)
-        calls = [call for call in made._control.calls if call[0] in ("setWatchdog", "speedStop")]
+        calls = [call for call in made._program.control.calls if call[0] in ("setWatchdog", "speedStop")]
         assert [call[0] for call in calls] == ["setWatchdog", "speedStop", "setWatchdog"], number
         assert (1.0 / calls[0][1], calls[2][1]) == (pytest.approx(3.5 / 2.0 + 0.3), 4.0)  # as long as it may take
-    made._control.calls.clear()
+    made._program.control.calls.clear()
     guard.send(StopProgram(9.0).encode())
     served.step(0.0)
-    assert [call[0] for call in made._control.calls if call[0] != "kick"] == ["servoStop"]
+    assert [call[0] for call in made._program.control.calls if call[0] != "kick"] == ["servoStop"]
