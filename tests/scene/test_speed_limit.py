@@ -180,7 +180,7 @@ def test_a_skin_on_the_base_needs_no_speed(tmp_path: Path) -> None:
     bare = base.replace('speed_limit_from = "impact.toml"\n', "")
     scene = load(tmp_path, base, fingerprint=limit_fingerprint(parse_scene(bare)))
     assert {item.sensor.name for item in scene.sensors} == {NAME, "foot"}
-    assert build_core(scene).needs_slider
+    assert build_core(scene).needs.slider
 
 
 @pytest.mark.parametrize(
