@@ -150,6 +150,7 @@ def load_mesh(
     vertices, faces = _read(path, data)
     if turn is not None:
         vertices = vertices @ turn.T
+    _check_corners(faces, len(vertices), str(path))
     if metres is None:
         extent = float((np.ptp(vertices[_numbered_anew(faces, len(vertices))[0]], axis=0) * np.abs(scale)).max())
         unit, metres, note = _unit(extent, asset)
@@ -197,10 +198,7 @@ def make_mesh(
         MeshError: a corner that is not finite, an index out of range, or a shape that cannot be a link.
     """
     vertices, faces = np.asarray(vertices, float), np.asarray(faces, np.int64)
-    if len(faces) == 0:
-        raise MeshError(f"{source}: no faces")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise MeshError(f"{source}: a face refers to corner {faces.max()}, there are {len(vertices)}")
+    _check_corners(faces, len(vertices), source)
     used = np.zeros(len(vertices), bool)
     used[faces] = True
     bad = used & ~np.isfinite(vertices).all(axis=1)
@@ -240,6 +238,19 @@ def make_mesh(
     if len(welded) < len(vertices):
         notes.append(f"welded {len(vertices)} vertices to {len(welded)}")
     return Mesh(welded, faces, source, unit, tuple(notes))
+
+
+def _check_corners(faces: Indices, count: int, source: str) -> None:
+    """Refuse faces that refer to other than so many corners, and no faces at all.
+
+    Raises:
+        MeshError: they do, or there are none.
+    """
+    if len(faces) == 0:
+        raise MeshError(f"{source}: no faces")
+    low, high = faces.min(), faces.max()
+    if low < 0 or high >= count:
+        raise MeshError(f"{source}: a face refers to corner {low if low < 0 else high}, there are {count}")
 
 
 def _numbered_anew(faces: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:

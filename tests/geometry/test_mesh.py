@@ -268,6 +268,19 @@ def test_sizes_that_cannot_be_links(tmp_path: Path, scale: float, words: str) ->
         load_mesh(file, unit="m")
 
 
+@pytest.mark.parametrize("corner", [4, -5])
+def test_a_file_whose_faces_name_no_corner_is_refused_whether_or_not_its_unit_is_named(
+    tmp_path: Path, corner: int
+) -> None:
+    head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    body = "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
+    file = tmp_path / "a.ply"
+    file.write_text(head + body + f"3 0 1 2\n3 0 1 {corner}\n", encoding="ascii")
+    for unit in (None, "m"):
+        with pytest.raises(MeshError, match=f"a face refers to corner {corner}, there are 4"):
+            load_mesh(file, unit=unit)
+
+
 def test_faces_that_name_no_corner() -> None:
     with pytest.raises(MeshError, match="a face refers to corner 9, there are 3"):
         make_mesh(np.eye(3), np.array([[0, 1, 9]]))
