@@ -23,7 +23,7 @@ from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.heartbeats.controller_clock import ControllerClock
+from coneskin.robot.guard.heartbeats.state_age import StateAge
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import Done, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -71,6 +71,7 @@ class ArmSupervisor:
         heartbeat: supervision of the program that moves the arm; None where that is the driver process.
         internal_control: True where the driver process moves the arm.
         speed_reduction: of the slow reaction; it has to know where the controller's speed slider is.
+        state_age: of the controller's states.
 
     Raises:
         RobotRefused: a reaction moves the arm, and there is no planner.
@@ -104,10 +105,9 @@ class ArmSupervisor:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
         self._limits = limits
         self._away = MotionAway(planner, self.internal_control)
-        self._clock = ControllerClock()
+        self.state_age = StateAge(limits.arm_silence)
         self._stop = ArmStop(limits, paths)
         self._reaction = reaction  # the one that is under way
-        self._fresh = -math.inf  # host time of the newest state that was a new one
         self._ending = False
 
     @property
@@ -212,10 +212,8 @@ class ArmSupervisor:
 
     def sample(self, state: ControllerState, out: Outputs) -> None:
         """Take a measured state."""
-        if self.state is None or state.controller_time != self.state.controller_time:
-            self._fresh = state.time
         self.state = state
-        stop, measured_at = self._stop, self._clock.measured_at(state.time, state.controller_time)
+        stop, measured_at = self._stop, self.state_age.note(state)
         self._away.note(measured_at, state)
         if stop.escalation.under_way:
             self._follow(state, measured_at, out)
@@ -248,7 +246,7 @@ class ArmSupervisor:
                 self.phase = Phase.ACTIVE
                 self.speed_reduction.put_back(now, out)
                 emit(out, EventName.RESUMED, now, slider=self.speed_reduction.slider)
-        elif stop.watch.under_way and self.silent(now):
+        elif stop.watch.under_way and self.state_age.silent(now):
             self._stop_now(now, stop.again("the controller fell silent"), False, out)
 
     def quiet_until(self) -> float:
@@ -260,11 +258,7 @@ class ArmSupervisor:
         heard = self.heartbeat is None or self.heartbeat.silent
         if self.phase is not Phase.ACTIVE or at_work or not heard or self._speed_limit is not None:
             return -math.inf
-        return self._fresh + self._limits.arm_silence
-
-    def silent(self, now: float) -> bool:
-        """Tell whether the controller's newest state is too old; one that repeats itself is."""
-        return now - self._fresh > self._limits.arm_silence
+        return self.state_age.quiet_until()
 
     # ---- what it does
 
@@ -284,7 +278,7 @@ class ArmSupervisor:
         self.speed_reduction.note_stop(self._stop.escalation.used)
         self._away.end(out)
         state = self.state
-        speed = None if state is None or self.silent(now) else state.speed
+        speed = None if state is None or self.state_age.silent(now) else state.speed
         self._stop.begin(now, speed, command.deceleration)
         self.phase = phase
 
@@ -297,6 +291,8 @@ class ArmSupervisor:
     def _decide(self, state: ControllerState, out: Outputs) -> None:
         """Decide what the standing arm does; the place of a touch may need a while to become certain."""
         stopping, enough = self.phase is Phase.STOPPING, self._stop.escalation.first_was_enough
+        if stale := self.state_age.stale(state.time):
+            self._away.bar(stale)
         decision = self._away.decide(state, self._reaction, stopping, enough, self._touches, out)
         self._reaction = decision.reaction
         if decision.waits:

@@ -234,12 +234,11 @@ class GuardCore:
             self._skin_event(event, out)
         arm = self._arm
         if arm is not None:
-            if arm.phase is not Phase.STARTING and arm.silent(now):
-                silence = f"{1e3 * self._limits.arm_silence:g} ms"
-                self._faults.add(now, f"the controller has sent no state for {silence}", out)
+            if arm.phase is not Phase.STARTING and (trouble := arm.state_age.trouble(now)):
+                self._faults.add(now, trouble, out)
             self._check_companions(now, arm, out)
-            if arm.phase is Phase.RETREATING and (stale := self._contacts.stale(now, self._stream.detectors)):
-                arm.abandon_motion(now, stale, out)
+            if arm.phase is Phase.RETREATING:
+                self._look_at_ages(now, arm, out)
             arm.look(now, out)
         if self.phase is not Phase.STARTING and not self._activation.resetting:
             return
@@ -253,6 +252,11 @@ class GuardCore:
             arm.release(self._activation.number, out)
         elif step is ActivationStep.WITHDRAW and arm is not None:
             arm.withdraw(out)
+
+    def _look_at_ages(self, now: float, arm: ArmSupervisor, out: Outputs) -> None:
+        """End a motion away where what supervises it is too old."""
+        if stale := self._contacts.stale(now, self._stream.detectors) or arm.state_age.stale(now):
+            arm.abandon_motion(now, stale, out)
 
     def _check_companions(self, now: float, arm: ArmSupervisor, out: Outputs) -> None:
         """Stop the arm where a process beside the guard has fallen silent, by a path that does not need it."""

@@ -48,8 +48,10 @@ def arm_blockers(arm: ArmSupervisor, now: float) -> list[str]:
         blockers.append("the position of the controller's speed slider is not known")
     if arm.heartbeat is not None and (blocker := arm.heartbeat.blocker()):
         blockers.append(blocker)
-    if arm.state is None or arm.silent(now):
+    if arm.state is None or arm.state_age.silent(now):
         return [*blockers, "the controller is silent"]
+    if trouble := arm.state_age.trouble(now):
+        blockers.append(trouble)
     return blockers + _state_blockers(arm.model, arm.state)
 
 

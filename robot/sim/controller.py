@@ -70,6 +70,7 @@ class Controller:
         self.digital_outputs = 0
         self.terminals = Terminals()
         self.outside_time: Callable[[], float] = lambda: self.timestamp
+        self.frozen = 0.0  # time in which no cycle ran though its clock went on [s]
         self.beyond = False  # programs may connect to other computers
         self.slider = 1.0
         self.resistance = [0.0] * 6  # current that each motor takes beyond the model of the arm [A]
@@ -93,7 +94,7 @@ class Controller:
     @property
     def timestamp(self) -> float:
         """Time since power-on [s]."""
-        return self.cycle * CYCLE
+        return self.cycle * CYCLE + self.frozen
 
     @property
     def speed_scaling(self) -> float:

@@ -173,7 +173,8 @@ class Server:
                 continue
             self._poll(0.0)
             if wait < -MAX_LATENESS:
-                due = time.monotonic()
+                before, due = due, time.monotonic()
+                self.controller.frozen += due - before  # or its states would look ever later than they are
             while due <= time.monotonic():
                 self._cycle()
                 due += CYCLE

@@ -82,6 +82,10 @@ class MotionAway:
         if self._planner is not None:
             self._planner.note(measured_at, state.q)
 
+    def bar(self, why: str) -> None:
+        """Let no motion begin before the next stop."""
+        self._barred = self._barred or why
+
     def prepare(self, state: ControllerState | None, permitted: bool) -> None:
         """Begin with a new stop, from the state in which its cause was seen."""
         self.permitted, self._barred = permitted, ""

@@ -79,6 +79,7 @@ class GuardRig:
         follows: bool = False,
         bits: int = 16,
         speed_limit: SpeedLimit | None = None,
+        limits: MonitoringLimits | None = None,
     ) -> None:
         names = ("one", "two")[:sensors]
         fine = Electronics(adc_bits=bits)  # with 16 a place is certain in the second frame of its touch
@@ -87,7 +88,13 @@ class GuardRig:
         at_once = Imperfections(foam=Foam(delayed=0.0))
         self.skin = VirtualSkin(skins, touches, faults=faults, imperfections=at_once, model="ladder")
         self.core = make_core(
-            skins, reaction or Reaction(kind="retreat"), rules, external, table, speed_limit=speed_limit
+            skins,
+            reaction or Reaction(kind="retreat"),
+            rules,
+            external,
+            table,
+            speed_limit=speed_limit,
+            limits=limits,
         )
         self.arm = MockArm(list(START_Q), [0.0] * 6, obeys)
         self.speed = speed
@@ -192,9 +199,10 @@ def make_core(
     table: TablePlane | None = None,
     driver: ArmDriver = UR_DRIVER,
     speed_limit: SpeedLimit | None = None,
+    limits: MonitoringLimits | None = None,
 ) -> GuardCore:
     """Return a core for sensors that all lie on the same place of the forearm."""
-    limits = MonitoringLimits()
+    limits = limits or MonitoringLimits()
     placed = [
         GuardedSensor(s.name, "forearm", LINK, lambda u, phi: (CONE.point(u, phi), CONE.normal(phi)), 0.1, 0.2)
         for s in sensors

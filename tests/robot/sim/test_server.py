@@ -264,3 +264,25 @@ def test_ten_clients_of_each_service_are_greeted_and_looked_after() -> None:
             assert all(client.socket.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) for client in clients)
         turn(server, 100)
         assert all(len(clients) == 10 for name, clients in server._clients.items() if name in PORTS)
+
+
+def test_a_controller_that_was_frozen_has_lost_cycles_and_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A client would else take every later state for a late one."""
+    now = [100.0]
+    monkeypatch.setattr("coneskin.robot.sim.server.time.monotonic", lambda: now[0])
+    controller = Controller(Options())
+    with Server(controller, free_host()) as server:
+
+        def wait(timeout: float) -> None:
+            now[0] += max(timeout, 1e-4)
+            if controller.cycle == 50 and controller.frozen == 0.0:
+                now[0] += 0.3  # in both waits of that cycle
+            if controller.cycle == 100:
+                server.stop()
+
+        monkeypatch.setattr(server, "_poll", wait)
+        server.run()
+    assert controller.cycle == 100
+    # a cycle, and the steps of this test's own clock
+    assert controller.timestamp == pytest.approx(now[0] - 100.0, abs=0.003)
+    assert controller.frozen == pytest.approx(0.6, abs=0.003)

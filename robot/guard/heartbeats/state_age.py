@@ -1,0 +1,67 @@
+"""Age of a controller's states: whether they stay away, repeat themselves, or come later than they may. Pure.
+
+A queue in the network that fills lets states come later and later, and no time between two of them is long. A host that
+was held up reads many late ones at once and then the newest, which is none.
+"""
+
+from __future__ import annotations
+
+import math
+
+from coneskin.robot.driver.state import ControllerState
+
+from .controller_clock import ControllerClock
+
+__all__ = ["StateAge"]
+
+_MAX_SUPERVISION_LAG = 0.05  # s; of states that show where a motion away has got, whatever silence is allowed
+_LAG_TIME = 0.02  # s for which they must be as late
+
+
+class StateAge:
+    """Age of the states of one controller.
+
+    Args:
+        limit: longest age of the newest state [s].
+    """
+
+    def __init__(self, limit: float) -> None:
+        self._limit = limit
+        self._clock = ControllerClock()
+        self._controller_time = -math.inf  # the latest so far
+        self._fresh = -math.inf  # host time of the newest state that was a new one
+        self._late_since = self._very_late_since = math.inf  # host times of the first state that came so late
+
+    def note(self, state: ControllerState) -> float:
+        """Take a state that was just read, and return the host time at which it was measured [s]."""
+        measured_at = self._clock.measured_at(state.time, state.controller_time)
+        if state.controller_time > self._controller_time:
+            self._controller_time, self._fresh = state.controller_time, state.time
+            lag = state.time - measured_at
+            self._late_since = min(self._late_since, state.time) if lag > _MAX_SUPERVISION_LAG else math.inf
+            self._very_late_since = min(self._very_late_since, state.time) if lag > self._limit else math.inf
+        return measured_at
+
+    def silent(self, now: float) -> bool:
+        """Tell whether the newest state is too old at a host time [s]; one whose time does not go on is."""
+        return now - self._fresh > self._limit
+
+    def quiet_until(self) -> float:
+        """Return the host time before which there is no trouble [s], whatever comes."""
+        return min(self._fresh, self._very_late_since) + self._limit
+
+    def trouble(self, now: float) -> str:
+        """Return what is wrong with how the states come, at a host time [s]; empty where nothing is."""
+        limit = f"{1e3 * self._limit:g} ms"
+        if self.silent(now):
+            return f"the controller has sent no state for {limit}"
+        if now - self._very_late_since > self._limit:
+            return f"the controller's states come more than {limit} late: its network is congested"
+        return ""
+
+    def stale(self, now: float) -> str:
+        """Return why they cannot supervise a motion away at a host time [s]; empty where they can."""
+        if now - self._late_since <= _LAG_TIME:
+            return ""
+        limit = f"{1e3 * _MAX_SUPERVISION_LAG:.0f} ms"
+        return f"the controller's states come more than {limit} late, too late to move away by"

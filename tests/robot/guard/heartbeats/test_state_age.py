@@ -1,0 +1,100 @@
+"""A network that fills: the controller's states come later and later, and no time between two of them is long."""
+
+import math
+from collections import deque
+
+import pytest
+
+from coneskin.robot.driver.messages import SetJointVelocity
+from coneskin.robot.guard.journal import BlockKind
+from coneskin.robot.guard.phase import Phase
+from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.testing.guard_rig import GuardRig, touch
+
+PATIENT = MonitoringLimits(arm_silence=0.25)  # as a scene of a busy computer has it
+RETREAT = Reaction(kind="retreat", distance=0.06)
+
+
+class QueuedRig(GuardRig):
+    """A rig whose controller sends through a queue that grows by 0.3 s/s up to ``longest``, from ``since`` on."""
+
+    longest, since, held_until = 0.0, math.inf, 0.0
+
+    def feed(self, kind, payload=b""):
+        if kind is not BlockKind.ARM:
+            return super().feed(kind, payload)
+        queue = self.__dict__.setdefault("queue", deque())
+        lag = min(self.longest, 0.3 * max(0.0, self.now - self.since))
+        queue.append((max(self.now + lag, self.held_until), payload))
+        while queue and queue[0][0] <= self.now:
+            super().feed(kind, queue.popleft()[1])
+        return []
+
+    def fill(self, longest):
+        self.longest, self.since = longest, self.now
+        return self
+
+
+def setpoints(rig):
+    return sum(isinstance(output, SetJointVelocity) for output in rig.outputs)
+
+
+def test_states_that_come_later_and_later_are_a_fault_and_the_arm_stands():
+    rig = QueuedRig(speed=0.3).run(0.5).fill(0.08).run(1.0)
+    (stop,) = [event for event in rig.events if event.name == "stopping"]  # once, though they stay late
+    assert stop.details["why"] == "the controller's states come more than 50 ms late: its network is congested"
+    assert rig.core.phase is Phase.LATCHED
+    assert rig.arm.speed < 0.01
+    assert any("more than 50 ms late" in line for line in rig.core.blockers(rig.now))
+    rig.longest = 0.0
+    rig.run(0.2)
+    rig.reset()
+    assert rig.run(0.3).core.phase is Phase.ACTIVE  # timely again, and a person has looked
+
+
+def test_a_lag_within_what_a_silence_may_last_is_no_fault():
+    rig = QueuedRig(speed=0.3, limits=PATIENT).run(0.5).fill(0.2).run(1.5)
+    assert rig.core.phase is Phase.ACTIVE
+    rig.longest = 0.3
+    assert rig.run(1.5).core.phase is Phase.LATCHED
+
+
+def test_no_arm_moves_away_by_states_that_are_late():
+    rig = QueuedRig(touch(1.2, 1.5), reaction=RETREAT, speed=0.3, limits=PATIENT).run(0.5).fill(0.1).run(2.0)
+    assert rig.core.phase is Phase.LATCHED
+    assert "no retreat: the controller's states come more than 50 ms late" in rig.event("latched").details["why"]
+    assert setpoints(rig) == 0
+
+
+def test_a_motion_away_ends_where_states_become_late():
+    rig = QueuedRig(touch(0.5, 0.8), reaction=RETREAT, speed=0.3, limits=PATIENT).run(0.5)
+    while "retreating" not in rig.names:
+        rig.run(0.001)
+    rig.fill(0.2).run(1.5)
+    assert rig.core.phase is Phase.LATCHED
+    retreated = rig.event("retreated")
+    assert "more than 50 ms late, too late to move away by" in retreated.details["why"]
+    # 50 ms late at 0.3 s per second, 20 ms more, and what the queue of that time hides
+    assert retreated.time - rig.event("retreating").time < 0.05 / 0.3 + 0.02 + 0.08
+
+
+@pytest.mark.parametrize("seconds", [0.04, 0.2])
+def test_a_host_that_was_held_up_reads_late_states_at_once_and_moves_on(seconds):
+    rig = QueuedRig(touch(0.5, 0.8), reaction=RETREAT, speed=0.3, limits=PATIENT).run(0.5)
+    while "retreating" not in rig.names:
+        rig.run(0.001)
+    rig.run(0.05)
+    rig.held_until = rig.now + seconds
+    rig.run(3.0)
+    assert "late" not in rig.event("retreated").details["why"]
+
+
+@pytest.mark.parametrize("step", [-0.002, -0.004])  # the mock arm's own clock goes on by 0.002 s
+def test_a_controller_whose_time_runs_backwards_or_stands_still_is_silent(step):
+    rig = GuardRig(speed=0.3).run(0.5)
+    for _ in range(100):
+        rig.arm.clock += step
+        rig.run(0.002)
+    assert rig.event("stopping").details["why"] == "the controller has sent no state for 50 ms"
+    assert rig.event("stopping").time < rig.now - 0.1
