@@ -78,6 +78,18 @@ def test_a_file_without_python_jumps_to_the_touch(tmp_path: Path) -> None:
         page.evaluate(JUMP, "touch located")
         wait_for_text(page, "#coneskin-clock", "0.021 s")
         wait_for_text(page, ".coneskin-phase", "stopping")
+        level = read_strands([RUN, RUN])[0].moment(0.0214).levels["forearm skin"]
+        wait_for_text(page, ".coneskin-level", f"level {level:.2f}")
+        marks = [float(mark.evaluate("(mark) => mark.style.left.slice(0, -1)"))
+                 for mark in page.query_selector_all(".coneskin-level-mark")]  # fmt: skip
+        assert marks == [pytest.approx(100.0 * level, abs=0.5)] * 2, "a bar for each run"
+        page.locator("#coneskin-traces select").select_option("joint speed [rad/s]")
+        shown = [trace.inner_text() for trace in page.query_selector_all(".coneskin-trace") if trace.is_visible()]
+        assert len(shown) == 1
+        assert "joint 6" in shown[0]
+        line = page.locator("#coneskin-events div", has_text="run 2: touch located")
+        line.hover()
+        assert line.evaluate("(line) => line.scrollHeight <= line.clientHeight && line.scrollWidth <= line.clientWidth")
         assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
         assert page.wrong == []
 

@@ -15,10 +15,13 @@ from pathlib import Path
 from coneskin.draft_file import draft_of
 from coneskin.errors import RecordingError
 
+from .level_changes import LevelChanges
 from .page_server import PageServer, page_client
-from .panel_text import NOTICE
+from .panel_text import EVENT_STYLE, NOTICE
+from .stage.level_scale import level_bars
 from .stage_nodes import StageNodes, look_at_stages
 from .strand import Strand, event_lines
+from .trace_drawing import trace_drawings
 
 __all__ = ["write_html"]
 
@@ -36,9 +39,10 @@ background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px
 #coneskin-notice{border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px;margin:6px 0}
 .coneskin-phase{color:#fff;padding:6px 10px;font-size:15px;margin:4px 0}
 .coneskin-health{color:#b91c1c;font-size:12px}
-#coneskin-timeline{width:100%;display:block;cursor:pointer}
+#coneskin-timeline{width:100%!important;margin:0!important;display:block;cursor:pointer}
 #coneskin-events{font:11px/1.5 monospace;margin-top:6px}
-#coneskin-events div{cursor:pointer;white-space:nowrap;overflow:hidden;text-overflow:ellipsis}
+.coneskin-cursor{position:absolute;top:0;bottom:0;width:2px;background:#111827;pointer-events:none}
+#coneskin-traces{font-size:11px;margin:4px 10px}
 #root .mantine-NumberInput-root,#root .mantine-Slider-label{display:none}
 """  # the client's own field and label count from the first picture, which is not where the run's clock has its zero
 
@@ -51,10 +55,18 @@ _SCRIPT = """
   const healths = [...panel.querySelectorAll('.coneskin-health')];
   const clock = document.getElementById('coneskin-clock');
   const list = document.getElementById('coneskin-events');
-  const cursor = document.getElementById('coneskin-cursor');
+  const cursors = [...panel.querySelectorAll('.coneskin-cursor')];
+  const levels = [...panel.querySelectorAll('.coneskin-level')];
+  const marks = [...panel.querySelectorAll('.coneskin-level-mark')];
+  const forces = [...panel.querySelectorAll('.coneskin-force b')];
+  const traces = [...panel.querySelectorAll('.coneskin-trace')];
+  panel.querySelector('#coneskin-traces select').onchange = (event) => {
+    traces.forEach((trace, k) => { trace.hidden = k !== Number(event.target.value); });
+  };
   const rows = data.events.map((event) => {
     const row = document.createElement('div');
-    row.textContent = row.title = event[1];
+    row.textContent = event[1];
+    row.tabIndex = 0;
     row.onclick = () => jump(event[0]);
     list.appendChild(row);
     return row;
@@ -89,12 +101,20 @@ _SCRIPT = """
     if (time !== null && time !== before) {
       before = time;
       clock.textContent = (1e-3 * Math.floor(1e3 * (time + data.since))).toFixed(3) + ' s';
-      cursor.style.left = (100 * time / data.duration) + '%';
+      cursors.forEach((cursor) => { cursor.style.left = (100 * time / data.duration) + '%'; });
+      let bar = 0, pressed = 0;
       data.runs.forEach((run, k) => {
         const phase = last(run.phases, time);
         phases[k].textContent = (data.runs.length > 1 ? run.title + ': ' : '') + phase[1];
         phases[k].style.background = phase[2];
         healths[k].textContent = last(run.health, time)[1];
+        run.levels.forEach((changes, sheet) => {
+          const level = last(changes, time)[1];
+          levels[bar].textContent = run.words[sheet][level];
+          marks[bar].style.left = level + '%';
+          bar += 1;
+        });
+        if (run.forces.length > 0) { forces[pressed].textContent = last(run.forces, time)[1]; pressed += 1; }
       });
       rows.forEach((row, k) => { row.style.opacity = data.events[k][0] <= time + 1e-4 ? 1 : 0.4; });
     }
@@ -123,7 +143,8 @@ def write_html(path: Path, strands: Sequence[Strand]) -> float:
     since, until = min(item.span[0] for item in strands), max(item.span[1] for item in strands)
     duration = max(until - since, 1e-3)
     count = min(max(2, int(duration * _RATE)), _PICTURES)
-    scene = _serialized(strands, since, _pictures(strands, since, duration, count))
+    changes = [LevelChanges(strand.stage.sheets) for strand in strands]
+    scene = _serialized(strands, since, _pictures(strands, since, duration, count), changes)
     embedded = base64.b64encode(scene).decode("ascii")
     head = (
         f"<title>coneskin: {escape(strands[0].stage.title)}</title><style>{_STYLE}</style>"
@@ -132,7 +153,7 @@ def write_html(path: Path, strands: Sequence[Strand]) -> float:
     page = page_client()
     page = page.replace("</head>", f"{head}</head>", 1)
     at = page.rindex("</body>")
-    page = page[:at] + _panel(strands, since, until) + page[at:]
+    page = page[:at] + _panel(strands, since, until, changes) + page[at:]
     try:
         with draft_of(path, overwrite=True) as draft:
             draft.write_text(page, encoding="utf-8")
@@ -161,8 +182,10 @@ def _pictures(strands: Sequence[Strand], since: float, duration: float, count: i
     return sorted(even | {at for at in events if 0.0 <= at < duration})
 
 
-def _serialized(strands: Sequence[Strand], since: float, pictures: Sequence[float]) -> bytes:
-    """Return the scene and its pictures as viser's client reads them."""
+def _serialized(
+    strands: Sequence[Strand], since: float, pictures: Sequence[float], changes: Sequence[LevelChanges]
+) -> bytes:
+    """Return the scene and its pictures as viser's client reads them, and take the levels of each picture."""
     with PageServer("coneskin", port=0x2F00) as server:
         taken = server.serializer()
         reach = max(strand.stage.reach for strand in strands)
@@ -177,34 +200,38 @@ def _serialized(strands: Sequence[Strand], since: float, pictures: Sequence[floa
             if at > before:
                 taken.insert_sleep(at - before)
             before = at
-            for strand, drawn in zip(strands, nodes, strict=True):
-                drawn.show(strand.moment(since + at))
+            for strand, drawn, levels in zip(strands, nodes, changes, strict=True):
+                moment = strand.moment(since + at)
+                drawn.show(moment)
+                levels.take(at, moment)
         return bytes(taken.serialize())
 
 
-def _panel(strands: Sequence[Strand], since: float, until: float) -> str:
+def _panel(strands: Sequence[Strand], since: float, until: float, changes: Sequence[LevelChanges]) -> str:
     from .timeline import timeline
 
     several = len(strands) > 1
-    runs, parts = [], []
-    for strand in strands:
+    runs, parts, bars = [], [], []
+    for strand, levels in zip(strands, changes, strict=True):
         phases = [[max(c.time - strand.zero - since, 0.0), c.phase.text, c.phase.colour] for c in strand.history.phases]
         health = [[0.0, ""]]
         for event in strand.history.events:
             if (wrong := strand.history.health(event.time)) != health[-1][1]:
                 health.append([event.time - strand.zero - since, wrong])
-        runs.append({"title": strand.stage.title, "phases": phases, "health": health})
+        runs.append({"title": strand.stage.title, "phases": phases, "health": health, **levels.data()})
         title = "" if several else f"<b>{escape(strand.stage.title)}</b>"  # of several, each phase says whose it is
         parts.append(f'{title}<div class="coneskin-phase"></div>')
         parts.append('<div class="coneskin-health"></div>')
+        force = strand.history.force(strand.zero + since)
+        bars.append(level_bars(strand.stage.sheets, {sheet.name: 0.0 for sheet in strand.stage.sheets}, force))
     events = [(line.time - since, " ".join(line.text.split())) for line in event_lines(strands)[:_EVENTS]]
     data = {"since": since, "duration": max(until - since, 1e-3), "several": several, "runs": runs, "events": events}
     text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element
     drawn = timeline(strands, since, until)
     return (
         f'<div id="coneskin"><div id="coneskin-notice">{escape(NOTICE)}</div>{"".join(parts)}'
-        f'<div id="coneskin-clock"></div><div style="position:relative">{drawn}<div id="coneskin-cursor" '
-        'style="position:absolute;top:0;bottom:0;width:2px;background:#111827;pointer-events:none"></div></div>'
-        f'<div id="coneskin-events"></div></div><script type="application/json" id="coneskin-data">{text}</script>'
-        f"<script>{_SCRIPT}</script>"
+        '<div id="coneskin-clock"></div><div style="position:relative;margin:4px 10px 0">'
+        f'{drawn}<div class="coneskin-cursor"></div></div>{"".join(bars)}{trace_drawings(strands, since, until)}'
+        f'<style>{EVENT_STYLE}</style><div id="coneskin-events"></div></div>'
+        f'<script type="application/json" id="coneskin-data">{text}</script><script>{_SCRIPT}</script>'
     )

@@ -9,10 +9,17 @@ from coneskin.robot.guard.journal import GuardEvent
 
 from .phase_words import PhaseWords
 
-__all__ = ["NOTICE", "event_list", "notice", "status"]
+__all__ = ["EVENT_STYLE", "NOTICE", "event_list", "notice", "status"]
 
 NOTICE = "No safety display. What is drawn may be late, old or wrong; nobody may rely on it near an arm."
 _SHOWN = 9  # events of the list
+_LONGEST = 1200  # letters of a line
+#: of the lines of events: three lines of the panel each, and all of it under the pointer or where it was clicked
+EVENT_STYLE = """
+#coneskin-events>div{padding-left:9ch;text-indent:-9ch;overflow:hidden;overflow-wrap:anywhere;cursor:pointer;
+display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
+#coneskin-events>div:hover,#coneskin-events>div:focus,#coneskin-events>div.now{display:block}
+"""
 _HOT = {"contact", "contact_located", "contact_extended", "stopping", "stop_failed", "fault", "guard_exited"}
 
 
@@ -73,11 +80,15 @@ def event_list(lines: Sequence[tuple[GuardEvent, str]], now: int) -> str:
         event, line = lines[index]
         style = "font-weight:700;" if index == now else "opacity:.45;" if index > now else ""
         colour = "#b91c1c" if event.name in _HOT else "inherit"
-        rows.append(
-            f'<div style="{style}color:{colour};white-space:nowrap;overflow:hidden;text-overflow:ellipsis" '
-            f'title="{escape(line.strip()[:600])}">{escape(line.strip()[:200])}</div>'
-        )
+        kind = ' class="now"' if index == now else ""
+        rows.append(f'<div tabindex="0"{kind} style="{style}color:{colour}">{escape(_line(line))}</div>')
     return (
+        f"<style>{EVENT_STYLE}</style>"
         '<div id="coneskin-events" style="font-family:monospace;font-size:11px;line-height:1.5;margin:2px 10px">'
         f"{''.join(rows) or 'no events'}</div>"
     )
+
+
+def _line(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."

@@ -175,6 +175,7 @@ def _add_solid(scene: Any, name: str, solid: Solid) -> None:
         _single(solid.vertices),
         solid.faces,
         color=solid.colour,
+        opacity=None if solid.opacity >= 1.0 else solid.opacity,
         side="front" if solid.closed else "double",
         cast_shadow=False,
         receive_shadow=False,

@@ -8,10 +8,11 @@ from typing import Any
 from .strand import Strand
 from .traces import Traces, trace_names, traces
 
-__all__ = ["TracePlot"]
+__all__ = ["COLOURS", "MOST_LINES", "TracePlot", "value_range"]
 
-_COLOURS = ("#2563eb", "#ea580c", "#16a34a", "#7c3aed", "#854d0e", "#0891b2", "#db2777", "#4b5563")
-_MOST = 12  # lines of one plot
+#: of the lines, in their order
+COLOURS = ("#2563eb", "#ea580c", "#16a34a", "#7c3aed", "#854d0e", "#0891b2", "#db2777", "#4b5563")
+MOST_LINES = 12  #: of one plot
 
 
 class TracePlot:
@@ -56,13 +57,13 @@ class TracePlot:
 
     def _traces(self) -> Traces:
         found = traces(self._strands, self._shown, self._since, self._until)
-        return Traces(found.names[:_MOST], found.times, found.values[:_MOST])
+        return Traces(found.names[:MOST_LINES], found.times, found.values[:MOST_LINES])
 
     def _make(self) -> Any:
         found = self._traces()
         series = [{"label": "time [s]"}]
         for number, name in enumerate(found.names):
-            series.append({"label": name, "stroke": _COLOURS[number % len(_COLOURS)], "width": 1.5})  # type: ignore[dict-item]
+            series.append({"label": name, "stroke": COLOURS[number % len(COLOURS)], "width": 1.5})  # type: ignore[dict-item]
         return self._gui.add_uplot(
             (found.times, *found.values),
             tuple(series),
@@ -72,11 +73,16 @@ class TracePlot:
         )
 
 
-def _scales(found: Traces) -> dict[str, Any]:
-    """Return the axes of a plot; one that looks for its own range finds none where a value is missing (NaN)."""
+def value_range(found: Traces) -> tuple[float, float]:
+    """Return from where to where the values of traces are drawn, with a margin; 0 to 1 where there are none."""
     import numpy as np
 
     known = found.values[np.isfinite(found.values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     margin = 0.05 * (high - low) or 0.5
-    return {"x": {"time": False, "auto": True}, "y": {"auto": False, "range": (low - margin, high + margin)}}
+    return low - margin, high + margin
+
+
+def _scales(found: Traces) -> dict[str, Any]:
+    """Return the axes of a plot; one that looks for its own range finds none where a value is missing (NaN)."""
+    return {"x": {"time": False, "auto": True}, "y": {"auto": False, "range": value_range(found)}}

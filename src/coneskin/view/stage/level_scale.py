@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .sheet_surface import SheetSurface
 
-__all__ = ["gradient", "level_bars", "level_colour", "level_words"]
+__all__ = ["force_words", "gradient", "level_bars", "level_colour", "level_words"]
 
 _STEPS = 24  # colours of a sheet: a change below one is not worth a message
 _QUIET, _TOUCHED, _FIRM = (46, 125, 107), (245, 158, 11), (220, 38, 38)
@@ -58,8 +58,13 @@ def level_bars(sheets: Sequence[SheetSurface], levels: Mapping[str, float], forc
     """
     parts = [_bar(sheet, levels[sheet.name]) for sheet in sheets]
     if force is not None:
-        parts.append(f'<div id="coneskin-force">force of the contact, in physics: <b>{force:.1f} N</b></div>')
+        parts.append(f'<div class="coneskin-force">force of the contact, in physics: <b>{force_words(force)}</b></div>')
     return f'<div id="coneskin-levels" style="font-size:12px;margin:4px 10px">{"".join(parts)}</div>'
+
+
+def force_words(force: float) -> str:
+    """Return a force [N] for people."""
+    return f"{force:.1f} N"
 
 
 def _bar(sheet: SheetSurface, level: float) -> str:
@@ -76,9 +81,9 @@ def _bar(sheet: SheetSurface, level: float) -> str:
         for at, text in ticks
     )
     return (
-        f"<div>{escape(level_words(sheet, level))}</div>"
+        f'<div class="coneskin-level">{escape(level_words(sheet, level))}</div>'
         f'<div style="position:relative;height:10px;background:{gradient(colours)}">'
-        f'<div style="position:absolute;left:calc({shown:.1f}% - 1px);top:-2px;width:3px;height:14px;'
-        'background:#111827"></div></div>'
+        f'<div class="coneskin-level-mark" style="position:absolute;left:{shown:.1f}%;top:-2px;width:3px;height:14px;'
+        'margin-left:-1px;background:#111827"></div></div>'
         f'<div style="position:relative;height:14px;font-size:10px;opacity:.8">{marks}</div>'
     )

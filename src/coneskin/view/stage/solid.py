@@ -29,6 +29,7 @@ class Solid(NamedTuple):
         faces: indices of vertices, counter-clockwise from outside, shape (m, 3).
         colour: red, green and blue, 0 to 255.
         closed: nobody sees its inside, which then is not drawn; False for a mesh of unknown quality.
+        opacity: 1 hides what is behind; less for what would hide a sheet.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Solid(NamedTuple):
     faces: NDArray[np.int64]
     colour: tuple[int, int, int]
     closed: bool = False
+    opacity: float = 1.0
 
 
 def revolve(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from coneskin.geometry.pose import Pose, Vector
 
 from .body_solids import body_solids
+from .buried_sheets import clear_where_buried
 from .sheet_surface import SheetSurface, sheet_surfaces
 from .solid import Solid
 
@@ -113,7 +114,8 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     if meshes:
         own = _link_meshes(scene, model)
         solids = (*(solid for solid in solids if solid.link not in {mesh.link for mesh in own}), *own)
-    return Stage(title, model, tuple(solids), sheets, bodies, starts)
+    stage = Stage(title, model, tuple(solids), sheets, bodies, starts)
+    return replace(stage, solids=clear_where_buried(solids, sheets, stage.poses(None)))
 
 
 def _link_meshes(scene: Scene, model: ArmModel) -> list[Solid]:
