@@ -8,6 +8,7 @@ import pytest
 from coneskin.code_version import running_version
 from coneskin.errors import RecordingError
 from coneskin.recording_file.defect import Defect, DefectKind
+from coneskin.replay.quantities import Tolerances
 from coneskin.replay.run import Run, read_run, replay
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.runs.cut import cut_run
@@ -46,6 +47,20 @@ def test_a_cut_that_shows_another_reaction_says_so(collision: Run, tmp_path: Pat
     cut = cut_run(lagging, tmp_path / "late.rec", around=2.95)
     assert cut.other_reaction.startswith("stopping, escalated")
     assert cut.other_reaction.endswith("; in the whole run nothing")
+
+
+def test_a_cut_without_a_duration_begins_as_early_as_the_same_contacts_need(
+    collision: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only a guard that has seen the run from its start knows the zero of the skin to the last bit."""
+    monkeypatch.setattr("coneskin.runs.cut.CUT_TOLERANCES", Tolerances(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    with pytest.raises(RecordingError, match=r"same contacts: .*or name no duration"):
+        cut_run(collision, tmp_path / "cut.rec", around=2.95, keep=1.0)
+    first = next(block.time for block in collision.blocks if block.kind == BlockKind.SKIN)
+    cut = cut_run(collision, tmp_path / "cut.rec", around=2.95)
+    assert cut.comparison.differences == ()
+    assert collision.start + cut.since <= first
+    assert cut.until == pytest.approx(3.45, abs=0.01)
 
 
 def test_nothing_is_cut_out_of_a_part_that_is_damaged(collision: Run, tmp_path: Path) -> None:

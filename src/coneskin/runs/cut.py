@@ -39,6 +39,8 @@ __all__ = ["CUT_TOLERANCES", "CutRun", "cut_run", "first_touch"]
 
 #: s before the settling of the guard that the skin needs: 50 untouched frames at 200 Hz, and as much again
 _SKIN_SETTLE = 0.5
+#: s of a cut whose duration nobody names
+_KEPT = 1.0
 #: what a start in the middle may change: the zero of the skin is learned from other frames
 CUT_TOLERANCES = Tolerances(place=5e-4, angle=0.02, level=0.02, speed=0.01, time=5e-3, relative=0.01)
 _SURFACES, _TRUTH, _ABSENT = (frozenset({kind}) for kind in (BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.ABSENT))
@@ -91,7 +93,7 @@ def first_touch(run: Run) -> float:
 
 
 def cut_run(
-    run: Run, target: Path, around: float, keep: float = 1.0, name: str = "", progress: Progress = silent
+    run: Run, target: Path, around: float, keep: float | None = None, name: str = "", progress: Progress = silent
 ) -> CutRun:
     """Write the part of a run around a moment as a recording of its own.
 
@@ -100,6 +102,7 @@ def cut_run(
         target: the file to make.
         around: the moment [s since the start of the run].
         keep: how much of it [s]: half before the moment, and as much as a guard needs to become active, half after it.
+            None: 1 s, begun as much earlier as it takes until the contacts are those of the whole run.
         name: of the whole run, for the new one's header.
         progress: called now and then with the fraction that is done.
 
@@ -107,37 +110,41 @@ def cut_run(
         RecordingError: there is nothing at that moment, no contact, or the contacts would be others than in the whole
             run; or the file is there already.
     """
-    if not (math.isfinite(around) and math.isfinite(keep) and keep > 0.0):
-        raise RecordingError(f"a cut needs a moment [s] and a duration above 0 s, got {around!r} s and {keep!r} s")
+    length = _KEPT if keep is None else keep
+    if not (math.isfinite(around) and math.isfinite(length) and length > 0.0):
+        raise RecordingError(f"a cut needs a moment [s] and a duration above 0 s, got {around!r} s and {length!r} s")
     start = run.start
-    lead = max(0.5 * keep, run.scene().monitoring_limits.settle + _SKIN_SETTLE)
-    since, until = start + around - lead, start + around + 0.5 * keep
+    lead = max(0.5 * length, run.scene().monitoring_limits.settle + _SKIN_SETTLE)
+    until = start + around + 0.5 * length
     if run.gap <= until:
         raise RecordingError(f"the part up to {until - start:.3f} s is not whole, so nothing is cut out: {run.missing}")
-    blocks = _written(run, since, until)
-    inputs = [block for block in blocks if block.kind in INPUTS and since < block.time <= until]
-    if not inputs:
-        raise RecordingError(f"the run has nothing from {around - lead:.3f} s to {around + 0.5 * keep:.3f} s")
-    cut = {"from": name, "around_s": around, "keep_s": keep}
+    cut = {"from": name, "around_s": around, "keep_s": length}
     made_by = {"coneskin": __version__, "commit": code_commit(), "resolved": resolved_settings(run.scene())}
     header = {**run.header, **made_by, "cut": cut}  # its events are those of today's code
-    part = replace(run, header=header, blocks=tuple(blocks), defects=(), copies=())
-    all_of_it, all_of_part = (
-        decide_again(run, label="the whole run", progress=progress),
-        recorded_decisions(part, "the cut"),
-    )
-    whole, again = _of_window(all_of_it, since, until), _of_window(all_of_part, since, until)
-    comparison = compare_decisions(whole, again, CUT_TOLERANCES)
-    contacts = [event for event in again.events if event.name == EventName.CONTACT]
-    if not contacts:
-        begun = ", ".join(f"{e.time - start:.3f}" for e in run.events if e.name == EventName.CONTACT)
-        where = f"; the run's touches begin at {begun} s" if begun else ""
-        raise RecordingError(
-            f"no touch begins from {around - lead:.3f} s to {around + 0.5 * keep:.3f} s: nothing to cut out{where}"
-        )
-    if comparison.differences:
-        lines = "; ".join(map(str, comparison.differences))
-        raise RecordingError(f"the cut would not show the same contacts: {lines}; keep more than {keep:g} s")
+    all_of_it: Decisions | None = None
+    while True:
+        since, window = start + around - lead, f"from {around - lead:.3f} s to {around + 0.5 * length:.3f} s"
+        blocks = _written(run, since, until)
+        inputs = [block for block in blocks if block.kind in INPUTS and since < block.time <= until]
+        if not inputs:
+            raise RecordingError(f"the run has nothing {window}")
+        all_of_it = all_of_it or decide_again(run, label="the whole run", progress=progress)
+        part = replace(run, header=header, blocks=tuple(blocks), defects=(), copies=())
+        all_of_part = recorded_decisions(part, "the cut")
+        whole, again = _of_window(all_of_it, since, until), _of_window(all_of_part, since, until)
+        comparison = compare_decisions(whole, again, CUT_TOLERANCES)
+        contacts = [event for event in again.events if event.name == EventName.CONTACT]
+        if not contacts:
+            begun = ", ".join(f"{e.time - start:.3f}" for e in run.events if e.name == EventName.CONTACT)
+            where = f"; the run's touches begin at {begun} s" if begun else ""
+            raise RecordingError(f"no touch begins {window}: nothing to cut out{where}")
+        if not comparison.differences:
+            break
+        if keep is not None or since <= start:  # nothing more is to be had
+            lines = "; ".join(map(str, comparison.differences))
+            hint = "" if keep is None else f"; keep more than {keep:g} s, or name no duration: it is then found"
+            raise RecordingError(f"the cut would not show the same contacts: {lines}{hint}")
+        lead *= 2.0
     active = next((e.time for e in part.events if e.name == EventName.ACTIVATED), math.inf) < contacts[0].time
     there, here = (_reaction(item.events, contacts[0].time, until) for item in (all_of_it, all_of_part))
     differs = active and there != here

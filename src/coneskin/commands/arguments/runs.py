@@ -112,7 +112,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cut.add_argument(
         "--around", type=float, metavar="SECONDS", help="the moment, as `runs info` shows it (default: the first touch)"
     )
-    cut.add_argument("--keep", type=float, default=1.0, metavar="SECONDS", help="duration (default 1)")
+    cut.add_argument(
+        "--keep",
+        type=float,
+        metavar="SECONDS",
+        help="duration (default 1, and as much before it as the same contacts need)",
+    )
     cut.add_argument("-o", "--output", type=Path, metavar="FILE", help="recording to make (default: NAME-cut.rec)")
     diff = job("diff", "contacts moved, reactions earlier or later, new and missing ones", _DIFF)
     diff.add_argument("one", type=Path, metavar="A", help="a run")
