@@ -164,9 +164,9 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         return Done(f"the time of {reaction.time_budget} s is over", progress)
     room = math.inf if plan.sweep is None else reaction.arm_distance - plan.sweep.distance(q)
     if not room > _ROOM_TOLERANCE:
-        return Done(
-            f"the arm has moved {1e3 * reaction.arm_distance:g} mm, as far as arm_distance_mm lets it", progress
-        )
+        most, wanted_way = 1e3 * reaction.arm_distance, 1e3 * reaction.distance
+        why = f"a point of the arm has moved {most:g} mm, as far as arm_distance_mm lets it"
+        return Done(f"{why}, before the touched one had moved {wanted_way:g} mm", progress)
     locked: list[int] = []
     while away >= LEAST_PROGRESS:
         speed, clipped = _speed(reaction, limits, speeds, away, left, room)
