@@ -30,8 +30,11 @@ def test_dimensions_are_designed_and_written_in_one_call(tmp_path: Path) -> None
         f"nested/{path.name[:-4]}" for path in (tmp_path / "skin" / "nested").glob("*.dxf")
     }
     assert steps
-    with pytest.raises(cs.GeometryError, match="exists already"):
+    with pytest.raises(cs.GeometryError, match=r"exists already.*replace=True"):
         cs.design_link(cs.Frustum(0.04, 0.07, 0.15), tmp_path / "skin")
+    again = cs.design_link(cs.Frustum(0.04, 0.07, 0.16), tmp_path / "skin", pictures=False, replace=True)
+    assert "160.000" in (tmp_path / "skin" / "report.md").read_text()
+    assert again.folder == tmp_path / "skin"
 
 
 def test_a_mesh_is_designed_without_a_folder() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,7 +60,7 @@ def design_link(
     arguments: Mapping[str, str] | None = None,
     files: FileOptions | None = None,
     pictures: bool = True,
-    replace_design: bool = False,
+    replace: bool = False,
     progress: Callable[[str], None] = lambda _: None,
     **search: Any,
 ) -> LinkDesign:
@@ -75,7 +76,7 @@ def design_link(
         arguments: of a xacro file (``expand_xacro``).
         files: options of the drawings.
         pictures: True to draw pictures too, which needs the extra ``pictures``.
-        replace_design: True to allow an earlier design in the folder; files that are not of that design stay.
+        replace: True to allow an earlier design in the folder; files that are not of that design stay.
         progress: called with the name of each step.
         search: fields of ``FitOptions``, such as ``tolerance=0.002`` [m].
 
@@ -88,7 +89,7 @@ def design_link(
         MissingExtra: a package that the mesh, the drawings or the pictures need is not installed.
     """
     if folder is not None:
-        check_target(Path(folder), replace_design)
+        check_target(Path(folder), replace)
     options = options or DesignOptions()
     # neighbours about other axes need room for the sheets of these options
     search = {
@@ -115,7 +116,7 @@ def design_link(
     if source is not None:
         name, frame, notes = source.name, source.frame, source.notes
     if source is not None and not options.link:
-        options = replace(options, link=source.name)
+        options = dataclasses.replace(options, link=source.name)
     sheets = cover_seams(design_sheets(places, options))
     mesh = None if source is None else source.mesh
     data: dict[str, Any] = {}
@@ -131,7 +132,7 @@ def design_link(
             notes=notes,
             options=files,
             pictures=pictures,
-            replace=replace_design,
+            replace=replace,
             progress=progress,
         )
     return LinkDesign(name, sheets, fit, mesh, frame, notes, None if folder is None else Path(folder), data)
