@@ -216,8 +216,8 @@ def test_guard_check_says_what_is_in_a_scene(tmp_path: Path, capsys: Output) -> 
         "scene": "scene.toml",
         "sensor sensor 0/0": "id 0/0 on the tube: radius 54 to 54 mm, height 434 mm, wrap 360 deg, at (0, 0, 0) mm, "
         "rpy (0, 0, 0) deg, in the mesh frame",
-        "place on sensor 0/0": "certain after about 3 frames of a firm touch: then a second contact of 0.7 mS "
-        "(about 2 N), 20 deg off, is excluded; after 512 frames one of 0.048 mS",
+        "place on sensor 0/0": "certain after about 3 frames of a firm touch: then a second contact of about "
+        "2 N (0.7 millisiemens), 20 deg off, is excluded; after 512 frames one of 0.048 millisiemens",
         "source": "virtual",
         "monitoring": "skin silent for 50 ms or late by 50 ms or without noise for 1000 frames: a fault",
         "touches": "1",

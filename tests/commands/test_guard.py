@@ -87,7 +87,8 @@ def test_rules_distances_and_limits_are_listed(tmp_path, capsys):
     [
         (
             "",
-            "certain after about 2 frames of a firm touch: then a second contact of 0.7 mS (about 2 N), 20 deg off",
+            "certain after about 2 frames of a firm touch: then a second contact of about 2 N (0.7 millisiemens), "
+            "20 deg off",
         ),
         ("adc_bits = 16", "certain after about 1 frame of"),
         ("adc_bits = 9\ncurrent_full_scale_ma = 20", "this sensor's place never becomes certain: the arm only stops"),

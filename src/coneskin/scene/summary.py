@@ -106,12 +106,12 @@ def _certainty(sensor: Sensor, arm: bool) -> str:
     if frames is None:
         return (
             f"this sensor's place never becomes certain{': the arm only stops' if arm else ''}; its readings are too "
-            f"coarse to exclude a second contact of {wanted:g} mS (about 2 N), only one of {reached:.2g} mS"
+            f"coarse to exclude a second contact of about 2 N ({wanted:g} millisiemens), only one of {reached:.2g}"
         )
     return (
         f"certain after about {frames} frame{'s' if frames > 1 else ''} of a firm touch: then a second contact of "
-        f"{wanted:g} mS (about 2 N), {math.degrees(DANGEROUS_ANGLE):.0f} deg off, is excluded; after 512 frames one of "
-        f"{reached:.2g} mS"
+        f"about 2 N ({wanted:g} millisiemens), {math.degrees(DANGEROUS_ANGLE):.0f} deg off, is excluded; after 512 "
+        f"frames one of {reached:.2g} millisiemens"
     )
 
 
