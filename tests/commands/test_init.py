@@ -1,6 +1,8 @@
 """``coneskin init``: from a design to a scene that a guard takes, without a line written by hand."""
 
+import json
 import os
+import shutil
 import tomllib
 from pathlib import Path
 
@@ -41,6 +43,7 @@ def test_a_simulated_scene_has_all_that_a_guard_needs(here: Path, capsys: Output
     assert main(["init", "skin", "--simulated", "--link", "upperarm"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         "scene.toml: 1 sensor on the upper_arm, a UR5e at 127.0.0.1",
+        "no arm was named, so it is a UR5e: --arm MODEL names another of UR's, --skin-only is none",
         "next: coneskin doctor scene.toml --simulated",
     ]
     scene = load_scene(here / "scene.toml")
@@ -107,6 +110,30 @@ def test_each_sensor_has_a_board_and_a_port_of_its_own(here: Path, capsys: Outpu
     members = [settings for _, settings in scene.source.settings["members"]]
     assert [(item["port"], item["baud"]) for item in members] == [("/dev/ttyACM0", 500000), ("/dev/ttyACM1", 500000)]
     assert scene.monitoring_limits.clock_drift == 5e-3
+
+
+def test_a_sheet_beside_the_axis_of_its_link_is_warned_of(here: Path, capsys: Output) -> None:
+    sensor = here / "off" / "sensor.toml"
+    shutil.copytree(here / "skin", here / "off")
+    data = json.loads((here / "off" / "design.json").read_text())
+    (here / "off" / "design.json").write_text(json.dumps({**data, "frame": "mesh", "link": "forearm"}))
+    sensor.write_text(sensor.read_text().replace("xyz_mm = [0.0,", "xyz_mm = [300.0,"))
+    assert main(["init", "off", "--simulated"]) == 0
+    assert "warning: link forearm, sheet 1 lies 300 mm beside the axis of the forearm" in capsys.readouterr().err
+
+
+def test_a_link_longer_than_the_arms_is_of_another_arm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["design", "--radius1-mm", "54", "--height-mm", "500", "-o", "skin", "--no-pictures"]) == 0
+    assert main(["init", "skin", "--simulated", "--link", "upper_arm"]) == 1
+    said = capsys.readouterr().err
+    assert "nothing is written; other arms than UR5e: --arm, none: --skin-only" in said
+    assert "height_mm must be at most 425 mm" in said
+    assert not (tmp_path / "scene.toml").exists()
+    assert main(["init", "skin", "--simulated", "--link", "upper_arm", "--arm", "UR10e"]) == 0
+    assert "no arm was named" not in capsys.readouterr().out
 
 
 def test_a_skin_alone_has_no_arm(here: Path) -> None:

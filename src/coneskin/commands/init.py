@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import shlex
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.errors import GeometryError
+from coneskin.errors import GeometryError, SceneError
 from coneskin.robot.sim.options import DEFAULT_MODEL
 
 from .terminal.hints import print_hint
@@ -65,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the scene, read it again, and name the next command."""
     from coneskin.design.first_scene import first_scene, read_design
     from coneskin.scene.reader import parse_scene
+    from coneskin.scene.suspicions import suspicions
     from coneskin.scene.whole_file import write_whole
 
     if args.output.exists() and not args.force:
@@ -74,11 +76,19 @@ def run(args: argparse.Namespace) -> int:
     design = read_design(args.design)
     address, ports, boards = _arm(args), _ports(args), _boards(args, design)
     text = first_scene(design, args.output.absolute(), address, ports, args.link, boards)
-    scene = parse_scene(text, args.output.name, args.output.absolute().parent)  # refused here rather than by the guard
+    try:
+        scene = parse_scene(text, args.output.name, args.output.absolute().parent)  # refused here, not by the guard
+    except SceneError as exc:
+        hint = f"; other arms than {address.model}: --arm, none: --skin-only" if address else ""
+        raise GeometryError(f"{args.design} makes no scene, and nothing is written{hint}\n{exc}") from exc
     write_whole(args.output, text)
     arm = f"a {scene.arm.model} at {scene.arm.host}" if scene.arm else "no arm"
     count = len(scene.sensors)
     print(f"{args.output}: {count} sensor{'s' if count != 1 else ''} on the {scene.links[0].name}, {arm}")
+    for line in suspicions(scene):
+        print(f"warning: {line}", file=sys.stderr)
+    if address and not args.arm:
+        print(f"no arm was named, so it is a {address.model}: --arm MODEL names another of UR's, --skin-only is none")
     print_hint(f"next: coneskin doctor {shlex.quote(str(args.output))}{' --simulated' if args.simulated else ''}")
     return 0
 

@@ -152,7 +152,10 @@ def first_scene(
     """
     name = link or design.link
     if arm is not None and name is None:
-        raise GeometryError(f"which link of the arm was it designed for? Add --link, one of {', '.join(LINK_INDEX)}")
+        raise GeometryError(
+            f"which link of the arm was it designed for? Add --link, one of {', '.join(LINK_INDEX)}, or --skin-only "
+            "where the arm is not one of UR's"
+        )
     if arm is not None and name is not None:
         name = next(known for known, number in LINK_INDEX.items() if number == link_index(name))
     lines = [_HEAD]
