@@ -39,7 +39,7 @@ PAGES = {
 }
 #: pages whose blocks start processes, or compute for seconds
 LONG = {"README.md", "docs/design.md", "docs/field.md", "docs/guard/external.md", "docs/guard/internal.md"}
-LONG |= {"docs/calibration.md", "docs/guard/commissioning.md"}
+LONG |= {"docs/calibration.md", "docs/guard/commissioning.md", "docs/permissible-speed.md"}
 LONG |= {"docs/index.md", "docs/replay.md", "docs/runs.md", "docs/sim-ur.md", "docs/physics.md"}
 #: blocks that no test runs, each with its reason in the page
 NOT_RUN = 3

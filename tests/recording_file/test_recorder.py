@@ -61,7 +61,10 @@ def test_a_full_disk_is_said(tmp_path: Path) -> None:
 def test_nothing_is_overwritten_and_nothing_is_written_to_a_closed_recording(tmp_path: Path) -> None:
     (tmp_path / "run.rec").write_bytes(b"x")
     with (
-        pytest.raises(RecordingError, match=r"cannot make the recording .*File exists"),
+        pytest.raises(
+            RecordingError,
+            match=r"run\.rec is there already, and a recording is never overwritten: name another file, or none",
+        ),
         Recorder(tmp_path / "run.rec"),
     ):
         pass

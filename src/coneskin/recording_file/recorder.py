@@ -138,8 +138,12 @@ class Recorder:
         try:
             file = open(path, "xb", buffering=0, opener=_create)  # noqa: SIM115 - closed by ``close``
         except OSError as exc:
-            hint = "; a recording is never overwritten: choose another file" if isinstance(exc, FileExistsError) else ""
-            raise RecordingError(f"cannot make the recording {path}: {exc.strerror or exc}{hint}") from exc
+            if isinstance(exc, FileExistsError):
+                hint = (
+                    "name another file, or none where the scene has [recording]: each run then has a folder of its own"
+                )
+                raise RecordingError(f"{path} is there already, and a recording is never overwritten: {hint}") from None
+            raise RecordingError(f"cannot make the recording {path}: {exc.strerror or exc}") from exc
         mark_recorded(file)
         self._close_part()
         self._file, self._written = file, 0
