@@ -207,7 +207,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
     },
     "time and messages": {
         "popup": 'popup("here", title="Popup #1", blocking=False)\nTrue',
-        "protective_stop": "not False or protective_stop()",  # it would not return: see test_controller.py
+        "protective_stop": "not False or protective_stop()",  # it would not return: see test_safety_system.py
         "sleep": "sleep(0.01)\nTrue",
         "sync": "sync()\nTrue",
         "textmsg": 'textmsg("value=", 3)\nTrue',
