@@ -181,6 +181,11 @@ def test_a_header_that_cannot_be_read_is_one_clear_line(tmp_path: Path, payload:
 def test_no_run_at_all(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"cannot read the recording .*run.rec: No such file"):
         read_run(tmp_path)
+    for name in ("2026-01-31T12-00-00", "2026-02-01T09-00-00"):
+        (tmp_path / "runs" / name).mkdir(parents=True)
+        (tmp_path / "runs" / name / "run.rec").touch()
+    with pytest.raises(RecordingError, match=r"runs is a folder of 2 runs: name one .*2026-02-01T09-00-00$"):
+        read_run(tmp_path / "runs")
     with Recorder(tmp_path / "run.rec"):
         pass
     with pytest.raises(RecordingError, match="has no header: the run ended before it began"):

@@ -223,7 +223,11 @@ class _Work:
         """Wait for a person to let the arm move again."""
         again = "; its motion then goes on" if self._session.scene.motion else ""
         person.ignore_earlier_lines()
-        print(f'type "reset" and Enter to let the arm move again{again}', file=sys.stderr, flush=True)
+        print(
+            f'type "reset" and Enter to let the arm move again{again}; Ctrl-C ends the guard',
+            file=sys.stderr,
+            flush=True,
+        )
         while time.monotonic() < self._end and not person.serve(self._session, 0.2):
             self._session.check_guard()
 

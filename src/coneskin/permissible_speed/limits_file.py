@@ -114,7 +114,8 @@ def read_limits(path: Path | str) -> LimitsFile:
     try:
         text = read_file(path, MAX_SIZE).decode("utf-8-sig")
     except OSError as exc:
-        raise SceneError([f"the file cannot be read: {exc.strerror or exc}"], str(path)) from exc
+        hint = "; docs/permissible-speed.md has one to begin with" if isinstance(exc, FileNotFoundError) else ""
+        raise SceneError([f"the file cannot be read: {exc.strerror or exc}{hint}"], str(path)) from exc
     except UnicodeDecodeError as exc:
         raise SceneError([f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8"], str(path)) from exc
     return parse_limits(text, path.name)

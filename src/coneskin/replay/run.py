@@ -174,6 +174,8 @@ def read_run(path: Path | str, progress: Callable[[float], None] | None = None) 
     """
     path = Path(path)
     if path.is_dir():
+        if not (path / "run.rec").exists() and (runs := sorted(path.glob("*/run.rec"))):
+            raise RecordingError(f"{path} is a folder of {len(runs)} runs: name one of them, such as {runs[-1].parent}")
         path = path / "run.rec"
     recording = read_recording(path, progress)
     first = next(iter(recording.blocks), None)
