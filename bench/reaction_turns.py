@@ -22,7 +22,7 @@ from coneskin.replay.run import read_run
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.journal import BlockKind, decode_event
 from coneskin.robot.sim.process import SimulatedController, free_host
-from coneskin.robot.stop.monitor import StopMonitor
+from coneskin.robot.stop.stop_monitor import StopMonitor
 from coneskin.robot.ur.state_reader import StateReader, decode_state
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard

@@ -144,7 +144,7 @@ HOT = {
     "stop_escalation journal",
     "robot/guard/motion": "motion_away reaction_motion",
     "robot/guard/heartbeats": "companion_monitor heartbeat_monitor controller_heartbeat controller_clock",
-    "robot/stop": "monitor",
+    "robot/stop": "stop_monitor",
     "robot/ur": "driver_process state_reader control_program ur_rtde",
 }
 

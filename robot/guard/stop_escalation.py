@@ -6,7 +6,7 @@ from coneskin.robot.driver.messages import EndReaction, StopProgram
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath, UseStopPath
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.robot.stop.monitor import PROTECTIVE_PATIENCE, StopMonitor
+from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
 from .journal import EventName
 from .outputs import Outputs, emit

@@ -19,7 +19,7 @@ from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath
 
 from .limits import MonitoringLimits
-from .monitor import PROTECTIVE_PATIENCE, StopMonitor
+from .stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
 __all__ = ["BLIND_TIMEOUT", "BackupStop"]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from coneskin.robot.arm.model import Joints
 from coneskin.robot.driver.state import ControllerState
 
-from .monitor import STANDSTILL_SAMPLES
+from .stop_monitor import STANDSTILL_SAMPLES
 
 __all__ = ["WATCH", "StandstillMonitor", "StandstillWatch"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from coneskin.robot.arm.model import Joints
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.reaction.types import JointVelocity
-from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES
+from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
 __all__ = ["FollowingErrorMonitor"]
 

@@ -21,7 +21,7 @@ from coneskin.robot.guard.journal import EventName
 from coneskin.robot.guard.outputs import Outputs, emit
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES
+from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
 if TYPE_CHECKING:  # a scene without a slow reaction does not load it
     from coneskin.robot.guard.motion.joint_current import JointCurrentMonitor

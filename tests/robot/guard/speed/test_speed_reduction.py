@@ -10,7 +10,7 @@ from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.speed.speed_reduction import HOLD, ReducedSpeedTouch, SpeedReduction
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES
+from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 from coneskin.testing.guard_rig import GuardRig, touch
 
 SLOW = 0.05  # m/s

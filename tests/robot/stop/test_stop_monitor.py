@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.robot.driver.stop_path import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
-from coneskin.robot.stop.monitor import STANDSTILL_SAMPLES, StopMonitor
+from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES, StopMonitor
 
 ALL = INTERNAL_PATHS
 
