@@ -514,7 +514,7 @@ def start_again_after_a_stop(host: str, revive: bool) -> dict[str, Any]:
         if revive:
             arm.revive()
         else:
-            arm._control.reuploadScript()
+            arm._program.control.reuploadScript()
         out["runs"] = _until(lambda: receive.getRuntimeState() == 2)
         out["moved"] = _until(lambda: receive.getActualQ() != stood, 0.3 if revive else 20.0)
         stops.use(StopPath.PROGRAM, 10.0)
