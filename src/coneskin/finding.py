@@ -37,7 +37,8 @@ class Finding:
     def text(self) -> str:
         """Return it for people, in one line or two."""
         line = f"{self.verdict:>9}  {self.item}: {self.value}"
-        line += f" ({self.rule})" if self.rule else ""
+        wanted = "wanted: " if self.verdict in {"bad", "warning"} else ""  # else it reads as what was found
+        line += f" ({wanted}{self.rule})" if self.rule else ""
         return f"{line}\n{'':9}  -> {self.remedy}" if self.remedy else line
 
 

@@ -74,6 +74,7 @@ def test_a_port_that_is_not_there_is_one_bad_finding(tmp_path: Path, capsys: Out
     assert main(["doctor", str(path)]) == 1
     out = capsys.readouterr().out
     assert "bad  skin, permission: there is no /dev/nothing-there; present: " in out
+    assert out.split("skin, port: ")[1].splitlines()[0].endswith(" (wanted: it can be opened)")
     assert "not tried  skin, wires: no port" in out
     assert "not tried  arm: the scene has no [arm]" in out
     assert out.splitlines()[-1].startswith("next: mend what is bad, then coneskin doctor")
