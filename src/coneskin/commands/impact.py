@@ -85,7 +85,7 @@ def _check(scene: Scene, ways: list[str]) -> None:
         "a [[link]] with a [[link.sensor]]": scene.sensors,
         "a [[body]] to run into": scene.bodies,
     }
-    problems += [f"an impact needs {name}" for name, part in needed.items() if not part]
+    problems += [f"an impact needs {name}: see docs/physics.md" for name, part in needed.items() if not part]
     if problems:
         raise SceneError(problems, scene.name)
 
