@@ -1,6 +1,9 @@
 """What a workshop builds: the jig's distance to real links, STEP read back by another reader, and the blind seam.
 
-python -m pip install -e '.[design,cad,bench]'; python bench/build.py --links FOLDER
+python -m pip install -e '.[design,cad,bench]'; python bench/build.py --links FOLDER > build.txt
+
+A link takes a minute or more. A run that was ended goes on with `--resume build.txt > build-2.txt`: the links that are
+whole there are taken over, each with the commit and load of its run.
 
 The links: meshes of the makers' packages that bench/design_links.py names, and Universal Robots'
 (Universal_Robots_ROS2_Description 2221ec0, BSD-3) and UFactory's (xarm_ros2 3654ba7, BSD-3).
@@ -10,7 +13,10 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 import tempfile
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -35,21 +41,44 @@ from coneskin.geometry.solid.step import WrappedLayer, write_step
 
 SAMPLES = 40_000  # on the faces of a link beside a part, and on the part
 NEAREST = 800  # of them whose distance is computed
+_DONE = "; done"  # ends the last row of a link
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--links", type=Path, help="folder of link meshes")
+    parser.add_argument("--resume", type=Path, help="output of an earlier run, whose finished links are taken over")
     args = parser.parse_args()
-    print(head("trimesh", "cadquery-ocp-novtk", "gmsh"))
+    earlier = _finished(args.resume.read_text()) if args.resume else {}
+    this = head("trimesh", "cadquery-ocp-novtk", "gmsh")
+    print(this, flush=True)
     print("\nblind angle of a full wrap [deg]; strip: its own four wires")
     seams()
     print("\nSTEP: distance of the surfaces that gmsh reads from the exact ones [m]")
     step()
     if args.links:
         print("\njig: distance of link and sheets that it bears already from the printed part [mm]; clearance 0.3 mm")
-        for path in sorted([*args.links.rglob("*.dae"), *args.links.rglob("*.stl")]):
-            jig(path)
+        paths = sorted([*args.links.rglob("*.dae"), *args.links.rglob("*.stl")])
+        for number, path in enumerate(paths, 1):
+            name = path.relative_to(args.links).as_posix()
+            print(f"link {number} of {len(paths)}: {name}", file=sys.stderr, flush=True)
+            began = time.perf_counter()
+            rows = earlier.get(name)
+            if rows is None:
+                rows = [*jig(path), f"  {name}: {time.perf_counter() - began:.0f} s, {this.splitlines()[-1]}{_DONE}"]
+            print("\n".join(rows), flush=True)
+
+
+def _finished(text: str) -> dict[str, list[str]]:
+    """Return the rows of each link that an earlier output has whole, by the link's name."""
+    links: dict[str, list[str]] = {}
+    rows: list[str] = []
+    for line in text.split("from the printed part", 1)[-1].splitlines()[1:]:
+        rows.append(line)
+        if line.endswith(_DONE):
+            links[line.split(": ")[0].strip()] = rows
+            rows = []
+    return links
 
 
 def seams() -> None:
@@ -119,17 +148,18 @@ def _off(side: Frustum, thickness: float, points: np.ndarray) -> np.ndarray:
     above = (radius - side.radius1) * side.cos_half_angle - z * side.sin_half_angle
     faces = [np.abs(above), np.abs(above - thickness), np.abs(along), np.abs(along - side.slant)]
     faces += [np.abs(np.sin(phi)) * radius, np.abs(np.sin(phi - side.wrap)) * radius]
-    return np.min(faces, axis=0)
+    return np.asarray(np.min(faces, axis=0))
 
 
-def jig(path: Path) -> None:
+def jig(path: Path) -> Iterator[str]:
+    """Yield the rows of a link: its nearest distance to each collar, or why it has none."""
     try:
         try:
             design = cs.design_link(path)
         except cs.MeshError:  # metres by its header, and 200 of them
             design = cs.design_link(path, unit="mm")
     except cs.ConeSkinError as exc:
-        print(f"  {path.name}: {str(exc)[:90]}", flush=True)
+        yield f"  {path.name}: {str(exc)[:90]}"
         return
     assert design.mesh is not None
     for index, sheet in enumerate(design.sheets):
@@ -138,14 +168,13 @@ def jig(path: Path) -> None:
         for collar in collars:
             gaps = [_gap(sheet, collar, part.surface, body) for part in collar.parts]
             turns = "" if collar.play is None else f", turns {math.degrees(collar.play):.0f} deg"
-            print(
+            yield (
                 f"  {path.name} {sheet.name} end {collar.end}: {min(gap for gap, _ in gaps):.3f}"
                 f"{' TOUCHES' if any(crossed for _, crossed in gaps) else ''}, lip {1e3 * collar.lip:.1f} mm"
-                f"{', flush' if collar.flush else ''}{turns}",
-                flush=True,
+                f"{', flush' if collar.flush else ''}{turns}"
             )
         for sentence in without:
-            print(f"  {path.name} {sheet.name}: {sentence}", flush=True)
+            yield f"  {path.name} {sheet.name}: {sentence}"
 
 
 def _gap(sheet: SheetDesign, collar: Collar, surface: ClosedSurface, body: Mesh) -> tuple[float, bool]:
