@@ -128,7 +128,8 @@ HOMES = {
         "skin/field/*.py",
         "skin/virtual/field_contacts.py",
         "src/coneskin/testing/field/*.py",
-        "src/coneskin/design/pictures.py",
+        "src/coneskin/design/link_picture.py",
+        "src/coneskin/design/workshop/datum_faces.py",
     ),
 }
 #: the live path: no numpy in any of it

@@ -71,6 +71,7 @@ def to_dxf(sheets: Sequence[CutSheet], arcs: ArcStyle = "bulge", tolerance: floa
     low = min(box[0] for box in boxes) * 1e3, min(box[1] for box in boxes) * 1e3, 0.0
     high = max(box[2] for box in boxes) * 1e3, max(box[3] for box in boxes) * 1e3, 0.0
     space.reset_extents(low, high)  # what a reader shows first, and some cutters check against their bed
+    document.header["$EXTMIN"], document.header["$EXTMAX"] = low, high  # ezdxf leaves a corner at the origin out
     stream = io.StringIO()
     document.write(stream)
     return stream.getvalue()

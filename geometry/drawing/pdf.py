@@ -200,8 +200,9 @@ def _map_page(tiling: PageTiling, sheets: Sequence[CutSheet], title: str) -> lis
     left, bottom = tiling.corner
     width, height = tiling.window
     content = ["0 0 0 rg 0 0 0 RG", _text(title, left, bottom + height - 6.0, 5.0)]
+    pages = "One page follows" if len(tiling.cells) == 1 else f"{len(tiling.cells)} pages follow"
     notes = [
-        f"Print at 100 %, without scaling. {len(tiling.cells)} pages follow. The bar below must measure 100 mm.",
+        f"Print at 100 %, without scaling. {pages}. The bar below must measure 100 mm.",
         "Cut at the crop marks and join the pages edge to edge; the crosses must meet. Empty pages are left out.",
         "Red: cut. Magenta: hole. Blue: mark, do not cut. Green: fold. Layers can be hidden in the viewer.",
         *(f"{sheet.slug}: {sheet.material}, {sheet.face} face up" for sheet in sheets),

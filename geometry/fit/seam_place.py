@@ -86,7 +86,8 @@ def place_seams(
                 start_azimuth=(sheets[i].start_azimuth + turn) % TURN,
             )
         direction = sheets[full[0]].placed.link_frustum.rotate((1.0, 0.0, 0.0))
-        names = " and ".join(str(i + 1) for i in full)
+        numbers = [str(i + 1) for i in full]
+        names = f"{', '.join(numbers[:-1])} and {numbers[-1]}" if len(numbers) > 1 else numbers[0]
         places.append(
             ChosenSeam(
                 axis,
@@ -134,12 +135,14 @@ def _reason(
     flattest: bool,
 ) -> str:
     x, y, z = (f"{value:z.2f}" for value in direction)
-    where = f"the seam of sheet {names} faces ({x}, {y}, {z})"
+    several = " and " in names
+    whose = f"the seams of sheets {names} face" if several else f"the seam of sheet {names} faces"
+    where = f"{whose} ({x}, {y}, {z}) of the link's frame"
     other = "--seam or --touch-side put it elsewhere"
     if flattest:
         return f"{where}, where the link is flattest, because a seam over a sharp bend peels; {other}"
     if shielded - least < _SHIELDED:
-        return f"{where}: the link shields no side of it more than another, so it is any side; {other}"
+        return f"{where}: the link shields no side more than another, so it is any side; {other}"
     if weights is not None:
         return f"{where}, where touches count least by {weights.name}; the cable leaves beside it; {other}"
     return (

@@ -185,5 +185,5 @@ def test_the_next_command_names_the_link_where_the_design_knows_none(
     monkeypatch.chdir(tmp_path)
     assert design(*CYLINDER, "-o", "skin") == 0
     said = capsys.readouterr().out.splitlines()[-1]
-    assert said.startswith("next: coneskin init skin --simulated --link LINK, with LINK one of base, ")
+    assert said.startswith("next: coneskin init skin --simulated --arm UR5e --link LINK, with LINK one of base, ")
     assert main(["init", "skin", "--simulated", "--link", "forearm"]) == 0

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.design.pictures import _covered
+from coneskin.design.link_picture import _covered
 from coneskin.design.sheets import DesignOptions, design_sheets
 from coneskin.design.weights_picture import draw_weights
 from coneskin.geometry.fit.touch_weights import TouchWeights

@@ -23,6 +23,7 @@ from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.solid.step import require_step_writer
 from coneskin.robot.arm.link_frames import LINK_INDEX
+from coneskin.robot.sim.options import DEFAULT_MODEL
 from coneskin.skin.matched_electronics import shunt_ohms
 
 from .arguments.design import add_arguments, design_options
@@ -113,7 +114,12 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
         )
         unnamed = source is None or arm_link(source.name) is None
         which = f" --link LINK, with LINK one of {', '.join(LINK_INDEX)}" if unnamed else ""
-        print_hint(f"next: coneskin init {folder} --simulated{which}")
+        if source is not None:
+            print_hint(
+                f"on another arm than a UR: coneskin init {folder} --simulated --skin-only, which reports touches; "
+                "only UR arms are guarded"
+            )
+        print_hint(f"next: coneskin init {folder} --simulated --arm {DEFAULT_MODEL}{which}, for your model of arm")
     return 0
 
 

@@ -89,7 +89,8 @@ def _draw_arm(axes: Any, item: SensorMarks, placed: SensorOnArm, q: Sequence[flo
     length = 1.2 * max(cone.radius1, cone.radius2)
     for number, mark in enumerate(item.plan, first):
         point, normal = placed.place_in_base(mark.u, mark.phi, q)
-        axes.quiver(*point, *normal, length=length, color=_MARK, lw=1.4)
+        outside = [p + length * n for p, n in zip(point, normal, strict=True)]
+        axes.quiver(*outside, *(-n for n in normal), length=length, color=_MARK, lw=1.4)  # as the finger comes
         tip = [p + 1.35 * length * n for p, n in zip(point, normal, strict=True)]
         axes.text(*tip, str(number), color=_MARK, fontsize=11, ha="center", va="center")
     middle = base_link.apply(placed.frustum.centre(0.5 * cone.slant))

@@ -20,6 +20,7 @@ from .report import report_text
 from .sheets import SheetDesign
 from .summary import design_summary
 from .workshop.build_figures import measure_build
+from .workshop.datum_faces import find_datum_faces
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
@@ -73,7 +74,8 @@ def write_design(
     if options.step:
         _require_step(sheets)
     title, source, frame, *notes = map(printable, (title, source, frame, *notes))  # a file's name may be no text
-    figures = [measure_build(design, index, frame, mesh, sheets[:index]) for index, design in enumerate(sheets)]
+    faces = () if mesh is None else find_datum_faces(mesh)
+    figures = [measure_build(design, index, frame, mesh, sheets[:index], faces) for index, design in enumerate(sheets)]
     data: dict[str, Any] = {"link": source or title, "frame": frame, "notes": list(notes)}
     data["sheets"] = [
         design_summary(design) | item.as_data(design) for design, item in zip(sheets, figures, strict=True)

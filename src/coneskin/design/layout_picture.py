@@ -78,14 +78,14 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Any, cable: CableExit) -> 
         return 1e3 * (x + out * away * math.sin(turn)), 1e3 * (y + out * away * math.cos(turn))
 
     middle = math.remainder(cable.phi, 2.0 * math.pi) if cable.phi > cone.wrap else cable.phi
-    middle = middle - 2.0 * math.pi if middle > math.pi and cone.wrap > 2.0 * math.pi - 0.5 else middle
+    middle = middle - 2.0 * math.pi if middle > math.pi and design.has_seam else middle
     tab = design.layout.plan.tab
     for wire in cable.wires:
         name, colour = wire.electrode, WIRE_COLOURS[wire.electrode]
         style = {"color": "#d4a800" if colour == "yellow" else colour, "lw": 1.2}
         if abs(wire.phi - middle) > math.pi:
             axes.plot(*zip(at(tab, wire.phi), at(0.5 * cable.tie + 0.5 * tab, cone.wrap), strict=True), **style)
-            way = "across\nthe seam" if cone.wrap > 2.0 * math.pi - 0.5 else "around\nthe link"
+            way = "across\nthe seam" if design.has_seam else "around\nthe link"
             axes.text(*at(cable.tie, wire.phi), f"{name}, {way}", fontsize=7, ha="center", va="center")
             continue
         steps = [at(tab, wire.phi), at(cable.tie, middle), at(cable.connector, middle)]

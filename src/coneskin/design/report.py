@@ -30,6 +30,11 @@ _ASSEMBLY = {
     "pairs": "Glue each conductive sheet to its substrate while both are flat, then wrap the pairs.",
     "bonded": "Glue all layers together while they are flat, then wrap the sheet; check the strains above.",
 }
+_TOOLS = (
+    "Tools: what cuts (a plotter with knives, or a scalpel and a cutting mat), caliper, steel rule, tape measure, try "
+    "square, soft pencil, needle, hand roller of rubber, kitchen scales, multimeter, wire stripper, crimping tool for "
+    "the contacts, flat pliers, side cutters, heat gun; a 3D printer where there is a jig."
+)
 
 
 def report_text(
@@ -72,6 +77,7 @@ def report_text(
     lines += _table(head, [[_text(row[key]) for key in keys] for row in material_rows(designs)])
     lines += ["", "### Everything to buy or to cut", ""]
     lines += _table(("item", "quantity", "for"), bill_of_materials(designs, figures, beds))
+    lines += ["", _TOOLS]
     if len(designs) > 1:
         lines += ["", "Build all sheets flat in any order; put them on the link in the order of their numbers."]
     for index, (design, item) in enumerate(zip(designs, figures, strict=True)):

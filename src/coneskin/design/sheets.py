@@ -113,6 +113,11 @@ class SheetDesign:
     above: str = ""
     seam_offset: float = 0.0
 
+    @property
+    def has_seam(self) -> bool:
+        """Whether its two edges meet, or nearly; otherwise the link is bare between them."""
+        return self.place.frustum.wrap > 2.0 * math.pi - 0.5
+
     def forecasts(self, count: int = 5) -> list[ResolutionForecast]:
         """Return the resolution at evenly spaced places from end 1 to end 2 of the active area."""
         slant = self.active.frustum.slant

@@ -135,7 +135,8 @@ def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
     if open_gap > shown_gap:
         note += f"; {open_gap:.0f} mm of the link between the edges are left out"
     cable = f"setback {set_lower:g} mm, wires leave at {side_name(figures.cable.side)}"
-    axes.set_title(f"{design.name}: section of the seam\n{note}; {cable}", fontsize=9)
+    what = "its two edges, between which the link is bare" if not design.has_seam else "the seam"
+    axes.set_title(f"{design.name}: section of {what}\n{note}; {cable}", fontsize=9)
     axes.axis("off")
 
 

@@ -217,3 +217,62 @@ def test_marks_to_touch_are_in_the_table_and_on_the_drawing() -> None:
     for (_, u, phi), label in zip(rows, drawn, strict=True):
         x, y = drawing_point(surface, 1e-3 * float(u), math.radians(float(phi)))
         assert math.dist((x, y), (label.x, label.y)) < 8e-3
+
+
+def ending_at(low: float, high: float) -> Mesh:
+    """A tube of 50 mm about z that ends at two heights."""
+    tube = bumped(None)
+    heights = np.where(tube.vertices[:, 2:] > 0.1, high, low)
+    return Mesh(np.concatenate([tube.vertices[:, :2], heights], axis=1), tube.faces)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [
+        (-0.1, 0.3, ""),
+        (-0.005, 0.3, "so the cable tie and the connector lie on what is bolted to the link"),
+        (-0.045, 0.3, "so the connector lies on what is bolted to the link"),
+    ],
+)
+def test_a_cable_beyond_the_end_of_the_link_is_led_to_what_is_there(low: float, high: float, said: str) -> None:
+    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions())
+    text = guide(design, measure_build(design, 0, "mesh", ending_at(low, high)))
+    assert ("bolted to the link" in text) == bool(said)
+    if said:
+        assert f"The link ends {-1e3 * low:.1f} mm beyond end 1, {said}" in text
+        assert "design again with `--wires end2`, where there are 100.0 mm of link" in text
+
+
+def test_a_link_without_room_at_either_end_carries_its_cable_on_the_sheet() -> None:
+    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions())
+    text = guide(design, measure_build(design, 0, "mesh", ending_at(-0.001, 0.202)))
+    assert "glue the mount on part 7" in text
+    assert "design again with `--wires" not in text
+
+
+def test_only_a_sheet_whose_edges_meet_has_a_seam() -> None:
+    """Of a partial wrap the guide speaks of two edges."""
+    for wrap, seam in ((2 * math.pi, True), (math.pi, False)):
+        design, figures = built(Frustum(0.054, 0.054, 0.2, wrap), wires="edge0")
+        assert design.has_seam == seam
+        text = guide(design, figures)
+        assert ("The seam: the edges of every part meet" in text) == seam
+        assert ("lead them out between the edges" in text) == seam
+        assert ("lead them out on the bare link beside that edge" in text) != seam
+
+
+def test_the_bill_has_what_the_steps_use_up() -> None:
+    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions())
+    figures = measure_build(design, 0, "mesh", ending_at(-0.1, 0.3))
+    items = {item.item: item for item in bill_of_materials([design], [figures])}
+    plastic = sum(part.surface.volume for collar in figures.collars for part in collar.parts)
+    assert items["PLA or PETG, for a 3D printer"].quantity.startswith(f"{1e6 * plastic:.0f} cm3")
+    strap = items["hook-and-loop tape 15 to 20 mm wide"].quantity
+    assert strap.startswith("2 pieces of ")
+    assert float(strap.split()[-2]) > 2e3 * math.pi * 0.05
+    sheet = next(item for name, item in items.items() if name.startswith("conductive sheet"))
+    assert "a strip of 20 x 120 mm to measure" in sheet.quantity, "step 2 measures a strip of it"
+    text = guide(design, figures)
+    assert "hook-and-loop tape" in text
+    assert "isopropanol" in text
+    assert any("isopropanol" in name for name in items)

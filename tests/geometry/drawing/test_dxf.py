@@ -11,8 +11,9 @@ from coneskin.geometry.drawing.cut_sheet import cut_sheets
 from coneskin.geometry.drawing.dxf import to_dxf
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
+from coneskin.geometry.drawing.test_piece import make_test_piece
 
-from ..drawing_readers import dxf_entities, dxf_header, dxf_layers, dxf_texts, read_dxf
+from ..drawing_readers import dxf_entities, dxf_header, dxf_layers, dxf_pairs, dxf_texts, read_dxf
 from ..sheet_cases import SHEETS
 
 mp.mp.dps = 40
@@ -192,3 +193,17 @@ def test_angles_are_in_degrees_within_a_turn():
             sweep = (float(dict(codes)[51]) - float(dict(codes)[50])) % 360.0
             assert 0.0 < sweep <= 90.0 + 1e-9
             assert math.isfinite(sweep)
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (-0.02, 0.01)])
+def test_the_extents_of_a_file_hold_all_of_it(corner):
+    """A corner at the origin is one too, which ezdxf takes for none: a reader shows what the header says."""
+    piece = make_test_piece("foam")
+    x1, y1, _, _ = piece.bounds
+    text = to_dxf([piece.moved(corner[0] - x1, corner[1] - y1)])
+    points = [point for entity in read_dxf(text) for curve in entity.curves for point in (curve(0.0), curve(1.0))]
+    for name, bound in (("$EXTMIN", min), ("$EXTMAX", max)):
+        pairs = dxf_pairs(text)
+        start = pairs.index((9, name))
+        found = tuple(float(value) for _, value in pairs[start + 1 : start + 3])
+        assert found == pytest.approx((bound(p.real for p in points), bound(p.imag for p in points)))

@@ -1,6 +1,7 @@
 """Place of the seam: behind what stands out from the link; anywhere where nothing does, and always the same."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,7 +69,22 @@ def test_a_bare_tube_keeps_its_seam() -> None:
     before = fitted(mesh)
     after, (place,) = place_seams(before, mesh)
     assert after.sheets[0].placed == before.sheets[0].placed
-    assert "shields no side of it more than another" in place.reason
+    assert "shields no side more than another" in place.reason
+
+
+def test_the_seams_of_several_sheets_are_named_one_by_one() -> None:
+    """Two sheets about one axis are turned together; a partial wrap beside them has no seam and is not named."""
+    mesh = tube_with_wing(0.7)
+    whole = fitted(mesh).sheets[0]
+    half = replace(whole, placed=whole.placed.part(0.0, 0.05, 0.0, math.pi))
+    for sheets, words in (
+        ((whole, whole), "the seams of sheets 1 and 2 face ("),
+        ((half, whole), "the seam of sheet 2 faces ("),
+        ((whole, half, whole, whole), "the seams of sheets 1, 3 and 4 face ("),
+    ):
+        _, (place,) = place_seams(replace(fitted(mesh), sheets=sheets), mesh)
+        assert place.reason.startswith(words)
+        assert "of the link's frame" in place.reason
 
 
 def test_partial_wraps_have_no_choice() -> None:

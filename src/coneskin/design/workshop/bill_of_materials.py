@@ -17,6 +17,8 @@ __all__ = ["ADHESIVE", "BillItem", "bill_of_materials"]
 ADHESIVE = 50e-6  # m; thickness of the tape between the layers
 _STRIP = 3e-3  # m; width of the tape in the margins of the isolation
 _OFFCUT = 1.15  # of the area of tape; it is trimmed at the borders
+_MASKED = 0.5  # m; of masking tape for an end of a sheet
+_STRAP_LAP = 80e-3  # m; of a strap: it passes over the collar, and holds on itself
 _INSULATION = 10e-3  # m; width of the tape over leads and electrodes
 
 
@@ -47,7 +49,7 @@ def bill_of_materials(
     items = [
         BillItem(
             material if "foil" not in material else f"{material}, 0.05 mm, with electrically conductive adhesive",
-            f"{1e4 * net[material]:.0f} cm2 net; "
+            f"{1e4 * net[material]:.0f} cm2 net{_strips(material)}; "
             + ("; ".join(_blank(bed) for bed in beds if bed.material == material) or "larger than the bed"),
             ", ".join(parts[material]),
         )
@@ -88,6 +90,22 @@ def bill_of_materials(
         BillItem("heat-shrink tube 6 mm, 20 mm long", f"{4 * count}", "over the joint of wire and tab"),
         BillItem("self-adhesive cable-tie mount 19 x 19 mm and cable tie 2.5 mm", f"{count}", "strain relief"),
     ]
+    items += [
+        BillItem("isopropanol, and a cloth that leaves no lint", "20 ml", "link, before the first layer"),
+        BillItem("masking tape 19 mm wide", f"{math.ceil(2e3 * _MASKED * count) / 1e3:.0f} m", "while adhesives set"),
+    ]
+    collars = [collar for item in figures for collar in item.collars]
+    if collars:
+        plastic = sum(part.surface.volume for collar in collars for part in collar.parts)
+        around = 2.0 * math.pi * max(design.place.frustum.radius1 for design in designs) + _STRAP_LAP
+        items += [
+            BillItem("PLA or PETG, for a 3D printer", f"{1e6 * plastic:.0f} cm3, and its support", "jig"),
+            BillItem(
+                "hook-and-loop tape 15 to 20 mm wide",
+                f"{len(collars)} pieces of {10.0 * math.ceil(1e2 * around):.0f} mm",
+                "around the collars",
+            ),
+        ]
     if pins:
         items.append(
             BillItem(
@@ -97,6 +115,11 @@ def bill_of_materials(
             )
         )
     return items
+
+
+def _strips(material: str) -> str:
+    """Return what is measured and not built in: the strips of step 2."""
+    return " and a strip of 20 x 120 mm to measure" if material.startswith("conductive sheet") else ""
 
 
 def _blank(bed: MaterialBed) -> str:

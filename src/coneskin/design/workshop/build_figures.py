@@ -11,6 +11,7 @@ from coneskin.design.sheets import SheetDesign
 from coneskin.geometry.drawing.surface_shape import ShapeTab, SurfaceShape, drawing_point
 from coneskin.geometry.frustum import Frustum
 
+from .datum_faces import DatumFace
 from .expected_readings import PairReading, expected_frame, pair_readings
 from .jig import Collar, jig_collars
 from .placement import SheetPlacement, find_placement
@@ -80,6 +81,19 @@ class BuildFigures:
                     "arc_mm": _mm(feature.arc),
                     "at_end": feature.end,
                 },
+                "faces": [
+                    {
+                        "name": face.name,
+                        "normal": [round(value, 6) + 0.0 for value in face.normal],
+                        "offset_mm": _mm(face.offset),
+                        "size_mm": [_mm(length) for length in face.size],
+                    }
+                    for face in placement.faces
+                ],
+                "heights": [
+                    {**_point(place.u, place.phi), "from_faces_mm": [_mm(height) for height in place.heights]}
+                    for place in placement.heights
+                ],
             },
             "jig": [
                 {
@@ -110,6 +124,7 @@ def measure_build(
     frame: str = "mesh",
     mesh: Mesh | None = None,
     others: Sequence[SheetDesign] = (),
+    faces: Sequence[DatumFace] = (),
 ) -> BuildFigures:
     """Work out the figures for building one sheet.
 
@@ -119,6 +134,7 @@ def measure_build(
         frame: frame of the poses, in words.
         mesh: of the link; None where it is known by its dimensions only.
         others: sheets that are on the link already when this one is put on.
+        faces: flat faces of the link, from which its place is measured.
 
     Raises:
         GeometryError: a scene would refuse its sensor, or the connector is out of range.
@@ -127,7 +143,7 @@ def measure_build(
         cable_exit(design.layout, design.options.connector),
         pair_readings(design),
         expected_frame(design, index, frame),
-        find_placement(design.place, mesh),
+        find_placement(design.place, mesh, () if design.above else faces),
         *jig_collars(design, mesh, others),
     )
 

@@ -9,6 +9,8 @@ from coneskin.design.sheets import SheetDesign
 from .build_figures import BuildFigures
 from .guide_words import SPREAD, in_mm, in_ohms, side_name, tie_place
 
+_MOUNT = 10e-3  # m; half of the mount of the cable tie
+
 __all__ = ["cable_steps", "reading_lines", "test_steps"]
 
 
@@ -20,7 +22,11 @@ def cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     if plan.wires == "end2" and design.next_joint is not None:
         yield "The tabs would run into the next sheet there: bend them up before that sheet is wrapped."
     if plan.wires.startswith("edge"):
-        yield "The tabs leave at the seam: lead them out between the edges before you close the wrap."
+        between = (
+            "between the edges before you close the wrap" if design.has_seam else "on the bare link beside that edge"
+        )
+        yield f"The tabs leave at {side_name(plan.wires)}: lead them out {between}."
+    yield from _short_of_room(figures)
     yield (
         f"Glue the cable-tie mount on the link {in_mm(cable.tie)} beyond {side_name(cable.side)}, at "
         f"{tie_place(design, figures)}. "
@@ -29,6 +35,28 @@ def cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         "(black), pin 3 C (yellow), pin 4 D (green). *Check:* pull each wire as hard as 3 N behind the tie: nothing "
         "moves before it; and move the joint of the arm through its whole range by hand (freedrive): nothing is "
         "pinched or stretched."
+    )
+
+
+def _short_of_room(figures: BuildFigures) -> Iterator[str]:
+    """Yield what a person does where the link ends before the place of the cable tie or of the connector."""
+    cable, place = figures.cable, figures.placement
+    rooms = {"end1": place.before, "end2": place.beyond}
+    room = rooms.get(cable.side)
+    if room is None or room >= cable.connector:
+        return
+    other = "end2" if cable.side == "end1" else "end1"
+    more = rooms[other] or 0.0
+    what = "connector lies" if room >= cable.tie + _MOUNT else "cable tie and the connector lie"
+    yield (
+        f"The link ends {in_mm(max(room, 0.0))} beyond {side_name(cable.side)}, so the {what} on what is bolted to the "
+        "link there and moves with it, such as a flange or a cover; never on the far side of a joint. If nothing does, "
+        + (
+            f"design again with `--wires {other}`, where there are {in_mm(more)} of link"
+            if more >= cable.tie + _MOUNT
+            else "glue the mount on part 7, over the margin of that end, and let the connector hang from it"
+        )
+        + "."
     )
 
 

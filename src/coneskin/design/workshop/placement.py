@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from coneskin.geometry.placed_frustum import PlacedFrustum
+
+from .datum_faces import DatumFace, DatumHeight, datum_heights, measured_faces
 
 if TYPE_CHECKING:
     from coneskin.geometry.mesh import Mesh
@@ -17,6 +20,8 @@ _STANDS_OUT = 3e-3  # m; what stands out less is no feature that a person finds
 _ALIKE = 0.01  # bends of two strips that differ by less are alike: they are fitted
 _NEARLY = 0.05  # a strip that is bent less than another by less belongs to it
 _OUTERMOST = 1e-3  # m; points so near to the outermost one are its neighbours
+_ALONG = 0.35  # mm of a height for each mm along the axis: it then fixes the place along the axis
+_SQUARE = math.sin(math.radians(1.0))  # an axis is held square, or along a face, by a try square
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,10 @@ class SheetPlacement:
         beyond: from end 2 to the outermost point of the link on its side [m]; None where there is no mesh.
         seam: direction in which edge 0 faces, in the frame of the link.
         feature: what stands out, from which the seam is measured; None where nothing does.
+        faces: flat faces of the link from which places are measured.
+        heights: distances from these faces; empty where there is none.
+        tilted: True where the axis is square to no face and along none, and the heights fix the place along it: what a
+            ruler would measure along the axis is then left out.
     """
 
     around1: float
@@ -58,18 +67,27 @@ class SheetPlacement:
     beyond: float | None
     seam: tuple[float, float, float]
     feature: LinkFeature | None
+    faces: tuple[DatumFace, ...] = ()
+    heights: tuple[DatumHeight, ...] = ()
+    tilted: bool = False
+
+    @property
+    def around_fixed(self) -> bool:
+        """Whether the heights fix edge 0."""
+        return any(any(height.steep) for height in self.heights)
 
 
-def find_placement(place: PlacedFrustum, mesh: Mesh | None = None) -> SheetPlacement:
+def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequence[DatumFace] = ()) -> SheetPlacement:
     """Measure where a sheet belongs on its link.
 
     Args:
         place: the side of the link that the sheet covers.
         mesh: of the link; None where it is known by its dimensions only.
+        faces: flat faces of the link (``find_datum_faces``).
     """
     side, pose = place.frustum, place.link_frustum
     around = side.wrap * side.radius1, side.wrap * side.radius2
-    seam = pose.rotate((1.0, 0.0, 0.0))
+    seam, axis = pose.rotate((1.0, 0.0, 0.0)), pose.rotate((0.0, 0.0, 1.0))
     if mesh is None:
         return SheetPlacement(*around, None, None, seam, None)
     import numpy as np
@@ -89,7 +107,19 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None) -> SheetPlace
             end = 1 if height < 0.5 * side.height else 2
             arc = azimuth * (side.radius1 if end == 1 else side.radius2)
             feature = LinkFeature(float(radius[furthest]), azimuth, height, arc, end)
-    return SheetPlacement(*around, -float(z.min()), float(z.max()) - side.height, seam, feature)
+    usable = measured_faces(place, faces)
+    along = [abs(math.fsum(a * b for a, b in zip(face.normal, axis, strict=True))) for face in usable]
+    held = any(cosine < _SQUARE or cosine > math.sqrt(1.0 - _SQUARE**2) for cosine in along)
+    return SheetPlacement(
+        *around,
+        -float(z.min()),
+        float(z.max()) - side.height,
+        seam,
+        feature,
+        usable,
+        datum_heights(place, usable) if usable else (),
+        max(along, default=0.0) >= _ALONG and not held,
+    )
 
 
 def sharpest_bends(place: PlacedFrustum) -> list[tuple[float, float]]:

@@ -23,27 +23,30 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
     far = design.place.link_frustum.rotate((0.0, 0.0, 1.0))
     ahead = ", ".join(f"{value:z.3f}" for value in far)
     yield (
-        f"End 1 is where the axis of the sheet begins, and end 2 lies from there along ({ahead}) of the frame above; "
-        "the picture of the link shows both. Anticlockwise, the direction of the wrap, is as seen from end 2."
+        "The picture of the link shows the sheet from two sides, with its ends"
+        f"{' and the flat faces of the link' if place.faces else ''}. End 2 lies from end 1 along ({ahead}) of the "
+        "frame above. Anticlockwise, the direction of the wrap, is as seen from end 2."
     )
     yield ""
     yield "| from | to | distance |"
     yield "|---|---|---|"
     if place.before is not None and place.beyond is not None:
-        yield (
-            "| outermost face of the link on the side of end 1, square to the axis | line of end 1 | "
-            f"{in_mm(place.before)} along the axis |"
-        )
-        yield f"| line of end 2 | outermost face of the link on its side | {in_mm(place.beyond)} along the axis |"
+        if not place.tilted:
+            yield (
+                "| outermost place of the link on the side of end 1: a plate held square to the axis touches it there "
+                f"| line of end 1 | {in_mm(place.before)} along the axis |"
+            )
+            yield f"| line of end 2 | outermost place of the link on its side | {in_mm(place.beyond)} along the axis |"
     else:
         yield "| the face of your link that you measured its height from | line of end 1 | 0 mm: choose it |"
     yield f"| line of end 1 | line of end 2 | {in_mm(side.slant)} along the surface |"
     word = "once around the link" if side.wrap > 6.28 else "edge 0, around the link, to the other edge"
     yield f"| {word} | at end 1 | {in_mm(place.around1)} by tape measure |"
     yield f"| {word} | at end 2 | {in_mm(place.around2)} by tape measure |"
-    if place.feature is not None:
+    if place.feature is not None and not place.around_fixed:
         yield f"| line of edge 0 | {_feature_way(design, place.feature)} |"
     yield ""
+    yield from _height_lines(design, place)
     yield from _facing(design, place)
     if place.before is None:
         yield (
@@ -51,8 +54,14 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
             "where they are in the frame of your arm's link into `xyz_mm` and `rpy_deg` of the sensor file: x of the "
             "sheet points at edge 0, z from end 1 to end 2."
         )
-    elif any(collar.play is not None for collar in figures.collars):
-        yield "What stands out from the link lets a collar lie at one azimuth only: take edge 0 from the jig."
+    elif found := [(collar.play, collar.end) for collar in figures.collars if collar.play is not None]:
+        play, end = min(found)
+        yield (
+            f"What stands out from the link holds the collar of end {end} within {math.degrees(play):.0f} deg: take "
+            f"edge 0 from it{', and check it by the bold distances' if place.around_fixed else ''}."
+        )
+    elif place.around_fixed:
+        yield "Edge 0 is where the bold distances say."
     elif design.place.bends:
         yield from _bend_lines(design)
     elif place.feature is None:
@@ -79,6 +88,38 @@ def _feature_way(design: SheetDesign, part: LinkFeature) -> str:
         straight = math.dist((x, y, part.height), (radius, 0.0, height))
         way = f"{in_mm(straight)} straight through the air, from edge 0 at end {part.end}"
     return f"{what} | {way} ({math.degrees(part.azimuth):.1f} deg)"
+
+
+def _height_lines(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
+    """Yield the distances of places of a sheet from the flat faces of the link."""
+    if not place.heights:
+        return
+    side = design.place.frustum
+    for face in place.faces:
+        long, wide = face.size
+        size = f"{1e3 * long:.0f} x {1e3 * wide:.0f} mm"
+        yield f"* {face.name}: a flat face of the link, {size}, outlined in the picture of the link."
+    yield ""
+    ends = "" if place.tilted else " Where the distances along the axis are easier to measure, take end 1 from those."
+    yield (
+        "Lay part 1 dry on the link, and slide it until these places of its inner face are as far from the faces, "
+        "square to them; then draw along its end 1 and its edge 0. Measure with the face on a flat table, by a ruler "
+        "that stands on it; on an arm that is assembled, from the gap beside the face, which shows its plane, or from "
+        f"a straight bar that is held against it. Bold ones change most when the sheet is turned.{ends} *Check:* every "
+        "distance within 1 mm."
+    )
+    yield ""
+    yield "| place of the sheet | " + " | ".join(f"from {face.name}" for face in place.faces) + " |"
+    yield "|---|" + "---|" * len(place.faces)
+    for row in place.heights:
+        end = 1 if row.u < 0.5 * side.slant else 2
+        arc = row.phi * side.radius_at(row.u)
+        where = "edge 0" if row.phi == 0.0 else f"{in_mm(arc)} from edge 0, in the direction of the wrap"
+        if row.phi == side.wrap:
+            where = "the other edge"
+        told = (f"**{in_mm(h)}**" if s else in_mm(h) for h, s in zip(row.heights, row.steep, strict=True))
+        yield f"| end {end}, {where} | " + " | ".join(told) + " |"
+    yield ""
 
 
 def _facing(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
@@ -126,7 +167,8 @@ def _axes_around(design: SheetDesign) -> Iterator[tuple[str, float]]:
                 facing = sign * (normals @ np.array(axis))
                 found = float(np.median(phi[facing > facing.max() - 1e-9])) if facing.max() > 0.9 else None
             else:
-                turn = round(math.atan2(sign * up, sign * across), 9) % (2.0 * math.pi)
+                turn = math.atan2(sign * up, sign * across) % (2.0 * math.pi)
+                turn = 0.0 if turn > 2.0 * math.pi - 1e-4 else turn  # edge 0 itself, but for rounding
                 found = turn if turn <= wrap else None
             if found is not None:
                 yield f"{'+' if sign > 0.0 else '-'}{name}", found

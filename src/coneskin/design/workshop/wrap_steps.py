@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 from coneskin.design.sheets import SheetDesign
@@ -22,8 +21,9 @@ def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     seams = "seam of the sheet below" if design.above else "edge 0"
     yield (
         f"Clean {ground} with isopropanol and a cloth that leaves no lint, and let it dry for a minute. Draw two lines "
-        f"on it with a soft pencil, by the table below: where end 1 lies, around it, and where {seams} lies, along it. "
-        f"*Check:* the sizes around the link in that table, by tape measure, within 1 mm for each 100 mm. If they "
+        f"on it with a soft pencil, by *Place of {design.name}* below: where end 1 lies, around it, and where {seams} "
+        "lies, along it. "
+        f"*Check:* the sizes around the link there, by tape measure, within 1 mm for each 100 mm. If they "
         "differ, this is another link than the design's: stop here."
     )
     if figures.collars:
@@ -73,7 +73,7 @@ def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         yield f"Wrap the whole on {TAPE}: end 1 and edge 0 on the pencil lines, {seen}."
     side = design.place.frustum
     gap = side.wrap * side.cos_half_angle * ADHESIVE
-    if side.wrap > 2.0 * math.pi - 0.5:
+    if design.has_seam:
         closing = options.seam_gap * 1e3
         yield (
             f"The seam: the edges of every part meet{f' up to {closing:g} mm' if closing else ''}. Each layer of tape "
@@ -97,7 +97,7 @@ def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         other = "" if len(ends) == 2 else ", and hold the other end with masking tape"
         middle = (
             "its seam in the middle of the slot between the parts"
-            if side.wrap > 2.0 * math.pi - 0.5
+            if design.has_seam
             else "its two edges flush with the outer sides of the parts"
         )
         yield (
