@@ -1,4 +1,4 @@
-"""What an examination of a controller is asked to look at; the answers are findings."""
+"""Examination of a controller: what it is asked to look at; the answers are findings."""
 
 from __future__ import annotations
 

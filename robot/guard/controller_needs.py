@@ -1,4 +1,4 @@
-"""What a guard needs of the arm's controller, beside its states and a way to stop it."""
+"""Needs of a guard: what its arm's controller must offer, beside its states and a way to stop it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["ControllerNeeds"]
 
 @dataclass(frozen=True, slots=True)
 class ControllerNeeds:
-    """What a guard needs of the controller; a guard without an arm needs nothing.
+    """Needs of one guard of the controller; a guard without an arm needs nothing.
 
     Attributes:
         slider: the speed slider: a reaction, or the limit of the speed, may use it.

@@ -1,1 +1,1 @@
-"""What a detector learns while nothing touches: currents, guides, leak and level of the sensor itself."""
+"""Untouched sensor: what a detector learns of it while nothing touches: currents, guides, leak and level."""

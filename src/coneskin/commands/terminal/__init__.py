@@ -1,1 +1,1 @@
-"""What a command shares with the terminal it runs in: a person who answers, lines typed, signals that end it."""
+"""Terminal of a command: a person who answers, lines typed, signals that end it."""
