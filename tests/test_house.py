@@ -77,7 +77,8 @@ MAY_IMPORT: dict[str, str] = {
     "monitor": "recording_file robot.guard scene session skin skin.detection skin.diagnosis skin.sources skin.virtual",
     "view.stage": "scene robot.arm skin skin.field geometry",
     "studio": "view design geometry geometry.fit geometry.drawing",
-    "view": "view.stage replay scene recording_file robot.arm robot.driver robot.guard skin geometry",
+    "view.client": "",
+    "view": "view.client view.stage replay scene recording_file robot.arm robot.driver robot.guard skin geometry",
     "design": "design.workshop scene.tables skin skin.firmware geometry geometry.fit geometry.drawing geometry.solid "
     "robot.arm",
     "design.workshop": "design scene.tables skin skin.diagnosis geometry geometry.drawing geometry.solid",

@@ -15,9 +15,10 @@ from typing import Any
 
 from coneskin.errors import ConeSkinError, MissingExtra
 
+from .client.file_drop import with_file_drop
+from .client.software_drawing import with_plain_edges
+from .client.unpacked_client import unpacked
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
-from .file_drop import with_file_drop
-from .software_drawing import with_plain_edges
 
 __all__ = ["LOOPBACK", "PageServer", "page_client"]
 
@@ -36,7 +37,7 @@ def _viser() -> Any:
 
 
 def page_client() -> str:
-    """Return the HTML of viser's client as it is served, and as a file that opens without Python contains it.
+    """Return the HTML of viser's client as a file that opens without Python contains it; it is served unpacked.
 
     Raises:
         MissingExtra: viser is not installed.
@@ -79,7 +80,8 @@ class PageServer:
 
         hosts = LOOPBACK | {host} if host in LOOPBACK else None
         allowed = ALLOWED | UPLOADS if uploads else ALLOWED
-        page = with_file_drop(page_client()) if uploads else page_client()
+        page = unpacked(page_client())
+        page = with_file_drop(page) if uploads else page
         self.gate = ConnectionGate(decode, hosts, page, allowed, **({"largest": _UPLOAD} if uploads else {}))
         _check_address(host)
         with _starting, _gated(self.gate), contextlib.redirect_stdout(io.StringIO()):

@@ -10,6 +10,7 @@ from coneskin.geometry.pose import Vector
 from .stage.floor import floor_lines
 from .stage.level_scale import level_colour
 from .stage.rotation import along, quaternion
+from .stage.solid import joined, revolve
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,7 +64,7 @@ def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
     light_plainly(server.scene)
     lines, faces = floor_lines(reach)
     server.scene.add_mesh_simple(
-        "/floor", _single(lines), faces, color=_FLOOR, side="double", cast_shadow=False, receive_shadow=False
+        "/floor", _single(lines), faces, color=_FLOOR, side="front", cast_shadow=False, receive_shadow=False
     )
 
 
@@ -81,7 +82,7 @@ class StageNodes:
         self._stage = stage
         scene.add_frame(root, show_axes=False, position=offset)
         self._frames = {link: scene.add_frame(f"{root}/link {link}", show_axes=False) for link in stage.links}
-        for solid in stage.solids:
+        for solid in joined(stage.solids):
             _add_solid(scene, f"{root}/link {solid.link}/{_node(solid.name)}", solid)
         self._bodies = []
         for number, body in enumerate(stage.bodies):
@@ -94,19 +95,17 @@ class StageNodes:
             colour = self._colours[sheet.name] = level_colour(0.0, sheet.touch_level)
             self._sheets[sheet.name] = scene.add_mesh_simple(
                 name,
-                _single(sheet.vertices),
-                sheet.faces,
+                *_both_sides(sheet.vertices, sheet.faces),
                 color=colour,
-                side="double",
+                side="front",
                 cast_shadow=False,
                 receive_shadow=False,
             )
             scene.add_mesh_simple(
                 f"{name}/active area",
-                _single(sheet.rim_vertices),
-                sheet.rim_faces,
+                *_both_sides(sheet.rim_vertices, sheet.rim_faces),
                 color=_RIM,
-                side="double",
+                side="front",
                 cast_shadow=False,
                 receive_shadow=False,
             )
@@ -162,10 +161,10 @@ class _MarkNodes:
         shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
         self._frame.position, self._frame.wxyz = mark.point, quaternion(along(mark.normal))
         arrow, faces = _arrow()
-        self._scene.add_mesh_simple(f"{self._name}/normal", arrow, faces, color=colour, opacity=shade, side="double")
-        patch, fan = _ellipse(mark)
+        self._scene.add_mesh_simple(f"{self._name}/normal", arrow, faces, color=colour, opacity=shade, side="front")
+        patch, fan = _both_sides(*_ellipse(mark))
         self._scene.add_mesh_simple(
-            f"{self._name}/uncertainty", patch, fan, color=colour, opacity=0.55 * (shade or 1.0), side="double"
+            f"{self._name}/uncertainty", patch, fan, color=colour, opacity=0.55 * (shade or 1.0), side="front"
         )
 
 
@@ -183,15 +182,13 @@ def _add_solid(scene: Any, name: str, solid: Solid) -> None:
 
 
 def _arrow() -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    from .stage.solid import revolve
-
     head, shaft, width = 0.035, 0.0035, 0.010
     profile = [(0.0, 0.0), (shaft, 0.0), (shaft, _NORMAL - head), (width, _NORMAL - head), (0.0, _NORMAL)]
     vertices, faces = revolve(profile, 16)
     return _single(vertices), faces
 
 
-def _ellipse(mark: ContactMark) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def _ellipse(mark: ContactMark) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the ellipse of a mark in its own frame; a small disc where nothing is known of its size."""
     import numpy as np
 
@@ -203,7 +200,19 @@ def _ellipse(mark: ContactMark) -> tuple[NDArray[np.float32], NDArray[np.int64]]
     rim = np.cos(turn) * first + np.sin(turn) * second + (0.0, 0.0, 0.004)
     vertices = np.concatenate([[[0.0, 0.0, 0.004]], rim])
     k = np.arange(_SEGMENTS)
-    return _single(vertices), np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % _SEGMENTS])
+    return vertices, np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % _SEGMENTS])
+
+
+def _both_sides(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return a surface that is seen from either side, as one of twice the faces.
+
+    "side" of viser does the same by another program of the drawing process, whose making takes longer than drawing.
+    """
+    import numpy as np
+
+    return np.concatenate([_single(vertices)] * 2), np.concatenate([faces, len(vertices) + faces[:, ::-1]])
 
 
 def _visible(axis: NDArray[np.float64]) -> NDArray[np.float64]:

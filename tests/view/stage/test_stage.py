@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from coneskin.view.stage.arm_solids import arm_solids
 from coneskin.view.stage.floor import floor_lines
 from coneskin.view.stage.level_scale import level_colour
 from coneskin.view.stage.rotation import along, quaternion
-from coneskin.view.stage.solid import Solid, barrel
+from coneskin.view.stage.solid import Solid, barrel, joined
 from coneskin.view.stage.stage import set_stage
 
 from ...scene.scenes import DOUBLE_CONE
@@ -38,6 +39,23 @@ def test_no_face_of_a_barrel_is_empty() -> None:
     corners = solid.vertices[solid.faces]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     assert areas.min() > 1e-7
+
+
+def test_joined_solids_have_the_faces_of_all_where_they_were() -> None:
+    solids = arm_solids(arm_model("UR5e"))
+    found = joined(solids)
+    assert len(found) < len(solids)
+
+    def corners(given: Sequence[Solid], link: int, colour: tuple[int, int, int]) -> np.ndarray:
+        triangles = [
+            one.vertices[one.faces].reshape(-1, 9) for one in given if (one.link, one.colour) == (link, colour)
+        ]
+        return np.sort(np.concatenate(triangles), axis=0)
+
+    for solid in found:
+        at = solid.link, solid.colour
+        assert sum((one.link, one.colour) == at for one in found) == 1
+        assert np.array_equal(corners(found, *at), corners(solids, *at))
 
 
 def distance(points: np.ndarray, solid: Solid) -> np.ndarray:
