@@ -223,7 +223,8 @@ def _panel(strands: Sequence[Strand], since: float, until: float, changes: Seque
         parts.append(f'{title}<div class="coneskin-phase"></div>')
         parts.append('<div class="coneskin-health"></div>')
         force = strand.history.force(strand.zero + since)
-        bars.append(level_bars(strand.stage.sheets, {sheet.name: 0.0 for sheet in strand.stage.sheets}, force))
+        none = {sheet.name: 0.0 for sheet in strand.stage.sheets}
+        bars.append(level_bars(strand.stage.sheets, none, force, f"run {len(runs)}" if several else ""))
     events = [(line.time - since, " ".join(line.text.split())) for line in event_lines(strands)[:_EVENTS]]
     data = {"since": since, "duration": max(until - since, 1e-3), "several": several, "runs": runs, "events": events}
     text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element

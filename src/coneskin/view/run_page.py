@@ -161,8 +161,8 @@ class _Player:
         self._texted = now
         self._field.show(moments)
         self._levels.content = "".join(
-            level_bars(strand.stage.sheets, moment.levels, moment.force)
-            for strand, moment in zip(self._strands, moments, strict=True)
+            level_bars(strand.stage.sheets, moment.levels, moment.force, f"run {number}" if len(moments) > 1 else "")
+            for number, (strand, moment) in enumerate(zip(self._strands, moments, strict=True), 1)
         )
         playback = self._playback
         share = (at - playback.since) / max(playback.until - playback.since, 1e-9)

@@ -48,15 +48,19 @@ def level_words(sheet: SheetSurface, level: float) -> str:
     return f"{text}, {force[0]:.3g} +- {force[1]:.2g} N"
 
 
-def level_bars(sheets: Sequence[SheetSurface], levels: Mapping[str, float], force: float | None = None) -> str:
+def level_bars(
+    sheets: Sequence[SheetSurface], levels: Mapping[str, float], force: float | None = None, title: str = ""
+) -> str:
     """Return a bar for each sheet: what its colours mean, and the level at this moment.
 
     Args:
         sheets: on the page.
         levels: by the names of the sheets.
         force: between the arm and what it meets, where physics knows it [N].
+        title: above the bars: whose they are, of several runs.
     """
-    parts = [_bar(sheet, levels[sheet.name]) for sheet in sheets]
+    parts = [f"<b>{escape(title)}</b>"] if title else []
+    parts += [_bar(sheet, levels[sheet.name]) for sheet in sheets]
     if force is not None:
         parts.append(f'<div class="coneskin-force">force of the contact, in physics: <b>{force_words(force)}</b></div>')
     return f'<div id="coneskin-levels" style="font-size:12px;margin:4px 10px">{"".join(parts)}</div>'
