@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,7 @@ class Mesh:
     source: str = "mesh"
     unit: str = "m"
     notes: tuple[str, ...] = ()
+    _kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # what takes long of a large mesh
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
@@ -64,10 +65,28 @@ class Mesh:
 
     def normals_and_areas(self) -> tuple[Floats, Floats]:
         """Return the unit normals by the winding of the file, shape (m, 3), and the areas [m2], shape (m,)."""
-        a, b, c = self.triangles.transpose(1, 0, 2)
-        cross = np.cross(b - a, c - a)
-        twice = np.linalg.norm(cross, axis=1)
-        return cross / twice[:, None], 0.5 * twice
+        if "normals" not in self._kept:
+            cross = _edge_products(self.vertices, self.faces)
+            twice = np.sqrt((cross * cross).sum(axis=0))
+            kept = (cross / twice).T, 0.5 * twice
+            for array in kept:
+                array.setflags(write=False)
+            self._kept["normals"] = kept
+        normals, areas = self._kept["normals"]
+        return normals, areas
+
+    @property
+    def outermost(self) -> Floats:
+        """Corners of the convex hull [m], shape (k, 3): how far a link reaches in any direction, they reach."""
+        if "outermost" not in self._kept:
+            from scipy.spatial import ConvexHull, QhullError
+
+            try:
+                self._kept["outermost"] = self.vertices[np.sort(ConvexHull(self.vertices).vertices)]
+            except QhullError:
+                self._kept["outermost"] = self.vertices
+        outermost: Floats = self._kept["outermost"]
+        return outermost
 
     @property
     def size(self) -> Floats:
@@ -89,13 +108,15 @@ class Mesh:
         The function takes origins [m] and directions, both of shape (n, 3), and returns the index of the first face hit
         by each ray, -1 for none, shape (n,).
         """
-        try:
-            import trimesh
-            from trimesh.ray.ray_pyembree import RayMeshIntersector
-        except ImportError:
-            return None
-        body = trimesh.Trimesh(self.vertices, self.faces, process=False, validate=False)
-        first: Callable[[Floats, Floats], Indices] = RayMeshIntersector(body).intersects_first
+        if "embree" not in self._kept:
+            try:
+                import trimesh
+                from trimesh.ray.ray_pyembree import RayMeshIntersector
+            except ImportError:
+                return None
+            body = trimesh.Trimesh(self.vertices, self.faces, process=False, validate=False)
+            self._kept["embree"] = RayMeshIntersector(body).intersects_first
+        first: Callable[[Floats, Floats], Indices] = self._kept["embree"]
         return first
 
 
@@ -201,11 +222,14 @@ def make_mesh(
     _check_corners(faces, len(vertices), source)
     used = np.zeros(len(vertices), bool)
     used[faces] = True
-    bad = used & ~np.isfinite(vertices).all(axis=1)
-    if bad.any():
-        raise MeshError(f"{source}: {int(bad.sum())} of {len(vertices)} vertices are not finite; export the mesh again")
-    low = vertices[used].min(axis=0)
-    size = vertices[used].max(axis=0) - low
+    # a coordinate at a time: numpy is slow with arrays of three columns
+    columns = [np.ascontiguousarray(column) for column in vertices[used].T]
+    finite = np.logical_and.reduce([np.isfinite(column) for column in columns])
+    if not finite.all():
+        bad = int((~finite).sum())
+        raise MeshError(f"{source}: {bad} of {len(vertices)} vertices are not finite; export the mesh again")
+    low = np.array([column.min() for column in columns])
+    size = np.array([column.max() for column in columns]) - low
     longest = float(size.max())
     advice = f"a link measures {MIN_LENGTH * 1e3:g} mm to {MAX_LENGTH:g} m: name the file's unit (unit m, cm, mm, inch)"
     if longest == 0.0:
@@ -215,14 +239,12 @@ def make_mesh(
     if longest > MAX_LENGTH:
         raise MeshError(f"{source}: {longest:.4g} m long (unit {unit}); {advice}")
     # one 63-bit key for each corner; a cell is a millionth of the length, far below any modelled detail
-    cells = np.where(used[:, None], (vertices - low) * (2**20 / longest), 0.0).round().astype(np.int64)
-    key = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
-    _, first, inverse = np.unique(key[used], return_index=True, return_inverse=True)
+    cells = [((c - least) * (2**20 / longest)).round().astype(np.int64) for c, least in zip(columns, low, strict=True)]
+    _, first, inverse = np.unique(cells[0] << 42 | cells[1] << 21 | cells[2], return_index=True, return_inverse=True)
     index = np.zeros(len(vertices), np.int64)
     index[used] = inverse
-    welded, faces = vertices[used][first], index[faces]
-    a, b, c = welded[faces].transpose(1, 0, 2)
-    twice = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    welded, faces = np.stack([column[first] for column in columns], axis=1), index[faces]
+    twice = np.sqrt((_edge_products(welded, faces) ** 2).sum(axis=0))
     keep = twice > 1e-12 * longest**2
     faces = faces[keep]
     if len(faces) == 0:
@@ -251,6 +273,14 @@ def _check_corners(faces: Indices, count: int, source: str) -> None:
     low, high = faces.min(), faces.max()
     if low < 0 or high >= count:
         raise MeshError(f"{source}: a face refers to corner {low if low < 0 else high}, there are {count}")
+
+
+def _edge_products(vertices: Floats, faces: Indices) -> Floats:
+    """Return the vector products of two edges of each face, shape (3, m); a coordinate at a time, which is faster."""
+    columns = [np.ascontiguousarray(column) for column in vertices.T]
+    a, b, c = (np.ascontiguousarray(column) for column in faces.T)
+    ab, ac = [x[b] - x[a] for x in columns], [x[c] - x[a] for x in columns]
+    return np.stack([ab[i - 2] * ac[i - 1] - ab[i - 1] * ac[i - 2] for i in range(3)])
 
 
 def _numbered_anew(faces: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
@@ -298,7 +328,8 @@ def _read(path: Path, data: bytes) -> tuple[Floats, Indices]:
         if len(getattr(part, "faces", ())) == 0:
             continue
         matrix = np.asarray(matrix)
-        corners.append(np.asarray(part.vertices, float) @ matrix[:3, :3].T + matrix[:3, 3])
+        own = np.asarray(part.vertices, float)
+        corners.append(own if np.array_equal(matrix, np.eye(4)) else own @ matrix[:3, :3].T + matrix[:3, 3])
         faces.append(np.asarray(part.faces, np.int64) + count)
         count += len(corners[-1])
     if not faces:

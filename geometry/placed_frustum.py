@@ -94,7 +94,7 @@ class PlacedFrustum:
 
         x, y, z = np.moveaxis(self.link_frustum.inverse().apply_all(np.asarray(points, float)), -1, 0)
         sa, ca = self.frustum.sin_half_angle, self.frustum.cos_half_angle
-        out = np.hypot(x, y) - self.frustum.radius1
+        out = np.sqrt(x * x + y * y) - self.frustum.radius1
         azimuth, middle = np.arctan2(y, x), 0.5 * self.frustum.wrap
         phi = azimuth - math.tau * np.round((azimuth - middle) / math.tau)
         return out * sa + z * ca, phi, out * ca - z * sa

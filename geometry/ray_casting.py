@@ -27,9 +27,10 @@ class RayCaster:
         found = mesh.embree_intersector() if engine in (None, "embree") else None
         self.engine = "embree" if found else "grid"
         self._first_faces = found or GridRayCaster(mesh).first_faces
-        corners = mesh.triangles
-        self._corner = corners[:, 0]
-        self._normal = mesh.normals_and_areas()[0]
+        normals = mesh.normals_and_areas()[0]
+        # a coordinate at a time: numpy is slow with arrays of three columns
+        self._normals = tuple(np.ascontiguousarray(column) for column in normals.T)
+        self._heights = np.einsum("ij,ij->i", mesh.vertices[mesh.faces[:, 0]], normals)
 
     def cast(self, origins: Floats, directions: Floats) -> tuple[Floats, Indices]:
         """Find where rays first meet the mesh, from either side of a face.
@@ -42,17 +43,15 @@ class RayCaster:
             distances [m], infinite where nothing is hit, shape (n,), and the faces hit, -1 where none, shape (n,).
         """
         face = np.asarray(self._first_faces(origins, directions), np.int64)
-        distance = np.full(len(face), np.inf)
         hit = face >= 0
-        at = face[hit]
-        normal = self._normal[at]
-        along = np.einsum("ij,ij->i", directions[hit], normal)
-        ahead = np.einsum("ij,ij->i", self._corner[at] - origins[hit], normal)
+        normals = [column[face] for column in self._normals]  # of the last face where nothing is hit
+        along = sum(directions[:, i] * normals[i] for i in range(3))
+        ahead = self._heights[face] - sum(origins[:, i] * normals[i] for i in range(3))
         with np.errstate(divide="ignore", invalid="ignore"):
             depth = ahead / along
-        sound = np.isfinite(depth) & (np.abs(along) > 1e-9)  # a grazing ray has no depth on the plane
-        distance[hit] = np.where(sound, depth, np.inf)
-        face[hit] = np.where(sound, at, -1)
+        sound = hit & np.isfinite(depth) & (np.abs(along) > 1e-9)  # a grazing ray has no depth on the plane
+        distance = np.where(sound, depth, np.inf)
+        face[~sound] = -1
         return distance, face
 
 

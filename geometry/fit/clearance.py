@@ -28,9 +28,11 @@ def clashing_cells(
         thickness: of both sheets, from the link outwards [m].
         gap: smallest distance between two sheets [m].
     """
-    out = np.stack([np.cos(profile.phi), np.sin(profile.phi), np.zeros(len(profile.phi))], axis=1)
-    out = out @ profile.frame.columns.T
-    feet = profile.frame.origin + profile.z[:, None, None] * profile.frame.axis + profile.radius[..., None] * out
+    turned = profile.frame.columns.T @ other.frame.columns
+    out = np.stack([np.cos(profile.phi), np.sin(profile.phi)], axis=1) @ turned[:2]
+    foot = (profile.frame.origin - other.frame.origin) @ other.frame.columns
+    # a coordinate at a time: numpy is slow with arrays of three columns
+    x, y, z = (foot[i] + profile.z[:, None] * turned[2, i] + profile.radius * out[:, i] for i in range(3))
     ca = 1.0 / math.hypot(1.0, side.slope)
     sa = side.slope * ca
     low = float(other.z[side.first]) - 0.5 * other.step
@@ -39,16 +41,15 @@ def clashing_cells(
     full = side.columns == len(other.phi)
     # cells lie up to a step apart: a sheet that slips between two of them is caught by the wider border
     slack = gap + 0.5 * max(profile.step, other.step)
-    base = ((feet - other.frame.origin) @ other.frame.columns).reshape(-1, 3)
     reach = 2.0 * (thickness + slack)  # beyond which no layer above a cell comes near
-    above = np.abs((np.hypot(base[:, 0], base[:, 1]) - side.radius - side.slope * base[:, 2]) * ca)
-    near = np.flatnonzero((above < reach) & (base[:, 2] > low - reach) & (base[:, 2] < high + reach))
-    base = base[near]
-    way = (out @ other.frame.columns)[near % len(profile.phi)]
+    above = np.abs((np.sqrt(x * x + y * y) - side.radius - side.slope * z) * ca)
+    near = np.flatnonzero((above < reach) & (z > low - reach) & (z < high + reach))
+    base = np.stack([x.flat[near], y.flat[near], z.flat[near]], axis=1)
+    way = out[near % len(profile.phi)]
     met = np.zeros(len(near), bool)
     for layer in np.linspace(0.0, thickness, _LAYERS):
         x, y, z = (base + layer * way).T
-        rho = np.hypot(x, y)
+        rho = np.sqrt(x * x + y * y)
         height = (rho - side.radius - side.slope * z) * ca
         foot = z + height * sa  # along the normal of the side
         inside = (height > -slack) & (height < thickness + slack) & (foot > low - slack) & (foot < high + slack)

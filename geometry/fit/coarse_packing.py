@@ -100,10 +100,16 @@ def _beside(frame: AxisFrame, other: AxisFrame) -> bool:
     return tilt < _BESIDE[0] and float(np.linalg.norm(gap - (gap @ other.axis) * other.axis)) < _BESIDE[1]
 
 
-def packings(surveys: list[AxisSurvey], requirements: SheetRequirements) -> list[list[Choice]]:
-    """Return packings of sheets on coarse profiles, the one that covers most first."""
-    most = requirements.max_sheets
-    alone = [plan_sheets(one.profile, one.lines, requirements, most) for one in surveys]
+def packings(
+    surveys: list[AxisSurvey], alone: list[list[AxisPlan]], requirements: SheetRequirements
+) -> list[list[Choice]]:
+    """Return packings of sheets on coarse profiles, the one that covers most first.
+
+    Args:
+        surveys: of the axes.
+        alone: the plans about each axis by itself, as ``plan_sheets`` returns them.
+        requirements: on the sheets.
+    """
     singles = [Choice(number, plan) for number, plans in enumerate(alone) for plan in plans]
     singles.sort(key=lambda choice: -choice.plan.score(requirements))
     found: dict[frozenset[tuple[int, tuple[int, int]]], list[Choice]] = {}
@@ -156,6 +162,6 @@ def profile_about(
 ) -> RadialProfile:
     """Measure a profile about an axis, of at most so many slices and so many rays in each."""
     slices, around = grid
-    length = float(np.ptp(mesh.vertices @ frame.axis))
+    length = float(np.ptp(mesh.outermost @ frame.axis))
     profile = measure_profile(mesh, rays, frame, max(length / slices, 0.0005), around, requirements.max_bridge)
     return profile if requirements.weights is None else profile.weighed(requirements.weights)

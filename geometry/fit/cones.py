@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -169,7 +169,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     first = plan.axes[0]
     further: AxisPlan | None = None
     if plan.count >= requirements.max_sheets:
-        further = FineStage(mesh, rays, hull, requirements).further(plan.axes, surveys)
+        further = search.stage(tolerance).further(plan.axes, surveys)
     return LinkFit(
         sheets=tuple(
             fitted_sheet(about, side, number, counted, tolerance, worth)
@@ -212,11 +212,19 @@ class _Search:
     surveys: list[AxisSurvey]
     requirements: SheetRequirements
     allow_hull: bool
+    _stages: dict[float, FineStage] = field(default_factory=dict, repr=False)
+
+    def stage(self, tolerance: float) -> FineStage:
+        """Return where packings are made anew within a tolerance [m]."""
+        if tolerance not in self._stages:
+            wanted = replace(self.requirements, tolerance=tolerance)
+            self._stages[tolerance] = FineStage(self.mesh, self.rays, self.hull, wanted)
+        return self._stages[tolerance]
 
     def plan(self, tolerance: float) -> tuple[SheetPlan | None, str]:
         """Return the best plan within a tolerance [m]; or None and, for a mesh that is a bare hull, the reason."""
-        wanted = replace(self.requirements, tolerance=tolerance)
-        plan = best_plan(FineStage(self.mesh, self.rays, self.hull, wanted), self.surveys)
+        stage = self.stage(tolerance)
+        plan, wanted = best_plan(stage, self.surveys), stage.requirements
         area, whole = plan.area if plan else 0.0, self.weighed
         # a requested wrap implies that the shape is known; otherwise sheets should cover some of a convex body
         if self.allow_hull or area >= HULL_SHARE * whole or (plan and wanted.wrap):

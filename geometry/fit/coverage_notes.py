@@ -32,7 +32,7 @@ def hull_note(mesh: Mesh, samples: SurfaceSamples) -> str:
     if len(mesh.faces) > MAX_HULL_FACES:
         return ""
     try:
-        hull = ConvexHull(mesh.vertices)
+        hull = ConvexHull(mesh.outermost)
     except QhullError:
         return ""
     points = samples.points[:: max(1, len(samples) // 1000)]

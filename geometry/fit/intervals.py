@@ -18,6 +18,8 @@ __all__ = ["balance_borders", "choose_intervals", "least_deviation", "longest_in
 Floats = NDArray[np.float64]
 Interval = tuple[int, int]  #: first slice and the one after the last
 
+_ROUNDING = 1e-9  # m; so that no interval is given up that is good by rounding
+
 
 def least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float, float]:
     """Return the straight side with the least largest distance from all slices (Chebyshev fit).
@@ -30,38 +32,48 @@ def least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float,
     Returns:
         largest distance between side and slices, square to the side [m]; radius at z = 0 [m]; slope dr/dz.
     """
+    deviation, radius, slope, _ = _chebyshev(z, high, low)
+    return deviation, radius, slope
 
-    def value(slope: float) -> tuple[float, float, float, float]:
-        above, below = high - slope * z, low - slope * z
+
+def _chebyshev(z: Floats, high: Floats, low: Floats) -> tuple[float, float, float, int]:
+    """Return what ``least_deviation`` does, and the first of the slices that by themselves deviate as much."""
+
+    def value(slope: float) -> tuple[float, float, float, float, int]:
+        line = slope * z
+        above, below = high - line, low - line
         i, j = int(above.argmax()), int(below.argmin())
-        return float(above[i] - below[j]), float(z[j] - z[i]), float(above[i]), float(below[j])
+        top, bottom = float(above[i]), float(below[j])
+        return top - bottom, float(z[j] - z[i]), top, bottom, min(i, j)
 
     reach = float(z[-1] - z[0])
     if reach <= 0.0:
-        gap, _, top, bottom = value(0.0)
-        return 0.5 * gap, 0.5 * (top + bottom), 0.0
+        gap, _, top, bottom, first = value(0.0)
+        return 0.5 * gap, 0.5 * (top + bottom), 0.0, first
     bound = (float(high.max() - low.min()) + 1e-9) / (float(z[1] - z[0]))
     left, right = -bound, bound
-    f_left, g_left, *_ = value(left)
-    f_right, g_right, *_ = value(right)
-    slope = 0.0
-    f, g, top, bottom = value(slope)
+    f_left, g_left, _, _, i_left = value(left)
+    f_right, g_right, _, _, i_right = value(right)
+    slope, first = 0.0, 0
+    f, g, top, bottom, i = value(slope)
     for _ in range(60):
         if g < 0.0:
-            left, f_left, g_left = slope, f, g
+            left, f_left, g_left, i_left = slope, f, g, i
         elif g > 0.0:
-            right, f_right, g_right = slope, f, g
+            right, f_right, g_right, i_right = slope, f, g, i
         else:
+            first = i
             break
         if not g_right > g_left:
             break
         # the convex function cannot be lower than the point where the supporting lines of both sides meet
         slope = (f_left - f_right + g_right * right - g_left * left) / (g_right - g_left)
         bottom_line = f_left + g_left * (slope - left)
-        f, g, top, bottom = value(slope)
+        f, g, top, bottom, i = value(slope)
         if f <= bottom_line + 1e-12:
+            first = min(i_left, i_right)
             break
-    return 0.5 * f / math.hypot(1.0, slope), 0.5 * (top + bottom), slope
+    return 0.5 * f / math.hypot(1.0, slope), 0.5 * (top + bottom), slope, first
 
 
 def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, min_slices: int = 2) -> list[int]:
@@ -72,21 +84,26 @@ def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, mi
     """
     usable = (low > 0.0) & np.isfinite(high)  # 0 marks a hole in the slice
     holes = np.concatenate([np.cumsum(~usable), [0]])
+    hopeless = _hopeless(z, np.where(usable, high, 0.0), np.where(usable, low, 0.0), tolerance, min_slices)
     heights, tops, bottoms = z.tolist(), high.tolist(), low.tolist()
+    bad = (-1, -1)  # the last interval that deviates too much, begun at the first of the slices that decide
     line = (0.0, 0.0)  # the side that was within the tolerance of the last good interval: radius at z = 0, and slope
 
     def good(first: int, end: int) -> bool:
-        nonlocal line
-        if end > len(z) or holes[end - 1] != holes[first - 1]:
+        nonlocal line, bad
+        if holes[end - 1] != holes[first - 1]:
             return False
         if end - first > min_slices:  # all but the last slice are known to be within the tolerance of the line
+            if end == bad[1] and first <= bad[0]:
+                return False
             radius = line[0] + line[1] * heights[end - 1]
             limit = tolerance * math.hypot(1.0, line[1])
             if tops[end - 1] - limit <= radius <= bottoms[end - 1] + limit:
                 return True
         window = slice(first, end)
-        off, *side = least_deviation(z[window], high[window], low[window])
+        off, *side, deciding = _chebyshev(z[window], high[window], low[window])
         if off > tolerance:
+            bad = (first + deciding, end)
             return False
         line = (side[0], side[1])
         return True
@@ -95,7 +112,7 @@ def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, mi
     stop = 0
     for first in range(len(z)):
         if stop < first + min_slices:
-            if not good(first, first + min_slices):
+            if first >= len(hopeless) or hopeless[first] or not good(first, first + min_slices):
                 ends.append(first)
                 continue
             stop = first + min_slices
@@ -103,6 +120,24 @@ def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, mi
             stop += 1
         ends.append(stop)
     return ends
+
+
+def _hopeless(z: Floats, high: Floats, low: Floats, tolerance: float, count: int) -> list[bool]:
+    """Return for each run of ``count`` slices whether its least round slice alone keeps it from being good.
+
+    Half of max(high - low) is a bound of the distance along the radii. Square to the side it is less by the cosine of
+    the slope, which is bounded as well: with a steeper side the first and the last slice deviate more than all do from
+    a level one.
+    """
+    if len(z) < count:
+        return []
+    tops, bottoms, gaps = (np.lib.stride_tricks.sliding_window_view(a, count) for a in (high, low, high - low))
+    spread = tops.max(axis=1) - bottoms.min(axis=1)
+    first, last = slice(None, len(z) - count + 1), slice(count - 1, None)
+    climb = spread - np.minimum(high[first] - low[last], high[last] - low[first])
+    steepest = climb / (z[last] - z[first])
+    hopeless: list[bool] = (0.5 * gaps.max(axis=1) > (tolerance + _ROUNDING) * np.hypot(1.0, steepest)).tolist()
+    return hopeless
 
 
 def choose_intervals(

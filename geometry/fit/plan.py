@@ -61,7 +61,7 @@ def best_plan(stage: FineStage, surveys: list[AxisSurvey]) -> SheetPlan | None:
     """
     wanted = stage.requirements
     best: SheetPlan | None = None
-    for number, packing in enumerate(packings(surveys, stage.loose)):
+    for number, packing in enumerate(packings(surveys, stage.alone(surveys), stage.loose)):
         if number >= _FINE_PACKINGS:
             break
         plan = stage.made(packing)
@@ -85,7 +85,7 @@ class FineStage:
     rays: RayCaster
     hull: SurfaceSamples
     requirements: SheetRequirements
-    _largest: dict[int, AxisPlan] = field(default_factory=dict, repr=False)
+    _alone: list[list[AxisPlan]] = field(default_factory=list, repr=False)
     _first: dict[tuple[int, tuple[int, int]], AxisPlan | None] = field(default_factory=dict, repr=False)
 
     @property
@@ -121,9 +121,8 @@ class FineStage:
             surveys: of all axes.
         """
         least = self.requirements.least_gain if axes else 0.0
-        hopes = sorted(
-            ((about.area, n) for n, about in self._alone(surveys).items() if about.area > least), reverse=True
-        )
+        single = ((plans[0].area, n) for n, plans in enumerate(self.alone(surveys)) if plans)
+        hopes = sorted((hope for hope in single if hope[0] > least), reverse=True)
         tries = _COMPLETIONS if axes else _LAST_TRIES
         found: list[Choice] = []
         for hope, number in hopes:
@@ -142,13 +141,12 @@ class FineStage:
                 best = made
         return best
 
-    def _alone(self, surveys: list[AxisSurvey]) -> dict[int, AxisPlan]:
-        """Return the largest sheet about each axis by itself."""
-        if not self._largest:
-            for number, one in enumerate(surveys):
-                for about in plan_sheets(one.profile, one.lines, self.loose, 1):
-                    self._largest[number] = about
-        return self._largest
+    def alone(self, surveys: list[AxisSurvey]) -> list[list[AxisPlan]]:
+        """Return the coarse plans about each axis by itself, of one sheet, two sheets ... (``plan_sheets``)."""
+        if not self._alone:
+            most = self.requirements.max_sheets
+            self._alone.extend(plan_sheets(one.profile, one.lines, self.loose, most) for one in surveys)
+        return self._alone
 
     def _first_of(self, choice: Choice) -> AxisPlan | None:
         key = (choice.axis, choice.kinds)

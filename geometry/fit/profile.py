@@ -135,16 +135,18 @@ def measure_profile(
         around: number of rays in a slice.
         max_bridge: width and length of the widest hole that a sheet spans rather than follows [m].
     """
-    low, high, reach = frame.extent(mesh.vertices)
+    low, high, reach = frame.extent(mesh.outermost)
     count = max(8, round((high - low) / step))
     step = (high - low) / count
     z = low + step * (np.arange(count) + 0.5)
     phi = np.linspace(0.0, 2.0 * math.pi, around, endpoint=False)
     start = 1.02 * reach + 1e-3
     out = frame.columns[:, :2] @ np.stack([np.cos(phi), np.sin(phi)])
-    origins = frame.origin + z[:, None, None] * frame.axis + start * out.T[None, :, :]
-    ways = np.broadcast_to(-out.T, origins.shape)
-    depth = rays.cast(origins.reshape(-1, 3), np.ascontiguousarray(ways).reshape(-1, 3))[0]
+    origins, ways = np.empty((count, around, 3)), np.empty((count, around, 3))
+    for i in range(3):  # numpy is slow with arrays of three columns
+        origins[..., i] = (frame.origin[i] + z * frame.axis[i])[:, None] + start * out[i]
+        ways[..., i] = -out[i]
+    depth = rays.cast(origins.reshape(-1, 3), ways.reshape(-1, 3))[0]
     # a ray that has passed the axis has not hit a surface on its own side
     radius = np.where(depth < start, start - depth, 0.0).reshape(count, around)
     present = radius[radius > 0.0]

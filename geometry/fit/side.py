@@ -181,5 +181,5 @@ def covered_points(
     width = 2.0 * math.pi / len(profile.phi)
     azimuth = (np.arctan2(local[:, 1], local[:, 0]) - side.column * width + 0.5 * width) % (2.0 * math.pi)
     inside &= azimuth <= side.columns * width
-    miss = np.hypot(local[:, 0], local[:, 1]) - side.radii(z)
+    miss = np.sqrt(local[:, 0] ** 2 + local[:, 1] ** 2) - side.radii(z)
     return np.asarray(inside & (np.abs(miss) <= 1.5 * tolerance * math.hypot(1.0, side.slope)))

@@ -48,7 +48,7 @@ def ruled_profile(
 ) -> RadialProfile:
     """Measure a profile about a line, of about so many slices and rays, with holes filled up to its section."""
     frame = AxisFrame.along(candidate.origin, candidate.axis, options.seam)
-    length = float(np.ptp(mesh.vertices @ frame.axis))
+    length = float(np.ptp(mesh.outermost @ frame.axis))
     profile = measure_profile(mesh, rays, frame, max(length / grid[0], 0.0005), grid[1], options.max_bridge)
     return _bridged_anew(profile, _apex_height(profile, candidate), options.max_bridge)
 

@@ -146,13 +146,13 @@ class _Builder:
         sheet_end = min(0.0, -lift) if end == 1 else self.side.height + max(0.0, -lift)
         self.step = sheet_end + self.sign * self.plan.clearance
         self.room: float | None = None
+        pose = design.place.link_frustum.inverse()
         if mesh is not None:
-            z = design.place.link_frustum.inverse().apply_all(mesh.vertices)[:, 2]
+            z = mesh.vertices @ np.array(pose.rotation[2]) + pose.translation[2]
             self.room = float(self.step - z.min() if end == 1 else z.max() - self.step)
         self.flush = self.room is not None and _SHORTEST <= self.room <= _FLUSH
         self.wanted = self.room if self.flush and self.room is not None else self.plan.grip
-        moved = None if body is None else body.moved(design.place.link_frustum.inverse())
-        self.link = LinkExcess(self.side, self.step, self.sign, self.wanted + self.plan.clearance, moved)
+        self.link = LinkExcess(self.side, self.step, self.sign, self.wanted + self.plan.clearance, body, pose)
 
     def collar(self) -> Collar:
         """Return the collar.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 
 __all__ = ["LinkExcess"]
@@ -41,13 +42,14 @@ class LinkExcess:
         step: height of the end of the sheet on the axis [m].
         sign: of the direction away from the sheet along the axis.
         reach: how far from the end is looked [m].
-        body: the link, in the frame of the sheet; None where it is the cone itself.
+        body: the link, in a frame of its own; None where it is the cone itself.
+        pose: of the frame of the link, seen from that of the sheet.
     """
 
-    def __init__(self, side: Frustum, step: float, sign: float, reach: float, body: Mesh | None) -> None:
+    def __init__(self, side: Frustum, step: float, sign: float, reach: float, body: Mesh | None, pose: Pose) -> None:
         self._side, self._step, self._sign = side, step, sign
-        self._far = 0.0 if body is None else float(np.hypot(*body.vertices[:, :2].T).max()) + 0.01
-        beside = None if body is None else self._beside(body, reach)
+        beside = None if body is None else _beside(body, pose, step, sign, reach)
+        self._far = 0.0 if beside is None else float(np.sqrt((beside.vertices[:, :2] ** 2).sum(axis=1).max())) + 0.01
         self._rays = None if beside is None else RayCaster(beside)
         self._edges = None if beside is None else self._follow_edges(beside, reach)
 
@@ -104,13 +106,6 @@ class LinkExcess:
             for column in (np.floor(x), np.ceil(x)):
                 np.maximum.at(result, (row.astype(int), column.astype(int)), excess)
 
-    def _beside(self, body: Mesh, reach: float) -> Mesh | None:
-        """Return the faces that rays or edges beside the sheet's end can meet; None where there is none."""
-        away = self._sign * (body.vertices[:, 2] - self._step)
-        beyond, before = away[body.faces] > reach + _BESIDE, away[body.faces] < -_BESIDE
-        near = np.asarray(~(beyond.all(axis=1) | before.all(axis=1)))
-        return body.part(near) if near.any() else None
-
     def _follow_edges(self, body: Mesh, reach: float) -> _EdgePoints:
         """Return points along the edges of the link that are beside the sheet's end."""
         pairs = np.sort(body.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -131,3 +126,11 @@ class LinkExcess:
         at = (np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)) / np.maximum(counts[edge] - 1, 1)
         x, y, z = (first[edge] + at[:, None] * (last - first)[edge]).T
         return _EdgePoints(np.hypot(x, y) - self.cone(z), self._sign * (z - self._step), np.arctan2(y, x))
+
+
+def _beside(body: Mesh, pose: Pose, step: float, sign: float, reach: float) -> Mesh | None:
+    """Return the faces that rays or edges beside a sheet's end can meet, in its frame; None where there is none."""
+    away = sign * (body.vertices @ np.array(pose.rotation[2]) + (pose.translation[2] - step))
+    beyond, before = ((away > reach + _BESIDE)[body.faces], (away < -_BESIDE)[body.faces])
+    near = ~(beyond.all(axis=1) | before.all(axis=1))
+    return body.part(near).moved(pose) if near.any() else None

@@ -93,7 +93,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
     import numpy as np
 
     x, y, z = pose.inverse().apply_all(mesh.vertices).T
-    radius = np.hypot(x, y)
+    radius = np.sqrt(x * x + y * y)
     feature = None
     furthest = int(radius.argmax())
     if not place.bends and radius[furthest] > max(side.radius1, side.radius2) + _STANDS_OUT:
