@@ -16,6 +16,7 @@ from coneskin.bounded_file import read_file
 from coneskin.errors import MeshError, MissingExtra
 
 from .collada_asset import TO_Z_UP, ColladaAsset, read_collada_asset
+from .outermost_points import outermost_points
 from .pose import Pose
 
 __all__ = ["UNITS", "Mesh", "load_mesh", "make_mesh", "refuse_entities"]
@@ -79,12 +80,7 @@ class Mesh:
     def outermost(self) -> Floats:
         """Corners of the convex hull [m], shape (k, 3): how far a link reaches in any direction, they reach."""
         if "outermost" not in self._kept:
-            from scipy.spatial import ConvexHull, QhullError
-
-            try:
-                self._kept["outermost"] = self.vertices[np.sort(ConvexHull(self.vertices).vertices)]
-            except QhullError:
-                self._kept["outermost"] = self.vertices
+            self._kept["outermost"] = outermost_points(self.vertices)
         outermost: Floats = self._kept["outermost"]
         return outermost
 

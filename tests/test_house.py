@@ -126,6 +126,7 @@ HOMES = {
         "geometry/fit/*.py",
         "geometry/fit/developable/*.py",
         "geometry/hole_bridging.py",
+        "geometry/outermost_points.py",
         "skin/field/*.py",
         "skin/virtual/field_contacts.py",
         "src/coneskin/testing/field/*.py",

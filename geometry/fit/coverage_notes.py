@@ -22,10 +22,15 @@ Floats = NDArray[np.float64]
 MAX_HULL_FACES = 5000  #: faces; a convex mesh with more is a smooth body, not a collision hull
 
 
-def hull_note(mesh: Mesh, samples: SurfaceSamples) -> str:
+def hull_note(mesh: Mesh, samples: SurfaceSamples, visual: bool = False) -> str:
     """Return a note if the mesh is a convex hull of few faces, as some collision bodies are; else an empty string.
 
     The positions of the samples decide, not the volume, which open and wrongly wound meshes do not have.
+
+    Args:
+        mesh: the link.
+        samples: of its hull.
+        visual: True where the mesh is called the visual one, and is taken for the link.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -40,10 +45,13 @@ def hull_note(mesh: Mesh, samples: SurfaceSamples) -> str:
     share = float((depth < 0.002 * mesh.size.max()).mean())
     if share < 0.95:
         return ""
-    return (
-        f"{100.0 * share:.0f} % of the surface lies on the convex hull, as in simplified collision bodies, which have "
-        "lost the tubes; use the visual mesh of the link, or allow_hull (--allow-hull) if this is the visual mesh"
+    found = (
+        f"{100.0 * share:.0f} % of the surface lies on the convex hull, as in simplified collision bodies, which have"
     )
+    if visual:
+        return f"{found} lost the tubes; it is called visual, and taken for the link: hold the test piece against that"
+    asked = "use the visual mesh of the link, or allow_hull (--allow-hull) if this is the visual mesh"
+    return f"{found} lost the tubes; {asked}"
 
 
 def bare_lengths(

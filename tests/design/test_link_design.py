@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 import coneskin as cs
-from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.mesh import Mesh, make_mesh
 
 
 def tube() -> Mesh:
@@ -47,6 +48,34 @@ def test_a_mesh_is_designed_without_a_folder() -> None:
     assert design.folder is None
     points, normals = sheet.place.place([0.0, 0.05], [0.0, 1.0])
     assert points.shape == normals.shape == (2, 3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("source", "taken"),
+    [
+        ("meshes/visual/link.stl", True),
+        ("maker__meshes_VISUAL_link.stl", True),
+        ("meshes/collision/link.stl", False),
+        ("link.stl", False),
+        ("visual/collision/link.stl", False),
+    ],
+)
+def test_a_convex_mesh_is_taken_for_the_link_where_it_is_called_visual(source: str, taken: bool) -> None:
+    """A stadium 0.6 m wide; its half tubes are 11 % of it, too little for a mesh that may be a collision hull."""
+    phi = np.linspace(0.0, np.pi, 25)
+    arc = np.stack([0.3 + 0.03 * np.sin(phi), 0.03 * np.cos(phi)], axis=1)
+    rings = [np.column_stack([np.concatenate([arc, -arc]), np.full(50, z)]) for z in (0.0, 0.2)]
+    hull = ConvexHull(np.concatenate(rings))
+    body = make_mesh(hull.points, hull.simplices, source)
+    if not taken:
+        with pytest.raises(cs.GeometryError, match=r"use the visual mesh of the link, or allow_hull \(--allow-hull\)"):
+            cs.design_link(body)
+        return
+    design = cs.design_link(body)
+    assert [sheet.place.frustum.radius1 for sheet in design.sheets] == pytest.approx([0.03, 0.03], abs=2e-4)
+    assert any("it is called visual, and taken for the link" in note for note in design.notes)
+    assert not any("it is called visual" in note for note in cs.design_link(body, allow_hull=True).notes)
 
 
 def test_what_cannot_be_covered_says_why() -> None:

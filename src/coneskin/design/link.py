@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
 
-__all__ = ["LinkMesh", "fit_link", "fit_mesh", "load_link", "with_seams"]
+__all__ = ["LinkMesh", "find_link_sheets", "fit_link", "fit_mesh", "load_link", "with_seams"]
 
 _RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
 
@@ -29,12 +29,14 @@ class LinkMesh:
         mesh: its surface.
         frame: frame of its coordinates, in words.
         notes: notes on the mesh, one sentence each.
+        visual: True where it is called the visual mesh, by a URDF or by its path: no collision body, though convex.
     """
 
     name: str
     mesh: Mesh
     frame: str
     notes: tuple[str, ...]
+    visual: bool = False
 
 
 def load_link(
@@ -66,7 +68,7 @@ def load_link(
     if not hash_sign and not path.lower().endswith((".urdf", ".xacro")):
         mesh = load_mesh(path, unit, up_axis)
         frame = f"the mesh's coordinates in {Path(path).name}"
-        yield LinkMesh(Path(path).stem, mesh, frame, (*_terms(path), *mesh.notes))
+        yield LinkMesh(Path(path).stem, mesh, frame, (*_terms(path), *mesh.notes), _called_visual(path))
         return
     from coneskin.geometry.urdf import load_urdf_link, urdf_links
 
@@ -82,7 +84,7 @@ def load_link(
             continue
         said = tuple(str(error) for error in errors)
         notes = (f"{kind} mesh of the URDF", *said, *_terms(path + name), *mesh.notes)
-        yield LinkMesh(name, mesh, f"the URDF link {name}", notes)
+        yield LinkMesh(name, mesh, f"the URDF link {name}", notes, kind == "visual")
     if len(errors) == 2:
         raise errors[0]
 
@@ -112,14 +114,13 @@ def fit_link(
         MeshError: the file, the link or its mesh cannot be found or read.
         GeometryError: an argument of the search is out of range.
     """
-    from coneskin.geometry.fit.sheets import find_sheets
-
-    facing = search.pop("seam_direction", None)
+    facing = search.get("seam_direction")
+    search = {name: value for name, value in search.items() if name != "seam_direction" or facing}
     tries: list[tuple[LinkMesh, LinkFit]] = []
     progress(f"reading {link}")
     for source in load_link(link, unit, up_axis, packages, arguments):
         progress(f"{source.name}: {len(source.mesh.faces)} faces")
-        fit = find_sheets(source.mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
+        fit = find_link_sheets(source, progress, **search)
         source = _with_notes(source, fit)
         if fit.sheets:
             return (source, fit) if facing else with_seams(source, fit, progress, search.get("weights"))
@@ -129,14 +130,43 @@ def fit_link(
 
 def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **search: Any) -> tuple[LinkMesh, LinkFit]:
     """Return a mesh with its fit, named by its source; arguments as in ``fit_link``."""
-    from coneskin.geometry.fit.sheets import find_sheets
-
     name = Path(mesh.source).stem
-    source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", (*_terms(mesh.source), *mesh.notes))
-    facing = search.pop("seam_direction", None)
-    fit = find_sheets(mesh, progress=progress, **({"seam_direction": facing} if facing else {}), **search)
+    notes = (*_terms(mesh.source), *mesh.notes)
+    source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", notes, _called_visual(mesh.source))
+    facing = search.get("seam_direction")
+    search = {name: value for name, value in search.items() if name != "seam_direction" or facing}
+    fit = find_link_sheets(source, progress, **search)
     source = _with_notes(source, fit)
     return (source, fit) if facing or not fit.sheets else with_seams(source, fit, progress, search.get("weights"))
+
+
+def find_link_sheets(source: LinkMesh, progress: Callable[[str], None], **search: Any) -> LinkFit:
+    """Return the fit of a mesh; a convex one is refused as a collision hull, unless it is called the visual mesh.
+
+    Args:
+        source: the mesh.
+        progress: called with the name of each step.
+        search: fields of ``FitOptions``, and ``round_only``.
+
+    Raises:
+        GeometryError: an argument of the search is out of range.
+    """
+    from coneskin.geometry.fit.coverage_notes import hull_note
+    from coneskin.geometry.fit.sheets import find_sheets
+    from coneskin.geometry.fit.surface_samples import sample_surface
+    from coneskin.geometry.ray_casting import RayCaster
+
+    asked = bool(search.pop("allow_hull", False))
+    fit = find_sheets(source.mesh, progress=progress, allow_hull=asked or source.visual, **search)
+    if asked or not source.visual or not fit.sheets:
+        return fit
+    note = hull_note(source.mesh, sample_surface(source.mesh, RayCaster(source.mesh)), visual=True)
+    return replace(fit, notes=(*fit.notes, note)) if note else fit
+
+
+def _called_visual(path: str) -> bool:
+    """Tell whether a path calls its mesh the visual one, as the folders of ROS descriptions do."""
+    return "visual" in path.lower() and "collision" not in path.lower()
 
 
 def _with_notes(source: LinkMesh, fit: LinkFit) -> LinkMesh:

@@ -8,12 +8,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from coneskin.design.folder import write_design
-from coneskin.design.link import LinkMesh, with_seams
+from coneskin.design.link import LinkMesh, find_link_sheets, with_seams
 from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
 from coneskin.errors import GeometryError
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
-from coneskin.geometry.fit.sheets import find_sheets
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
 __all__ = ["Handles", "Workbench", "adjusted"]
@@ -112,7 +111,7 @@ class Workbench:
             GeometryError: the tolerance is not above 0.
             MeshError: no face of the mesh is visible from outside.
         """
-        fit = find_sheets(link.mesh, tolerance=tolerance, progress=progress)
+        fit = find_link_sheets(link, progress or (lambda _step: None), tolerance=tolerance)
         if fit.sheets:
             link, fit = with_seams(link, fit, progress or (lambda _step: None))
         made = cls(link, fit, replace(options or DesignOptions(), link=link.name))
