@@ -3,7 +3,9 @@
     python bench/build_report.py DESIGN-FOLDER ...      # of round sheets, drawn with the defaults of `coneskin design`
 
 Areas by the outlines in the DXF files, arcs included; holes by their centres there; ohms by the integral over rings and
-rulings between the electrodes, over as much of the sheet as the DXF file has; wires by their way around the end.
+rulings between the electrodes, over as much of the sheet as the DXF file has; wires by their way around the end. Sizes
+and volumes of the jig as trimesh reads the STL files. Where the link of the design can be read: how far it stands out
+beyond the planes of its flat faces, and the distances of the places of a sheet from these, by its radii and its pose.
 """
 
 from __future__ import annotations
@@ -15,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import ezdxf
+import numpy as np
+import trimesh
 
 STRIPPED, LOOP, CONTACT, STEP = 8.0, 20.0, 4.0, 5.0  # mm; as the guide says
 
@@ -22,7 +26,8 @@ STRIPPED, LOOP, CONTACT, STEP = 8.0, 20.0, 4.0, 5.0  # mm; as the guide says
 def main() -> None:
     for name in sys.argv[1:]:
         folder = Path(name)
-        sheets = json.loads((folder / "design.json").read_text())["sheets"]
+        data = json.loads((folder / "design.json").read_text())
+        sheets, link = data["sheets"], _link(Path(data["link"]))
         for number, sheet in enumerate(sheets, 1):
             cut = folder / ("cut" if len(sheets) == 1 else f"sheet-{number}/cut")
             area = max(abs(1e-2 * _area(cut, layer) / layer["area_cm2"] - 1.0) for layer in sheet["layers"])
@@ -37,6 +42,8 @@ def main() -> None:
                 f"A-B {said['A-B']:.1f} for {along:.1f} ohm, C-D {said['C-D']:.1f} for "
                 f"{around:.1f} ohm, wires within {wires:g} mm"
             )
+            print(f"  {_jig(folder if len(sheets) == 1 else folder / f'sheet-{number}', sheet)}")
+            print(f"  {_faces(link, sheet)}")
 
 
 def _outlines(cut: Path, layer: dict[str, Any], kind: str) -> list[list[tuple[float, float, float]]]:
@@ -105,7 +112,7 @@ def _integral(layer: dict[str, Any], u1: float, u2: float) -> float:
     steps, slope = 2000, (layer["radius2_mm"] - layer["radius1_mm"]) / layer["slant_mm"]
     h = (u2 - u1) / steps
     weights = [1.0 if k in (0, steps) else 4.0 if k % 2 else 2.0 for k in range(steps + 1)]
-    return h / 3.0 * sum(w / (layer["radius1_mm"] + slope * (u1 + k * h)) for k, w in enumerate(weights))
+    return float(h / 3.0 * sum(w / (layer["radius1_mm"] + slope * (u1 + k * h)) for k, w in enumerate(weights)))
 
 
 def _span(cut: Path, layer: dict[str, Any], at: float, around: bool) -> tuple[float, float]:
@@ -136,7 +143,60 @@ def _length(sheet: dict[str, Any], wire: dict[str, Any]) -> float:
     radius = cone["radius1_mm"] if cable["side"] == "end1" else cone["radius2_mm"]
     turn = abs((wire["phi_deg"] - cable["phi_deg"] + 180.0) % 360.0 - 180.0)
     length = STRIPPED + math.radians(turn) * radius + cable["connector_mm"] + LOOP + CONTACT
-    return math.ceil(length / STEP - 1e-6) * STEP
+    return float(math.ceil(length / STEP - 1e-6) * STEP)
+
+
+def _link(path: Path) -> np.ndarray | None:
+    """Return the corners of a link's mesh [mm]; None where there is no file."""
+    if not path.is_file():
+        return None
+    corners = np.asarray(trimesh.load_mesh(path).vertices, float)
+    return corners * (1e3 if np.ptp(corners, axis=0).max() < 5.0 else 1.0)
+
+
+def _jig(place: Path, sheet: dict[str, Any]) -> str:
+    """Compare the parts of the jig with what the report says of them."""
+    size = volume = 0.0
+    parts = [part for collar in sheet["jig"] for part in collar["parts"]]
+    if not parts:
+        return "no jig"
+    for part in parts:
+        solid = trimesh.load_mesh(place / part["file"])
+        assert solid.is_watertight
+        assert solid.is_winding_consistent
+        assert len(solid.split()) == 1
+        assert abs(solid.bounds[0][2]) < 1e-3, "it stands on the printer's bed"
+        size = max(size, float(np.abs(np.sort(solid.extents) - np.sort(part["size_mm"])).max()))
+        volume = max(volume, abs(1e-3 * solid.volume / part["volume_cm3"] - 1.0))
+    return f"jig: {len(parts)} parts, each one closed solid, sizes within {size:.4f} mm, volumes within {volume:.1e}"
+
+
+def _faces(link: np.ndarray | None, sheet: dict[str, Any]) -> str:
+    """Compare the faces and the distances from them with the link's mesh and the pose of the sheet."""
+    faces, cone = sheet["placement"]["faces"], sheet["link_cone"]
+    if not faces or link is None:
+        return "no flat faces"
+    normals = np.array([face["normal"] for face in faces])
+    offsets = np.array([face["offset_mm"] for face in faces])
+    beyond = (link @ normals.T).max(axis=0) - offsets
+    angles = np.radians(cone["rpy_deg"])[::-1]  # yaw, pitch, roll
+    turns = [
+        trimesh.transformations.rotation_matrix(a, d)[:3, :3] for a, d in zip(angles, np.eye(3)[::-1], strict=True)
+    ]
+    rotation = turns[0] @ turns[1] @ turns[2]
+    worst = 0.0
+    for row in sheet["placement"]["heights"]:
+        if sheet.get("bends") and row["phi_deg"]:
+            continue  # its radii are arc over wrap: they place edge 0 only
+        share, phi = row["u_mm"] / cone["slant_mm"], math.radians(row["phi_deg"])
+        radius = cone["radius1_mm"] + share * (cone["radius2_mm"] - cone["radius1_mm"])
+        local = np.array([radius * math.cos(phi), radius * math.sin(phi), share * cone["height_mm"]])
+        heights = offsets - normals @ (rotation @ local + cone["xyz_mm"])
+        worst = max(worst, float(np.abs(heights - row["from_faces_mm"]).max()))
+    return (
+        f"faces {', '.join(face['name'] for face in faces)}: the link reaches {beyond.max():+.3f} mm beyond them, "
+        f"{len(sheet['placement']['heights'])} places within {worst:.3f} mm"
+    )
 
 
 if __name__ == "__main__":

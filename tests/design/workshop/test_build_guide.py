@@ -2,10 +2,12 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from coneskin.design.jig_plan import JigPlan
 from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
 from coneskin.design.workshop.bill_of_materials import bill_of_materials
 from coneskin.design.workshop.build_figures import BuildFigures, measure_build
@@ -53,8 +55,6 @@ def test_every_sheet_is_built_by_steps_of_its_own() -> None:
 @pytest.mark.parametrize("assembly", ["loose", "pairs", "bonded"])
 @pytest.mark.parametrize("side", SIDES)
 def test_every_part_has_its_step_and_its_face(assembly: str, side: SheetSide) -> None:
-    from dataclasses import replace
-
     from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 
     stack = replace(PAPER_STACK, assembly=assembly)  # type: ignore[arg-type]
@@ -276,3 +276,25 @@ def test_the_bill_has_what_the_steps_use_up() -> None:
     assert "hook-and-loop tape" in text
     assert "isopropanol" in text
     assert any("isopropanol" in name for name in items)
+
+
+def test_what_no_ruler_reaches_is_not_told() -> None:
+    """A part that stands out 0.5 m away is no place to measure from; at 0.13 m it is (above)."""
+    (design,) = design_sheets(
+        [PlacedFrustum(Frustum(0.05, 0.05, 0.2, math.radians(200)))], DesignOptions(jig=JigPlan("none"))
+    )
+    mesh = bumped(4.5)
+    for reach, told in ((0.1, True), (0.5, False)):
+        far = np.array(mesh.vertices)
+        far[-1] = reach * math.cos(4.5), reach * math.sin(4.5), 0.24
+        text = guide(design, measure_build(design, 0, "mesh", Mesh(far, mesh.faces)))
+        assert ("through the air" in text) == told
+
+
+def test_an_end_at_the_links_own_end_is_told_for_a_tilted_sheet_too() -> None:
+    design, figures = built(Frustum(0.05, 0.05, 0.2))
+    for before, beyond in ((0.002, 0.02), (0.02, 0.002)):
+        place = replace(figures.placement, before=before, beyond=beyond, tilted=True)
+        text = guide(design, replace(figures, placement=place))
+        assert ("| line of end 1 | 2.0 mm along the axis" in text) == (before < 0.01)
+        assert ("| line of end 2 | outermost place" in text) == (beyond < 0.01)

@@ -13,6 +13,9 @@ from .placement import LinkFeature, SheetPlacement, sharpest_bends
 
 __all__ = ["placement_lines"]
 
+_AT_END = 3e-3  # m; a sheet so near to the end of a link is placed by eye
+_FARTHEST = 0.2  # m; a ruler through the air
+
 
 def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the distances by which a sheet is placed."""
@@ -31,11 +34,12 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
     yield "| from | to | distance |"
     yield "|---|---|---|"
     if place.before is not None and place.beyond is not None:
-        if not place.tilted:
+        if not place.tilted or place.before < _AT_END:
             yield (
                 "| outermost place of the link on the side of end 1: a plate held square to the axis touches it there "
                 f"| line of end 1 | {in_mm(place.before)} along the axis |"
             )
+        if not place.tilted or place.beyond < _AT_END:
             yield f"| line of end 2 | outermost place of the link on its side | {in_mm(place.beyond)} along the axis |"
     else:
         yield "| the face of your link that you measured its height from | line of end 1 | 0 mm: choose it |"
@@ -43,8 +47,8 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
     word = "once around the link" if side.wrap > 6.28 else "edge 0, around the link, to the other edge"
     yield f"| {word} | at end 1 | {in_mm(place.around1)} by tape measure |"
     yield f"| {word} | at end 2 | {in_mm(place.around2)} by tape measure |"
-    if place.feature is not None and not place.around_fixed:
-        yield f"| line of edge 0 | {_feature_way(design, place.feature)} |"
+    if place.feature is not None and not place.around_fixed and (way := _feature_way(design, place.feature)):
+        yield f"| line of edge 0 | {way} |"
     yield ""
     yield from _height_lines(design, place)
     yield from _facing(design, place)
@@ -77,7 +81,10 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
 
 
 def _feature_way(design: SheetDesign, part: LinkFeature) -> str:
-    """Return the way from edge 0 to what stands out, around the sheet, or straight where that is not on the sheet."""
+    """Return the way from edge 0 to what stands out, around the sheet, or straight where that is not on the sheet.
+
+    It is empty where that would be too far for a ruler.
+    """
     side = design.place.frustum
     what = f"middle of the part of the link that stands out furthest, {in_mm(part.radius)} from the axis"
     if part.azimuth <= side.wrap:
@@ -86,6 +93,8 @@ def _feature_way(design: SheetDesign, part: LinkFeature) -> str:
         radius, height = (side.radius1, 0.0) if part.end == 1 else (side.radius2, side.height)
         x, y = part.radius * math.cos(part.azimuth), part.radius * math.sin(part.azimuth)
         straight = math.dist((x, y, part.height), (radius, 0.0, height))
+        if straight > _FARTHEST:
+            return ""
         way = f"{in_mm(straight)} straight through the air, from edge 0 at end {part.end}"
     return f"{what} | {way} ({math.degrees(part.azimuth):.1f} deg)"
 
