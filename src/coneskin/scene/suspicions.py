@@ -131,8 +131,8 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
         if beside > _BESIDE or tilt > _TILT:
             yield (
                 f"{where} lies {1e3 * beside:.0f} mm beside the axis of the {name}, turned by "
-                f"{math.degrees(tilt):.0f} deg against it, as a sheet about another axis of the link does; otherwise "
-                "correct xyz_mm and rpy_deg, or the frame"
+                f"{math.degrees(tilt):.0f} deg against it: right for a sheet about another axis of the link; otherwise "
+                "correct xyz_mm and rpy_deg, the frame, or whose link it is"
             )
         radius = max(cone.radius1, cone.radius2)
         if radius > room:
