@@ -1,5 +1,6 @@
 """``coneskin doctor``: from a design to a guarded arm without editing a file; exit codes, JSON, a patched scene."""
 
+import contextlib
 import io
 import os
 import sys
@@ -10,10 +11,12 @@ import pytest
 from coneskin.cli import main
 from coneskin.doctor.doctor import Doctor
 from coneskin.doctor.wire_examination import WirePatch
-from coneskin.finding import Finding
+from coneskin.finding import Finding, Verdict
 from coneskin.robot.sim.process import free_host
 from coneskin.scene.reader import load_scene
 from coneskin.testing.forearm import forearm_scene
+
+from ..scene.scenes import SKIN_ONLY
 
 Output = pytest.CaptureFixture[str]
 MESH = Path(os.environ.get("CONESKIN_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "ur/ur5e/visual"
@@ -57,6 +60,25 @@ def test_a_scene_is_changed_where_a_person_agrees(
     assert main(["doctor", str(path), *words]) == 1
     assert '+radial_positive = "A"' in capsys.readouterr().err
     assert load_scene(path).sensors[0].sensor.polarity.radial == ("A" if changed else "B")
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict", "said"),
+    [
+        (SKIN_ONLY, "ok", "next: coneskin guard scene.toml"),  # which refuses to simulate an arm that is not there
+        (forearm_scene(), "ok", "next: coneskin guard scene.toml --simulated"),
+        (forearm_scene(), "bad", "next: mend what is bad, then coneskin doctor scene.toml --simulated"),
+    ],
+)
+def test_the_next_command_is_for_what_was_examined(
+    text: str, verdict: Verdict, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+) -> None:
+    monkeypatch.setattr(Doctor, "examine", lambda doctor: doctor.findings.append(Finding("wires", verdict, "")))
+    monkeypatch.setattr("coneskin.commands.doctor.simulated_arm", lambda scene: contextlib.nullcontext())
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(text)
+    main(["doctor", "scene.toml", "--simulated"])
+    assert capsys.readouterr().out.splitlines()[-1] == said
 
 
 def test_a_scene_with_nothing_to_examine_is_bad(tmp_path: Path, capsys: Output) -> None:

@@ -108,10 +108,11 @@ def _agrees() -> bool:
 
 
 def _say_next(args: argparse.Namespace, scene: Scene, code: int) -> None:
-    name = shlex.quote(str(args.scene))
+    name = shlex.quote(str(args.scene)) + (" --simulated" if args.simulated else "")
     if code:
         print_hint(f"next: mend what is bad, then coneskin doctor {name}")
     elif scene.moves_away:
-        print_hint(f"next: coneskin commission {name}{' --simulated' if args.simulated else ''}")
+        print_hint(f"next: coneskin commission {name}")
     else:
-        print_hint(f"next: coneskin guard {name}{' --simulated' if args.simulated else ''}")
+        alone = scene.arm is None  # `guard --simulated` simulates an arm: a virtual skin alone needs no option
+        print_hint(f"next: coneskin guard {shlex.quote(str(args.scene)) if alone else name}")
