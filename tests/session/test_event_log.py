@@ -10,6 +10,7 @@ from coneskin.channel import Channel, pair
 from coneskin.recording import Block, encode_block
 from coneskin.replay.run import read_run
 from coneskin.robot.guard.journal import BlockKind, GuardEvent
+from coneskin.scene.scene import RecordingScene
 from coneskin.session.event_log import EventLog, new_recording
 from coneskin.session.guard_monitor import GuardMonitor
 
@@ -74,6 +75,44 @@ def test_a_full_disk_ends_the_recording_and_says_so(tmp_path, channel):
     assert "No space left" in message.details["what"]
     emit(theirs, "contact")
     assert log.wait_for(("contact",), 5.0) is not None
+    theirs.close()
+    close(log)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full on this system to stand for a full disk")
+def test_a_disk_that_is_full_at_the_end_is_said_and_hides_no_collision(tmp_path):
+    """``close`` ends a ``with``: what it raised would stand in the place of what the guard has stopped."""
+    seen = []
+    log = EventLog(tmp_path / "run.rec", seen.append)
+    log.open({})
+    log._recorder._file.close()
+    log._recorder._file = open("/dev/full", "wb", buffering=0)  # noqa: SIM115 - the log closes it
+    log.close()
+    assert "recording ended: cannot write to the recording" in log.events[-1].details["what"]
+    assert seen == log.events
+
+
+def test_a_file_that_cannot_be_closed_ends_the_recording_and_loses_no_event(tmp_path, channel):
+    ours, theirs = channel
+
+    class Network:
+        def write(self, data):
+            return len(data)
+
+        def close(self):
+            raise OSError(28, "No space left on device")
+
+    log = EventLog(tmp_path / "run.rec", None, RecordingScene(tmp_path, max_size=1000))
+    log.open({})
+    log._recorder._file.close()
+    log._recorder._file = Network()
+    listen(log, ours)
+    theirs.send(
+        encode_block(Block(BlockKind.TICK, 0.5, os.urandom(2000)))
+        + encode_block(GuardEvent("contact", 1.0, {}).block())
+    )
+    assert log.wait_for(("contact",), 5.0) is not None
+    assert "cannot close the recording" in log.wait_for(("message",), 5.0).details["what"]
     theirs.close()
     close(log)
 

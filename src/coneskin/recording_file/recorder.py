@@ -145,7 +145,12 @@ class Recorder:
                 raise RecordingError(f"{path} is there already, and a recording is never overwritten: {hint}") from None
             raise RecordingError(f"cannot make the recording {path}: {exc.strerror or exc}") from exc
         mark_recorded(file)
-        self._close_part()
+        try:
+            self._close_part()
+        except RecordingError:
+            file.close()
+            path.unlink()
+            raise
         self._file, self._written = file, 0
         self._hand_over(encode_file_head(FileHead(len(self.parts), self._run)))
         self.parts.append(path)
@@ -158,7 +163,10 @@ class Recorder:
     def _close_part(self) -> None:
         if self._file is not None:
             file, self._file = self._file, None
-            file.close()
+            try:
+                file.close()
+            except OSError as exc:  # of a network's disk, which only then says that it is full
+                raise RecordingError(f"cannot close the recording {self.path}: {exc.strerror or exc}") from exc
 
     def _append(self, blocks: list[Block]) -> None:
         self._hand_over(encode_chunk(self._run, self._sequence, blocks))

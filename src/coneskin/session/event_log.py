@@ -129,12 +129,15 @@ class EventLog:
 
     def close(self) -> None:
         """Close the recording, and deliver what waits for the program's function; may be called again."""
-        if self._delivery is not None:
-            self._delivery.close()
         self._write([])
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
-            recorder.close()
+            try:
+                recorder.close()
+            except ConeSkinError as exc:  # it has no end then, which its reader says too
+                self._tell([_recording_ended(time.monotonic(), exc)])
+        if self._delivery is not None:
+            self._delivery.close()
 
     def _write(self, blocks: list[Block]) -> None:
         events = []
@@ -150,16 +153,18 @@ class EventLog:
                 recorder, self._recorder = self._recorder, None
                 with contextlib.suppress(ConeSkinError):
                     recorder.close()
-                what = f"recording ended: {exc}"
-                events.append(GuardEvent(EventName.MESSAGE, blocks[-1].time, {"what": what}))
+                events.append(_recording_ended(blocks[-1].time, exc))
         for block in blocks:
             if block.kind == BlockKind.EVENT:
                 try:
                     events.append(decode_event(block))
                 except ConeSkinError as exc:
                     events.append(GuardEvent(EventName.MESSAGE, block.time, {"what": str(exc)}))
-        if not events:
-            return
+        if events:
+            self._tell(events)
+
+    def _tell(self, events: list[GuardEvent]) -> None:
+        """Keep events, and give them to whoever waits for them."""
         for event in events:
             _LOGGER.log(logging.WARNING if event.name in _GRAVE else logging.INFO, "%s %s", event.name, event.details)
         names = {event.name for event in events}
@@ -170,6 +175,10 @@ class EventLog:
             self._changed.notify_all()
         if self._delivery is not None:
             self._delivery.put(events)
+
+
+def _recording_ended(now: float, why: ConeSkinError) -> GuardEvent:
+    return GuardEvent(EventName.MESSAGE, now, {"what": f"recording ended: {why}"})
 
 
 def _recorder(path: Path, limits: RecordingScene | None) -> Recorder:
