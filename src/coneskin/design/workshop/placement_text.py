@@ -109,13 +109,13 @@ def _height_lines(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
         size = f"{1e3 * long:.0f} x {1e3 * wide:.0f} mm"
         yield f"* {face.name}: a flat face of the link, {size}, outlined in the picture of the link."
     yield ""
+    bold = " Bold ones change most when the sheet is turned." if place.around_fixed else ""
     ends = "" if place.tilted else " Where the distances along the axis are easier to measure, take end 1 from those."
     yield (
         "Lay part 1 dry on the link, and slide it until these places of its inner face are as far from the faces, "
         "square to them; then draw along its end 1 and its edge 0. Measure with the face on a flat table, by a ruler "
         "that stands on it; on an arm that is assembled, from the gap beside the face, which shows its plane, or from "
-        f"a straight bar that is held against it. Bold ones change most when the sheet is turned.{ends} *Check:* every "
-        "distance within 1 mm."
+        f"a straight bar that is held against it.{bold}{ends} *Check:* every distance within 1 mm."
     )
     yield ""
     yield "| place of the sheet | " + " | ".join(f"from {face.name}" for face in place.faces) + " |"
