@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["CalibrationResult", "Calibrator"]
 
 _VIRTUAL_PRESS = 4.0  # s of a press with a known force, likewise
+_ASKS = ("mark", "again", "press")  # kinds of notice on which the person touches the skin
 _VIRTUAL_DURATION = 1.5  # s of a touch of a virtual skin; it ends by itself
 
 
@@ -124,37 +125,27 @@ class Calibrator:
             watch = stack.enter_context(SkinWatch(self.scene, port))
             watch.await_ready()
             ohms = [watch.untouched_ohms(item.sensor) for item in self.sensors]
-            self._touch(TouchSequence(self.sensors, self._mark_error), watch)
+            self._carry_out(TouchSequence(self.sensors, self._mark_error), watch)
             if self._forces:
-                self._press(ForceSequence(self._pressed, self._forces), watch)
+                self._carry_out(ForceSequence(self._pressed, self._forces), watch)
         results = [self._result(item, found, by) for item, found in zip(self.sensors, ohms, strict=True)]
         return [_judged(result, watch.contradiction(result.touches.sensor.name)) for result in results]
 
-    def _touch(self, sequence: TouchSequence, watch: SkinWatch) -> None:
+    def _carry_out(self, sequence: TouchSequence | ForceSequence, watch: SkinWatch) -> None:
         touch_marks(sequence, watch, partial(self._tell, sequence), self._reading, self._refused)
         if sequence.incomplete:
             raise SkinError(sequence.incomplete)
 
-    def _press(self, sequence: ForceSequence, watch: SkinWatch) -> None:
-        touch_marks(sequence, watch, partial(self._tell_press, sequence), self._reading, self._refused)
-        if sequence.incomplete:
-            raise SkinError(sequence.incomplete)
-
-    def _tell_press(self, sequence: ForceSequence, notices: list[Notice]) -> None:
+    def _tell(self, sequence: TouchSequence | ForceSequence, notices: list[Notice]) -> None:
+        """Tell the person; a virtual skin is touched in the person's place."""
+        if isinstance(sequence, ForceSequence):
+            force, duration = sequence.force, _VIRTUAL_PRESS
+        else:
+            force, duration = VIRTUAL_FORCE, _VIRTUAL_DURATION
         for notice in notices:
             self._notice(notice)
-            if self._client is not None and notice.kind == "press" and sequence.mark is not None:
-                sensor = sequence.current.sensor.name
-                self._client.touch(*sequence.mark.place, sequence.force, _VIRTUAL_PRESS, sensor)
-            elif self._client is not None and notice.kind == "read":
-                self._client.release()
-
-    def _tell(self, sequence: TouchSequence, notices: list[Notice]) -> None:
-        for notice in notices:
-            self._notice(notice)
-            if self._client is not None and notice.kind in ("mark", "again") and sequence.mark is not None:
-                sensor = sequence.current.sensor.name
-                self._client.touch(*sequence.mark.place, VIRTUAL_FORCE, _VIRTUAL_DURATION, sensor)
+            if self._client is not None and notice.kind in _ASKS and sequence.mark is not None:
+                self._client.touch(*sequence.mark.place, force, duration, sequence.current.sensor.name)
             elif self._client is not None and notice.kind == "read":
                 self._client.release()
 
