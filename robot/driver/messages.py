@@ -129,7 +129,7 @@ class StatusReport(NamedTuple):
 
     def encode(self) -> bytes:
         """Return the message."""
-        return f"{self.kind}\n{self.text}".encode()
+        return f"{self.kind}\n{self.text}".encode("utf-8", "backslashreplace")  # an error may name a file
 
     @classmethod
     def decode(cls, message: bytes) -> StatusReport:

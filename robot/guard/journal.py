@@ -212,6 +212,17 @@ def decode_event(block: Block) -> GuardEvent:
     return GuardEvent(name, block.time, details)
 
 
+def encode_loss(what: str, why: str) -> bytes:
+    """Return the payload of a block that says which port is gone or missing, and why; half a letter is written out."""
+    return f"{what}\n{why}".encode("utf-8", "backslashreplace")
+
+
+def decode_loss(payload: bytes) -> tuple[str, str]:
+    """Return which port such a payload means, and why it is gone."""
+    what, _, why = payload.decode("utf-8", "replace").partition("\n")
+    return what, why
+
+
 def describe_way(details: Mapping[str, Any], verb: str = "retreated") -> str:
     """Return in words how far a motion away went, from the details of the event ``retreated``.
 

@@ -23,7 +23,7 @@ from coneskin.skin.sources.source import Source
 from coneskin.skin.sources.source_reopening import SourceReopening
 
 from .core import GuardCore
-from .journal import BlockKind
+from .journal import BlockKind, encode_loss
 from .outbox import Outbox
 from .phase import Phase
 from .ports import GuardPorts
@@ -113,7 +113,7 @@ class GuardLoop:
         for sock in ports.stops.sockets().values() if ports.stops else ():
             self._selector.register(sock, selectors.EVENT_READ, "stops")
         for what, why in ports.absent.items():
-            self._take(BlockKind.ABSENT, f"{what}\n{why}".encode())
+            self._take(BlockKind.ABSENT, encode_loss(what, why))
 
     def _watch_skin(self, source: Source) -> None:
         if (descriptor := source.fileno()) is not None:
@@ -216,7 +216,7 @@ class GuardLoop:
                 self._take(BlockKind.REOPENED, b"skin")
             else:
                 why = f"{source.name} is gone and could not be opened again: start the guard anew"
-                self._take(BlockKind.LOST, f"skin\n{why}".encode())
+                self._take(BlockKind.LOST, encode_loss("skin", why))
 
     def _read_arm(self, reader: PayloadReader) -> None:
         try:
@@ -249,7 +249,7 @@ class GuardLoop:
             self._forget(sock)
             sock.close()
             why = f"the controller has closed the {name} connection, which a stop may need"
-            self._take(BlockKind.LOST, f"{name}\n{why}".encode())
+            self._take(BlockKind.LOST, encode_loss(name, why))
 
     def _take(self, kind: BlockKind, payload: bytes) -> None:
         """Feed the core, which sends its commands at once; then record all of it."""
@@ -275,7 +275,7 @@ class GuardLoop:
         if what == "skin" and self._ports.reopen is not None:
             self._gone = self._ports.source
         setattr(self._ports, _PORTS[what], None)
-        self._take(BlockKind.LOST, f"{what}\n{why}".encode())
+        self._take(BlockKind.LOST, encode_loss(what, why))
         if what == "controller" and (driver := self._ports.driver) is not None:
             # it would connect again by itself, and its program start with whatever command is still there
             driver.close()

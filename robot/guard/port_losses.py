@@ -10,7 +10,7 @@ from coneskin.robot.guard.heartbeats.companion_monitor import CompanionMonitor
 
 from .event_folding import EventFolding
 from .fault_register import FaultRegister
-from .journal import EventName
+from .journal import EventName, decode_loss
 from .outputs import Outputs, emit
 from .phase import Phase
 from .skin_connection import SkinConnection
@@ -54,7 +54,7 @@ class PortLosses:
 
     def take_lost(self, block: Block, out: Outputs) -> None:
         """Take that a port is gone: the arm stops."""
-        what, why = _words(block)
+        what, why = decode_loss(block.payload)
         self._lost[what] = why
         self._companions.lose(what, block.time)
         if self._arm is not None and what == "slider":
@@ -68,7 +68,7 @@ class PortLosses:
 
     def take_absent(self, block: Block, out: Outputs) -> None:
         """Take that there is no such stop path in this run."""
-        what, why = _words(block)
+        what, why = decode_loss(block.payload)
         self._companions.lose(what, block.time)
         emit(out, EventName.MESSAGE, block.time, what=f"a stop path is missing, {what}: {why}")
 
@@ -80,9 +80,3 @@ class PortLosses:
         del self._lost["skin"]
         self._connection.reopen(block.time)
         emit(out, EventName.MESSAGE, block.time, what="the skin's port is open again; a reset is needed")
-
-
-def _words(block: Block) -> tuple[str, str]:
-    """Return which port a block means, and what it says of it."""
-    what, _, why = block.payload.decode("utf-8", "replace").partition("\n")
-    return what, why

@@ -1,6 +1,6 @@
 """Commands of the guard to the driver process, as bytes."""
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from coneskin.robot.driver.messages import (
@@ -9,6 +9,7 @@ from coneskin.robot.driver.messages import (
     Release,
     SetJointVelocity,
     Shutdown,
+    StatusReport,
     StopProgram,
     decode_command,
 )
@@ -38,3 +39,11 @@ def test_nonsense_is_refused(message):
     except ValueError:
         return
     assert command.encode() == message or message[:1] in b"VSHC"
+
+
+@given(st.text(st.characters()))
+@example("/dev/caf\udce9")
+def test_a_report_with_any_text_arrives(text):
+    """The name of a file that is no UTF-8 must not end the process that reports it."""
+    back = StatusReport.decode(StatusReport("error", text).encode())
+    assert back == StatusReport("error", text.encode("utf-8", "backslashreplace").decode())
