@@ -14,6 +14,8 @@ from coneskin.view.page_server import PageServer
 from ..geometry.synthetic import placed, revolve
 from ..view.browser import browser_page, wait_for_text
 
+#: how far the eye is from what it looks at [m]
+DISTANCE = "() => window.__viserMutable.cameraControl.distance"
 pytestmark = pytest.mark.long
 
 
@@ -57,6 +59,7 @@ def test_a_person_designs_a_sheet_and_then_one_for_another_link(tmp_path: Path) 
         wait_for_text(page, "#coneskin-facts", "theta0")
         page.wait_for_selector("#coneskin-flat svg path, #coneskin-flat svg polyline, #coneskin-flat svg line",
                                state="attached")  # fmt: skip
+        page.wait_for_function(DISTANCE + " > 0.3")  # of a link of 0.2 m
         before = page.inner_text("#coneskin-facts")
         thumb = page.locator("[role=slider]").first  # takes length off end 1, half a millimetre with each key
         thumb.focus()
@@ -70,5 +73,6 @@ def test_a_person_designs_a_sheet_and_then_one_for_another_link(tmp_path: Path) 
         drop(page, other)
         wait_for_text(page, "#coneskin-said", "tube.stl: 1 sheets")
         assert page.url.startswith(server.url), "the browser has not gone to the file"
+        page.wait_for_function(DISTANCE + " < 0.3")  # m; the tube is 0.15 m long
         wait_for_text(page, "#coneskin-facts", "infinite")  # r1 of a cylinder
         assert page.wrong == []
