@@ -19,6 +19,8 @@ TO_Z_UP = {
     "Z_UP": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
 }
 
+_DEEPEST = 3  # elements within each other down to the unit: COLLADA, asset, unit
+
 
 @dataclass(frozen=True, slots=True)
 class ColladaAsset:
@@ -53,7 +55,9 @@ def read_collada_asset(path: Path, data: bytes) -> ColladaAsset:
                 within.append(element.tag.rpartition("}")[2])
                 continue
             # a tool's own unit may stand in an extra inside, and parts of the document have assets of their own
-            inside = within[1:]
+            inside = (
+                within[1:] if len(within) <= _DEEPEST else []
+            )  # a deep document would be copied at each of its ends
             within.pop()
             if inside == ["asset", "unit"]:
                 asset = replace(asset, unit=element.get("name", "unit"), metres=float(element.get("meter", "1")))

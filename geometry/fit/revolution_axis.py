@@ -36,6 +36,8 @@ def find_revolution_axis(
     """
     middle = samples.points.mean(axis=0)
     size = float(np.ptp(samples.points, axis=0).max())
+    if size == 0.0:  # one point is all that is seen of it
+        return None
     p, n = (samples.points - middle) / size, samples.normals
     rows = np.concatenate([np.cross(p, n), n], axis=1)
     if start is None:

@@ -295,6 +295,12 @@ def test_options_out_of_range(tmp_path: Path) -> None:
         load_mesh(tmp_path / "a.stl", up_axis="z")
 
 
+def test_a_document_as_deep_as_it_is_long_is_read_once(tmp_path: Path) -> None:
+    """Each end of an element copied the names of all around it: a minute for a megabyte, the square of it for more."""
+    deep = b"<COLLADA>" + b"<a>" * 150_000 + b"<unit meter='3'/>" + b"</a>" * 150_000 + b"</COLLADA>"
+    assert read_collada_asset(tmp_path / "a.dae", deep) == ColladaAsset()
+
+
 def test_bad_collada_tags(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="unit tag must hold metres above 0, got 0"):
         load_mesh(write_dae(tmp_path / "a.dae", TUBE, '<unit meter="0"/>'))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,12 @@ def test_the_revolution_axis_bears_a_housing() -> None:
     tilt, shift = off(*line)
     assert tilt < 0.02
     assert shift < 0.25
+
+
+def test_one_point_has_no_axis() -> None:
+    """What is left of a mesh most of whose faces hide each other: a polygon of 50 000 corners over a tube."""
+    tube = hull(rugby())
+    assert find_revolution_axis(replace(tube, points=np.broadcast_to(tube.points[:1], tube.points.shape))) is None
 
 
 def test_the_revolution_axis_from_a_start() -> None:
