@@ -78,9 +78,7 @@ class StudioPage:
         light_plainly(scene)
         vertices = bench.link.mesh.vertices
         self._rays = RayCaster(bench.link.mesh)
-        view = first_view(bench.designs, self._rays, vertices)
-        self._server.look_from(*view)
-        self._server.move_viewers(*view)  # who has put another link onto the page
+        self._server.look_from(*first_view(bench.designs, self._rays, vertices))
         self._legend.content = legend(bench.fit.tolerance)
         scene.add_mesh_simple(
             "/link",

@@ -128,13 +128,6 @@ class PageServer:
         self._server.initial_camera.look_at = at
         self._server.initial_camera.fov = _FIELD_OF_VIEW
 
-    def move_viewers(self, position: tuple[float, float, float], at: tuple[float, float, float]) -> None:
-        """Have those who look already look from another place as well [m]: what they looked at is gone."""
-        for client in self._server.get_clients().values():
-            with client.atomic():
-                client.camera.position = position
-                client.camera.look_at = at
-
     def on_viewer(self, begin: Callable[[Any], Callable[[], None]]) -> None:
         """Call a function for each viewer that connects.
 
