@@ -28,6 +28,7 @@ from .surface_shape import ShapeCorner, ShapeTab, SheetSide, SurfaceShape
 __all__ = ["ElectrodePlan", "SheetLayout", "SurfaceRectangle", "edge_room", "lay_out_sheet"]
 
 _LEAST = 1e-4  # m; no cutter makes a narrower strip or gap
+_LEAST_ACTIVE = 1e-3  # m; less between the electrodes is no sensor
 _MIN_WEB = 1e-3  # m; least width of material around a hole
 
 
@@ -80,6 +81,13 @@ class ElectrodePlan:
             raise GeometryError(
                 f"lead must be at most the electrode ({self.electrode * 1e3:.4g} mm), got {self.lead * 1e3:.4g} mm"
             )
+
+    @property
+    def least_arc(self) -> float:
+        """Length around the narrow end of a sheet below which electrodes, lead and tabs may find no room [m]."""
+        back = max(self.margin, self.setback + self.lead + self.clearance) + self.lead + self.clearance
+        tabs = back + 2.0 * self.clearance + self.lead if self.tab else back
+        return max(self.margin + self.electrode + _LEAST_ACTIVE, tabs) + self.margin + self.electrode
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,7 +257,7 @@ def edge_room(sheet: Frustum) -> float:
 
 def _check_room(plan: ElectrodePlan, where: str, active: float, whole: float, unit: float) -> None:
     """Refuse a sheet that would have no active area left in one direction."""
-    if active > 1e-3 * unit:
+    if active > _LEAST_ACTIVE * unit:
         return
     raise GeometryError(
         f"the sheet measures {whole / unit * 1e3:.4g} mm {where}; margins of {plan.margin * 1e3:.4g} mm and electrodes "

@@ -46,6 +46,11 @@ class SheetRequirements:
     gap: float
     least_gain: float
     weights: TouchWeights | None = None
+    min_arc: float = 0.0
+
+    def least_radius(self, wrap: float) -> float:
+        """Return the smallest radius [m] of a side at least so wide [rad]; its fit may lie a tolerance inside."""
+        return max(self.min_radius, self.min_arc / wrap + self.tolerance) if self.min_arc else self.min_radius
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +159,7 @@ def _full_wraps(
     if requirements.wrap is not None and requirements.wrap != TURN:
         return found
     high, low = profile.bounds(requirements.tolerance)
-    low = np.where(low >= requirements.min_radius, low, 0.0)
+    low = np.where(low >= requirements.least_radius(TURN), low, 0.0)
     ends = longest_intervals(profile.z, high, low, requirements.tolerance, rows)
     worth = profile.radius.mean(axis=1) if profile.weight is None else (profile.radius * profile.weight).mean(axis=1)
     for number in range(1, count + 1):
@@ -178,13 +183,14 @@ def largest_partial_wrap(
     exact = requirements.wrap is not None
     columns = min(math.ceil((requirements.wrap or requirements.min_wrap) / TURN * around), around)
     free, floor = profile.free(), profile.floor(requirements.tolerance)
+    least = requirements.least_radius(columns * TURN / around)
     best: StraightSide | None = None
     area = 0.0
     for radius, slope in lines:
         line = radius + slope * profile.z + rise
         limit = requirements.tolerance * math.hypot(1.0, slope)
         good = free & (profile.radius <= (line + limit)[:, None]) & (floor >= (line - limit)[:, None])
-        good &= (line >= requirements.min_radius)[:, None]
+        good &= (line >= least)[:, None]
         filled = good.sum(axis=1)
         if int(filled.sum()) < rows * columns:
             continue

@@ -130,6 +130,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         options.gap,
         LEAST_GAIN * link.weighed_area,
         link.weights,
+        options.min_arc,
     )
     mesh, rays, hull, counted, worth = link.mesh, link.rays, link.hull, link.counted, link.worth
     tolerance, min_length = options.tolerance, options.min_length

@@ -39,6 +39,7 @@ class FitOptions:
         samples: number of points on the mesh by which coverage is measured; the sheets do not depend on it.
         max_wires: wires at most, four for each sheet; None for as many as the sheets need.
         min_radius: smallest radius of a sheet [m]; a cone is covered up to there, not up to its apex.
+        min_arc: smallest length of the narrow end of a sheet around the axis [m]; electrodes have to find room there.
         thickness: of a sheet [m]; sheets about different axes do not run into each other.
         gap: smallest distance between sheets about different axes, and between partial wraps [m].
         weights: what areas count, where touches are likelier on some than on others; None for all the same.
@@ -64,12 +65,13 @@ class FitOptions:
     weights: TouchWeights | None = None
     exposure: bool = False
     allow_hull: bool = False
+    min_arc: float = 0.0
 
     def __post_init__(self) -> None:
         for name, most in (("tolerance", MOST_TOLERANCE), ("min_length", math.inf), ("max_bridge", _MOST_BRIDGE)):
             _check_length(name, getattr(self, name), most)
         _check_length("min_radius", self.min_radius, math.inf)
-        for name in ("thickness", "gap"):
+        for name in ("thickness", "gap", "min_arc"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:g} mm")

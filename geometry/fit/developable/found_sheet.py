@@ -210,7 +210,7 @@ def _checked(
         return None
     placed = placed.part(ends[0], ends[1], 0.0, placed.frustum.wrap)
     narrow = min(placed.frustum.radius1, placed.frustum.radius2)
-    if narrow < options.min_radius * max(1.0, placed.sharpest_bend):
+    if narrow < options.min_radius * max(1.0, placed.sharpest_bend) or narrow * placed.frustum.wrap < options.min_arc:
         return None
     kept = slice(run[0], run[1])
     seen = off[kept][~hole[kept]]

@@ -140,6 +140,7 @@ def _load_and_fit(args: argparse.Namespace, say: Callable[[str], None]) -> tuple
         max_bridge=args.max_bridge_mm * 1e-3,
         max_wires=args.max_wires,
         min_radius=2e-3 * args.lead_mm,
+        min_arc=design_options(args).plan.least_arc,
         thickness=sum(args.thickness_mm) * 1e-3 if args.thickness_mm else PAPER_STACK.thickness,
         gap=args.sheet_gap_mm * 1e-3,
         seam_direction=seam_direction(args),

@@ -96,6 +96,7 @@ def design_link(
         "thickness": options.stack.thickness,
         "gap": options.sheet_gap,
         "min_radius": 2.0 * options.plan.lead,
+        "min_arc": options.plan.least_arc,
         **search,
     }
     source: LinkMesh | None = None

@@ -35,6 +35,29 @@ def off_sheet(outline, rim):
     return points[~inside(points, rim)]
 
 
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(
+    "widths",
+    [
+        {},
+        {"tab": 0.0},
+        {"margin": 3e-3, "electrode": 3e-3, "lead": 3e-3, "hole": 0.0},
+        {"margin": 0.015, "electrode": 0.01},
+        {"margin": 1e-4, "setback": 1e-4, "electrode": 2e-3, "lead": 2e-3, "clearance": 4e-3, "hole": 0.0},
+    ],
+)
+def test_a_tube_of_the_least_arc_has_room_and_a_narrower_one_has_none_for_wires_at_an_end(side, widths):
+    plan = ElectrodePlan(**widths, wires=side)
+
+    def tube(arc):
+        return Frustum(arc / 2.6, arc / 2.6, 0.15, 2.6)
+
+    assert lay_out_sheet(tube(1.001 * plan.least_arc), plan).active_share > 0.0
+    if side.startswith("end"):
+        with pytest.raises(GeometryError, match=r"less than 1 mm active|do not fit"):
+            lay_out_sheet(tube(0.98 * plan.least_arc), plan)
+
+
 @pytest.mark.parametrize(("name", "side"), sweep(CASES, short=4))
 def test_electrodes_of_a_sheet_keep_apart_and_leads_keep_off_their_sheet(name, side):
     layout = lay_out_sheet(SHEETS[name], ElectrodePlan(wires=side))

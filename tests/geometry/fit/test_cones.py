@@ -348,6 +348,14 @@ def test_a_cone_is_covered_up_to_the_smallest_radius_and_not_to_its_apex() -> No
     assert max(sheet.frustum.radius1, sheet.frustum.radius2) == pytest.approx(0.06, abs=5e-4)
 
 
+def test_a_cone_is_covered_up_to_where_its_electrodes_find_room() -> None:
+    body = placed(revolve([(0.0, 0.001), (0.15, 0.06)], segments=96, rings=30))
+    (sheet,) = find_cones(body, min_arc=0.1).sheets
+    narrow = min(sheet.frustum.radius1, sheet.frustum.radius2)
+    assert 0.1 <= narrow * sheet.frustum.wrap <= 0.1 + 2.0 * math.pi * 1.3e-3  # a fit may lie a tolerance inside
+    assert max(sheet.frustum.radius1, sheet.frustum.radius2) == pytest.approx(0.06, abs=5e-4)
+
+
 @pytest.mark.long
 def test_wires_are_four_for_each_sheet() -> None:
     assert len(find_cones(placed(shoulder()), max_wires=7).sheets) == 1
@@ -368,6 +376,7 @@ def test_a_shallow_dent_counts_as_a_deviation_and_a_deep_one_as_a_hole() -> None
         ({"min_length": math.nan}, "min_length must be above 0 mm, got nan mm"),
         ({"max_bridge": -1.0}, "max_bridge must be above 0 mm, got -1000 mm"),
         ({"min_radius": 0.0}, "min_radius must be above 0 mm, got 0 mm"),
+        ({"min_arc": -1e-3}, "min_arc must be finite and not negative, got -1 mm"),
         ({"thickness": -1e-3}, "thickness must be finite and not negative, got -1 mm"),
         ({"max_wires": 3}, "max_wires must be a whole number from 4 to 400, got 3"),
         ({"max_sheets": 0}, "max_sheets must be a whole number from 1 to 100, got 0"),
