@@ -53,9 +53,10 @@ def tube(radius1, radius2, height, sides=96):
         yield low[i], high[i + 1], high[i]
 
 
-def test_a_mesh_from_file_to_sensor_in_the_meshs_frame(tmp_path):
+def test_a_mesh_from_file_to_sensor_in_the_meshs_frame(tmp_path, capsys):
     stl(tmp_path / "cone.stl", list(tube(0.040, 0.050, 0.160)))
     assert design(str(tmp_path / "cone.stl"), "-o", str(tmp_path / "out")) == 0
+    assert "note: unit m guessed from the largest extent, 0.16" in capsys.readouterr().err
     _, placed = sensor_of(tmp_path / "out")
     table = tomllib.loads((tmp_path / "out" / "sensor.toml").read_text())
     assert all(value == round(value, 4) for value in (*table["xyz_mm"], *table["rpy_deg"]))  # a fit has more digits

@@ -87,6 +87,8 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
         if not fit.sheets:
             return _nothing_fits(source, fit)
         title, frame, notes = source.name, source.frame, source.notes
+        for note in notes:  # a unit that was guessed wrongly should be seen before anything is cut
+            print(f"note: {note}", file=sys.stderr, flush=True)
     named = replace(options, link="" if source is None else source.name)
     designs = cover_seams(design_sheets(fit or links, named))
     data = write_design(

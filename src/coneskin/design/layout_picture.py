@@ -52,10 +52,12 @@ def draw_layout(figure: Any, design: SheetDesign, cable: CableExit) -> None:
         label = {"A": "foil of A, B (upper sheet)", "C": "foil of C, D (lower sheet)"}.get(name)
         style = {"facecolor": FOIL_COLOUR, "alpha": 0.45 if upper else 0.8, "edgecolor": INK_COLOUR, "lw": 0.4}
         axes.fill(*_xy(draw_shape(cone, foil)), label=label, **style)
-    for number, (u, phi) in enumerate(layout.holes):
-        label = None if number else f"registration holes, diameter {1e3 * layout.plan.hole:g} mm"
+    for u, phi in layout.holes:
         hole = _xy(draw_hole(cone, u, phi, layout.plan.hole))
-        axes.fill(*hole, facecolor="white", edgecolor=INK_COLOUR, lw=0.8, label=label)
+        axes.fill(*hole, facecolor="white", edgecolor=INK_COLOUR, lw=0.8)
+    if layout.holes:  # the legend would show an area as a rectangle
+        label = f"registration holes, diameter {1e3 * layout.plan.hole:g} mm"
+        axes.plot([], [], "o", mfc="white", mec=INK_COLOUR, mew=0.8, label=label)
     if cable.side.startswith("end"):
         _draw_cable(axes, design, cone, cable)
     _dimensions(axes, design, cone)

@@ -35,11 +35,13 @@ def draw_parts(figure: Any, design: SheetDesign) -> None:
         x0, y0, x1, y1 = (1e3 * value for value in cut.bounds)
         off = 0.05 * max(x1 - x0, y1 - y0)
         arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.6, "shrinkA": 0, "shrinkB": 0}
-        text = {"ha": "center", "va": "center", "fontsize": 7, "color": INK_COLOUR, "backgroundcolor": "white"}
+        text = {"textcoords": "offset points", "fontsize": 7, "color": INK_COLOUR}
         axes.annotate("", (x0, y0 - off), (x1, y0 - off), arrowprops=arrow)
-        axes.text(0.5 * (x0 + x1), y0 - off, f"{x1 - x0:.2f}", **text)
+        middle = (0.5 * (x0 + x1), y0 - off)
+        axes.annotate(f"{x1 - x0:.2f}", middle, xytext=(0, -2), ha="center", va="top", **text)
         axes.annotate("", (x1 + off, y0), (x1 + off, y1), arrowprops=arrow)
-        axes.text(x1 + off, 0.5 * (y0 + y1), f"{y1 - y0:.2f}", rotation=90, **text)
+        middle = (x1 + off, 0.5 * (y0 + y1))
+        axes.annotate(f"{y1 - y0:.2f}", middle, xytext=(3, 0), ha="left", va="center", rotation=90, **text)
         sector = unroll(cut.surface)
         lines = f"{cut.number} {cut.name}, {cut.face} up\nslant {1e3 * sector.slant:.2f}, arcs "
         lines += f"{1e3 * sector.arc1:.2f} (end 1), {1e3 * sector.arc2:.2f} (end 2)"
