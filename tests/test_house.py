@@ -20,7 +20,7 @@ FOLDERS = ("geometry", "skin", "robot")
 #: modules at the bottom of src/coneskin, which every folder may import
 GROUND = {
     *("coneskin", "errors", "finding", "arrays", "bounded_file", "draft_file", "json_text"),
-    *("recording", "channel", "child_process", "terminal_text", "picture_file", "time_argument"),
+    *("recording", "channel", "child_process", "time_slice", "terminal_text", "picture_file", "time_argument"),
 }
 #: arrows between folders: what each may import, beside itself and the ground; robot -> skin -> geometry, never back.
 #: What is not in this table is an arrow that needs a decision: imports for types only count too.

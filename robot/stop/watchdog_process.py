@@ -26,6 +26,7 @@ from coneskin.robot.driver.messages import (
 )
 from coneskin.robot.driver.protocol import PayloadReader
 from coneskin.robot.driver.registry import load_driver
+from coneskin.time_slice import shorten_time_slice
 
 from .backup_stop import BackupStop
 from .limits import MonitoringLimits
@@ -107,6 +108,7 @@ class GuardWatchdog:
 
 def main(arguments: list[str]) -> int:
     """Run as ``python -m coneskin.robot.stop.watchdog_process``: take the channels, wait for the settings, serve."""
+    shorten_time_slice()
     lifeline, (guard, session) = inherit(arguments, parent=1)
     while not (hello := session.receive()) and not session.closed:
         wait_readable([session], 1.0)

@@ -34,6 +34,7 @@ from coneskin.robot.driver.messages import (
     StopProgram,
     decode_command,
 )
+from coneskin.time_slice import shorten_time_slice
 
 from .program_request import carry_out, stop_acceleration
 from .ur_rtde import UrArm, stop_time
@@ -252,6 +253,7 @@ def _void(age: float, lifetime: float) -> str:
 
 def main(arguments: list[str]) -> int:
     """Run as ``python -m coneskin.robot.ur.driver_process``: take the channels, wait for the host, serve."""
+    shorten_time_slice()
     lifeline, (guard, program) = inherit(arguments, parent=1)
     while not (hello := program.receive()) and not program.closed:
         wait_readable([program], 1.0)

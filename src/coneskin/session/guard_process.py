@@ -7,15 +7,12 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from coneskin.channel import decode_json, wait_readable, wait_writable
 from coneskin.child_process import inherit
 from coneskin.errors import ConeSkinError
 from coneskin.recording import encode_block
-
-if TYPE_CHECKING:  # imported once the line to the program is there, which may have ended already
-    pass
+from coneskin.time_slice import shorten_time_slice
 
 __all__ = ["main"]
 
@@ -25,6 +22,7 @@ _AUTOGROUP = Path("/proc/self/autogroup")  # of sched(7): nice values only count
 
 def main(arguments: list[str]) -> int:
     """Take the channels and the scene, open what it names, and run until the guard is to end."""
+    shorten_time_slice()
     lifeline, (session, *rest) = inherit(arguments)
     # while the other processes start; not above, because the program may be gone before all of it is loaded
     from coneskin.robot.guard.journal import EventName, GuardEvent

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.channel import Channel, decode_json, encode_json, wait_readable
 from coneskin.child_process import inherit
 from coneskin.errors import ConeSkinError
+from coneskin.time_slice import shorten_time_slice
 
 if TYPE_CHECKING:  # imported once the line to the program is there, which may have ended already
     from coneskin.scene.scene import Scene
@@ -50,6 +51,7 @@ def virtual_skin(scene: Scene, script: bool = True, pressed: bool = False) -> Vi
 
 def main(arguments: list[str]) -> int:
     """Take the channel and the scene, report the port, and play until the channel ends."""
+    shorten_time_slice()  # it plays a device, which waits for no processor
     _, (channel, *lines) = inherit(arguments)  # it ends with the program at once: nothing depends on it then
     from coneskin.scene.reader import parse_scene
     from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, play, wait_for_reader, write_all
