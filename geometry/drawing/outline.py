@@ -12,6 +12,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from coneskin.errors import GeometryError
 
 __all__ = ["FlatPoint", "Outline", "PathSegment", "circle_outline"]
@@ -74,6 +77,15 @@ class PathSegment:
         ratio = math.sin(0.5 * fraction * sweep) / math.sin(0.5 * sweep) if abs(sweep) > 1e-9 else fraction
         reach, angle = ratio * self.chord, 0.5 * (self.heading(0.0) + self.heading(fraction))
         return self.start[0] + reach * math.cos(angle), self.start[1] + reach * math.sin(angle)
+
+    def along(self, count: int) -> NDArray[np.float64]:
+        """Return count + 1 points at equal distances, both ends included, shape (count + 1, 2) [m]."""
+        sweep, fractions = self.sweep, np.linspace(0.0, 1.0, count + 1)
+        ratios = np.sin(0.5 * sweep * fractions) / math.sin(0.5 * sweep) if abs(sweep) > 1e-9 else fractions
+        angles = self.heading(0.0) + 0.5 * sweep * fractions
+        return np.asarray(self.start) + (self.chord * ratios)[:, None] * np.column_stack(
+            (np.cos(angles), np.sin(angles))
+        )
 
     def split(self, count: int) -> Iterator[PathSegment]:
         """Split the segment into equal pieces; the first and last point are kept to the last bit."""

@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .cut_sheet import CutSheet
 
 __all__ = ["PageTiling", "tile_pages"]
@@ -56,30 +59,23 @@ def tile_pages(sheets: Sequence[CutSheet], width: float, height: float) -> PageT
         max(box[2] for box in boxes) * 1e3,
         max(box[3] for box in boxes) * 1e3,
     )
-    points = [
-        (x * 1e3, y * 1e3)
-        for sheet in sheets
-        for part in sheet.parts
-        for stroke in part.strokes
-        for segment in stroke.outline.segments()
-        for x, y in (
-            segment.at(i / count) for count in [math.ceil(segment.length / _SAMPLE_STEP)] for i in range(count + 1)
-        )
-    ]
+    strokes = (stroke for sheet in sheets for part in sheet.parts for stroke in part.strokes)
+    segments = (segment for stroke in strokes for segment in stroke.outline.segments())
+    points = 1e3 * np.concatenate([one.along(math.ceil(one.length / _SAMPLE_STEP)) for one in segments])
     options = [_spread(points, extent, *size) for size in ((width, height), (height, width))]
     return min(options, key=lambda option: len(option.cells))
 
 
 def _spread(
-    points: list[tuple[float, float]], extent: tuple[float, float, float, float], width: float, height: float
+    points: NDArray[np.float64], extent: tuple[float, float, float, float], width: float, height: float
 ) -> PageTiling:
     x0, y0, x1, y1 = extent
     window_x, window_y = width - 2.0 * _SIDE, height - _TOP - _BOTTOM
     columns, rows = max(1, math.ceil((x1 - x0) / window_x)), max(1, math.ceil((y1 - y0) / window_y))
     left = 0.5 * (x0 + x1 - columns * window_x)
     bottom = 0.5 * (y0 + y1 - rows * window_y)
-    seen = {
-        (min(int((x - left) / window_x), columns - 1), min(int((y - bottom) / window_y), rows - 1)) for x, y in points
-    }
+    places = (points - (left, bottom)) / (window_x, window_y)
+    column, row = np.minimum(places.astype(int), (columns - 1, rows - 1)).T
+    seen = {divmod(int(cell), rows) for cell in np.unique(column * rows + row)}
     cells = tuple(sorted(seen, key=lambda cell: (-cell[1], cell[0])))
     return PageTiling(width, height, (columns, rows), (left, bottom), extent, cells)

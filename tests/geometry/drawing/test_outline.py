@@ -32,6 +32,7 @@ def polygon_area(points):
 def test_segment_agrees_with_its_circle(bulge):
     segment = PathSegment((0.1, 0.2), (0.4, -0.1), bulge)
     points = [segment.at(i / 64) for i in range(65)]
+    assert segment.along(64) == pytest.approx(np.array(points), abs=1e-15)
     assert points[0] == pytest.approx(segment.start)
     assert points[-1] == pytest.approx(segment.end)
     if abs(bulge) > 1e-6:
