@@ -89,6 +89,19 @@ def test_the_text_of_the_scene_carries_the_speeds(tmp_path: Path) -> None:
     assert parse_scene(scene.text).speed_limit == scene.speed_limit
 
 
+def test_a_recording_from_before_there_were_digests_is_read(tmp_path: Path) -> None:
+    scene = load(tmp_path)
+    tables = tomllib.loads(scene.text)
+    del tables["speed_limit"]["digest"]
+    old = tomli_w.dumps(tables)
+    assert parse_scene(old, recorded=True).speed_limit == scene.speed_limit
+    with pytest.raises(SceneError, match="the key digest is missing; run `coneskin permissible`"):
+        parse_scene(old)
+    changed = old.replace("[speed_limit]", '[speed_limit]\ndigest = "0"', 1)
+    with pytest.raises(SceneError, match="digest is not that of the table"):
+        parse_scene(changed, recorded=True)
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -134,17 +134,20 @@ def _read(tables: dict[str, Any], path: Path, problems: list[str]) -> None:
     tables["speed_limit"] = found["speed_limit"]
 
 
-def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLimitScene | None:
+def read_speed_limit(tables: Mapping[str, Any], recorded: bool, problems: list[str]) -> SpeedLimitScene | None:
     """Return the permissible speeds of a scene; None where it names none, or they have a mistake.
 
     Args:
         tables: of the whole file.
+        recorded: they come from a recording; one made before there were digests has none.
         problems: every mistake is added here.
     """
     if "speed_limit" not in tables:
         return None
     lines: list[str] = []
     table = tables["speed_limit"]
+    if recorded:
+        table = {"digest": limit_digest(table), **table}
     values = check(table, SPEED_LIMIT_KEYS, "speed_limit", lines)
     digest = values.pop("digest", "")
     rows = values.pop("curve", ())[:_MAX_ROWS]
