@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 
 _FLAT = 0.2e-3  # m; corners so near to a plane lie in it
 _ALIGNED = math.cos(math.radians(2.0))  # faces of the mesh that are tilted less against a plane belong to it
+_NEAR = math.sqrt(2.0 - 2.0 * _ALIGNED) + 1e-6  # between unit normals of such faces
 _NARROWEST = 25e-3  # m; on a narrower face a link rocks, and on the line that a round one touches it rolls
 _MATERIAL = 0.3  # of the outline of a face that the link must fill; else nobody sees a face there
 _MOST = 4  # faces; more are a nuisance
@@ -76,12 +77,13 @@ def find_datum_faces(mesh: Mesh) -> tuple[DatumFace, ...]:
     Args:
         mesh: of the link.
     """
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, KDTree
 
-    hull = ConvexHull(mesh.vertices)
-    corners = mesh.vertices[hull.simplices]
+    hull = ConvexHull(mesh.outermost)
+    corners = mesh.outermost[hull.simplices]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     normals, left = hull.equations[:, :3], np.ones(len(area), bool)
+    tree = KDTree(normals)  # a round link has a hundred thousand facets, and nearly as many directions
     own = mesh.vertices[mesh.faces]
     own_normal = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
     own_area = 0.5 * np.linalg.norm(own_normal, axis=1)
@@ -90,9 +92,10 @@ def find_datum_faces(mesh: Mesh) -> tuple[DatumFace, ...]:
         if not left[first]:
             continue
         normal, offset = normals[first], -float(hull.equations[first, 3])
-        inside = np.abs(corners @ normal - offset).max(axis=1) < _FLAT
-        inside &= (normals @ normal > _ALIGNED) & left
-        left &= ~inside
+        near = np.array(tree.query_ball_point(normal, _NEAR))
+        near = near[left[near] & (normals[near] @ normal > _ALIGNED)]
+        inside = near[np.abs(corners[near] @ normal - offset).max(axis=1) < _FLAT]
+        left[inside] = False
         whole = float(area[inside].sum())
         if whole < 0.5 * _NARROWEST**2:  # less than a triangle of that width has
             continue
