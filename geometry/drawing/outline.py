@@ -83,9 +83,8 @@ class PathSegment:
         sweep, fractions = self.sweep, np.linspace(0.0, 1.0, count + 1)
         ratios = np.sin(0.5 * sweep * fractions) / math.sin(0.5 * sweep) if abs(sweep) > 1e-9 else fractions
         angles = self.heading(0.0) + 0.5 * sweep * fractions
-        return np.asarray(self.start) + (self.chord * ratios)[:, None] * np.column_stack(
-            (np.cos(angles), np.sin(angles))
-        )
+        headings = np.column_stack((np.cos(angles), np.sin(angles)))
+        return np.asarray(self.start + (self.chord * ratios)[:, None] * headings)
 
     def split(self, count: int) -> Iterator[PathSegment]:
         """Split the segment into equal pieces; the first and last point are kept to the last bit."""

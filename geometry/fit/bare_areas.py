@@ -16,7 +16,7 @@ from .plan import SheetPlan
 from .side import covered_points
 from .surface_samples import SurfaceSamples
 
-__all__ = ["BareArea", "bare_areas"]
+__all__ = ["LEAST_SHARE", "BareArea", "bare_areas", "flat_samples", "sheet_more"]
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _FLAT_COSINE = math.cos(math.radians(2.0))
 _ROUND_COSINE = 0.985
 _STRAIGHT_SINE = 0.06
 _LEAST_LENGTH = 0.010  # m; a cone touches a dome of 40 mm over less
-_LEAST_SHARE = 0.01  # of the hull; less is not reported
+LEAST_SHARE = 0.01  #: of the hull; a smaller bare area is not reported
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,16 +65,12 @@ def bare_areas(
     def take(reason: str, chosen: NDArray[np.bool_]) -> None:
         mine = bare & chosen
         share = float(mine.mean())
-        if share >= _LEAST_SHARE:
+        if share >= LEAST_SHARE:
             found.append(BareArea(reason, share, hull.points[mine]))
             bare[mine] = False
 
     if more is not None:
-        count = plan.count + 1
-        take(
-            f"a sheet more would cover it: allow {count} sheets with {4 * count} wires",
-            _covered([more], hull, requirements.tolerance),
-        )
+        take(sheet_more(plan.count), _covered([more], hull, requirements.tolerance))
     further, hindered = _further_plans(plan, surveys, requirements)
     if further is not None and further.area < requirements.least_gain:
         little = "is too small" if requirements.weights is None else "covers too little that counts"
@@ -87,13 +83,18 @@ def bare_areas(
             "a sheet here would run into another one or reach too far around it",
             _covered([hindered], hull, requirements.tolerance),
         )
-    take("flat", _flat(hull))
+    take("flat", flat_samples(hull))
     least = f"{requirements.min_length * 1e3:g} mm long and {math.degrees(requirements.min_wrap):g} deg wide"
     left = np.zeros(len(hull), bool)
     left[bare] = _round(surveys, hull.subset(bare), requirements.tolerance)
     take(f"round, but without room for a sheet {least}", left)
     take("curved in two ways, or in a corner", np.ones(len(hull), bool))
     return sorted(found, key=lambda area: -area.share)
+
+
+def sheet_more(count: int) -> str:
+    """Return the reason why an area is bare that a sheet beside ``count`` others would cover."""
+    return f"a sheet more would cover it: allow {count + 1} sheets with {4 * (count + 1)} wires"
 
 
 def _covered(plans: tuple[AxisPlan, ...] | list[AxisPlan], hull: SurfaceSamples, tolerance: float) -> NDArray[np.bool_]:
@@ -134,7 +135,7 @@ def _further_plans(
     return further, hindered
 
 
-def _flat(hull: SurfaceSamples) -> NDArray[np.bool_]:
+def flat_samples(hull: SurfaceSamples) -> NDArray[np.bool_]:
     """Return whether the hull is flat about each sample, shape (n,)."""
     from scipy.spatial import cKDTree
 

@@ -20,6 +20,7 @@ from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
 
+from .bare_beside import bare_beside
 from .found_sheet import (
     FoundSheet,
     covered_samples,
@@ -92,6 +93,9 @@ def with_developables(
         return cones
     shares = [f"{sum(sheet.area_share for sheet in sheets):.0%}" for sheets in (cones.sheets, best)]
     kinds = " and ".join(sorted({f"a {sheet.placed.kind}" for sheet in best if sheet.placed.bends}))
+    say("looking at what stays bare")
+    more = _pack(mesh, rays, hull, worth, coarse, options, list(best), 1, least) if len(best) == most else []
+    bare = bare_beside(best, more, () if best is alone else cones.bare_areas, link.hull, options)
     note = f"the link is not round: cones cover {shares[0]} of its hull, with {kinds} it is {shares[1]}"
     return replace(
         cones,
@@ -101,7 +105,7 @@ def with_developables(
         bare=(),
         reason="",
         needed_tolerance=tolerance,
-        bare_areas=() if best is alone else cones.bare_areas,
+        bare_areas=bare,
         candidates=cones.candidates + len(candidates),
     )
 

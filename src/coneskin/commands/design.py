@@ -62,8 +62,11 @@ def run(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
     began = time.perf_counter()
 
+    said = set()
+
     def say(step: str) -> None:
         look()
+        said.add(step)
         print(f"{time.perf_counter() - began:6.2f} s  {step}", file=sys.stderr, flush=True)
 
     check_target(args.output, args.force)
@@ -87,7 +90,8 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
         if not fit.sheets:
             return _nothing_fits(source, fit)
         title, frame, notes = source.name, source.frame, source.notes
-        for note in notes:  # a unit that was guessed wrongly should be seen before anything is cut
+        # a unit that was guessed wrongly should be seen before anything is cut
+        for note in (note for note in notes if note not in said):
             print(f"note: {note}", file=sys.stderr, flush=True)
     named = replace(options, link="" if source is None else source.name)
     designs = cover_seams(design_sheets(fit or links, named))

@@ -10,6 +10,7 @@ from scipy.special import ellipe
 
 from coneskin.geometry.fit.developable.side_fit import fit_developable
 from coneskin.geometry.fit.sheets import find_sheets
+from coneskin.geometry.mesh import make_mesh
 from coneskin.geometry.pose import Pose
 from coneskin.testing.ruled_tube import RuledTube, Section, ellipse_section, rounded_box_section, stadium_section
 
@@ -89,3 +90,30 @@ def test_a_round_tube_stays_the_cone_that_it_was() -> None:
     cones, fit = (find_sheets(mesh, round_only=only) for only in (True, False))
     assert [sheet.placed for sheet in fit.sheets] == [sheet.placed for sheet in cones.sheets]
     assert not fit.sheets[0].placed.bends
+
+
+@pytest.mark.long
+def test_what_an_oval_tube_leaves_bare_is_its_ends() -> None:
+    mesh = TUBES["stadium"].mesh(around=160)
+    fit = find_sheets(mesh)
+    ends = 2.0 * (math.pi * 0.04**2 + 0.04 * 0.08)  # half circles of 40 mm, 40 mm apart
+    ends /= ends + 0.2 * (math.tau * 0.04 + 2.0 * 0.04)
+    (sheet,) = fit.sheets
+    told = {area.reason: area.share for area in fit.bare_areas}
+    assert told["flat"] == pytest.approx(ends, abs=0.02)
+    assert sheet.area_share + sum(told.values()) == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.long
+def test_the_second_of_two_ovals_is_bare_for_want_of_a_sheet() -> None:
+    wide = RuledTube(stadium_section(0.04, 0.04), 0.2).mesh(around=160)
+    thin = RuledTube(stadium_section(0.025, 0.03), 0.15, pose=Pose.from_xyz_rpy((0.0, 0.0, 0.2))).mesh(around=160)
+    faces = np.vstack([wide.faces, thin.faces + len(wide.vertices)])
+    mesh = make_mesh(np.vstack([wide.vertices, thin.vertices]), faces)
+    one, two = (find_sheets(mesh, max_sheets=count) for count in (1, 2))
+    assert (len(one.sheets), len(two.sheets)) == (1, 2)
+    told = {area.reason: area.share for area in one.bare_areas}
+    assert told["a sheet more would cover it: allow 2 sheets with 8 wires"] == pytest.approx(
+        two.sheets[1].area_share, abs=0.02
+    )
+    assert not any("sheet more" in area.reason for area in two.bare_areas)

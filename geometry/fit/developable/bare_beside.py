@@ -1,0 +1,67 @@
+"""Bare areas beside developable sheets, each with the reason."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.geometry.fit.bare_areas import LEAST_SHARE, BareArea, flat_samples, sheet_more
+from coneskin.geometry.fit.fit_options import FitOptions
+from coneskin.geometry.fit.fitted_sheet import FittedSheet
+from coneskin.geometry.fit.surface_samples import SurfaceSamples
+
+from .found_sheet import covered_samples
+
+__all__ = ["bare_beside"]
+
+
+def bare_beside(
+    sheets: Sequence[FittedSheet],
+    more: Sequence[FittedSheet],
+    earlier: Sequence[BareArea],
+    hull: SurfaceSamples,
+    options: FitOptions,
+) -> tuple[BareArea, ...]:
+    """Return what sheets leave bare, by reason, the largest area first.
+
+    Args:
+        sheets: the sheets.
+        more: what could be added if one more were allowed.
+        earlier: bare areas of the same samples before the last of the sheets were found; their reasons still hold.
+        hull: samples of the link.
+        options: of the search.
+    """
+    bare = ~_covered(sheets, hull, options.tolerance)
+    found: list[BareArea] = []
+
+    def take(reason: str, chosen: NDArray[np.bool_]) -> None:
+        mine = bare & chosen
+        share = float(mine.mean())
+        if share >= LEAST_SHARE:
+            found.append(BareArea(reason, share, hull.points[mine]))
+            bare[mine] = False
+
+    if more:
+        take(sheet_more(len(sheets)), _covered(more, hull, options.tolerance))
+    for area in earlier:
+        take(area.reason, _among(hull, area))
+    take("flat", flat_samples(hull))
+    least = f"{options.min_length * 1e3:g} mm long and {math.degrees(options.min_wrap):g} deg wide"
+    take(f"curved in two ways, in a corner, or without room for a sheet {least}", np.ones(len(hull), bool))
+    return tuple(sorted(found, key=lambda area: -area.share))
+
+
+def _covered(sheets: Sequence[FittedSheet], hull: SurfaceSamples, tolerance: float) -> NDArray[np.bool_]:
+    covered = np.zeros(len(hull), bool)
+    for sheet in sheets:
+        covered |= covered_samples(sheet.placed, hull, tolerance)
+    return covered
+
+
+def _among(hull: SurfaceSamples, area: BareArea) -> NDArray[np.bool_]:
+    """Return whether each sample is one of an area, shape (n,)."""
+    inside = set(map(tuple, area.points.tolist()))
+    return np.fromiter((tuple(point) in inside for point in hull.points.tolist()), bool, len(hull))
