@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from coneskin.geometry.bend import Bend
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
@@ -176,6 +178,13 @@ def test_it_writes_the_folder_that_a_scene_reads(bench: Workbench, tmp_path: Pat
     bench.handle(0, Handles())
 
 
+def stl(mesh: Mesh) -> bytes:
+    corners = mesh.vertices[mesh.faces]
+    record = np.zeros(len(corners), np.dtype([("n", "<3f4"), ("v", "<9f4"), ("a", "<u2")]))
+    record["v"] = corners.reshape(-1, 9)
+    return bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes()
+
+
 def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench, tmp_path: Path) -> None:
     pytest.importorskip("viser", reason="viser is not installed: no page is served")
     other: list[LinkMesh] = []
@@ -197,11 +206,25 @@ def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench
         page._take_upload()
         assert "tube.stl" in page._said.content
         assert other == []
-        corners = bench.link.mesh.vertices[bench.link.mesh.faces]
-        record = np.zeros(len(corners), np.dtype([("n", "<3f4"), ("v", "<9f4"), ("a", "<u2")]))
-        record["v"] = corners.reshape(-1, 9)
-        data = bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes()
-        page._upload.value = SimpleNamespace(name="../../tube.stl", content=data)
+        page._upload.value = SimpleNamespace(name="../../tube.stl", content=stl(bench.link.mesh))
         page._take_upload()
         assert [link.name for link in other] == ["tube"]
         assert "1 sheets" in page._said.content
+
+
+def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: Workbench, tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="viser is not installed: no page is served")
+    data = stl(bench.link.mesh)
+
+    def load(link: LinkMesh) -> Workbench:
+        if link.name == "slow":  # while its sheets are looked for
+            page._upload.value = SimpleNamespace(name="quick.stl", content=data)
+            page._take_upload()
+        return replace(bench, link=link)
+
+    with PageServer("studio", port=18190, uploads=True) as server:
+        page = StudioPage(server, bench, tmp_path / "skin", False, load)
+        page._upload = SimpleNamespace(value=SimpleNamespace(name="slow.stl", content=data))
+        page._take_upload()
+        assert page._bench.link.name == "quick"
+        assert "quick.stl: 1 sheets" in page._said.content

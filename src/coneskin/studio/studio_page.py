@@ -181,10 +181,12 @@ class StudioPage:
                 found = next(iter(load_link(str(path))))
             stem = "".join(letter for letter in Path(file.name).stem if letter.isalnum() or letter in "-_ ")[:40]
             bench = self._load(LinkMesh(stem or "link", found.mesh, found.frame, found.notes))
-        except ConeSkinError as exc:
+        except (ConeSkinError, OSError) as exc:
             self._say(f"{file.name}: {exc}")
             return
         with self._lock:
+            if self._upload.value is not file:  # another was dropped meanwhile, and is the one that is wanted
+                return
             self._bench = bench
             self._stand()
         self._say(f"{file.name}: {len(bench.fit.sheets)} sheets")
