@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import ConvexHull
 
 import coneskin as cs
+from coneskin.design.link import load_link
 from coneskin.geometry.mesh import Mesh, make_mesh
 
 
@@ -48,6 +50,27 @@ def test_a_mesh_is_designed_without_a_folder() -> None:
     assert design.folder is None
     points, normals = sheet.place.place([0.0, 0.05], [0.0, 1.0])
     assert points.shape == normals.shape == (2, 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "visual"),
+    [
+        ("visual/link.stl", True),
+        ("visual_meshes/forearm/link.stl", True),
+        ("collision_free/visual/link.stl", True),
+        ("visual/link_hull.stl", False),
+        ("visual/hulls/link.stl", False),
+        ("visual/Link-Convex.stl", False),
+        ("VisualStudio/link.stl", False),
+    ],
+)
+def test_the_nearest_name_in_a_path_says_whether_a_mesh_is_the_visual_one(
+    tmp_path: Path, name: str, visual: bool
+) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(parents=True)
+    trimesh.creation.box((0.1, 0.1, 0.2)).export(path)
+    assert [link.visual for link in load_link(str(path), "m")] == [visual]
 
 
 @pytest.mark.long

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["LinkMesh", "find_link_sheets", "fit_link", "fit_mesh", "load_link", "with_seams"]
 
+#: words in the name of a file or folder
+_VISUAL, _SIMPLIFIED = {"visual", "visuals"}, {"collision", "collisions", "hull", "hulls", "convex"}
 _RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
 
 
@@ -165,8 +167,14 @@ def find_link_sheets(source: LinkMesh, progress: Callable[[str], None], **search
 
 
 def _called_visual(path: str) -> bool:
-    """Tell whether a path calls its mesh the visual one, as the folders of ROS descriptions do."""
-    return "visual" in path.lower() and "collision" not in path.lower()
+    """Tell whether a path calls its mesh the visual one, as ROS descriptions do; the nearest name counts."""
+    for part in reversed(Path(path).parts):
+        words = set(re.split("[^a-z]+", part.lower()))
+        if words & _SIMPLIFIED:
+            return False
+        if words & _VISUAL:
+            return True
+    return False
 
 
 def _with_notes(source: LinkMesh, fit: LinkFit) -> LinkMesh:
