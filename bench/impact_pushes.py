@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose, Vector
+from coneskin.permissible_speed.arm_patches import ArmPatch
 from coneskin.permissible_speed.contact_course import ContactCourse
+from coneskin.permissible_speed.extra_way import ExtraWay, extra_ways
+from coneskin.permissible_speed.limits_file import BodyRegion, MeasuredReaction
+from coneskin.permissible_speed.speed_map import contact_at
+from coneskin.permissible_speed.speed_search import ForceLimits
 from coneskin.permissible_speed.taylor_integrator import integrate
 from coneskin.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.robot.arm.inertia import effective_mass, mass_matrix
@@ -83,22 +88,31 @@ class Push:
         way = self.rate * (min(time, braked) + since) - math.copysign(0.5 * self.braking * since**2, self.rate)
         return way, self.rate - math.copysign(self.braking * since, self.rate)
 
-    def course(self, *, by_mass: bool = False) -> ContactCourse:
+    def course(self, *, by_mass: bool = False, extra: ExtraWay | None = None) -> ContactCourse:
         """Return what the model of permissible speeds makes of it.
 
         Args:
             by_mass: True for the servo of ``coneskin permissible``, which knows the mass alone; else with the
                 stiffness that the six servos together have there.
+            extra: way of the patch beyond the straight one; implies by_mass.
         """
         pose = link_pose(MODEL, self.q, LINK)
         normal = pose.rotate(CONE.normal(self.phi))
         mass = effective_mass(MODEL, arm_inertia(MODEL), self.q, LINK, CONE.point(self.u, self.phi), normal)
-        stiffness = mass * SERVO**2
-        if not by_mass:
-            stiffness = float(1.0 / np.sum(self.levers**2 / (np.diag(self.masses) * SERVO**2)))
-        deceleration = self.braking * abs(float(self.levers[self.joint]))
-        arm = DrivenArm(self.speed, mass, stiffness, 2.0 * stiffness / SERVO, REACTION, deceleration)
+        lever = abs(float(self.levers[self.joint]))
+        if by_mass or extra is not None:
+            ball = BodyRegion("ball", self.body, ForceLimits(math.inf, math.inf))
+            measured = MeasuredReaction(REACTION, self.braking, "bench", SERVO / (2.0 * math.pi))
+            contact = contact_at(self.speed, lever, mass, ball, measured, self.padding, extra or ExtraWay())
+            return integrate(contact, HORIZON)
+        stiffness = float(1.0 / np.sum(self.levers**2 / (np.diag(self.masses) * SERVO**2)))
+        arm = DrivenArm(self.speed, mass, stiffness, 2.0 * stiffness / SERVO, REACTION, self.braking * lever)
         return integrate(TwoMassContact(arm, self.body, self.padding), HORIZON)
+
+    def extra(self) -> ExtraWay:
+        """Return the extra way that ``coneskin permissible`` takes for the patch in this position of the joints."""
+        patch = ArmPatch("one", LINK, self.u, self.phi, CONE.point(self.u, self.phi), CONE.normal(self.phi))
+        return extra_ways(MODEL, [patch], [self.q])[0].rounded_up()
 
 
 def draw_push(seed: int) -> Push | None:

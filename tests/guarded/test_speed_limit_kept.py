@@ -40,7 +40,7 @@ def limited_scene(simulated, folder):
     patch = {"sensor": sensor.sensor.name, "curve": 0, "any_curve": 0}
     ends = 0.0, 1e3 * sensor.sensor.frustum.slant
     limit = {
-        "format": 1,
+        "format": 2,
         "fingerprint": limit_fingerprint(bare),
         "date": "2026-11-23T06:00:00Z",
         "coneskin": "0.1.0",

@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +11,12 @@ import pytest
 from coneskin.errors import SceneError
 from coneskin.permissible_speed import speed_map
 from coneskin.permissible_speed.arm_patches import motion_positions, patches_of, weigh
+from coneskin.permissible_speed.extra_way import ExtraWay, extra_ways
 from coneskin.permissible_speed.limits_file import parse_limits
 from coneskin.permissible_speed.speed_map import LEVERS, contact_at, map_speeds
 from coneskin.permissible_speed.speed_map_file import write_map
 from coneskin.permissible_speed.speed_search import ForceLimits, keeps
+from coneskin.permissible_speed.two_mass_contact import TwoMassContact
 from coneskin.robot.arm.inertia import effective_mass
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.ur_inertias import arm_inertia
@@ -63,10 +66,12 @@ def test_a_map_keeps_the_limits_it_was_made_for_and_a_scene_takes_it(tmp_path: P
         assert curve.region == "hand"
         assert all(a <= b for a, b in zip(curve.speeds, curve.speeds[1:], strict=False))
         for lever, speed in zip(LEVERS[::3], curve.speeds[::3], strict=True):
-            contact = contact_at(speed, lever, curve.mass, hand, limits.measured, scene.padding)  # type: ignore[arg-type]
+            contact = contact_at(speed, lever, curve.mass, hand, limits.measured, scene.padding, curve.extra)  # type: ignore[arg-type]
             assert keeps(contact, hand.limits)
-    for row, mass in zip(found.table.patches, found.masses, strict=True):
+    ways = extra_ways("UR5e", found.patches, motion_positions(scene))
+    for row, mass, way in zip(found.table.patches, found.masses, ways, strict=True):
         assert found.curves[row.curve].mass >= mass
+        assert found.curves[row.curve].extra.up_to(way) == way
         assert all(own >= anywhere for own, anywhere in zip(*_speeds(found, row), strict=True))
     write_map(found, tmp_path / "impact.toml")
     text = SCENE.replace('model = "UR5e"', 'model = "UR5e"\nspeed_limit_from = "impact.toml"')
@@ -111,6 +116,22 @@ def test_two_regions_of_one_name_keep_their_own_limits(monkeypatch: pytest.Monke
     speeds = []
     for regions in ((softer,), (hand, softer)):
         maker = speed_map._CurveMaker(replace(limits, regions=regions), Padding(), lambda _: None)
-        number = maker.number(3, 8.0, 8.0)
+        number = maker.number(3, 8.0, 8.0, ExtraWay())
         speeds.append(maker.curves[number].speeds)
     assert speeds[0] == speeds[1]
+
+
+def test_a_speed_keeps_the_limits_also_without_the_extra_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A body that swings may meet the arm harder where that goes less far; here, because it is made so."""
+    limits = parse_limits(FREE)
+
+    def gentler(speed: float, lever: float, *rest: Any) -> TwoMassContact:
+        *others, extra = rest
+        return contact_at(0.5 * speed if extra.lag else speed, lever, *others)
+
+    monkeypatch.setattr(speed_map, "contact_at", gentler)
+    monkeypatch.setattr(speed_map, "_MASSES", (8.0,))
+    monkeypatch.setattr(speed_map, "LEVERS", LEVERS[-1:])
+    maker = speed_map._CurveMaker(limits, Padding(), lambda _: None)
+    without, with_it = (maker.curves[maker.number(3, 8.0, 8.0, ExtraWay(lag))].speeds for lag in (0.0, 0.8))
+    assert with_it == without

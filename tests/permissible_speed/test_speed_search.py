@@ -16,7 +16,7 @@ def test_for_free_masses_it_is_the_speed_of_the_standards_formula(arm: float, bo
     """ISO/TS 15066, annex A: v = F / sqrt(mu k)."""
     padding = Padding(thickness=1.0, stiffness=1e9, loss=0.0)  # as good as none
     limits = ForceLimits(140.0, 140.0)
-    found = permissible_speed(lambda v: TwoMassContact(DrivenArm(v, arm), StruckBody(body, k), padding), limits)
+    found = permissible_speed(lambda v: [TwoMassContact(DrivenArm(v, arm), StruckBody(body, k), padding)], limits)
     exact = 140.0 / math.sqrt(k / (1.0 / arm + 1.0 / body))
     assert exact * 0.995 < found <= exact * 1.0001
 
@@ -41,7 +41,7 @@ def test_no_slower_speed_breaks_the_limits(
         arm = DrivenArm(speed, mass, mass * 1e4, mass * 200.0, 0.012, 9.0 * lever)
         return TwoMassContact(arm, StruckBody(body, tissue, support))
 
-    found = permissible_speed(contact, limits)
+    found = permissible_speed(lambda v: [contact(v)], limits)
     assert found > 0.0
     assert keeps(contact(found), limits)
     assert keeps(contact(share * found), limits)
@@ -55,10 +55,22 @@ def test_a_hard_wall_with_a_slow_reaction_lets_nothing_move() -> None:
     def contact(speed: float) -> TwoMassContact:
         return TwoMassContact(DrivenArm(speed, reaction=5.0, deceleration=0.01), StruckBody(math.inf), stiff)
 
-    assert permissible_speed(contact, ForceLimits(10.0, 10.0)) == 0.0
+    assert permissible_speed(lambda v: [contact(v)], ForceLimits(10.0, 10.0)) == 0.0
 
 
 def test_what_keeps_the_limits_at_the_top_may_have_it() -> None:
     limits = ForceLimits(1e4, 1e4)
-    found = permissible_speed(lambda v: TwoMassContact(DrivenArm(v, 1.0), StruckBody(0.01)), limits, top=2.0)
+    found = permissible_speed(lambda v: [TwoMassContact(DrivenArm(v, 1.0), StruckBody(0.01))], limits, top=2.0)
     assert found == 2.0
+
+
+def test_of_several_contacts_the_one_that_allows_the_least_counts() -> None:
+    limits = ForceLimits(140.0, 140.0)
+
+    def contact(speed: float, arm: float) -> TwoMassContact:
+        return TwoMassContact(DrivenArm(speed, arm), StruckBody(4.4, 50e3))
+
+    light, heavy = (permissible_speed(lambda v, arm=arm: [contact(v, arm)], limits) for arm in (2.0, 20.0))  # type: ignore[misc]
+    assert heavy < 0.9 * light
+    for arms in ((2.0, 20.0), (20.0, 2.0)):
+        assert permissible_speed(lambda v, arms=arms: [contact(v, arm) for arm in arms], limits) == heavy  # type: ignore[misc]

@@ -44,7 +44,7 @@ def curve(*speeds: float) -> dict[str, object]:
 
 def table(**changes: object) -> dict[str, object]:
     values: dict[str, object] = {
-        "format": 1,
+        "format": 2,
         "fingerprint": limit_fingerprint(parse_scene(SCENE)),
         "date": "2026-11-23T06:00:00Z",
         "coneskin": "0.1.0",
@@ -102,6 +102,20 @@ def test_a_recording_from_before_there_were_digests_is_read(tmp_path: Path) -> N
         parse_scene(changed, recorded=True)
 
 
+def test_a_recording_with_speeds_of_an_older_model_is_read_and_a_newer_one_refused(tmp_path: Path) -> None:
+    scene = load(tmp_path)
+    for number in (1, 3):
+        changed = table(format=number)
+        text = tomli_w.dumps(tomllib.loads(scene.text) | changed)
+        with pytest.raises(SceneError, match=f"format must be 2, got {number}"):
+            parse_scene(text)
+        if number == 1:
+            assert parse_scene(text, recorded=True).speed_limit is not None
+        else:
+            with pytest.raises(SceneError, match="format must be 2, got 3"):
+                parse_scene(text, recorded=True)
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -127,7 +141,7 @@ def test_a_slow_reaction_is_refused_beside_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"format": 2}, "format must be 1, got 2"),
+        ({"format": 3}, "format must be 2, got 3"),
         ({"levers_mm": [100.0, 100.0, 400.0]}, "levers_mm must rise"),
         ({"curve": [{"region": "hand", "speeds_mm_s": [50.0]}]}, "one speed for each"),
         ({"curve": []}, "there must be one"),

@@ -114,6 +114,12 @@ def _print(found: SpeedMap, args: argparse.Namespace) -> None:
             curve = found.curves[number]
             cells = "".join(f"{speed:>8.3f}" for speed in curve.speeds)
             print(f"{f'{name}, {what}':20}{curve.region[:15]:>16}{cells}")
+    extras = [found.curves[patch.curve].extra for patch in table.patches]
+    lag, bend = max(extra.lag for extra in extras), max(extra.bend for extra in extras)
+    print(
+        f"with what a surface goes beyond a straight way, at worst: {lag:.2g} m/rad by the lag of other joints, "
+        f"{bend:.2g} m/rad2 by turning"
+    )
     if args.output is not None:
         name = Path(os.path.relpath(args.output.resolve(), args.scene.resolve().parent)).as_posix()
         value = json.dumps(name, ensure_ascii=False)  # a string of TOML, too

@@ -86,9 +86,20 @@ def _draw_sheet(axes: Any, scene: Scene, found: SpeedMap, name: str, scale: tupl
 
 
 def _draw_curves(axes: Any, found: SpeedMap) -> None:
-    for curve in sorted(found.curves, key=lambda curve: curve.mass):
+    """Draw all curves, and name the slowest and the fastest of the motion and of any position."""
+    own, anywhere = ({getattr(row, name) for row in found.table.patches} for name in ("curve", "any_curve"))
+    named: dict[int, str] = {}
+    for what, numbers in (("any position", anywhere), *([("motion", own)] if found.table.lowest else [])):
+        ranked = sorted(numbers, key=lambda number: found.curves[number].speeds[_LEVER])
+        for word, number in {ranked[-1]: ("fastest", ranked[-1]), ranked[0]: ("slowest", ranked[0])}.values():
+            named[number] = f"{what}, {word}" if len(ranked) > 1 else what
+    for number, curve in enumerate(found.curves):
+        if number not in named:
+            axes.plot(LEVERS, curve.speeds, color="0.75", linewidth=0.7)
+    for number, name in named.items():
+        curve = found.curves[number]
         mass = "any mass" if math.isinf(curve.mass) else f"up to {curve.mass:g} kg"
-        axes.plot(LEVERS, curve.speeds, "o-", markersize=3, label=f"{mass}, {curve.region}")
+        axes.plot(LEVERS, curve.speeds, "o-", markersize=3, label=f"{name}: {curve.region}, {mass}")
     axes.set(
         xlabel="lever: speed of the surface over that of the leading joint [m/rad]", ylabel="permissible speed [m/s]"
     )
@@ -106,7 +117,8 @@ def _draw_forces(axes: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -
         if curve is None:
             continue
         speed = curve.speeds[_LEVER]
-        course = integrate(contact_at(speed, LEVERS[_LEVER], curve.mass, region, limits.measured, padding))
+        contact = contact_at(speed, LEVERS[_LEVER], curve.mass, region, limits.measured, padding, curve.extra)
+        course = integrate(contact)
         (line,) = axes.plot(
             [1e3 * t for t in times], [course.force(t) for t in times], label=f"{region.name} at {speed:.2f} m/s"
         )

@@ -3,26 +3,30 @@
 A patch has a speed for each lever, the ratio of its speed along the normal and that of the leading joint: with a short
 one, that joint turns fast, brakes for long, and the surface goes far. The mass of a patch is the heaviest in the
 positions of the scene's motion; where the arm may be anywhere it may be any. The force nearly always grows with the
-mass, but servos swing, so that the least speed of all masses in the range counts.
+mass, but servos swing, so that the least speed of all masses in the range counts. What the surface goes beyond the way
+of one driven mass is the most of those positions (``extra_way``), or of a sample of all.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import random
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from typing import TYPE_CHECKING
 
 from coneskin import __version__
 from coneskin.errors import SceneError
 from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
-from coneskin.scene.tables.speed_limit_table import limit_fingerprint
+from coneskin.scene.tables.speed_limit_table import SPEED_LIMIT_FORMAT, limit_fingerprint
 from coneskin.skin.padding import Padding
 
 from .arm_patches import motion_positions, patches_of, weigh
+from .extra_way import ExtraWay, extra_ways
 from .limits_file import BodyRegion, LimitsFile, MeasuredReaction
-from .speed_search import LEAST_SPEED, TOP_SPEED, permissible_speed
+from .speed_search import LEAST_SPEED, TOP_SPEED, keeps, permissible_speed
 from .two_mass_contact import DrivenArm, TwoMassContact
 
 if TYPE_CHECKING:
@@ -37,6 +41,10 @@ LEVERS = (0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28, 1.8)
 #: kg; a range of masses is looked at at these within it, and at the next beyond
 _MASSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)
 _IMMOVABLE = 1e6  # kg; no contact slows it down, but where it brakes it goes beyond as its servos do
+_NO_WAY = ExtraWay()
+_ANYWHERE = 300  # joint positions that are looked at where the arm may be anywhere
+_MISSED = 1.1  # factor for what they may miss of the most
+_FASTEST = 100.0  # m/s of a contact
 _MARGIN = 0.05  # rad around a motion, within which its curves hold
 
 
@@ -47,11 +55,13 @@ class SpeedCurve:
     Attributes:
         region: of the body that allows the least, at the longest lever.
         mass: heaviest of the arm [kg].
+        extra: way that a surface goes at most beyond that of one driven mass.
         speeds: for each of ``LEVERS`` [m/s].
     """
 
     region: str
     mass: float
+    extra: ExtraWay
     speeds: tuple[float, ...]
 
 
@@ -73,7 +83,13 @@ class SpeedMap:
 
 
 def contact_at(
-    speed: float, lever: float, mass: float, region: BodyRegion, measured: MeasuredReaction, padding: Padding
+    speed: float,
+    lever: float,
+    mass: float,
+    region: BodyRegion,
+    measured: MeasuredReaction,
+    padding: Padding,
+    extra: ExtraWay = _NO_WAY,
 ) -> TwoMassContact:
     """Return the contact of a patch with a part of a body.
 
@@ -84,12 +100,31 @@ def contact_at(
         region: that is struck.
         measured: how the arm stops.
         padding: of the skin.
+        extra: way of the patch: the arm brakes as much later as it overshoots further, and moves with the mean lever of
+            its way.
     """
     turn = 2.0 * math.pi * measured.servo
     mass = min(mass, _IMMOVABLE)
     servo = mass * turn * turn, 2.0 * mass * turn
-    arm = DrivenArm(speed, mass, *servo, reaction=measured.reaction, deceleration=measured.deceleration * lever)
-    return TwoMassContact(arm, region.body, padding)
+    reaction = measured.reaction + extra.delay(speed, lever, measured.deceleration, turn)
+
+    def driven(stretch: float) -> TwoMassContact:
+        towards = min(stretch * speed, _FASTEST)
+        return TwoMassContact(
+            DrivenArm(towards, mass, *servo, reaction=reaction, deceleration=stretch * measured.deceleration * lever),
+            region.body,
+            padding,
+        )
+
+    straight = driven(1.0)
+    if extra.bend <= 0.0 or speed <= 0.0:
+        return straight
+    closing = straight.way_to_close
+    if math.isinf(closing):  # of a free body: by the padding alone
+        closing = straight.law.under(straight.closing_force)
+    rate = speed / lever
+    angle = closing / lever + rate * reaction + 0.5 * rate * rate / measured.deceleration
+    return driven(extra.stretch(angle, lever))
 
 
 def map_speeds(
@@ -112,22 +147,29 @@ def map_speeds(
     padding = scene.padding or Padding()
     free = any_position or scene.motion is None
     lightest, masses = [0.0] * len(patches), [math.inf] * len(patches)
+    assert scene.arm is not None  # or there were no patches
+    everywhere = extra_ways(scene.arm.model, patches, _any_positions())
+    extras = everywhere
     lowest: tuple[float, ...] = ()
     highest: tuple[float, ...] = ()
-    if not free and scene.motion is not None and scene.arm is not None:
-        weights = weigh(scene.arm.model, patches, motion_positions(scene))
+    if not free and scene.motion is not None:
+        positions = motion_positions(scene)
+        weights = weigh(scene.arm.model, patches, positions)
+        extras = extra_ways(scene.arm.model, patches, positions)
         lightest, masses = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
         lowest = tuple(min(values) - _MARGIN for values in zip(*scene.motion.waypoints, strict=True))
         highest = tuple(max(values) + _MARGIN for values in zip(*scene.motion.waypoints, strict=True))
     maker = _CurveMaker(limits, padding, note)
     rows = []
-    for patch, light, heavy in zip(patches, lightest, masses, strict=True):
-        own, anywhere = maker.number(patch.link, light, heavy), maker.number(patch.link, 0.0, math.inf)
+    most = {link: _most([*extras, *everywhere], link, patches) for link in {patch.link for patch in patches}}
+    for patch, light, heavy, extra in zip(patches, lightest, masses, extras, strict=True):
+        anywhere = maker.number(patch.link, 0.0, math.inf, most[patch.link])
+        own = anywhere if free else maker.number(patch.link, light, heavy, extra.rounded_up().up_to(most[patch.link]))
         rows.append(LimitedPatch(patch.sensor, patch.u, patch.phi, own, anywhere))
     found = maker.curves
     _check_speeds(scene, found)
     table = SpeedLimitScene(
-        format=1,
+        format=SPEED_LIMIT_FORMAT,
         fingerprint=limit_fingerprint(scene),
         date=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
         coneskin=__version__,
@@ -146,46 +188,66 @@ def map_speeds(
     return SpeedMap(table, tuple(found), tuple(patches), tuple(masses))
 
 
+def _any_positions() -> list[tuple[float, ...]]:
+    chance = random.Random(0)
+    return [tuple(chance.uniform(-math.pi, math.pi) for _ in range(6)) for _ in range(_ANYWHERE)]
+
+
+def _most(extras: Sequence[ExtraWay], link: int, patches: Sequence[ArmPatch]) -> ExtraWay:
+    """Return the most of the ways of a link's patches, and what a sample may miss."""
+    own = [extra for extra, patch in zip(extras, (*patches, *patches), strict=True) if patch.link == link]
+    return ExtraWay(_MISSED * max(extra.lag for extra in own), _MISSED * max(extra.bend for extra in own))
+
+
+_Contacts = list[TwoMassContact]
+
+
 class _CurveMaker:
     """Maker of curves, each of them once."""
 
     def __init__(self, limits: LimitsFile, padding: Padding, note: Callable[[str], None]) -> None:
         self.curves: list[SpeedCurve] = []
         self._limits, self._padding, self._note = limits, padding, note
-        self._numbers: dict[tuple[tuple[BodyRegion, ...], tuple[float, ...]], int] = {}
-        self._speeds: dict[tuple[BodyRegion, float], tuple[float, ...]] = {}  # two regions may have one name
+        self._numbers: dict[tuple[tuple[BodyRegion, ...], tuple[float, ...], ExtraWay], int] = {}
+        # two regions may have one name
+        self._speeds: dict[tuple[BodyRegion, float, ExtraWay], tuple[float, ...]] = {}
 
-    def number(self, link: int, lightest: float, heaviest: float) -> int:
-        """Return the number of the curve of a link, for a range of masses [kg]."""
+    def number(self, link: int, lightest: float, heaviest: float, extra: ExtraWay) -> int:
+        """Return the number of the curve of a link, for a range of masses [kg] and an extra way."""
         regions = tuple(region for region in self._limits.regions if not region.links or link in region.links)
         first = max((n for n, mass in enumerate(_MASSES) if mass <= lightest), default=0)
         last = min(n for n, mass in enumerate(_MASSES) if mass >= heaviest)
         masses = _MASSES[first : last + 1]
-        key = regions, masses
+        key = regions, masses, extra
         if key not in self._numbers:
-            least = min((self._search(r, mass)[-1], r.name) for r in regions for mass in masses)[1]
-            speeds = zip(*(self._search(region, mass) for region in regions for mass in masses), strict=True)
-            curve = SpeedCurve(least, masses[-1], tuple(map(min, speeds)))
+            least = min((self._search(r, mass, extra)[-1], r.name) for r in regions for mass in masses)[1]
+            speeds = zip(*(self._search(region, mass, extra) for region in regions for mass in masses), strict=True)
+            curve = SpeedCurve(least, masses[-1], extra, tuple(map(min, speeds)))
             if curve not in self.curves:
                 self.curves.append(curve)
             self._numbers[key] = self.curves.index(curve)
         return self._numbers[key]
 
-    def _search(self, region: BodyRegion, mass: float) -> tuple[float, ...]:
+    def _search(self, region: BodyRegion, mass: float, extra: ExtraWay) -> tuple[float, ...]:
         """Return the permissible speeds of one mass against one region, for each lever."""
-        key = region, mass
+        key = region, mass, extra
         if key not in self._speeds:
             self._note(f"{region.name} struck by {mass:g} kg")
             speeds: list[float] = []
             for number, lever in enumerate(LEVERS):
 
-                def contact(speed: float, lever: float = lever) -> TwoMassContact:
-                    return contact_at(speed, lever, mass, region, self._limits.measured, self._padding)
+                def contacts(speed: float, lever: float = lever, ways: Sequence[ExtraWay] = (extra,)) -> _Contacts:
+                    common = region, self._limits.measured, self._padding
+                    return [contact_at(speed, lever, mass, *common, way) for way in ways]
 
                 least, top = LEAST_SPEED, TOP_SPEED
                 if number and speeds[-1] > 0.0:  # a longer lever brakes sooner, but not by more than it is longer
                     least, top = speeds[-1], min(TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
-                speeds.append(permissible_speed(contact, region.limits, least, top))
+                found = permissible_speed(contacts, region.limits, least, top)
+                both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
+                if found > 0.0 and not all(keeps(contact, region.limits) for contact in both(found)):
+                    found = permissible_speed(both, region.limits, least, top)
+                speeds.append(found)
             for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
                 speeds[number] = min(speeds[number], speeds[number + 1])
             self._speeds[key] = tuple(speeds)

@@ -42,6 +42,7 @@ def map_table(found: SpeedMap) -> dict[str, Any]:
     values["curve"] = [
         {"region": curve.region}
         | ({} if math.isinf(curve.mass) else {"mass_kg": curve.mass})
+        | {"lag_mm": 1e3 * curve.extra.lag, "bend_mm": 1e3 * curve.extra.bend}
         | {"speeds_mm_s": [math.floor(1e5 * speed) / 1e2 for speed in curve.speeds]}
         for curve in found.curves
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .taylor_integrator import integrate
@@ -41,28 +41,35 @@ def keeps(model: TwoMassContact, limits: ForceLimits) -> bool:
 
 
 def permissible_speed(
-    at_speed: Callable[[float], TwoMassContact], limits: ForceLimits, least: float = LEAST_SPEED, top: float = TOP_SPEED
+    at_speed: Callable[[float], Sequence[TwoMassContact]],
+    limits: ForceLimits,
+    least: float = LEAST_SPEED,
+    top: float = TOP_SPEED,
 ) -> float:
-    """Return the highest speed up to which a contact keeps limits [m/s]; 0 where none of 1 mm/s or more does.
+    """Return the highest speed up to which contacts keep limits [m/s]; 0 where none of 1 mm/s or more does.
 
     Force grows with speed; so it is searched by halving, and what is returned was looked at and keeps them.
 
     Args:
-        at_speed: makes the contact at a speed [m/s].
+        at_speed: makes the contacts at a speed [m/s], all of which must keep them.
         limits: to be kept.
         least: speed from which to look on [m/s]; where it does not keep them, from the lowest on.
         top: highest speed to look at [m/s].
     """
-    if keeps(at_speed(top), limits):
+
+    def all_keep(speed: float) -> bool:
+        return all(keeps(contact, limits) for contact in at_speed(speed))
+
+    if all_keep(top):
         return top
     low, high = least, top
-    if not keeps(at_speed(low), limits):
+    if not all_keep(low):
         low, high = LEAST_SPEED, least
-        if low == high or not keeps(at_speed(low), limits):
+        if low == high or not all_keep(low):
             return 0.0
     while high > low * (1.0 + _PRECISION):
         middle = math.sqrt(low * high)
-        if keeps(at_speed(middle), limits):
+        if all_keep(middle):
             low = middle
         else:
             high = middle

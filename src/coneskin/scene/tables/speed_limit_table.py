@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from coneskin.scene.scene import Scene
 
 __all__ = [
+    "SPEED_LIMIT_FORMAT",
     "SPEED_LIMIT_KEYS",
     "check_speed_limit",
     "inline_speed_limit",
@@ -34,7 +35,8 @@ __all__ = [
     "read_speed_limit",
 ]
 
-_FORMAT = 1  # to be raised where the model changes, so that old files are void
+#: to be raised where the model changes, so that old files are void
+SPEED_LIMIT_FORMAT = 2
 _MAX_BYTES = 1 << 20  # of a file; a map of ten sheets has 100 kB
 _MAX_ROWS = 20_000
 _MAX_LINES = 10  # of mistakes
@@ -60,6 +62,8 @@ SPEED_LIMIT_KEYS = (
 _CURVE = (
     Key("region", str),
     Key("mass_kg", float, None, low=0.0, high=1e6),
+    Key("lag_mm", float, 0.0, low=0.0, high=1e5),
+    Key("bend_mm", float, 0.0, low=0.0, high=1e5),
     Key("speeds_mm_s", list, low=0.0, high=10_000.0),
 )
 _PATCH = (
@@ -77,7 +81,7 @@ def limit_fingerprint(scene: Scene) -> str:
 
     reactions = [scene.default_reaction, *(rule.reaction for rule in scene.rules)]
     facts = {
-        "format": _FORMAT,
+        "format": SPEED_LIMIT_FORMAT,
         "arm": scene.arm.model if scene.arm else None,
         "sheets": [
             [link.name, link.frame, item.sensor.name, asdict(item.sensor.frustum), *_place(item.placed)]
@@ -139,7 +143,7 @@ def read_speed_limit(tables: Mapping[str, Any], recorded: bool, problems: list[s
 
     Args:
         tables: of the whole file.
-        recorded: they come from a recording; one made before there were digests has none.
+        recorded: they come from a recording; it may have an older format, and no digest.
         problems: every mistake is added here.
     """
     if "speed_limit" not in tables:
@@ -160,8 +164,8 @@ def read_speed_limit(tables: Mapping[str, Any], recorded: bool, problems: list[s
         limited = tuple(LimitedPatch(*(row[key.plain] for key in _PATCH)) for row in patches)
         found = SpeedLimitScene(curves=speeds, patches=limited, **values)
         lines += unfit(found)
-        if found.format != _FORMAT:
-            lines.insert(0, f"speed_limit.format must be {_FORMAT}, got {found.format}")
+        if found.format > SPEED_LIMIT_FORMAT or (found.format < SPEED_LIMIT_FORMAT and not recorded):
+            lines.insert(0, f"speed_limit.format must be {SPEED_LIMIT_FORMAT}, got {found.format}")
         elif digest != limit_digest(table):
             lines.insert(0, "speed_limit.digest is not that of the table: the file was cut, or changed by hand")
     problems += [f"{line}; {HOW_TO}" for line in lines[:_MAX_LINES]]
