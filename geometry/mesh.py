@@ -80,7 +80,7 @@ class Mesh:
     def outermost(self) -> Floats:
         """Corners of the convex hull [m], shape (k, 3): how far a link reaches in any direction, they reach."""
         if "outermost" not in self._kept:
-            self._kept["outermost"] = outermost_points(self.vertices)
+            self._kept["outermost"] = frozen(outermost_points(self.vertices), (None, 3), "outermost")
         outermost: Floats = self._kept["outermost"]
         return outermost
 

@@ -1,7 +1,9 @@
 """Outermost points of a body: they reach as far as all do, whatever the direction."""
 
 import numpy as np
+import trimesh
 
+from coneskin.geometry.mesh import make_mesh
 from coneskin.geometry.outermost_points import outermost_points
 
 
@@ -20,3 +22,10 @@ def test_they_reach_as_far_as_all_and_none_is_inside() -> None:
 def test_all_points_of_a_plane_are_returned() -> None:
     flat = np.random.default_rng(4).random((30, 3)) * [1.0, 1.0, 0.0]
     assert outermost_points(flat) is flat
+
+
+def test_a_mesh_keeps_them_where_nobody_can_change_them() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.05)
+    mesh = make_mesh(np.array(ball.vertices), np.array(ball.faces))
+    assert mesh.outermost is mesh.outermost
+    assert not mesh.outermost.flags.writeable

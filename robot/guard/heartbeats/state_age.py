@@ -56,7 +56,8 @@ class StateAge:
         if self.silent(now):
             return f"the controller has sent no state for {limit}"
         if now - self._very_late_since > self._limit:
-            return f"the controller's states come more than {limit} late: its network is congested"
+            causes = "its network is congested, or it does not keep up with its clock, as a simulator may not"
+            return f"the controller's states come more than {limit} late: {causes}"
         return ""
 
     def stale(self, now: float) -> str:

@@ -6,6 +6,8 @@ from collections import deque
 import pytest
 
 from coneskin.robot.driver.messages import SetJointVelocity
+from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.guard.heartbeats.state_age import StateAge
 from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.types import Reaction
@@ -13,6 +15,7 @@ from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.testing.guard_rig import GuardRig, touch
 
 PATIENT = MonitoringLimits(arm_silence=0.25)  # as a scene of a busy computer has it
+STANDING = (0.0,) * 6, (0.0,) * 6, True, False, True
 RETREAT = Reaction(kind="retreat", distance=0.06)
 
 
@@ -43,7 +46,10 @@ def setpoints(rig):
 def test_states_that_come_later_and_later_are_a_fault_and_the_arm_stands():
     rig = QueuedRig(speed=0.3).run(0.5).fill(0.08).run(1.0)
     (stop,) = [event for event in rig.events if event.name == "stopping"]  # once, though they stay late
-    assert stop.details["why"] == "the controller's states come more than 50 ms late: its network is congested"
+    why = (
+        "the controller's states come more than 50 ms late: its network is congested, or it does not keep up with its "
+    )
+    assert stop.details["why"] == f"{why}clock, as a simulator may not"
     assert rig.core.phase is Phase.LATCHED
     assert rig.arm.speed < 0.01
     assert any("more than 50 ms late" in line for line in rig.core.blockers(rig.now))
@@ -98,3 +104,23 @@ def test_a_controller_whose_time_runs_backwards_or_stands_still_is_silent(step):
         rig.run(0.002)
     assert rig.event("stopping").details["why"] == "the controller has sent no state for 50 ms"
     assert rig.event("stopping").time < rig.now - 0.1
+
+
+@pytest.mark.parametrize("period", [0.002, 0.008], ids=["e-Series", "CB3"])
+@pytest.mark.parametrize("drift", [-1e-3, 1e-3])  # ten times what quartz does
+def test_neither_drift_nor_a_busy_reader_is_a_lag(period, drift):
+    age, seen = StateAge(0.05), []
+    for k in range(round(60.0 / period)):
+        measured = k * period
+        held = measured % 0.1 < 0.03  # the reader takes up to 30 ms of them at once, ten times a second
+        read = measured - measured % 0.1 + 0.03 if held else measured
+        age.note(ControllerState(read, 100.0 + (1.0 - drift) * measured, *STANDING))
+        seen += [age.trouble(read), age.stale(read)]
+    assert set(seen) == {""}
+
+
+def test_a_simulator_that_falls_behind_is_a_lag_that_says_so():
+    age = StateAge(0.05)
+    for k in range(4000):
+        age.note(ControllerState(0.002 * k, 0.98 * 0.002 * k, *STANDING))
+    assert "does not keep up with its clock" in age.trouble(8.0)
