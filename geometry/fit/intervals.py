@@ -86,15 +86,22 @@ def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, mi
     holes = np.concatenate([np.cumsum(~usable), [0]])
     hopeless = _hopeless(z, np.where(usable, high, 0.0), np.where(usable, low, 0.0), tolerance, min_slices)
     heights, tops, bottoms = z.tolist(), high.tolist(), low.tolist()
-    bad = (-1, -1)  # the last interval that deviates too much, begun at the first of the slices that decide
+    # of the last interval that deviates too much: first of the slices that decide, its end, distance along the radii
+    bad = (-1, -1, 0.0)
     line = (0.0, 0.0)  # the side that was within the tolerance of the last good interval: radius at z = 0, and slope
+
+    def steepest(first: int, end: int) -> float:
+        """Return a bound of distance along the radii by distance square to the side; as in ``_hopeless``."""
+        spread = float(high[first:end].max() - low[first:end].min())
+        climb = spread - min(tops[first] - bottoms[end - 1], tops[end - 1] - bottoms[first])
+        return math.hypot(1.0, climb / (heights[end - 1] - heights[first]))
 
     def good(first: int, end: int) -> bool:
         nonlocal line, bad
         if holes[end - 1] != holes[first - 1]:
             return False
         if end - first > min_slices:  # all but the last slice are known to be within the tolerance of the line
-            if end == bad[1] and first <= bad[0]:
+            if end == bad[1] and first <= bad[0] and bad[2] > tolerance * steepest(first, end):
                 return False
             radius = line[0] + line[1] * heights[end - 1]
             limit = tolerance * math.hypot(1.0, line[1])
@@ -103,7 +110,7 @@ def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, mi
         window = slice(first, end)
         off, *side, deciding = _chebyshev(z[window], high[window], low[window])
         if off > tolerance:
-            bad = (first + deciding, end)
+            bad = (first + deciding, end, off * math.hypot(1.0, side[1]))
             return False
         line = (side[0], side[1])
         return True

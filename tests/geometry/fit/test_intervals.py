@@ -110,6 +110,22 @@ def test_longest_from_stops_at_holes_and_steps() -> None:
     assert longest_intervals(z, high, low, 0.001) == [0, 1, 5, 5, 6, 8, 8, 7]
 
 
+def test_no_interval_with_a_bend_is_a_slice_shorter_than_it_need_be() -> None:
+    """A longer interval may have a steeper side, and slices that deviate too much along the radii not square to it."""
+    z, shorter = heights(24, 0.003), []
+    for seed in range(50):
+        rng = np.random.default_rng(seed)
+        radius = 0.06 + rng.normal(0.0, 3e-4, 24)
+        for bend in rng.choice(z, 3):
+            radius += rng.uniform(-1.0, 1.0) * np.maximum(0.0, z - bend)
+        high, low = (radius + sign * np.abs(rng.normal(0.0, 0.0015, 24)) for sign in (1.0, -1.0))
+        for first, end in enumerate(longest_intervals(z, high, low, 0.002, 3)):
+            longer = slice(first, end + 1)
+            if first + 3 <= end < len(z) and least_deviation(z[longer], high[longer], low[longer])[0] <= 0.002:
+                shorter.append((seed, first, end))
+    assert shorter == []
+
+
 def double_cone(z: Floats, belt: float) -> Floats:
     return np.where(z < belt, 0.04 + 0.2 * z, 0.04 + 0.2 * belt - 0.15 * (z - belt))
 
