@@ -1,9 +1,9 @@
 """Cut sheets of a sensor: the outlines, holes, marks and labels of each material.
 
-There are seven, in the order of assembly: lower substrate, lower electrodes, lower conductive, isolation, upper
-conductive, upper electrodes, upper substrate. A part that is laid with the other face up is its mirror image, with tabs
-and leads on the wrong side, so every part is labelled with the face that is up. By default that is the face on which
-the next part is glued: electrodes go on the back of each conductive sheet, between it and its substrate.
+There are seven: lower substrate, lower electrodes, lower conductive, isolation, upper conductive, upper electrodes,
+upper substrate. A part that is laid with the other face up is its mirror image, with tabs and leads on the wrong side, so
+every part is labelled with the face that is up. By default that is the face on which the next part is glued. Electrodes
+go on the face of each conductive sheet that faces the isolation: a printed or coated film conducts on that face alone.
 """
 
 from __future__ import annotations
@@ -206,11 +206,11 @@ def cut_sheets(
 
     return (
         sheet(1, "lower substrate", 0, "outside"),
-        sheet(2, "lower electrodes", 1, "inside", foil=True),
-        sheet(3, "lower conductive", 1, "inside"),
+        sheet(2, "lower electrodes", 1, "outside", foil=True),
+        sheet(3, "lower conductive", 1, "outside"),
         sheet(4, "isolation", 2, "outside"),
-        sheet(5, "upper conductive", 3, "outside"),
-        sheet(6, "upper electrodes", 3, "outside", foil=True),
+        sheet(5, "upper conductive", 3, "inside"),
+        sheet(6, "upper electrodes", 3, "inside", foil=True),
         sheet(7, "upper substrate", 4, "inside"),
     )
 

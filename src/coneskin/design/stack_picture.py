@@ -14,11 +14,12 @@ from .workshop.guide_words import side_name
 
 __all__ = ["draw_seam", "draw_stack"]
 
-_FACES = ("#e8d9c0", FOIL_COLOUR, "#55585e", "#cfe3f1", "#55585e", FOIL_COLOUR, "#e8d9c0")
+_ORDER = (1, 3, 2, 4, 6, 5, 7)  # numbers of the parts, from the link outwards
+_FACES = ("#e8d9c0", "#55585e", FOIL_COLOUR, "#cfe3f1", FOIL_COLOUR, "#55585e", "#e8d9c0")
 
 
 def draw_stack(figure: Any, design: SheetDesign) -> None:
-    """Draw the seven parts above each other in the order of assembly, all seen from outside.
+    """Draw the seven parts above each other in their order on the link, all seen from outside.
 
     Args:
         figure: an empty figure of matplotlib.
@@ -30,7 +31,8 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
     squeeze, lean = 0.38, 0.30
     pitch = squeeze * depth * 0.62 + 0.05 * width
     right = 0.0
-    for level, cut in enumerate(design.cuts):
+    stacked = sorted(design.cuts, key=lambda cut: _ORDER.index(cut.number))
+    for level, cut in enumerate(stacked):
         lift = level * pitch
 
         def slanted(outline: Outline, lift: float = lift, mirrored: bool = cut.face == "inside") -> Any:
@@ -49,7 +51,7 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
                 colour = {"hole": "#b3007a", "score": "#2040c0", "fold": "#0a7d24"}.get(stroke.kind)
                 if colour:
                     axes.plot(*slanted(stroke.outline), color=colour, lw=0.5)
-    for level, cut in enumerate(design.cuts):  # beside the parts, however far the last of them lean
+    for level, cut in enumerate(stacked):  # beside the parts, however far the last of them lean
         label = f"{cut.number}  {cut.name}\n    {cut.material}\n    drawing: {cut.face} up"
         axes.text(right + 0.03 * width, level * pitch + 0.2 * squeeze * depth, label, fontsize=8, va="center")
     axes.annotate(
@@ -106,10 +108,15 @@ def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
         axes.text(reach * 1.03, at, _layer_name(design, index), fontsize=8, va="center")
     margin = (layout.field.phi1 - _turn(plan.electrode, side)) * arc
     width = _turn(plan.electrode, side) * arc
-    foil = heights[1] - 0.012 * reach
-    for start, name in ((margin, "D"), (-shown_gap - margin - width, "C")):
-        axes.fill_between([start, start + width], foil, heights[1], color=FOIL_COLOUR)
-        axes.text(start + 0.5 * width, foil - 0.02 * reach, name, ha="center", va="top", fontweight="bold", fontsize=9)
+    thick = 0.012 * reach
+    foils = [("D", margin, width, 1.0), ("C", -shown_gap - margin - width, width, 1.0)]
+    if plan.wires.startswith("end"):  # of the electrode at the other end, on its way to the wires
+        foils.append((f"lead of {'A' if plan.wires == 'end1' else 'B'}", *_lead(layout, arc), -1.0))
+    for name, start, wide, way in foils:  # on the faces of the conductive sheets, towards each other
+        face, beyond = (heights[2], heights[1]) if way > 0.0 else (heights[3], heights[4])
+        axes.fill_between([start, start + wide], face, face + way * thick, color=FOIL_COLOUR)
+        style = {"ha": "center", "va": "center", "fontsize": 9, "fontweight": "bold"}
+        axes.text(start + 0.5 * wide, beyond - 0.04 * way * reach, name, **style)
     top = heights[5]
     if design.options.overlap:
         flap = 1e3 * design.options.overlap
@@ -155,6 +162,15 @@ def _insets(shape: Any, wrap: float, u: float, arc: float) -> tuple[float, float
         if min(a.u, b.u) <= u < max(a.u, b.u) and abs(a.phi - b.phi) < 1e-12
     ]
     return min(at) * arc, (wrap - max(at)) * arc
+
+
+def _lead(layout: Any, arc: float) -> tuple[float, float]:
+    """Return where the lead along edge 0 begins, and its width [mm]."""
+    from coneskin.geometry.drawing.surface_shape import ShapeCorner
+
+    foil = layout.foils["A" if layout.plan.wires == "end1" else "B"]
+    start, end, *_ = sorted({round(corner.phi, 9) for corner in foil if isinstance(corner, ShapeCorner)})
+    return start * arc, (end - start) * arc
 
 
 def _layer_name(design: SheetDesign, index: int) -> str:

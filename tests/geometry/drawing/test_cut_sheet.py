@@ -49,8 +49,9 @@ def test_seven_sheets_from_the_link_outwards():
 def test_faces_are_those_on_which_the_next_thing_is_glued_unless_asked_otherwise():
     layout = lay_out_sheet(SHEETS["widening"])
     faces = {sheet.name: sheet.face for sheet in cut_sheets(layout, PAPER_STACK)}
-    assert faces["lower substrate"] == faces["upper conductive"] == "outside"
-    assert faces["upper substrate"] == faces["lower conductive"] == "inside"
+    # a film conducts on one face: those of both sheets carry the electrodes, and face each other
+    assert {faces[f"lower {part}"] for part in ("substrate", "conductive", "electrodes")} == {"outside"}
+    assert {faces[f"upper {part}"] for part in ("substrate", "conductive", "electrodes")} == {"inside"}
     for wanted in ("outside", "inside"):
         for sheet in cut_sheets(layout, PAPER_STACK, face_up=wanted):
             assert sheet.face == wanted

@@ -15,6 +15,9 @@ from .wiring import STRIPPED
 
 __all__ = ["flat_steps"]
 
+#: side of the wires -> the electrode whose lead runs to it from the other side
+_LED_AROUND = {"end1": "A", "end2": "B", "edge0": "C", "edge1": "D"}
+
 
 def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the steps that are done while everything is flat."""
@@ -39,8 +42,9 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         "over 10 mm at both ends. *Check:* the multimeter's reading divided by 5 is its resistance per square; this "
         f"design wants {ohms} ohm per square (lower, upper), within {SPREAD:.0%}. Otherwise design again with "
         "`--lower-sheet-ohm` and `--upper-sheet-ohm`: the electronics then match what you have. Which face conducts? "
-        "Printed and coated films conduct on one face only, which is the face that the labels call up: try both with "
-        "the probes."
+        "Printed and coated films conduct on one face only: try both with the probes. It must be the face that the "
+        "labels call up (part 3 its outside, part 5 its inside): it carries the foils, and the two face each other "
+        "through the isolation."
     )
     yield (
         "Cut the seven parts: red lines and magenta holes are cut, blue ones are marks, green ones are folds, black is "
@@ -61,8 +65,10 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         "the conductive adhesive towards part 5, and roll them down: B along end 1, A along end 2. *Check* as before."
     )
     yield (
-        "Cover the bare faces of all four foils, leads included, with polyimide tape, and trim it at the foil. Only "
-        "the tabs stay bare. *Check:* a probe slid along the tape finds no contact with the foil below."
+        "Cover the bare faces of all four foils, leads included, with polyimide tape that stands 1 mm over the foil on "
+        "each side: they will face the other conductive sheet. The lead of "
+        f"{_LED_AROUND[plan.wires]} lies where its sheet is cut away: cover its adhesive too. Only the tabs stay bare. "
+        "*Check:* a probe slid along the tape finds no contact with the foil below."
     )
     ab, cd = figures.pairs
     yield (
