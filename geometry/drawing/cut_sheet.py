@@ -1,9 +1,10 @@
 """Cut sheets of a sensor: the outlines, holes, marks and labels of each material.
 
 There are seven: lower substrate, lower electrodes, lower conductive, isolation, upper conductive, upper electrodes,
-upper substrate. A part that is laid with the other face up is its mirror image, with tabs and leads on the wrong side, so
-every part is labelled with the face that is up. By default that is the face on which the next part is glued. Electrodes
-go on the face of each conductive sheet that faces the isolation: a printed or coated film conducts on that face alone.
+upper substrate. A part that is laid with the other face up is its mirror image, with tabs and leads on the wrong side,
+so every part is labelled with the face that is up. By default that is the face on which the next part is glued.
+Electrodes go on the face of each conductive sheet that faces the isolation: a printed or coated film conducts on that
+face alone.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ class DesignOptions:
     Attributes:
         stack: the five layers.
         plan: electrodes, tabs, holes.
-        wires: side where the wires leave, for all sheets; None for end 1, but end 2 of the last of several, so that
+        wires: side where the wires leave, for all sheets; None for end 1, but end 2 of the last of several on one axis:
             tabs do not run into the neighbour.
         electronics: as far as they are fixed; the rest is chosen to match each sheet (``match_electronics``).
         upper_sheet_ohms: sheet resistance of the upper conductive layer [ohm per square]; None to choose a material

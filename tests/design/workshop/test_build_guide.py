@@ -142,6 +142,24 @@ def test_a_round_link_has_nothing_to_measure_the_seam_from() -> None:
     assert find_placement(PlacedFrustum(Frustum(0.05, 0.05, 0.2)), Mesh(wide, collar.faces)).feature is None
 
 
+@pytest.mark.parametrize(("azimuth", "in_the_way"), [(0.0, True), (1.5, False)])
+def test_a_part_of_the_link_in_the_way_of_the_cable_is_told(azimuth: float, in_the_way: bool) -> None:
+    """A block of 45 degrees, from 12 mm beyond end 2 on, 20 mm high."""
+    tube = bumped(None)
+    phi = azimuth + np.array([-0.4, 0.4, 0.4, -0.4])
+    r = np.array([0.03, 0.03, 0.07, 0.07])
+    wall = np.column_stack([r * np.cos(phi), r * np.sin(phi), np.full(4, 0.212)])
+    faces = np.vstack([tube.faces, [[144, 145, 146], [144, 146, 147]]])
+    mesh = Mesh(np.vstack([tube.vertices, wall]), faces)
+    place = PlacedFrustum(Frustum(0.05, 0.05, 0.2))
+    free = find_placement(place, mesh).free
+    assert free == (math.inf, pytest.approx(0.012) if in_the_way else math.inf)
+    (design,) = design_sheets([place], DesignOptions(wires="end2"))
+    text = guide(design, measure_build(design, 0, mesh=mesh))
+    assert ("in the way of the cable at edge 0, 12.0 mm beyond end 2" in text) == in_the_way
+    assert ("mount there, 30.0 mm" in text) == in_the_way
+
+
 def test_coordinates_of_the_file_are_those_of_the_drawing() -> None:
     design, figures = built(CONE, link="forearm")
     data = figures.as_data(design)

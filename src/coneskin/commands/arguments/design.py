@@ -141,7 +141,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--wires",
         choices=get_args(SheetSide),
-        help="side where all four wires leave (default end1; end2 for the last of several sheets)",
+        help="side where all four wires leave (default end1; end2 for the last of several sheets on one axis)",
     )
     _add_quantity(add, "connector-mm", 60.0, "distance of the wires' connector from the rim")
     _add_quantity(add, "seam-gap-mm", 0.0, "gap of the seam of a full wrap")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from coneskin.design.sheets import SheetDesign
@@ -26,10 +27,12 @@ def cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
             "between the edges before you close the wrap" if design.has_seam else "on the bare link beside that edge"
         )
         yield f"The tabs leave at {side_name(plan.wires)}: lead them out {between}."
-    yield from _short_of_room(figures)
+    rooms = _rooms(figures)
+    yield from _short_of_room(figures, rooms)
+    ground = "there" if rooms.get(cable.side, math.inf) < cable.tie + _MOUNT else "on the link"
     yield (
-        f"Glue the cable-tie mount on the link {in_mm(cable.tie)} beyond {side_name(cable.side)}, at "
-        f"{tie_place(design, figures)}. "
+        f"Glue the cable-tie mount {ground}, {in_mm(cable.tie)} beyond "
+        f"{side_name(cable.side)}, at {tie_place(design, figures)}. "
         "Lead the four wires to it flat on the link, leave a loop of 20 mm so that no pull reaches a tab, and tie them "
         f"down. Crimp the connector {in_mm(cable.connector)} beyond the rim: pin 1 A (red), pin 2 B "
         "(black), pin 3 C (yellow), pin 4 D (green). *Check:* pull each wire as hard as 3 N behind the tie: nothing "
@@ -38,15 +41,29 @@ def cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     )
 
 
-def _short_of_room(figures: BuildFigures) -> Iterator[str]:
-    """Yield what a person does where the link ends before the place of the cable tie or of the connector."""
+def _rooms(figures: BuildFigures) -> dict[str, float]:
+    """Return how far the link goes on, with nothing of it in the way, beyond each end that has a mesh [m]."""
+    place = figures.placement
+    ends = (("end1", place.before, place.free[0]), ("end2", place.beyond, place.free[1]))
+    return {end: min(room, free) for end, room, free in ends if room is not None}
+
+
+def _short_of_room(figures: BuildFigures, rooms: dict[str, float]) -> Iterator[str]:
+    """Yield what a person does where the link ends, or is in the way, before the place of tie or connector."""
     cable, place = figures.cable, figures.placement
-    rooms = {"end1": place.before, "end2": place.beyond}
-    room = rooms.get(cable.side)
-    if room is None or room >= cable.connector:
+    room = rooms.get(cable.side, math.inf)
+    if room >= cable.connector:
         return
     other = "end2" if cable.side == "end1" else "end1"
-    more = rooms[other] or 0.0
+    more = rooms.get(other, 0.0)
+    if room in place.free:
+        yield (
+            f"Another part of the link is in the way of the cable at edge 0, {in_mm(room)} beyond "
+            f"{side_name(cable.side)}: design again with `--seam X Y Z`, a direction in which the link goes on clear "
+            f"of it for {in_mm(cable.connector)}, or with a shorter `--connector-mm`; of a single sheet the wires can "
+            f"leave at the other end, `--wires {other}`, where {in_mm(more)} are free."
+        )
+        return
     what = "connector lies" if room >= cable.tie + _MOUNT else "cable tie and the connector lie"
     yield (
         f"The link ends {in_mm(max(room, 0.0))} beyond {side_name(cable.side)}, so the {what} on what is bolted to the "

@@ -56,7 +56,7 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     yield f"Lay part 3 on the bench, {cuts[2].face} up. Its blue lines show the places of C and D (part 2)."
     yield (
         f"Lay foils C and D on them, {cuts[1].face} up, the conductive adhesive towards part 3, and roll them down. C "
-        "belongs to the edge whose label has the degrees, D to edge 0. The tabs stand out over "
+        "belongs to the edge labelled (C), D to edge 0. The tabs stand out over "
         f"{side_name(plan.wires)}. Rolling, here and below: {ROLLING} *Check:* no bubble, no wrinkle, and no corner "
         "that lifts when the sheet is bent to the radius of the link."
     )
@@ -79,8 +79,8 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     yield (
         f"Wires to the tabs, in the colours and lengths of the table below: strip {in_mm(STRIPPED)} of each wire, lay "
         "the strands on the tab, fold the tab once over them, wrap copper tape with conductive adhesive around it, "
-        "press it flat with pliers, and shrink a tube over it (heat gun at its lowest setting, a metal ruler between "
-        "tube and foam). *Check:* below 1 ohm from the free end of the wire to the foil, also while you pull the wire "
+        "press it flat with pliers, and shrink a tube over it (heat gun at its lowest setting, a metal ruler under "
+        "the tab). *Check:* below 1 ohm from the free end of the wire to the foil, also while you pull the wire "
         "as hard as a full cup hangs on it (3 N)."
         if plan.tab
         else "This sheet has no tabs: lay the strands of each wire (table below) flat on its foil at the rim, and "

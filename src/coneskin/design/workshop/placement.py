@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LinkFeature", "SheetPlacement", "find_placement", "sharpest_bends"]
 
+_CABLE = 4e-3  # m; height at which a cable on the link must not meet another part of it
 _STANDS_OUT = 3e-3  # m; what stands out less is no feature that a person finds
 _ALIKE = 0.01  # bends of two strips that differ by less are alike: they are fitted
 _NEARLY = 0.05  # a strip that is bent less than another by less belongs to it
@@ -59,6 +60,8 @@ class SheetPlacement:
         heights: distances from these faces; empty where there is none.
         tilted: True where the axis is square to no face and along none, and the heights fix the place along it: what a
             ruler would measure along the axis is then left out.
+        free: from end 1 and from end 2, along the side and outwards at edge 0, to another part of the link [m];
+            infinite where there is none.
     """
 
     around1: float
@@ -70,6 +73,7 @@ class SheetPlacement:
     faces: tuple[DatumFace, ...] = ()
     heights: tuple[DatumHeight, ...] = ()
     tilted: bool = False
+    free: tuple[float, float] = (math.inf, math.inf)
 
     @property
     def around_fixed(self) -> bool:
@@ -119,7 +123,22 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
         usable,
         datum_heights(place, usable) if usable else (),
         max(along, default=0.0) >= _ALONG and not held,
+        _free_ways(place, mesh),
     )
+
+
+def _free_ways(place: PlacedFrustum, mesh: Mesh) -> tuple[float, float]:
+    """Return how far a cable at edge 0 can go on beyond end 1 and end 2 before it meets the link [m]."""
+    import numpy as np
+
+    from coneskin.geometry.ray_casting import RayCaster
+
+    side = place.frustum
+    u = np.array([0.0, side.slant])
+    points, normals = place.place(u, np.zeros(2))
+    way = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
+    distances, _ = RayCaster(mesh).cast(points + _CABLE * normals, np.array([-way, way]))
+    return float(distances[0]), float(distances[1])
 
 
 def sharpest_bends(place: PlacedFrustum) -> list[tuple[float, float]]:

@@ -27,13 +27,15 @@ def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         "differ, this is another link than the design's: stop here."
     )
     if figures.collars:
+        line = any(collar.end == 1 for collar in figures.collars)
+        at_line = ", and the pencil line of end 1 is at the step of its collar, within 1 mm" if line else ""
         yield (
             "Fit the printed collars (below) on the bare link, without tape, and strap them. *Check:* no part rocks, "
-            "the slots between the parts are open all along, and the pencil line of end 1 is at the step of its "
-            "collar, within 1 mm. Then take them off again."
+            f"the slots between the parts are open all along{at_line}. Then take them off again."
         )
     pins = (
-        " Put the flat-headed pins into its three holes from the inside; every further part is pushed over them. The "
+        " Before that, put the flat-headed pins into its three holes from the inside; every further part is pushed "
+        "over them. The "
         "corner beside the lead has no hole: a mirrored part does not fit."
         if design.layout.holes
         else ""
@@ -79,9 +81,9 @@ def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     yield (
         "*Check* after each wrapped part: both edges are straight, the rim stands within 0.5 mm of the pencil line all "
         "around, and there is no fold; a part is peeled off and laid again within a minute, later it tears. After part "
-        "5, measure again from wire to wire: A-B and C-D as before, and A to C above 10 Mohm. Roll part 1 and part 7 "
-        "as above; on the isolation and above the active area only smooth by hand, for the roller would press the two "
-        "conductive sheets together."
+        "5, measure again from wire to wire: A-B and C-D as before, and A to C above 10 Mohm. Roll part 1, and "
+        "the margins of part 7, as above; on the isolation and above the active area only smooth by hand, for the "
+        "roller would press the two conductive sheets together."
     )
     if options.overlap:
         yield f"Fold the flap of part 7, {in_mm(options.overlap)} wide, over edge 0 and fix it with {TAPE}."
