@@ -188,7 +188,7 @@ def cut_sheets(
         surface = snap_to_cylinder(stack.surface(place, index), snap)
         layout = layout_above(flat, place, stack.offset(index))
         layer = stack.layers[index]
-        text = (plain, name.upper(), f"{face.upper()} FACE UP")
+        text = (plain, f"{number} {name.upper()}", f"{face.upper()} FACE UP")
         material = "aluminium foil" if foil else f"{layer.material} {layer.thickness * 1e3:.2f} mm"
         if foil:
             pair = "CD" if index < 2 else "AB"

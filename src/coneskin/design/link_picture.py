@@ -46,11 +46,11 @@ def draw_link(
     first = designs[0].place.link_frustum
     triangles, owner = _triangles(designs, mesh, areas)
     rays = None if mesh is None else RayCaster(mesh)
-    for side, (x, y) in enumerate(((0.80, 0.45), (-0.80, -0.45))):
+    for side, (x, y, z) in enumerate(((0.80, 0.45, 0.35), (-0.80, -0.45, -0.35))):
         axes = figure.add_axes((0.5 * side, 0.14, 0.5, 0.84), projection="3d", computed_zorder=False, proj_type="ortho")
-        # slightly from the side and from above
-        view = np.array(first.rotate((x, y, 0.35)))
-        light = np.array(first.rotate((x, -0.3 * y, 0.45)))
+        # slightly from the side; once from above and once from below, so that both ends are seen
+        view = np.array(first.rotate((x, y, z)))
+        light = np.array(first.rotate((x, -0.3 * y, 1.3 * z)))
         _draw_side(axes, triangles, owner, view / np.linalg.norm(view), light / np.linalg.norm(light))
         for index, design in enumerate(designs):
             sight = _Sight(view / np.linalg.norm(view), rays, 1e-3 * float(np.ptp(triangles, axis=(0, 1)).max()))

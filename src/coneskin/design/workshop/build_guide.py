@@ -32,8 +32,9 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
     yield ""
     yield (
         f"Files: `{files}`. Wherever a step says *outside up* or *inside up*, that face of the sensor looks at "
-        "you: the inside faces the link later. Every part carries the name of the link, of the sheet and of the part, "
-        "its material, the face that is up, and the names of its four sides. End 1 is where B is, end 2 where A is, "
+        "you: the inside faces the link later. Every part carries the names of the link and of the sheet and the face "
+        "that is up; a foil its letter beside them, any other part its number, its name, its material and the names "
+        "of its four sides. End 1 is where B is, end 2 where A is, "
         "edge 0 where D is, the other edge where C is."
     )
     steps = [*flat_steps(design, figures), *wrap_steps(design, figures), *cable_steps(design, figures)]
