@@ -115,9 +115,8 @@ def main() -> int:
     for reason, _ in reasons.most_common():
         line(f"... {reason}", [one for one in found if one.left_out.reason == reason])
     low = [one.errors[0] for one in found if one.errors[0] < -AGREED]
-    print(
-        f"peak more than {AGREED:.0%} below MuJoCo's: {len(low)} of {len(found)}, at most {-min(low, default=0.0):.1%}"
-    )
+    worst = abs(min(low, default=0.0))
+    print(f"peak more than {AGREED:.0%} below MuJoCo's: {len(low)} of {len(found)}, at most {worst:.1%}")
     if args.permissible:
         return 1 if low else 0
     return 0 if all(one.worst <= AGREED for one in held) else 1
