@@ -56,9 +56,9 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     yield f"Lay part 3 on the bench, {cuts[2].face} up. Its blue lines show the places of C and D (part 2)."
     yield (
         f"Lay foils C and D on them, {cuts[1].face} up, the conductive adhesive towards part 3, and roll them down. C "
-        "belongs to the edge labelled (C), D to edge 0. The tabs stand out over "
-        f"{side_name(plan.wires)}. Rolling, here and below: {ROLLING} *Check:* no bubble, no wrinkle, and no corner "
-        "that lifts when the sheet is bent to the radius of the link."
+        "belongs to the edge labelled (C), D to edge 0. A foil is one piece with its lead and its tab, so these lie "
+        f"where they belong; the tabs stand out over {side_name(plan.wires)}. Rolling, here and below: {ROLLING} "
+        "*Check:* no bubble, no wrinkle, and no corner that lifts when the sheet is bent to the radius of the link."
     )
     yield (
         f"Lay part 5 on the bench, {cuts[4].face} up. Lay foils A and B (part 6) on its blue lines, {cuts[5].face} up, "
@@ -78,10 +78,12 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     )
     yield (
         f"Wires to the tabs, in the colours and lengths of the table below: strip {in_mm(STRIPPED)} of each wire, lay "
-        "the strands on the tab, fold the tab once over them, wrap copper tape with conductive adhesive around it, "
-        "press it flat with pliers, and shrink a tube over it (heat gun at its lowest setting, a metal ruler under "
+        f"the strands along the outer half of the tab, fold that half ({in_mm(0.5 * plan.tab)}) over them, wrap copper "
+        "tape with conductive adhesive around it, press it flat with pliers, and shrink a tube over it (heat gun at "
+        "its lowest setting, a metal ruler under "
         "the tab). *Check:* below 1 ohm from the free end of the wire to the foil, also while you pull the wire "
-        "as hard as a full cup hangs on it (3 N)."
+        "as hard as a full cup hangs on it (3 N). "
+        "Until the cable tie is there, masking tape holds the wires to the part, so that nothing pulls at a tab."
         if plan.tab
         else "This sheet has no tabs: lay the strands of each wire (table below) flat on its foil at the rim, and "
         "copper tape with conductive adhesive over them. *Check:* below 1 ohm from the free end of the wire to the "

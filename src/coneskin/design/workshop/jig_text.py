@@ -21,7 +21,7 @@ def jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iterat
         figures: for building it.
         folder: of its files, as a path in the folder of the design; "." for that folder itself.
     """
-    plan = design.options.jig
+    plan, wires = design.options.jig, design.layout.plan.wires
     if plan.surface == "none":
         yield "No jig was asked for (`--jig none`)."
         return
@@ -59,6 +59,8 @@ def jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iterat
                 f". What stands out lets it be turned by {math.degrees(collar.play):.0f} deg "
                 f"({in_mm(collar.play * radius)}) at most: put it in the middle"
             )
+        if wires == f"end{collar.end}":
+            how += ". Under its lip is a way out for tabs and wires, above their places: lead them through it"
         yield how + "."
     for sentence in figures.no_collar:
         yield f"* No collar: {sentence}."
