@@ -57,7 +57,7 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     yield (
         f"Lay foils C and D on them, {cuts[1].face} up, the conductive adhesive towards part 3, and roll them down. C "
         "belongs to the edge labelled (C), D to edge 0. A foil is one piece with its lead and its tab, so these lie "
-        f"where they belong; the tabs stand out over {side_name(plan.wires)}. Rolling, here and below: {ROLLING} "
+        f"where they belong. The tabs stand out over {side_name(plan.wires)}. Rolling, here and below: {ROLLING} "
         "*Check:* no bubble, no wrinkle, and no corner that lifts when the sheet is bent to the radius of the link."
     )
     yield (
