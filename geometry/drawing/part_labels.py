@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from coneskin.geometry.frustum import Frustum
 
 from .electrode_layout import SheetLayout, SurfaceRectangle
-from .surface_shape import drawing_point
+from .surface_shape import ShapeCorner, drawing_point
 
 __all__ = ["CAP_HEIGHT", "PartLabel", "ascii_text", "part_labels", "strip_label", "text_width"]
 
@@ -124,11 +124,15 @@ def strip_label(layout: SheetLayout, surface: Frustum, which: str, face: str, ti
     }[which]
     pad = 0.08 * plan.electrode
     turn = pad / narrow
+    # along its strip a foil ends before the rim, and before the lead of its neighbour
+    corners = [corner for corner in layout.foils[which] if isinstance(corner, ShapeCorner)]
+    along = [corner.phi if which in "AB" else corner.u for corner in corners]
+    first, last = min(along) + (turn if which in "AB" else pad), max(along) - (turn if which in "AB" else pad)
     strip = {
-        "A": SurfaceRectangle(field.u2 + pad, field.u2 + 2.0 * half - pad, 0.0, surface.wrap),
-        "B": SurfaceRectangle(field.u1 - 2.0 * half + pad, field.u1 - pad, 0.0, surface.wrap),
-        "C": SurfaceRectangle(0.0, surface.slant, field.phi2 + turn, field.phi2 + 2.0 * half / narrow - turn),
-        "D": SurfaceRectangle(0.0, surface.slant, field.phi1 - 2.0 * half / narrow + turn, field.phi1 - turn),
+        "A": SurfaceRectangle(field.u2 + pad, field.u2 + 2.0 * half - pad, first, last),
+        "B": SurfaceRectangle(field.u1 - 2.0 * half + pad, field.u1 - pad, first, last),
+        "C": SurfaceRectangle(first, last, field.phi2 + turn, field.phi2 + 2.0 * half / narrow - turn),
+        "D": SurfaceRectangle(first, last, field.phi1 - 2.0 * half / narrow + turn, field.phi1 - turn),
     }[which]
     full = f"{which} - {face.upper()} FACE UP"
     for text in (*([f"{full} - {title}"] if title else []), full, which):
