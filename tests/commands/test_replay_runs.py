@@ -42,9 +42,9 @@ def test_a_folder_of_runs_is_listed_and_several_runs_are_summed_up(
         (tmp_path / name).mkdir()
         (tmp_path / name / "run.rec").write_bytes(COLLISION.read_bytes())
     assert main(["replay", str(tmp_path)]) == 2
-    out = capsys.readouterr().out
-    assert "there are 2 below it" in out
-    assert f"coneskin replay {tmp_path / 'b'}\n" in out
+    printed = capsys.readouterr()
+    assert printed.err.startswith(f"coneskin replay: {tmp_path} is no run; there are 2 below it")
+    assert f"coneskin replay {tmp_path / 'b'}\n" in printed.out
     both = [str(tmp_path / name) for name in ("a", "b")]
     assert main(["replay", *both, "--jobs", "1"]) == 0
     assert re.search(r"^as recorded +2 +0 +0 +2 +0 +0 ", capsys.readouterr().out, re.MULTILINE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -91,7 +92,8 @@ def _list_runs(folder: Path) -> int:
     from coneskin.runs.run_files import find_recordings
 
     paths = find_recordings([folder])
-    print(f"{folder} is no run; there are {len(paths)} below it: name one, several, or replay all of them")
+    what = f"{folder} is no run; there are {len(paths)} below it: name one, several, or replay all of them"
+    print(f"coneskin replay: {what}", file=sys.stderr)
     for path in paths:
         print(f"  coneskin replay {path.parent if path.name == 'run.rec' else path}")
     return 2
