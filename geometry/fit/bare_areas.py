@@ -16,7 +16,7 @@ from .plan import SheetPlan
 from .side import covered_points
 from .surface_samples import SurfaceSamples
 
-__all__ = ["LEAST_SHARE", "BareArea", "bare_areas", "flat_samples", "sheet_more"]
+__all__ = ["BareArea", "BareTally", "bare_areas", "flat_samples", "sheet_more"]
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _FLAT_COSINE = math.cos(math.radians(2.0))
 _ROUND_COSINE = 0.985
 _STRAIGHT_SINE = 0.06
 _LEAST_LENGTH = 0.010  # m; a cone touches a dome of 40 mm over less
-LEAST_SHARE = 0.01  #: of the hull; a smaller bare area is not reported
+_LEAST_SHARE = 0.01  # of the hull; a smaller bare area is not reported
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +41,36 @@ class BareArea:
     reason: str
     share: float
     points: Floats = field(repr=False)
+
+
+class BareTally:
+    """Tally of what sheets leave bare: each reason takes what no earlier one has taken.
+
+    Args:
+        hull: samples of the link.
+        covered: those that sheets cover, shape (n,).
+
+    Attributes:
+        bare: samples that no reason has taken, shape (n,).
+    """
+
+    def __init__(self, hull: SurfaceSamples, covered: NDArray[np.bool_]) -> None:
+        self.bare = ~covered
+        self._hull = hull
+        self._found: list[BareArea] = []
+
+    def take(self, reason: str, chosen: NDArray[np.bool_]) -> None:
+        """Take the bare ones of chosen samples, shape (n,), for a reason; a part too small to report stays bare."""
+        mine = self.bare & chosen
+        share = float(mine.mean())
+        if share >= _LEAST_SHARE:
+            self._found.append(BareArea(reason, share, self._hull.points[mine]))
+            self.bare[mine] = False
+
+    @property
+    def areas(self) -> list[BareArea]:
+        """What was taken, the largest area first."""
+        return sorted(self._found, key=lambda area: -area.share)
 
 
 def bare_areas(
@@ -59,16 +89,8 @@ def bare_areas(
         hull: samples of the link.
         requirements: on the sheets.
     """
-    bare = ~_covered(plan.axes, hull, requirements.tolerance)
-    found: list[BareArea] = []
-
-    def take(reason: str, chosen: NDArray[np.bool_]) -> None:
-        mine = bare & chosen
-        share = float(mine.mean())
-        if share >= LEAST_SHARE:
-            found.append(BareArea(reason, share, hull.points[mine]))
-            bare[mine] = False
-
+    tally = BareTally(hull, _covered(plan.axes, hull, requirements.tolerance))
+    take = tally.take
     if more is not None:
         take(sheet_more(plan.count), _covered([more], hull, requirements.tolerance))
     further, hindered = _further_plans(plan, surveys, requirements)
@@ -86,10 +108,10 @@ def bare_areas(
     take("flat", flat_samples(hull))
     least = f"{requirements.min_length * 1e3:g} mm long and {math.degrees(requirements.min_wrap):g} deg wide"
     left = np.zeros(len(hull), bool)
-    left[bare] = _round(surveys, hull.subset(bare), requirements.tolerance)
+    left[tally.bare] = _round(surveys, hull.subset(tally.bare), requirements.tolerance)
     take(f"round, but without room for a sheet {least}", left)
     take("curved in two ways, or in a corner", np.ones(len(hull), bool))
-    return sorted(found, key=lambda area: -area.share)
+    return tally.areas
 
 
 def sheet_more(count: int) -> str:

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.geometry.fit.bare_areas import LEAST_SHARE, BareArea, flat_samples, sheet_more
+from coneskin.geometry.fit.bare_areas import BareArea, BareTally, flat_samples, sheet_more
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 
-from .found_sheet import covered_samples
+from .found_sheet import covered_by
 
 __all__ = ["bare_beside"]
 
@@ -34,31 +34,16 @@ def bare_beside(
         hull: samples of the link.
         options: of the search.
     """
-    bare = ~_covered(sheets, hull, options.tolerance)
-    found: list[BareArea] = []
-
-    def take(reason: str, chosen: NDArray[np.bool_]) -> None:
-        mine = bare & chosen
-        share = float(mine.mean())
-        if share >= LEAST_SHARE:
-            found.append(BareArea(reason, share, hull.points[mine]))
-            bare[mine] = False
-
+    tally = BareTally(hull, covered_by(sheets, hull, options.tolerance))
+    take = tally.take
     if more:
-        take(sheet_more(len(sheets)), _covered(more, hull, options.tolerance))
+        take(sheet_more(len(sheets)), covered_by(more, hull, options.tolerance))
     for area in earlier:
         take(area.reason, _among(hull, area))
     take("flat", flat_samples(hull))
     least = f"{options.min_length * 1e3:g} mm long and {math.degrees(options.min_wrap):g} deg wide"
     take(f"curved in two ways, in a corner, or without room for a sheet {least}", np.ones(len(hull), bool))
-    return tuple(sorted(found, key=lambda area: -area.share))
-
-
-def _covered(sheets: Sequence[FittedSheet], hull: SurfaceSamples, tolerance: float) -> NDArray[np.bool_]:
-    covered = np.zeros(len(hull), bool)
-    for sheet in sheets:
-        covered |= covered_samples(sheet.placed, hull, tolerance)
-    return covered
+    return tuple(tally.areas)
 
 
 def _among(hull: SurfaceSamples, area: BareArea) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +24,7 @@ from .ruled_region import RuledRegion, columns_of, ruled_region
 from .ruling_candidates import RulingCandidate
 from .side_fit import fit_developable
 
-__all__ = ["FoundSheet", "covered_samples", "fit_sheet", "hull_points", "ruled_profile", "widest_region"]
+__all__ = ["FoundSheet", "covered_by", "fit_sheet", "hull_points", "ruled_profile", "widest_region"]
 
 Floats = NDArray[np.float64]
 
@@ -164,7 +165,7 @@ def _rise(mesh: Mesh, placed: PlacedDevelopable, tolerance: float) -> float:
     return mean if mean > 0.0 and spread <= 0.3 * mean else 0.0
 
 
-def covered_samples(placed: PlacedFrustum, hull: SurfaceSamples, distance: float) -> NDArray[np.bool_]:
+def _covered_samples(placed: PlacedFrustum, hull: SurfaceSamples, distance: float) -> NDArray[np.bool_]:
     """Return whether a sheet lies on each sample of the hull, shape (n,)."""
     side = placed.frustum
     u, phi, off = placed.locate_all(hull.points)
@@ -173,6 +174,14 @@ def covered_samples(placed: PlacedFrustum, hull: SurfaceSamples, distance: float
         inside = (np.abs(off) <= distance) & (u >= 0.0) & (u <= side.slant)
     normals = placed.place(np.zeros(len(phi)), phi)[1]
     return np.asarray(inside & (np.einsum("ij,ij->i", normals, hull.normals) > _ALIGNED))
+
+
+def covered_by(sheets: Iterable[FittedSheet], hull: SurfaceSamples, distance: float) -> NDArray[np.bool_]:
+    """Return whether any of the sheets lies on each sample of the hull, shape (n,)."""
+    covered = np.zeros(len(hull), bool)
+    for sheet in sheets:
+        covered |= _covered_samples(sheet.placed, hull, distance)
+    return covered
 
 
 def _checked(
@@ -214,7 +223,7 @@ def _checked(
         return None
     kept = slice(run[0], run[1])
     seen = off[kept][~hole[kept]]
-    covers = covered_samples(placed, hull, 1.5 * options.tolerance)
+    covers = _covered_samples(placed, hull, 1.5 * options.tolerance)
     full = region.columns == len(profile.phi)
     sheet = FittedSheet(
         placed=placed,

@@ -23,7 +23,7 @@ from coneskin.geometry.ray_casting import RayCaster
 from .bare_beside import bare_beside
 from .found_sheet import (
     FoundSheet,
-    covered_samples,
+    covered_by,
     fit_sheet,
     hull_points,
     ruled_profile,
@@ -64,9 +64,7 @@ def with_developables(
     say("looking for rulings")
     mesh, rays, hull, weights = link.mesh, link.rays, link.counted, link.weights
     worth = np.ones(len(hull)) if weights is None else weights.at(hull.points)
-    taken = np.zeros(len(hull), bool)
-    for sheet in cones.sheets:
-        taken |= covered_samples(sheet.placed, hull, 1.5 * tolerance)
+    taken = covered_by(cones.sheets, hull, 1.5 * tolerance)
     least = LEAST_GAIN
     if float(worth[~taken].sum()) < least * float(worth.sum()):
         return cones
@@ -126,9 +124,7 @@ def _pack(
     while len(done) < most:
         there = [*others, *done]
         regions = _regions(coarse, options, there)
-        taken = np.zeros(len(hull), bool)
-        for sheet in there:
-            taken |= covered_samples(sheet.placed, hull, 1.5 * options.tolerance)
+        taken = covered_by(there, hull, 1.5 * options.tolerance)
         best: FoundSheet | None = None
         tried = 0
         for area, number, region in regions:
