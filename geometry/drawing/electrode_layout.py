@@ -27,6 +27,8 @@ from .surface_shape import ShapeCorner, ShapeTab, SheetSide, SurfaceShape
 
 __all__ = ["ElectrodePlan", "SheetLayout", "SurfaceRectangle", "edge_room", "lay_out_sheet"]
 
+#: side of the wires -> the electrode beside it, the one opposite to it, and the two that run towards it
+_ELECTRODES = {"end1": "BADC", "end2": "ABDC", "edge0": "DCBA", "edge1": "CDBA"}
 _LEAST = 1e-4  # m; no cutter makes a narrower strip or gap
 _LEAST_ACTIVE = 1e-3  # m; less between the electrodes is no sensor
 _MIN_WEB = 1e-3  # m; least width of material around a hole
@@ -81,6 +83,11 @@ class ElectrodePlan:
             raise GeometryError(
                 f"lead must be at most the electrode ({self.electrode * 1e3:.4g} mm), got {self.lead * 1e3:.4g} mm"
             )
+
+    @property
+    def led_across(self) -> str:
+        """The electrode on the far side, whose lead crosses the sheet to the wires, where its own layer is cut away."""
+        return _ELECTRODES[self.wires][1]
 
     @property
     def least_arc(self) -> float:
@@ -219,7 +226,6 @@ def lay_out_sheet(sheet: Frustum, plan: ElectrodePlan | None = None) -> SheetLay
     along_marks = tuple(shape((sp, q), (end_p, q)) for q in (mq, mq + eq, high, edge_q))
     hole_p, hole_q = 0.5 * (mp + sp), 0.5 * (mq + sq)
     holes = shape((hole_p, q_all - hole_q), (p_all - hole_p, q_all - hole_q), (p_all - hole_p, hole_q))
-    names = {"end1": "BADC", "end2": "ABDC", "edge0": "DCBA", "edge1": "CDBA"}[plan.wires]
     return SheetLayout(
         sheet=sheet,
         plan=plan,
@@ -228,9 +234,9 @@ def lay_out_sheet(sheet: Frustum, plan: ElectrodePlan | None = None) -> SheetLay
         rim=shape((0.0, 0.0), (0.0, q_all), (p_all, q_all), (p_all, 0.0)),
         upper=across if at_end else along,
         lower=along if at_end else across,
-        foils=dict(sorted(zip(names, (near_foil, far_foil, low_foil, high_foil), strict=True))),
+        foils=dict(sorted(zip(_ELECTRODES[plan.wires], (near_foil, far_foil, low_foil, high_foil), strict=True))),
         marks={"upper" if at_end else "lower": across_marks, "lower" if at_end else "upper": along_marks},
-        folds={name: fold(q) for name, q in zip(names, tab_q, strict=True)} if plan.tab else {},
+        folds={name: fold(q) for name, q in zip(_ELECTRODES[plan.wires], tab_q, strict=True)} if plan.tab else {},
         holes=tuple((at.u, at.phi) for at in holes if isinstance(at, ShapeCorner)) if plan.hole else (),
     )
 

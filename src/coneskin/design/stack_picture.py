@@ -111,7 +111,7 @@ def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
     thick = 0.012 * reach
     foils = [("D", margin, width, 1.0), ("C", -shown_gap - margin - width, width, 1.0)]
     if plan.wires.startswith("end"):  # of the electrode at the other end, on its way to the wires
-        foils.append((f"lead of {'A' if plan.wires == 'end1' else 'B'}", *_lead(layout, arc), -1.0))
+        foils.append((f"lead of {plan.led_across}", *_lead(layout, arc), -1.0))
     for name, start, wide, way in foils:  # on the faces of the conductive sheets, towards each other
         face, beyond = (heights[2], heights[1]) if way > 0.0 else (heights[3], heights[4])
         axes.fill_between([start, start + wide], face, face + way * thick, color=FOIL_COLOUR)
@@ -168,7 +168,7 @@ def _lead(layout: Any, arc: float) -> tuple[float, float]:
     """Return where the lead along edge 0 begins, and its width [mm]."""
     from coneskin.geometry.drawing.surface_shape import ShapeCorner
 
-    foil = layout.foils["A" if layout.plan.wires == "end1" else "B"]
+    foil = layout.foils[layout.plan.led_across]
     start, end, *_ = sorted({round(corner.phi, 9) for corner in foil if isinstance(corner, ShapeCorner)})
     return start * arc, (end - start) * arc
 

@@ -56,7 +56,7 @@ def _short_of_room(figures: BuildFigures, rooms: dict[str, float]) -> Iterator[s
         return
     other = "end2" if cable.side == "end1" else "end1"
     more = rooms.get(other, 0.0)
-    if room in place.free:
+    if room == place.free[cable.side == "end2"]:  # the link goes on, but not clear of the cable
         yield (
             f"Another part of the link is in the way of the cable at edge 0, {in_mm(room)} beyond "
             f"{side_name(cable.side)}: design again with `--seam X Y Z`, a direction in which the link goes on clear "

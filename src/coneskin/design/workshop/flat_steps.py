@@ -15,9 +15,6 @@ from .wiring import STRIPPED
 
 __all__ = ["flat_steps"]
 
-#: side of the wires -> the electrode whose lead runs to it from the other side
-_LED_AROUND = {"end1": "A", "end2": "B", "edge0": "C", "edge1": "D"}
-
 
 def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the steps that are done while everything is flat."""
@@ -67,7 +64,7 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     yield (
         "Cover the bare faces of all four foils, leads included, with polyimide tape that stands 1 mm over the foil on "
         "each side: they will face the other conductive sheet. The lead of "
-        f"{_LED_AROUND[plan.wires]} lies where its sheet is cut away: cover its adhesive too. Only the tabs stay bare. "
+        f"{plan.led_across} lies where its sheet is cut away: cover its adhesive too. Only the tabs stay bare. "
         "*Check:* a probe slid along the tape finds no contact with the foil below."
     )
     ab, cd = figures.pairs

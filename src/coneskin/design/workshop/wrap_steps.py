@@ -40,33 +40,31 @@ def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         else ""
     )
     seen = "anticlockwise as seen when you look from end 2 towards end 1"
+    strips = f"strips of {TAPE} 3 mm wide on both of its faces, along its rim and outside the foils only"
+    isolation = (
+        f"Wrap part 4, outside up. Fix it with {strips}: adhesive on the active area would glue the conductive sheets "
+        "apart."
+    )
     if stack.assembly == "loose":
         yield (
             f"Wrap part 1, outside up (labels towards you), on {TAPE}, here and below edge to edge under the whole "
             f"part: end 1 and edge 0 on the pencil lines, {seen}.{pins}"
         )
         yield f"Wrap part 3, inside towards the link, on {TAPE}, within {marks}; its foils face you."
-        yield (
-            f"Wrap part 4, outside up. Fix it with strips of {TAPE} 3 mm wide, on both of its faces, along its rim and "
-            "outside the foils only: adhesive on the active area would glue the conductive sheets apart."
-        )
+        yield isolation
         yield "Wrap part 5, its foils towards the isolation, fixed by the same strips."
         yield f"Wrap part 7, inside towards the link, on {TAPE} to the outside of part 5, within its blue outline."
     elif stack.assembly == "pairs":
         yield (f"Glue part 3 on part 1 (outside up), its foils up, within {marks}, with {TAPE}, both flat.")
         yield f"Glue part 5 on part 7 (inside up), its foils up, within its blue outline, with {TAPE}."
         yield f"Wrap the pair 1 and 3 on {TAPE}: end 1 and edge 0 on the pencil lines, {seen}.{pins}"
-        yield (
-            f"Wrap part 4, outside up. Fix it with strips of {TAPE} 3 mm wide, on both of its faces, along its rim and "
-            "outside the foils only: adhesive on the active area would glue the conductive sheets apart."
-        )
+        yield isolation
         yield "Wrap the pair 5 and 7, fixed by the same strips, part 7 outermost."
     else:
         yield (f"Lay part 1 on the bench, outside up.{pins} Glue part 3 on it, its foils up, within {marks}.")
         yield (
-            f"Lay part 4 on it, outside up, with strips of {TAPE} 3 mm wide on both of its faces, along its rim and "
-            "outside the foils only; then part 5, its foils down, on the same strips; then part 7, inside down, with "
-            "tape, within its blue outline."
+            f"Lay part 4 on it, outside up, with {strips}; then part 5, its foils down, on the same strips; then part "
+            "7, inside down, with tape, within its blue outline."
         )
         yield f"Wrap the whole on {TAPE}: end 1 and edge 0 on the pencil lines, {seen}."
     side = design.place.frustum
