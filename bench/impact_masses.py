@@ -16,6 +16,7 @@ from report import head
 
 from coneskin.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.scene.reader import parse_scene
+from coneskin.testing.forearm import forearm_scene
 
 MOTIONS = {
     "base turns 70 deg": "[[-10, -90, 90, -90, -90, 0], [60, -90, 90, -90, -90, 0]]",
@@ -24,19 +25,7 @@ MOTIONS = {
     "elbow through stretched out": "[[0, -90, -60, -90, -90, 0], [40, -60, 60, -90, -60, 0]]",
 }
 
-SCENE = """
-[arm]
-model = "UR5e"
-host = "127.0.0.1"
-[[link]]
-name = "forearm"
-[[link.sensor]]
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
-[reaction]
-kind = "stop"
+MOTION = """
 [motion]
 waypoints_deg = {motion}
 speed_deg_s = 60
@@ -54,7 +43,7 @@ def main() -> None:
         f"{'48 patches of the forearm':28} heavier than sampled: median  95 %   worst   lighter: worst   above its step"
     )
     for name, motion in MOTIONS.items():
-        scene = parse_scene(SCENE.format(motion=motion))
+        scene = parse_scene(forearm_scene() + MOTION.format(motion=motion))
         patches, sample = patches_of(scene), motion_positions(scene)
         assert scene.motion is not None
         box = list(zip(*scene.motion.waypoints, strict=True))

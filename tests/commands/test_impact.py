@@ -6,28 +6,19 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
+from coneskin.testing.forearm import forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
-SCENE = """
-[arm]
-model = "UR5e"
-host = "127.0.0.1"
-[[link]]
-name = "forearm"
-[[link.sensor]]
-radius1_mm = 37.6
-radius2_mm = 37.2
-height_mm = 260
-xyz_mm = [0, 0, 80]
-[reaction]
-kind = "stop"
-deceleration_rad_s2 = 20
+SCENE = (
+    forearm_scene(reaction='kind = "stop"\ndeceleration_rad_s2 = 20')
+    + """
 [motion]
 waypoints_deg = [[-10, -90, 90, -90, -90, 0], [60, -90, 90, -90, -90, 0]]
 speed_deg_s = 60
 acceleration_deg_s2 = 400
 """
+)
 BODY = '[[body]]\nkind = "hand"\nxyz_mm = [-192, -120, 587]\nmass_kg = 0.6\nstiffness_n_per_mm = 20\n'
 
 
