@@ -6,11 +6,10 @@ import pytest
 import tomli_w
 
 from coneskin.scene.reader import load_scene, parse_scene
-from coneskin.scene.tables.speed_limit_check import limit_digest
-from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START
 
+from ..speed_limit_values import limit_values
 from .guarded_session import kill, moving, scene_text, until
 
 pytestmark = pytest.mark.long
@@ -39,22 +38,12 @@ def limited_scene(simulated, folder):
     (sensor,) = bare.sensors
     patch = {"sensor": sensor.sensor.name, "curve": 0, "any_curve": 0}
     ends = 0.0, 1e3 * sensor.sensor.frustum.slant
-    limit = {
-        "format": 2,
-        "fingerprint": limit_fingerprint(bare),
-        "date": "2026-11-23T06:00:00Z",
-        "coneskin": "0.1.0",
-        "edition": "invented",
-        "transcribed_by": "one",
-        "verified_by": "other",
-        "measured_by": "a test",
-        "reaction_ms": 10.0,
-        "deceleration_rad_s2": 8.0,
-        "levers_mm": [100.0, 200.0, 400.0],
-        "curve": [{"region": "hand", "speeds_mm_s": [200.0, 200.0, 200.0]}],
-        "patch": [{**patch, "u_mm": u, "phi_deg": phi} for u in ends for phi in (0.0, 90.0, 180.0, 270.0)],
-    }
-    limit["digest"] = limit_digest(limit)
+    limit = limit_values(
+        bare,
+        deceleration_rad_s2=8.0,
+        curve=[{"region": "hand", "speeds_mm_s": [200.0, 200.0, 200.0]}],
+        patch=[{**patch, "u_mm": u, "phi_deg": phi} for u in ends for phi in (0.0, 90.0, 180.0, 270.0)],
+    )
     (folder / "impact.toml").write_text(tomli_w.dumps({"speed_limit": limit}), encoding="utf-8")
     named = text.replace('model = "UR5e"', 'model = "UR5e"\nspeed_limit_from = "impact.toml"')
     (folder / "scene.toml").write_text(named, encoding="utf-8")

@@ -19,9 +19,10 @@ from coneskin.scene.build import _speed_limit, build_core, place_on_arm
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.scene import Scene
 from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
-from coneskin.scene.tables.speed_limit_check import limit_digest
 from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.testing.forearm import forearm_scene
+
+from ..speed_limit_values import limit_values
 
 SCENE = forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n"
 LIMITED = SCENE.replace('model = "UR5e"', 'model = "UR5e"\nspeed_limit_from = "impact.toml"')
@@ -44,22 +45,11 @@ def curve(*speeds: float) -> dict[str, object]:
 
 def table(**changes: object) -> dict[str, object]:
     values: dict[str, object] = {
-        "format": 2,
-        "fingerprint": limit_fingerprint(parse_scene(SCENE)),
-        "date": "2026-11-23T06:00:00Z",
-        "coneskin": "0.1.0",
-        "edition": "invented",
-        "transcribed_by": "one",
-        "verified_by": "other",
-        "measured_by": "a test",
-        "reaction_ms": 10.0,
         "deceleration_rad_s2": 9.0,
-        "levers_mm": [100.0, 200.0, 400.0],
         "curve": [{"region": "hand", "speeds_mm_s": [50.0, 100.0, 200.0]}],
         "patch": around(0.0, 90.0, 180.0, 270.0),
     }
-    values |= changes
-    return {"speed_limit": {"digest": limit_digest(values)} | values}
+    return {"speed_limit": limit_values(parse_scene(SCENE), **values | changes)}
 
 
 def load(folder: Path, text: str = LIMITED, **changes: object) -> Scene:
