@@ -25,8 +25,8 @@ from report import head
 from scipy.spatial import KDTree
 
 import coneskin as cs
-from coneskin.design.seam_strip import blind_angle, cover_seams
-from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.sheets.seam_strip import blind_angle, cover_seams
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
 from coneskin.design.workshop.jig import Collar, jig_collars
 from coneskin.design.workshop.jig_surroundings import with_sheets
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan

@@ -22,13 +22,13 @@ from dataclasses import replace
 
 from report import head, quantile
 
-from coneskin.calibration.fit import fit_map
-from coneskin.calibration.marks import MARK_COUNTS, calibration_marks
-from coneskin.calibration.refusals import KnownTouch
-from coneskin.commissioning.misreadings import Place
-from coneskin.errors import SkinError
+from coneskin.commissioning.acceptance.misreadings import Place
+from coneskin.commissioning.calibration.fit import fit_map
+from coneskin.commissioning.calibration.marks import MARK_COUNTS, calibration_marks
+from coneskin.commissioning.calibration.refusals import KnownTouch
+from coneskin.core.errors import SkinError
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.reading import read
+from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.electronics import LeadOhms
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact

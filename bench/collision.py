@@ -4,9 +4,9 @@
     python bench/collision.py --case 123 --way retreat
 
 Random collisions (bench/collision_cases.py), the same ones in each way: the guard with each of its reactions, the
-controller's own force limit imitated (coneskin.physics.force_limit), and nothing. Force arises from the motion: MuJoCo
+controller's own force limit imitated (impact.simulation.force_limit), and nothing. Force arises from the motion: MuJoCo
 moves the arm and the bodies, the padding makes the force, the skin's bytes reach the guard, its stop changes the motion
-(coneskin.physics.collision_run), in virtual time with the latencies that were measured.
+(coneskin.impact.simulation.collision_run), in virtual time with the latencies that were measured.
 
 peak: greatest force on the body. clamp: force 0.5 s after the first contact. worse: collisions whose clamp is more than
 --most-n above a bare stop's. missed: a body felt more than 5 N and nothing was sent to stop the arm. The exit code is 0
@@ -31,8 +31,8 @@ from pathlib import Path
 from collision_cases import KINDS, RUN_UP_ACCELERATION, draw
 from report import commit, head, quantile
 
-from coneskin.physics.collision_run import CollisionRun
-from coneskin.physics.joint_program import ConstantSpeed
+from coneskin.impact.simulation.collision_run import CollisionRun
+from coneskin.impact.simulation.joint_program import ConstantSpeed
 from coneskin.skin.padding import Padding
 
 REACTIONS = ("stop", "retreat", "comply", "slow")

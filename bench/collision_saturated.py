@@ -17,7 +17,7 @@ from collision import rows_of
 from collision_settled import settle
 from report import head
 
-from coneskin.physics.impact_outcome import CLAMP_TIME
+from coneskin.impact.simulation.impact_outcome import CLAMP_TIME
 
 _KINDS = ("wall", "post", "hand")
 _LIMIT = 0.99  # of its highest torque, from which on a motor is at its limit

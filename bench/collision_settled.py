@@ -18,12 +18,12 @@ from collision import REACTIONS, rows_of
 from collision_cases import RUN_UP_ACCELERATION, draw
 from report import head
 
-from coneskin.physics.collision_run import CollisionRun
-from coneskin.physics.impact_outcome import CLAMP_TIME
-from coneskin.physics.joint_program import ConstantSpeed
-from coneskin.recording import Block
+from coneskin.core.recording.block import Block
+from coneskin.impact.simulation.collision_run import CollisionRun
+from coneskin.impact.simulation.impact_outcome import CLAMP_TIME
+from coneskin.impact.simulation.joint_program import ConstantSpeed
 from coneskin.robot.arm.ur_inertias import arm_inertia
-from coneskin.robot.guard.journal import BlockKind, EventName, decode_event
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_event
 
 
 def settle(seed: int, way: str, until: float) -> tuple[float, float, float]:

@@ -4,7 +4,7 @@
     python bench/decode.py --quick               # under a minute
     python bench/decode.py --write               # also bench/RESULTS-decode.md and bench/decode.png
 
-The sheets are solved by finite elements (coneskin.testing.field.flat_plant, NGSolve), the circuit by nodal analysis
+The sheets are solved by finite elements (tests.support.field.flat_plant, NGSolve), the circuit by nodal analysis
 (converter_plant), the frames go as bytes into the stream of the tree at hand and of an older commit, each in a process
 of its own, the same frames to both.
 """
@@ -34,7 +34,7 @@ import numpy as np
 from decode_plants import RADII, SHEETS, STIFFNESSES, SolvedPlants, disc_cases
 from decode_runs import ROOT, Decoder
 
-from coneskin.testing.field.flat_plant import FlatPlant
+from tests.support.field.flat_plant import FlatPlant
 
 OLD = "5a3f846"  # the commit whose decoder ../shared/design/decode.md measured
 ALL = "cells,several,power,disturbances,collisions,time"

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from decode_plants import RELATIVE, SHEETS, STEP, Case, SolvedPlants, radius_at
 
-from coneskin.testing.field.converter_plant import ConverterPlant
+from tests.support.field.converter_plant import ConverterPlant
 
 PRIOR_RADIUS, PRIOR_CONDUCTANCE = 0.5, 1.0  # standard deviation of the logarithms
 

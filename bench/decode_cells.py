@@ -10,7 +10,7 @@ from decode_bound import bound, varied
 from decode_plants import RADII, SHEETS, STIFFNESSES, SolvedPlants, disc_cases, radius_at, solve_bare
 from decode_runs import LEARNED, Decoder, Sitting
 
-from coneskin.testing.field.converter_plant import ConverterPlant
+from tests.support.field.converter_plant import ConverterPlant
 
 MATCHED = 2.2  # of the larger untouched drive current
 BASELINES = (0.0, 3e-3, 1e-2)  # ratio; standard deviation of the drift of each sheet since it was learned

@@ -20,7 +20,7 @@ import numpy as np
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import SkinFault
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor

@@ -10,7 +10,7 @@ from decode_plants import RADII, SHEETS, Case, SolvedPlants, disc_cases, radius_
 from decode_runs import LEARNED, Decoder, Sitting
 from report import quantile
 
-from coneskin.testing.field.converter_plant import leak_admittance
+from tests.support.field.converter_plant import leak_admittance
 
 BITS = "16 bit, matched"  # so that noise hides nothing
 

@@ -19,10 +19,10 @@ from pathlib import Path
 
 from decode_fault_kinds import FaultCase, draw_kind
 
-from coneskin.errors import SkinConnectionError
+from coneskin.core.errors import SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import SkinFault, TouchBegan
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.matched_electronics import match_electronics

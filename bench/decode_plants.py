@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from coneskin.testing.field.flat_plant import FlatPlant, PressedPatch
+from tests.support.field.flat_plant import FlatPlant, PressedPatch
 
 RADII = (1e-3, 3e-3, 7.5e-3, 15e-3)  # m
 STIFFNESSES = (0.3, 1.0, 3.0, math.inf)  # ka

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from coneskin.testing.field.converter_plant import ConverterPlant
-from coneskin.testing.field.flat_plant import FlatPlant
+from tests.support.field.converter_plant import ConverterPlant
+from tests.support.field.flat_plant import FlatPlant
 
 CHILD = Path(__file__).with_name("decode_child.py")
 ROOT = CHILD.parent.parent

@@ -11,7 +11,7 @@ from decode_cells import electronics
 from decode_plants import SEVERAL, SHEETS, Case, SolvedPlants, disc_cases, several_cases
 from decode_runs import LEARNED, Decoder, Sitting
 
-from coneskin.testing.field.flat_plant import FlatPlant, PressedPatch
+from tests.support.field.flat_plant import FlatPlant, PressedPatch
 
 FRAMES = 20
 DANGEROUS = math.radians(20.0)

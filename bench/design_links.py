@@ -31,7 +31,7 @@ from pathlib import Path
 import numpy as np
 from report import head
 
-from coneskin.errors import MeshError
+from coneskin.core.errors import MeshError
 from coneskin.geometry.fit import hypotheses
 from coneskin.geometry.fit.axis_plan import SheetRequirements, plan_sheets
 from coneskin.geometry.fit.candidates import AxisCandidate

@@ -21,7 +21,7 @@ from coneskin.geometry.fit.developable.packing import with_developables
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.sampled_link import sample_link
 from coneskin.geometry.pose import Pose
-from coneskin.testing.ruled_tube import RuledTube, ellipse_section, rounded_box_section, stadium_section
+from tests.support.ruled_tube import RuledTube, ellipse_section, rounded_box_section, stadium_section
 
 POSE = Pose.from_xyz_rpy((0.1, 0.2, -0.1), (0.5, -0.3, 0.8))
 TUBES = {

@@ -27,10 +27,11 @@ from typing import Any
 
 from report import head
 
-from coneskin.recording import Block, encode_block
+from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.driver.messages import StopProgram
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
+from coneskin.robot.sim.companion_processes import CompanionProcesses
 from coneskin.robot.ur.state_reader import RECIPE
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
@@ -38,7 +39,6 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import Frame, encode
-from coneskin.testing.companion_processes import CompanionProcesses
 from coneskin.testing.forearm import forearm_scene
 
 RATE_HZ = 1000

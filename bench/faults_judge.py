@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from coneskin.errors import ConeSkinError
-from coneskin.replay.run import Run, read_run, replay
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.errors import ConeSkinError
+from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.runs.replay.run import Run, read_run, replay
 from coneskin.skin.wire import FrameDecoder
 
 

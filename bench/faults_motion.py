@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from faults_setup import give_precedence
 
-from coneskin.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose

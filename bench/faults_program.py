@@ -21,8 +21,8 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from coneskin.errors import ConeSkinError
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.core.errors import ConeSkinError
+from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.session.session import Session, guard
 
 FILES = 1100

@@ -26,7 +26,7 @@ from faults_child import Child
 from faults_motion import BEHIND, ArmMotion, Touch
 from faults_setup import ACCELERATION, CLOCK, GOAL, MONITORING, SECOND_SKIN, SPEED, USUAL, Setup, give_precedence
 
-from coneskin.errors import ConeSkinError, RobotConnectionError
+from coneskin.core.errors import ConeSkinError, RobotConnectionError
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import load_scene
 from coneskin.testing.commissioned import write_passed_record

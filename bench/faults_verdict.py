@@ -12,9 +12,9 @@ from faults_kind import FEW, FaultKind
 from faults_setup import CLOCK, GOAL, SLOW, STOP, MachineWatch, Outcome
 from faults_trial import Trial
 
-from coneskin.errors import ConeSkinError
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.errors import ConeSkinError
+from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.runs.replay.run import read_run
 
 PATIENCE = 3.0  # s beyond the budget for which a late standstill is waited for
 RESTARTS_END = 8.0  # s after which an arm that is started again and again does not stand any more

@@ -33,10 +33,10 @@ import numpy as np
 from field_tables import Run, draw, print_agreement, print_table, print_work, show_time
 from report import head
 
-from coneskin.testing.field.port_solution import port_solution
-from coneskin.testing.field.problems import Problem
-from coneskin.testing.field.reference import Reference, load_references, provenance
-from coneskin.testing.field.solution import solve_discs, solve_general
+from tests.support.field.port_solution import port_solution
+from tests.support.field.problems import Problem
+from tests.support.field.reference import Reference, load_references, provenance
+from tests.support.field.solution import solve_discs, solve_general
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
 CELLS = ((8, 2), (12, 3), (16, 4), (24, 5), (32, 7), (48, 9), (64, 11))
@@ -47,15 +47,15 @@ def installed() -> list[Any]:
     found: list[Any] = []
     if find_spec("ngsolve") is None:
         return found
-    from coneskin.testing.field import ngsolve_peer
+    from tests.support.field import ngsolve_peer
 
     found.append(ngsolve_peer)
     if find_spec("skfem") is not None:
-        from coneskin.testing.field import skfem_peer
+        from tests.support.field import skfem_peer
 
         found.append(skfem_peer)
         if find_spec("pyeit") is not None:
-            from coneskin.testing.field import pyeit_peer
+            from tests.support.field import pyeit_peer
 
             found.append(pyeit_peer)
     return found

@@ -5,7 +5,7 @@
 
 Sheet ratio 1e-6 to 1e6, r1/width 1e-6 to 10 (widening, narrowing, cylinders), sector angles to a full turn, radius from
 1e-4 of the room to the edge, one disc or two, bonds and ka 1e-3 to 10, inputs of 1 to 1e18 ohm or open, tolerances 1e-4
-to 1e-12. The reference is `coneskin.testing.field.rim_solution`, at two densities of points; where it does not
+to 1e-12. The reference is `tests.support.field.rim_solution`, at two densities of points; where it does not
 settle (rims along an edge), the series at three times the order and nine times the points, also twice. Its circuit is
 in 60 digits. A case without a settled reference counts for nothing, and is listed.
 """
@@ -26,15 +26,15 @@ import numpy as np
 from field_tables import print_table
 from report import head, quantile
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.skin.field.coupling import Coupling
 from coneskin.skin.field.disc import Disc, Discs, centre_distance
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.multipole import solve_discs
 from coneskin.skin.field.sheet import SectorSheet
-from coneskin.testing.field.exact_circuit import exact_volts
-from coneskin.testing.field.rim_solution import solve_rims
+from tests.support.field.exact_circuit import exact_volts
+from tests.support.field.rim_solution import solve_rims
 
 ROUNDING = 3e-13  # of the supply: what both sides' rounding may leave at these extremes
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from coneskin.skin.field.fourport import Readings, angular_phase, radial_phase
 from coneskin.skin.field.patch import solve_patch
-from coneskin.testing.field.port_solution import PortSolution
-from coneskin.testing.field.problems import Problem
-from coneskin.testing.field.solution import contact_patch, disc_arrays, field_model
+from tests.support.field.port_solution import PortSolution
+from tests.support.field.problems import Problem
+from tests.support.field.solution import contact_patch, disc_arrays, field_model
 
 PHASES = (radial_phase(), angular_phase())
 

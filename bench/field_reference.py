@@ -1,6 +1,6 @@
 """Reference solutions of the field problems by NGSolve, written once and committed with their provenance.
 
-    python bench/field_reference.py --write      # makes src/coneskin/testing/field/reference.json, about four minutes
+    python bench/field_reference.py --write      # makes tests/support/field/reference.json, about four minutes
     python bench/field_reference.py              # compares the committed file with this machine's NGSolve
 
 Every sensor is solved twice, at degree 12 on one mesh and at degree 10 on a finer one; the file keeps the first and the
@@ -19,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from coneskin.testing.field.ngsolve_peer import solve
-from coneskin.testing.field.port_solution import port_solution
-from coneskin.testing.field.problems import (
+from tests.support.field.ngsolve_peer import solve
+from tests.support.field.port_solution import port_solution
+from tests.support.field.problems import (
     Array,
     Problem,
     general_problems,
@@ -29,7 +29,7 @@ from coneskin.testing.field.problems import (
     random_problems,
     standard_problems,
 )
-from coneskin.testing.field.reference import PATH, Reference, encode_reference, load_references
+from tests.support.field.reference import PATH, Reference, encode_reference, load_references
 
 
 def phases(problem: Problem, energies: Array, modes: Array) -> Array:
@@ -103,7 +103,7 @@ def write(path: Path = PATH, progress: Callable[[str], None] = print) -> None:
         progress(f"{problem.name}: ports agree to {last.estimate:.1e}, potentials to {last.field_estimate:.1e}")
     content = {
         "provenance": {
-            "what": "hp-FEM in the physical plane, discs meshed with curved elements; testing/field/ngsolve_peer.py",
+            "what": "hp-FEM in the physical plane, discs meshed with curved elements; tests.support.field",
             "command": "python bench/field_reference.py --write",
             "versions": {"ngsolve": ngsolve.__version__, "numpy": np.__version__, "python": sys.version.split()[0]},
             "order": "degree 12, edges 0.5 width / 0.7 radius; checked by degree 10, 0.4 width / 0.5 radius",

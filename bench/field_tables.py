@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from coneskin.testing.field.port_solution import PortSolution
-from coneskin.testing.field.problems import Problem
-from coneskin.testing.field.reference import Reference
+from tests.support.field.port_solution import PortSolution
+from tests.support.field.problems import Problem
+from tests.support.field.reference import Reference
 
 TARGETS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 

@@ -28,8 +28,8 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.virtual.field_contacts import FieldContacts
 from coneskin.skin.wire import FrameDecoder
-from coneskin.testing.firmware.emulated_board import BoardPrograms, BoardRun, run_board
-from coneskin.testing.firmware.firmware_build import build_emulator, build_sketch, missing_tools
+from tests.support.firmware.emulated_board import BoardPrograms, BoardRun, run_board
+from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 
 SENSOR = board_circuit("uno", Sensor(Frustum(0.0375, 0.0375, 0.24, math.radians(350)))).sensor
 PLACES = ((0.05, 1.0), (0.2, 5.0))  # u [m], phi [rad]

@@ -19,17 +19,17 @@ from pathlib import Path
 
 from report import head, quantile
 
-from coneskin.errors import Collision
-from coneskin.replay.run import read_run
-from coneskin.replay.run_picture import draw_run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.errors import Collision
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.runs.replay.run import read_run
+from coneskin.runs.replay.run_picture import draw_run
 from coneskin.session.session import guard
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-from coneskin.testing.firmware.emulated_board import BoardPrograms, EmulatedBoard, sheets_at_touch
-from coneskin.testing.firmware.firmware_build import build_emulator, build_sketch, missing_tools
-from coneskin.testing.firmware.guarded_board import board_scene
 from coneskin.testing.forearm import GOAL, START
+from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard, sheets_at_touch
+from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
+from tests.support.firmware.guarded_board import board_scene
 
 NAMES = ("frame", "stop written", "slower", "standstill")
 

@@ -22,9 +22,9 @@ from impact_neglected import LIMIT, Neglected, neglected
 from impact_pushes import CONE, HORIZON, LINK, MODEL, RADIUS, RATIO, Push, draw_push
 from report import head, quantile
 
-from coneskin.physics.mujoco_plant import MujocoPlant
-from coneskin.physics.scene_description import SheetOnLink
-from coneskin.scene.body import BodyScene
+from coneskin.impact.simulation.mujoco_plant import MujocoPlant
+from coneskin.impact.simulation.scene_description import SheetOnLink
+from coneskin.scene.values.body import BodyScene
 
 AGREED = 0.05
 _CYCLE, _STEP = 5e-4, 1e-4  # s from one target to the next; of the engine

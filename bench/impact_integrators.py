@@ -28,8 +28,8 @@ from impact_reference import closed_form, reference
 from report import head
 from scipy.integrate import solve_ivp
 
-from coneskin.permissible_speed.taylor_integrator import integrate
-from coneskin.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
+from coneskin.impact.permissible_speed.taylor_integrator import integrate
+from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.padding import Padding
 
 HAND = StruckBody(0.6, tissue=75e3, support=20e3, damping=2.0 * 0.3 * math.sqrt(20e3 * 0.6))

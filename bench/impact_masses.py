@@ -14,7 +14,7 @@ import random
 import numpy as np
 from report import head
 
-from coneskin.permissible_speed.arm_patches import motion_positions, patches_of, weigh
+from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.scene.reader import parse_scene
 from coneskin.testing.forearm import forearm_scene
 

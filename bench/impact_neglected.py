@@ -15,7 +15,7 @@ import numpy as np
 from impact_pushes import CONE, HORIZON, LINK, MODEL, RADIUS, SERVO, Push
 from numpy.typing import NDArray
 
-from coneskin.permissible_speed.contact_course import ContactCourse
+from coneskin.impact.permissible_speed.contact_course import ContactCourse
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.ur_inertias import arm_inertia
 

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose, Vector
-from coneskin.permissible_speed.arm_patches import ArmPatch
-from coneskin.permissible_speed.contact_course import ContactCourse
-from coneskin.permissible_speed.extra_way import ExtraWay, extra_ways
-from coneskin.permissible_speed.limits_file import BodyRegion, MeasuredReaction
-from coneskin.permissible_speed.speed_map import contact_at
-from coneskin.permissible_speed.speed_search import ForceLimits
-from coneskin.permissible_speed.taylor_integrator import integrate
-from coneskin.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
+from coneskin.impact.permissible_speed.arm_patches import ArmPatch
+from coneskin.impact.permissible_speed.contact_course import ContactCourse
+from coneskin.impact.permissible_speed.extra_way import ExtraWay, extra_ways
+from coneskin.impact.permissible_speed.limits_file import BodyRegion, MeasuredReaction
+from coneskin.impact.permissible_speed.speed_map import contact_at
+from coneskin.impact.permissible_speed.speed_search import ForceLimits
+from coneskin.impact.permissible_speed.taylor_integrator import integrate
+from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.robot.arm.inertia import effective_mass, mass_matrix
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh

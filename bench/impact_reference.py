@@ -10,7 +10,7 @@ from typing import Any
 
 import mpmath as mp
 
-from coneskin.permissible_speed.two_mass_contact import TwoMassContact
+from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
 
 __all__ = ["closed_form", "reference"]
 

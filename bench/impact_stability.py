@@ -20,8 +20,8 @@ import numpy as np
 from impact_integrators import TURN, by_scipy
 from report import head
 
-from coneskin.permissible_speed.taylor_integrator import integrate
-from coneskin.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
+from coneskin.impact.permissible_speed.taylor_integrator import integrate
+from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.padding import Padding
 
 MASSES = tuple(10.0 ** (n / 3.0) for n in range(-9, 10))  # kg

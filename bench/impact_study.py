@@ -17,8 +17,8 @@ import random
 import numpy as np
 from report import head, quantile
 
-from coneskin.permissible_speed.taylor_integrator import integrate
-from coneskin.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
+from coneskin.impact.permissible_speed.taylor_integrator import integrate
+from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.robot.arm.inertia import effective_mass
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model

@@ -22,7 +22,7 @@ from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Reaction
-from coneskin.testing.pinocchio_arm import load_pinocchio, pin_arm, pin_jacobian, pin_place
+from tests.support.pinocchio_arm import load_pinocchio, pin_arm, pin_jacobian, pin_place
 
 Q = (0.3, -1.2, 1.1, 0.4, 0.5, 0.6)
 POINT = (0.1, 0.02, 0.05)

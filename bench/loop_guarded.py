@@ -12,26 +12,26 @@ from typing import Any
 from loop_far_end import CLOCK, CYCLE, SENSOR, TOUCHED, FarEnd
 from loop_stamps import Stamp, Stamps
 
-from coneskin.channel import Channel, pair
+from coneskin.core.channel import Channel, pair
+from coneskin.core.recording.block import Block
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.recording import Block
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
-from coneskin.robot.guard.contact import GuardedSensor
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.guard.loop import GuardLoop
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.ports import GuardPorts
+from coneskin.robot.guard.signals.contact import GuardedSensor
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
 from coneskin.robot.ur.state_reader import RECIPE
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.frame.timing import TimingLimits
 from coneskin.skin.detection.stream import TouchStream
-from coneskin.skin.detection.timing import TimingLimits
 from coneskin.skin.sources.serial_port import SerialPort
 
 LATE = 0.5  # s; frames that the machine holds up are no matter here

@@ -9,10 +9,10 @@ from typing import Any
 
 from loop_far_end import CLOCK
 
-from coneskin.channel import Channel
+from coneskin.core.channel import Channel
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.journal import GuardEvent
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sources.serial_port import SerialPort
 from coneskin.skin.wire import FrameDecoder

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from report import head
 
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene.reader import parse_scene
 from coneskin.session.event_publisher import EventPublisher
 from coneskin.session.session import Session, guard

@@ -5,7 +5,7 @@
 
 Random collisions (bench/push_in_cases.py), the same ones in each reaction, in virtual time: the guard's core reads the
 bytes of a virtual skin, and an arm of bounded acceleration obeys its commands as late as was measured. What touches is
-a stiff pad at a place that is true whatever the skin reads (coneskin.testing.pressing_body).
+a stiff pad at a place that is true whatever the skin reads (tests.support.pressing_body).
 
 For each contact: the way of the surface at the true place towards the body, after the two touched, at its largest; a
 collision counts with its worst contact. Excess: the same less what a bare stop does in the same collision. The exit
@@ -28,7 +28,7 @@ from report import head, quantile
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.types import Reaction
-from coneskin.testing.collision_rig import CollisionRig
+from tests.support.collision_rig import CollisionRig
 
 REACTIONS = {
     "stop": Reaction("stop"),

@@ -16,8 +16,8 @@ from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.skin.sensor import Sensor
-from coneskin.testing.collision_rig import SkinOnLink
-from coneskin.testing.pressing_body import Body
+from tests.support.collision_rig import SkinOnLink
+from tests.support.pressing_body import Body
 
 ARMS = ("UR5e", "UR10e", "UR3e")
 SPEED = 0.1, 1.5  # rad/s, of the leading joint

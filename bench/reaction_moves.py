@@ -19,7 +19,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
-from coneskin.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError
 from coneskin.session.session import Session
 from coneskin.testing.forearm import START
 

@@ -17,13 +17,13 @@ from typing import Any
 
 from reaction_moves import CLOCK, EXTERNAL, Child, ExternalArm, GuardedArm
 
-from coneskin.errors import ConeSkinError
-from coneskin.replay.run import read_run
+from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.journal import BlockKind, decode_event
+from coneskin.robot.guard.signals.journal import BlockKind, decode_event
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.stop.stop_monitor import StopMonitor
 from coneskin.robot.ur.state_reader import StateReader, decode_state
+from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
 from coneskin.testing.forearm import START, forearm_scene

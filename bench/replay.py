@@ -24,10 +24,10 @@ from replay_long_run import record_long_run
 from replay_memory import memory
 from report import head
 
-from coneskin.replay.run import read_run, replay
-from coneskin.replay.touch_scan import scan_touches
-from coneskin.robot.guard.journal import INPUTS
-from coneskin.robot.guard.outputs import Output
+from coneskin.robot.guard.signals.journal import INPUTS
+from coneskin.robot.guard.signals.outputs import Output
+from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.touch_scan import scan_touches
 from coneskin.scene.build import build_core
 
 RUN = Path(__file__).parents[1] / "tests" / "data" / "collision.rec"

@@ -12,13 +12,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from coneskin.errors import ConeSkinError
-from coneskin.recording import Block
-from coneskin.recording_file.chunk import FILE_HEAD_SIZE, decode_body
-from coneskin.recording_file.reader import read_recording
-from coneskin.recording_file.scan import Chunk, walk
-from coneskin.replay.replay import Verdict
-from coneskin.replay.run import read_run, replay
+from coneskin.core.errors import ConeSkinError
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.chunk import FILE_HEAD_SIZE, decode_body
+from coneskin.core.recording.reader import read_recording
+from coneskin.core.recording.scan import Chunk, walk
+from coneskin.runs.replay.replay import Verdict
+from coneskin.runs.replay.run import read_run, replay
 
 __all__ = ["damage", "kill"]
 

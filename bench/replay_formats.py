@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from coneskin.recording import Block
-from coneskin.recording_file.reader import read_recording
-from coneskin.recording_file.recorder import Recorder
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.reader import read_recording
+from coneskin.core.recording.recorder import Recorder
 
 __all__ = ["formats"]
 

@@ -7,13 +7,13 @@ import math
 import random
 from pathlib import Path
 
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.run import read_run
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.driver.messages import StatusReport
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
-from coneskin.robot.guard.outputs import Output
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
+from coneskin.robot.guard.signals.outputs import Output
 from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.runs.replay.run import read_run
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch

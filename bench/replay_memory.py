@@ -8,14 +8,18 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.recording.recorder import Recorder
+from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.runs.replay.run import read_run
 
 __all__ = ["memory"]
 
-_SCAN = "import sys; from coneskin.replay.run import read_run; from coneskin.replay.touch_scan import scan_touches; "
-_SCAN += "scan_touches(read_run(sys.argv[1]))"
+_SCAN = """
+import sys
+from coneskin.runs.replay.run import read_run
+from coneskin.runs.replay.touch_scan import scan_touches
+scan_touches(read_run(sys.argv[1]))
+"""
 
 
 def memory(model: Path, folder: Path, megabytes: int) -> Iterator[str]:

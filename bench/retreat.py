@@ -19,7 +19,7 @@ from coneskin.robot.arm.kinematics import point_jacobian
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.reaction.retreat import LEAST_PROGRESS, RetreatPlan, plan_retreat
 from coneskin.robot.reaction.types import ArmState, Reaction
-from coneskin.testing.retreat_simulation import follow, joints_within, touch
+from tests.support.retreat_simulation import follow, joints_within, touch
 
 LINKS = {1: "shoulder", 2: "upper arm", 3: "forearm", 4: "wrist 1", 5: "wrist 2", 6: "wrist 3"}
 

@@ -17,7 +17,7 @@ import time
 
 from report import head
 
-from coneskin.errors import SkinConnectionError, SkinTimeout
+from coneskin.core.errors import SkinConnectionError, SkinTimeout
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor

@@ -15,13 +15,13 @@ from collections.abc import Sequence
 
 from report import head
 
-from coneskin.physics.joint_program import Waypoints
+from coneskin.impact.simulation.joint_program import Waypoints
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds, SurfaceSpeeds
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
+from coneskin.robot.sim.mock_arm import MockArm
 from coneskin.robot.ur.driver import UR_DRIVER
 from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q
-from coneskin.testing.mock_arm import MockArm
 
 CYCLE = 0.002  # s
 LATE = 10  # cycles from a command to its effect

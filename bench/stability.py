@@ -10,7 +10,7 @@ the 4 x 4 matrix Y instead of the structured elimination.
 
 from report import head
 
-from coneskin.testing.field.extremes import ORDER, POINTS, extreme_cases, measure, scale_errors
+from tests.support.field.extremes import ORDER, POINTS, extreme_cases, measure, scale_errors
 
 
 def main() -> None:

@@ -24,7 +24,7 @@ import time
 
 from report import head
 
-from coneskin.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard

@@ -28,8 +28,8 @@ from view_browser import PROCESSES, drawn_pictures, first_picture, resident
 from view_guard import guard_rounds, print_lateness
 from view_viewer import Viewer, processor_time, waited
 
-from coneskin.errors import ConeSkinError
-from coneskin.robot.guard.journal import EventName
+from coneskin.core.errors import ConeSkinError
+from coneskin.robot.guard.signals.journal import EventName
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard

@@ -6,9 +6,9 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from coneskin.recording import END, Block
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.recording.block import END, Block
+from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.runs.replay.run import read_run
 
 __all__ = ["RUN", "collisions_again", "header_of"]
 

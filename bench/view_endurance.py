@@ -23,8 +23,8 @@ from report import head
 from view_browser import resident
 from view_collisions import collisions_again, header_of
 
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
 from coneskin.view.live_page import LivePage
 from coneskin.view.live_run import LiveRun
 from coneskin.view.page_server import PageServer

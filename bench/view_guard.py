@@ -20,8 +20,8 @@ from typing import Any
 from report import quantile
 from view_browser import browser_processes, drawn_pictures, first_picture
 
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.runs.replay.run import read_run
 from coneskin.skin.wire import FrameDecoder
 
 __all__ = ["guard_rounds", "print_lateness"]

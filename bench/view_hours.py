@@ -21,8 +21,8 @@ from view import page_of
 from view_browser import FLAGS, PROGRAM, memory_of, resident
 from view_collisions import collisions_again, header_of
 
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
 
 STEP = 0.05  # s of the run that are written together: the recorder's own
 

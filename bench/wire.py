@@ -16,7 +16,7 @@ from report import head
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
-from coneskin.skin.detection.reading import read
+from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.memory_source import MemorySource

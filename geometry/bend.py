@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 __all__ = ["Bend", "bends_between", "check_bends"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-from coneskin.errors import MeshError
+from coneskin.core.errors import MeshError
 
 __all__ = ["TO_Z_UP", "ColladaAsset", "read_collada_asset"]
 

@@ -20,7 +20,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 from .bend import Bend, bends_between, check_bends
 from .bent_strip import BentStrip, RulingFrame, frames_along

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coneskin.arrays import frozen
-from coneskin.errors import GeometryError
+from coneskin.core.arrays import frozen
+from coneskin.core.errors import GeometryError
 
 from .hole_bridging import bridge_holes
 from .mesh import Mesh

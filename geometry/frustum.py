@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 if TYPE_CHECKING:
     import numpy as np

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.arrays import frozen
-from coneskin.bounded_file import read_file
-from coneskin.errors import MeshError, MissingExtra
+from coneskin.core.arrays import frozen
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import MeshError, MissingExtra
 
 from .collada_asset import TO_Z_UP, ColladaAsset, read_collada_asset
 from .outermost_points import outermost_points

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 from .frustum import Frustum
 from .pose import Pose, Vector

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 if TYPE_CHECKING:
     import numpy as np

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 from .frustum import Frustum
 

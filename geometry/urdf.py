@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from coneskin.bounded_file import read_file
-from coneskin.errors import MeshError
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import MeshError
 
 from .mesh import Mesh, load_mesh, make_mesh, refuse_entities
 from .pose import Pose, Vector

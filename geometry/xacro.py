@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from coneskin.errors import MeshError, MissingExtra
+from coneskin.core.errors import MeshError, MissingExtra
 
 __all__ = ["expand_xacro"]
 

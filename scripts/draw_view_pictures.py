@@ -43,11 +43,11 @@ _COLOURS = 96  # of the film's palette
 
 def collision(folder: Path) -> Path:
     """Make the collision of docs/physics.md, and return its recording."""
-    from coneskin.physics.collision_run import CollisionRun
-    from coneskin.physics.joint_program import Waypoints
-    from coneskin.recording import Block
-    from coneskin.recording_file.recorder import Recorder
-    from coneskin.robot.guard.journal import BlockKind
+    from coneskin.core.recording.block import Block
+    from coneskin.core.recording.recorder import Recorder
+    from coneskin.impact.simulation.collision_run import CollisionRun
+    from coneskin.impact.simulation.joint_program import Waypoints
+    from coneskin.robot.guard.signals.journal import BlockKind
     from coneskin.scene.reader import parse_scene
 
     page = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")

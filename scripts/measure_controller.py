@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
-from coneskin.errors import ConeSkinError, RobotTimeout
+from coneskin.core.errors import ConeSkinError, RobotTimeout
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.ur.heartbeat_registers import HeartbeatRegisters, program_lines
 from coneskin.robot.ur.rtde_connection import RtdeConnection

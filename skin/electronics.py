@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, fields
 from typing import Literal, NamedTuple
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 
 __all__ = ["Electronics", "LeadOhms", "Polarity", "Thresholds"]
 

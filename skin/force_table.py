@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 
 __all__ = ["ForceTable"]
 

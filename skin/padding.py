@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 
 __all__ = ["Padding"]
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 
 from .log_scale import LogScale

@@ -12,7 +12,7 @@ import pytest
 from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, settings
 
-from .hold_ups import HoldUpWatch
+from .support.hold_ups import HoldUpWatch
 
 # before numpy is loaded: each core has a worker of its own, and threads of linear algebra only wait for each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -21,7 +21,7 @@ _TASKS = Path("/proc/self/task")  # Linux; elsewhere only threads are looked at
 _HERE = Path(__file__).parent
 _WITH_PROCESSES = (  # tests that run one at a time; below this folder
     *("guarded", "commands/test_guard.py", "robot/sim/test_command.py", "robot/sim/test_wheel.py", "robot/ur"),
-    *("physics/test_live_plant.py", "test_demos.py", "test_measure_controller.py"),
+    *("impact/simulation/test_live_plant.py", "test_demos.py", "test_measure_controller.py"),
 )
 _TRIES = 5  # of a test with processes, as long as the computer holds it up
 _SHORT = "not long"  # the marker expression of the short run, as in pyproject.toml

@@ -264,9 +264,9 @@ def test_a_recording_of_another_guard_ends_with_1(tmp_path: Path, capsys: Output
     """The same bytes and other events: the exit code tells a script."""
     record(tmp_path / "run.rec")
     path = tmp_path / "other.rec"
-    from coneskin.recording_file.reader import read_recording
-    from coneskin.recording_file.recorder import Recorder
-    from coneskin.robot.guard.journal import BlockKind
+    from coneskin.core.recording.reader import read_recording
+    from coneskin.core.recording.recorder import Recorder
+    from coneskin.robot.guard.signals.journal import BlockKind
 
     with Recorder(path) as recorder:
         recorder.write(
@@ -277,8 +277,8 @@ def test_a_recording_of_another_guard_ends_with_1(tmp_path: Path, capsys: Output
 
 
 def test_a_run_in_which_nothing_happened_is_nothing_to_compare(tmp_path: Path, capsys: Output) -> None:
-    from coneskin.recording_file.reader import read_recording
-    from coneskin.recording_file.recorder import Recorder
+    from coneskin.core.recording.reader import read_recording
+    from coneskin.core.recording.recorder import Recorder
 
     record(tmp_path / "run.rec")
     with Recorder(tmp_path / "empty.rec") as recorder:

@@ -3,15 +3,14 @@
 import importlib
 import math
 import re
-from pathlib import Path
 
 import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.sector import unroll
 from coneskin.skin.sensor import Sensor
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 DOCUMENT = (ROOT / "docs" / "conventions.md").read_text(encoding="utf-8")
 HOMES = {
     "Frustum": "coneskin.geometry.frustum",
@@ -19,7 +18,7 @@ HOMES = {
     "PlacedFrustum": "coneskin.geometry.placed_frustum",
     "Sensor": "coneskin.skin.sensor",
     "Electronics": "coneskin.skin.electronics",
-    "ContactMatrix": "coneskin.skin.detection.contact_matrix",
+    "ContactMatrix": "coneskin.skin.detection.frame.contact_matrix",
     "TouchEvent": "coneskin.skin.detection.events",
     "ArmModel": "coneskin.robot.arm.model",
     "ControllerState": "coneskin.robot.ur.state_reader",

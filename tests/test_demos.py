@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-DEMOS = Path(__file__).parents[1] / "demos"
+from tests.support.paths import ROOT
+
+DEMOS = ROOT / "demos"
 ARGUMENTS = {"04_guard_a_program.py": ["127.0.0.44" if sys.platform.startswith("linux") else "127.0.0.1"]}
 
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 
 import coneskin
+from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.long
 
-ROOT = Path(__file__).parents[1]
 FOLDERS = ("geometry", "skin", "robot")
 USER = """\
 from typing import assert_type

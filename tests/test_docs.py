@@ -31,8 +31,8 @@ import pytest
 from coneskin.cli import COMMANDS
 from coneskin.robot.sim.process import free_host
 from coneskin.scene.reader import parse_scene
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 PAGES = {
     path.relative_to(ROOT).as_posix(): path
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import coneskin as cs
-from coneskin import errors
+from coneskin.core import errors
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 NAMES = sorted(set(cs.__all__) - {"__version__"})
 
 

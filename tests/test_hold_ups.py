@@ -5,11 +5,12 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
-from .hold_ups import HoldUpWatch
+from tests.support.paths import ROOT
+
+from .support.hold_ups import HoldUpWatch
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="it suspends a process by a signal")
 
@@ -80,7 +81,7 @@ def test_what_was_held_up_runs_again_and_what_always_fails_fails(tmp_path):
         str(tmp_path),
         str(tmp_path),
     ]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment, timeout=120)
     assert "1 failed, 2 passed" in done.stdout, done.stdout + done.stderr
     assert done.stdout.count("held up, so run again: test_it.py::test_held_up_once") == 1

@@ -12,7 +12,7 @@ NUMERIC = {"numpy", "scipy"}
 DEVICES = {"serial", "rtde_control", "rtde_receive", "rtde_io", "dashboard_client"}
 DRAWING = {"trimesh", "matplotlib", "ezdxf", "collada", "embreex", "tomli_w"}
 PAGE = {"viser", "websockets", "msgspec", "coneskin.view"}
-ENGINE = {"mujoco", "coneskin.physics"}
+ENGINE = {"mujoco", "coneskin.impact.simulation"}
 HEAVY = NUMERIC | DEVICES | DRAWING | PAGE | ENGINE
 VIRTUAL = {
     "coneskin.skin.virtual.skin",
@@ -22,8 +22,12 @@ VIRTUAL = {
 }
 FIELD = {"coneskin.skin.field", "coneskin.skin.virtual.field_contacts"}
 KINEMATICS = {"coneskin.robot.arm.link_frames", "coneskin.robot.arm.compiled_kinematics"}
-SIMULATOR = {"coneskin.robot.sim.controller", "coneskin.robot.sim.process", "coneskin.robot.sim.server"}
-CALIBRATION = {"coneskin.calibration", "coneskin.scene.calibration_file", "coneskin.skin.place_map"}
+SIMULATOR = {"coneskin.robot.sim.runtime.controller", "coneskin.robot.sim.process", "coneskin.robot.sim.server"}
+CALIBRATION = {
+    "coneskin.commissioning.calibration",
+    "coneskin.scene.values.calibration_file",
+    "coneskin.skin.place_map",
+}
 LOADED = "coneskin.geometry.frustum", "coneskin.skin.sensor"
 
 _LOAD = "from coneskin.scene.reader import load_scene; scene = load_scene({scene!r})"
@@ -42,15 +46,15 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "the package alone": ("", "import coneskin", {"coneskin"}, HEAVY | {"coneskin.geometry", "coneskin.skin"}),
     "errors and scene values": (
         "",
-        "import coneskin.errors, coneskin.scene.scene",
-        {"coneskin.scene.scene"},
+        "import coneskin.core.errors, coneskin.scene.values.scene",
+        {"coneskin.scene.values.scene"},
         HEAVY | {"coneskin.geometry", "coneskin.skin", "coneskin.robot", "coneskin.scene.reader"},
     ),
     "design only: unroll": (
         "",
         "from coneskin.cli import main; main(['unroll', '--radius1-mm', '54', '--height-mm', '434'])",
         {"coneskin.geometry.sector"},
-        HEAVY | {"coneskin.skin", "coneskin.robot", "coneskin.scene.reader", "coneskin.design.sheets"},
+        HEAVY | {"coneskin.skin", "coneskin.robot", "coneskin.scene.reader", "coneskin.design.sheets.sheet_design"},
     ),
     "one cylinder, read": (
         _SERIAL_FREE,
@@ -82,11 +86,11 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
         | SIMULATOR
         | {"coneskin.session.session", "coneskin.skin.sources.serial_port", "coneskin.robot.ur.ur_rtde"},
     ),
-    "no body": (_STOP, _LOAD, {*LOADED}, HEAVY | {"coneskin.scene.body", "coneskin.skin.padding"}),
+    "no body": (_STOP, _LOAD, {*LOADED}, HEAVY | {"coneskin.scene.values.body", "coneskin.skin.padding"}),
     "bodies, which no guard knows of": (
         _STOP + '[[body]]\nkind = "post"\nxyz_mm = [0, 0, 0]\ndirection = [0, 0, 1]\n[padding]\n',
         _BUILD,
-        {*LOADED, "coneskin.scene.body", "coneskin.skin.padding"},
+        {*LOADED, "coneskin.scene.values.body", "coneskin.skin.padding"},
         HEAVY | VIRTUAL | FIELD | SIMULATOR,
     ),
     "no mesh": (
@@ -120,14 +124,14 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "replay": (
         "",
         "from coneskin.cli import main; assert main(['replay', {run!r}]) == 0",
-        {*LOADED, "coneskin.replay.replay", "coneskin.robot.guard.core"},
+        {*LOADED, "coneskin.runs.replay.replay", "coneskin.robot.guard.core"},
         (HEAVY - {"numpy"})  # which replays what is quiet many inputs at once
         | FIELD
         | SIMULATOR
         | {
             "coneskin.session.session",
             "coneskin.skin.sources.serial_port",
-            "coneskin.replay.run_picture",
+            "coneskin.runs.replay.run_picture",
             "coneskin.robot.ur.ur_rtde",
         },
     ),
@@ -140,7 +144,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "the process of the simulated arm": (
         "",
         "import coneskin.robot.sim.command",
-        {"coneskin.robot.sim.controller", "coneskin.robot.sim.motion.remote_plant"},
+        {"coneskin.robot.sim.runtime.controller", "coneskin.robot.sim.motion.remote_plant"},
         HEAVY | VIRTUAL | FIELD,
     ),
     "the driver of ur_rtde": (

@@ -3,14 +3,14 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from coneskin.robot.sim.process import SimulatedController, free_host
+from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the simulated controller needs several addresses")
-SCRIPT = Path(__file__).parents[1] / "scripts" / "measure_controller.py"
+SCRIPT = ROOT / "scripts" / "measure_controller.py"
 
 
 def measured(simulated, *options, answer=""):

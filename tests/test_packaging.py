@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from coneskin.commands import guard
+from tests.support.paths import ROOT
 
-FOLDER = Path(__file__).parents[1] / "packaging"
+FOLDER = ROOT / "packaging"
 UNIT = FOLDER / "coneskin@.service"
 
 

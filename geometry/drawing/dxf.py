@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Literal, get_args
 
-from coneskin.errors import GeometryError, MissingExtra
+from coneskin.core.errors import GeometryError, MissingExtra
 
 from .cut_sheet import CutSheet
 from .outline import Outline, PathSegment

@@ -20,7 +20,7 @@ import math
 from dataclasses import dataclass
 from typing import get_args
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 
 from .surface_shape import ShapeCorner, ShapeTab, SheetSide, SurfaceShape

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from coneskin.errors import GeometryError, MissingExtra
+from coneskin.core.errors import GeometryError, MissingExtra
 
 from .cut_sheet import CutPart, CutSheet, Stroke
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 __all__ = ["FlatPoint", "Outline", "PathSegment", "circle_outline"]
 

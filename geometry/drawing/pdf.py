@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Literal, get_args
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 from .cut_sheet import LINE_COLOURS, CutSheet
 from .outline import Outline

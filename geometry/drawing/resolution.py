@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 
 __all__ = ["AdConverter", "ResolutionForecast", "forecast_resolution"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 
 from .touch_weights import TouchWeights
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.arrays import frozen
-from coneskin.bounded_file import read_file
-from coneskin.errors import GeometryError
+from coneskin.core.arrays import frozen
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import perpendicular_vectors

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coneskin.arrays import frozen
-from coneskin.errors import GeometryError
+from coneskin.core.arrays import frozen
+from coneskin.core.errors import GeometryError
 
 __all__ = ["ClosedSurface", "shell_surface", "to_stl"]
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from coneskin.errors import GeometryError, MissingExtra
+from coneskin.core.errors import GeometryError, MissingExtra
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
 

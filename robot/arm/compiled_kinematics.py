@@ -11,7 +11,7 @@ import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 
 from .damped_least_squares import DAMPING_FLOOR, SINGULAR_BELOW, SINGULAR_DAMPING
 from .kinematics import JOINTS, cos_sin

@@ -18,7 +18,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 
 from .kinematics import JOINTS, link_poses, point_jacobian

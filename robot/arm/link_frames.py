@@ -29,7 +29,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose
 
 from .kinematics import cos_sin

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 
 __all__ = ["ZERO_VELOCITY", "ArmModel", "Joints"]
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import functools
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 
 from .inertia import ArmInertia, LinkInertia

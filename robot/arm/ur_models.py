@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import re
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 
 from .model import ArmModel, Joints
 

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from coneskin.channel import Channel
+from coneskin.core.channel import Channel
 
 from .messages import REPORT_PERIOD, StatusReport
 

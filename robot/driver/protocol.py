@@ -10,7 +10,7 @@ import socket
 from collections.abc import Mapping
 from typing import Any, Protocol, Self
 
-from coneskin.finding import Finding
+from coneskin.core.finding import Finding
 from coneskin.robot.arm.model import ArmModel
 
 from .arm_reading import ArmReading

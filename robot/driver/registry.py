@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 
 from .protocol import ArmDriver
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from enum import Enum
 
-from .journal import EventName
-from .outputs import Outputs, emit
+from .signals.journal import EventName
+from .signals.outputs import Outputs, emit
 
 __all__ = ["Activation", "ActivationStep"]
 

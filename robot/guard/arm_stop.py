@@ -10,9 +10,9 @@ from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.standstill import WATCH, StandstillWatch
 
-from .contact import Contact
-from .journal import EventName
-from .outputs import Outputs, emit
+from .signals.contact import Contact
+from .signals.journal import EventName
+from .signals.outputs import Outputs, emit
 from .stop_escalation import StopEscalation
 
 __all__ = ["ArmStop"]

@@ -17,7 +17,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver
@@ -29,14 +29,14 @@ from coneskin.robot.reaction.types import Done, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 
 from .arm_stop import ArmStop
-from .contact import Contact
 from .controller_needs import ControllerNeeds
-from .journal import EventName
 from .motion.motion_away import MotionAway
-from .outputs import Outputs, emit
 from .phase import Phase
+from .signals.contact import Contact
+from .signals.journal import EventName
+from .signals.outputs import Outputs, emit
+from .signals.touch_record import TouchRecord
 from .speed.speed_reduction import SpeedReduction
-from .touch_record import TouchRecord
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
     from coneskin.robot.guard.heartbeats.controller_heartbeat import ControllerHeartbeat

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from coneskin.recording import Block
-from coneskin.robot.guard.heartbeats.companion_monitor import CompanionMonitor
+from coneskin.core.recording.block import Block
 
+from .companion_monitor import CompanionMonitor
 from .fault_register import FaultRegister
-from .journal import EventName
-from .outputs import Outputs, emit
 from .phase import Phase
+from .signals.journal import EventName
+from .signals.outputs import Outputs, emit
 
 if TYPE_CHECKING:
     from coneskin.robot.driver.state import ControllerState

@@ -11,24 +11,24 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from coneskin.recording import Block
+from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
-from coneskin.robot.guard.heartbeats.companion_monitor import CompanionMonitor
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEvent
 from coneskin.skin.detection.stream import TouchStream
 
 from .activation import Activation, ActivationStep
-from .contact import GuardedSensor
+from .companion_monitor import CompanionMonitor
 from .controller_inputs import ControllerInputs
 from .controller_needs import ControllerNeeds
 from .event_folding import EventFolding
 from .fault_register import FaultRegister
-from .journal import BlockKind, EventName
-from .outputs import Outputs, emit
 from .phase import Phase
 from .port_losses import PortLosses
 from .preconditions import arm_blockers, skin_blockers
+from .signals.contact import GuardedSensor
+from .signals.journal import BlockKind, EventName
+from .signals.outputs import Outputs, emit
 from .skin_connection import SkinConnection
 from .skin_contacts import SkinContacts
 

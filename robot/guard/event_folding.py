@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from .journal import EventName
-from .outputs import Outputs, emit
+from .signals.journal import EventName
+from .signals.outputs import Outputs, emit
 
 __all__ = ["EventFolding"]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, TypeVar
 
-from coneskin.errors import RobotConnectionError
-from coneskin.recording import Block
+from coneskin.core.errors import RobotConnectionError
+from coneskin.core.recording.block import Block
 
 from .event_folding import EventFolding
-from .journal import EventName
-from .outputs import Outputs
+from .signals.journal import EventName
+from .signals.outputs import Outputs
 
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor

@@ -13,9 +13,9 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
-from coneskin.channel import Channel
-from coneskin.errors import ConeSkinError, SkinTimeout
-from coneskin.recording import Block, encode_block
+from coneskin.core.channel import Channel
+from coneskin.core.errors import ConeSkinError, SkinTimeout
+from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.driver.messages import HEARTBEAT_PERIOD, Heartbeat, Shutdown
 from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SpeedSlider, StopConnections
 from coneskin.robot.guard.heartbeats.controller_heartbeat import heartbeat_count
@@ -23,10 +23,10 @@ from coneskin.skin.sources.source import Source
 from coneskin.skin.sources.source_reopening import SourceReopening
 
 from .core import GuardCore
-from .journal import BlockKind, encode_loss
 from .outbox import Outbox
 from .phase import Phase
 from .ports import GuardPorts
+from .signals.journal import BlockKind, encode_loss
 
 __all__ = ["GuardLoop"]
 

@@ -6,9 +6,9 @@ from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
 from coneskin.robot.driver.stop_path import StopPath, UseStopPath
 
-from .journal import GuardEvent
-from .outputs import Output
 from .ports import GuardPorts
+from .signals.journal import GuardEvent
+from .signals.outputs import Output
 
 __all__ = ["Outbox"]
 

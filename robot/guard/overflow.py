@@ -6,9 +6,9 @@ recording, but no event is: a program that goes on has to know of a collision.
 
 from __future__ import annotations
 
-from coneskin.recording import decode_blocks, encode_block
+from coneskin.core.recording.block import decode_blocks, encode_block
 
-from .journal import BlockKind, EventName, GuardEvent
+from .signals.journal import BlockKind, EventName, GuardEvent
 
 __all__ = ["RecordingOverflowFilter"]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from coneskin.recording import Block
-from coneskin.robot.guard.heartbeats.companion_monitor import CompanionMonitor
+from coneskin.core.recording.block import Block
 
+from .companion_monitor import CompanionMonitor
 from .event_folding import EventFolding
 from .fault_register import FaultRegister
-from .journal import EventName, decode_loss
-from .outputs import Outputs, emit
 from .phase import Phase
+from .signals.journal import EventName, decode_loss
+from .signals.outputs import Outputs, emit
 from .skin_connection import SkinConnection
 
 if TYPE_CHECKING:

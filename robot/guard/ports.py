@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from coneskin.channel import Channel
+from coneskin.core.channel import Channel
 from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SetpointWriter, SpeedSlider, StopConnections
 from coneskin.skin.sources.source import Source
 from coneskin.skin.sources.source_reopening import SourceReopening

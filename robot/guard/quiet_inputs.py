@@ -12,15 +12,15 @@ from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import RobotConnectionError
-from coneskin.recording import Block
+from coneskin.core.errors import RobotConnectionError
+from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.guard.heartbeats.heartbeat_monitor import HELD_UP
 from coneskin.skin.detection.quiet_frames import QuietFrames, find_quiet_frames
 from coneskin.skin.frame_batch import find_frames
 
 from .core import GuardCore
-from .journal import BlockKind
+from .signals.journal import BlockKind
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import TouchBegan, TouchEnded, TouchEvent
 
-from .contact import Contact, GuardedSensor
 from .event_folding import EventFolding
-from .journal import EventName
-from .outputs import Outputs, emit
 from .phase import Phase
+from .signals.contact import Contact, GuardedSensor
+from .signals.journal import EventName
+from .signals.outputs import Outputs, emit
 
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor

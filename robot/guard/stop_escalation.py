@@ -8,8 +8,8 @@ from coneskin.robot.driver.stop_path import StopPath, UseStopPath
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
-from .journal import EventName
-from .outputs import Outputs, emit
+from .signals.journal import EventName
+from .signals.outputs import Outputs, emit
 
 __all__ = ["StopEscalation"]
 

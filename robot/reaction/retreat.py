@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.compiled_kinematics import compile_contact
 from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds, damping_squared, stacked_speeds

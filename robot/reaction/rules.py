@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 
 from .types import KINDS, Reaction
 

@@ -12,16 +12,16 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from coneskin.bounded_file import read_file
-from coneskin.channel import Channel
-from coneskin.errors import ConeSkinError, RobotRefused
+from coneskin.core.bounded_file import read_file
+from coneskin.core.channel import Channel
+from coneskin.core.errors import ConeSkinError, RobotRefused
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 
-from .controller import Controller
+from .machine.options import DEFAULT_MODEL, START_Q, Options, Version
 from .memory_bound import SIMULATOR, bounded_memory
 from .motion.remote_plant import RemotePlant
-from .options import DEFAULT_MODEL, START_Q, Options, Version
+from .runtime.controller import Controller
 from .server import PORTS, Server, is_loopback
 
 __all__ = ["EXAMPLE", "add_arguments", "main", "run"]

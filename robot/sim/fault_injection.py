@@ -13,10 +13,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 
-from .controller import Controller
-from .controller_state import describe
+from .runtime.controller import Controller
+from .runtime.controller_state import describe
 
 __all__ = ["FaultInjector", "Services"]
 

@@ -22,9 +22,9 @@ from collections.abc import Container, Sequence
 from pathlib import Path
 from typing import Any
 
-from coneskin.errors import RobotConnectionError, RobotTimeout
+from coneskin.core.errors import RobotConnectionError, RobotTimeout
 
-from .options import DEFAULT_MODEL
+from .machine.options import DEFAULT_MODEL
 from .server import PORTS
 
 __all__ = ["SimulatedController", "free_host"]

@@ -14,16 +14,16 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.robot.sim.urscript.translator import Translation
 
 from .compiler import Compiler
-from .controller import Controller
 from .fault_injection import FaultInjector
 from .motion.arm import CYCLE
 from .polyscope.user_interface import UserInterface
 from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client
 from .ports.publisher import Publisher
+from .runtime.controller import Controller
 from .services import SCRIPT_PORTS, PortServices
 
 __all__ = ["PORTS", "Server", "is_loopback"]

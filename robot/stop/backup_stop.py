@@ -12,8 +12,8 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
-from coneskin.channel import wait_readable
-from coneskin.errors import ConeSkinError
+from coneskin.core.channel import wait_readable
+from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.protocol import ArmDriver, PayloadReader, StopConnections
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath

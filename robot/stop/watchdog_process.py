@@ -12,9 +12,10 @@ import sys
 import time
 from collections.abc import Callable
 
-from coneskin.channel import Channel, decode_json, wait_readable
-from coneskin.child_process import inherit
-from coneskin.errors import ConeSkinError
+from coneskin.core.channel import Channel, decode_json, wait_readable
+from coneskin.core.child_process import inherit
+from coneskin.core.errors import ConeSkinError
+from coneskin.core.time_slice import shorten_time_slice
 from coneskin.robot.driver.messages import (
     HEARTBEAT_TIMEOUT,
     REPORT_PERIOD,
@@ -26,7 +27,6 @@ from coneskin.robot.driver.messages import (
 )
 from coneskin.robot.driver.protocol import PayloadReader
 from coneskin.robot.driver.registry import load_driver
-from coneskin.time_slice import shorten_time_slice
 
 from .backup_stop import BackupStop
 from .limits import MonitoringLimits

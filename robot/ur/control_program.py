@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from coneskin.errors import MissingExtra, RobotConnectionError, RobotRefused
+from coneskin.core.errors import MissingExtra, RobotConnectionError, RobotRefused
 
 __all__ = ["ControlProgram", "rtde_errors"]
 

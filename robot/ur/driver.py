@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-from coneskin.finding import Finding
+from coneskin.core.finding import Finding
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.examination import ExaminationScope
 from coneskin.robot.driver.protocol import ArmDriver

@@ -18,9 +18,10 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from coneskin.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.child_process import inherit
-from coneskin.errors import ConeSkinError
+from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
+from coneskin.core.child_process import inherit
+from coneskin.core.errors import ConeSkinError
+from coneskin.core.time_slice import shorten_time_slice
 from coneskin.robot.driver.deadman import Deadman
 from coneskin.robot.driver.messages import (
     HEARTBEAT_TIMEOUT,
@@ -34,7 +35,6 @@ from coneskin.robot.driver.messages import (
     StopProgram,
     decode_command,
 )
-from coneskin.time_slice import shorten_time_slice
 
 from .program_request import carry_out, stop_acceleration
 from .ur_rtde import UrArm, stop_time

@@ -13,9 +13,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
-from coneskin.channel import wait_readable
-from coneskin.errors import ConeSkinError, RobotRefused
-from coneskin.finding import Finding, Verdict
+from coneskin.core.channel import wait_readable
+from coneskin.core.errors import ConeSkinError, RobotRefused
+from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.examination import ExaminationScope
 

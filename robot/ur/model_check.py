@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.model import ArmModel, Joints

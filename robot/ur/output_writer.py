@@ -8,8 +8,8 @@ from __future__ import annotations
 import threading
 from typing import Self
 
-from coneskin.channel import wait_readable
-from coneskin.errors import RobotConnectionError, RobotRefused
+from coneskin.core.channel import wait_readable
+from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.arm_reading import DIGITAL_GROUPS
 
 from . import rtde_codec as rtde

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from enum import IntEnum
 from typing import Any, NamedTuple
 
-from coneskin.errors import RobotConnectionError, RobotRefused
+from coneskin.core.errors import RobotConnectionError, RobotRefused
 
 from .rtde_variables import VARIABLES, WIRE_TYPES
 

@@ -9,8 +9,8 @@ import socket
 import time
 from collections.abc import Callable, Sequence
 
-from coneskin.channel import wait_readable
-from coneskin.errors import RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.core.channel import wait_readable
+from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
 
 from . import rtde_codec as rtde
 

@@ -6,7 +6,7 @@ each register to one client, so the guard refuses to start where another has tak
 
 from __future__ import annotations
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint
 

@@ -6,7 +6,7 @@ use", and vice versa. A scene can leave the slider to the program (``arm.slider_
 
 from __future__ import annotations
 
-from coneskin.errors import ConeSkinError, RobotConnectionError
+from coneskin.core.errors import ConeSkinError, RobotConnectionError
 
 from . import rtde_codec as rtde
 from .rtde_connection import RtdeConnection

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from coneskin.errors import RobotConnectionError
+from coneskin.core.errors import RobotConnectionError
 from coneskin.robot.driver.state import ControllerState
 
 from . import rtde_codec as rtde

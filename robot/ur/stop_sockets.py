@@ -20,7 +20,7 @@ from __future__ import annotations
 import socket
 from contextlib import suppress
 
-from coneskin.errors import RobotConnectionError
+from coneskin.core.errors import RobotConnectionError
 from coneskin.robot.driver.setpoint import SetpointProgram
 from coneskin.robot.driver.stop_path import StopPath
 

@@ -11,8 +11,8 @@ import time
 from collections.abc import Callable
 from typing import Any, Self
 
-from coneskin.channel import wait_readable
-from coneskin.errors import ConeSkinError, RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.core.channel import wait_readable
+from coneskin.core.errors import ConeSkinError, RobotConnectionError, RobotRefused, RobotTimeout
 from coneskin.robot.driver.arm_reading import ArmReading
 
 from . import rtde_codec as rtde

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .faults import Fault
+from .frame.faults import Fault
 
 __all__ = ["Contradictions"]
 

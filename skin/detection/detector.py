@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.detection.place.touch_place import TouchPlace
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.detection.untouched.guides import UntouchedGuides
@@ -23,14 +23,14 @@ from .contradictions import Contradictions
 from .events import SkinEvent
 from .fault_diagnosis import DIAGNOSED, FaultDiagnosis
 from .fault_reports import FaultReports
-from .faults import Fault
-from .reading import read
+from .frame.faults import Fault
+from .frame.reading import read
+from .frame.settings import DetectorSettings
+from .frame.timing import FrameTiming
+from .frame.touch_reading import TouchReading
 from .reported_touch import ReportedTouch
 from .self_test import FrameSelfTest
-from .settings import DetectorSettings
 from .stuck_values import StuckValues
-from .timing import FrameTiming
-from .touch_reading import TouchReading
 
 if TYPE_CHECKING:  # for replays only
     from .quiet_frames import QuietFrames

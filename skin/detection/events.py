@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .faults import Fault
+from .frame.faults import Fault
 
 __all__ = ["SkinEvent", "SkinFault", "TouchBegan", "TouchEnded", "TouchEvent", "TouchMoved"]
 

@@ -14,8 +14,8 @@ from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
-from .contact_matrix import FrameInversion
-from .faults import Fault
+from .frame.contact_matrix import FrameInversion
+from .frame.faults import Fault
 from .wiring_hypothesis import Observation, PointContact, WiringHypothesis, list_hypotheses, observe
 
 __all__ = ["DIAGNOSED", "FaultDiagnosis"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .events import SkinEvent, SkinFault
 from .fault_diagnosis import DIAGNOSED, FaultDiagnosis
-from .faults import Fault
+from .frame.faults import Fault
 
 __all__ = ["FaultReports"]
 

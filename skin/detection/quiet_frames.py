@@ -13,7 +13,7 @@ from coneskin.skin.frame_batch import FrameBatch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status, frame_at
 
-from .reading import GUIDE_SLACK, LEVEL_NOISE, read
+from .frame.reading import GUIDE_SLACK, LEVEL_NOISE, read
 
 if TYPE_CHECKING:
     import numpy as np

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from .frame.timing import FrameTiming
 from .quiet_frames import QuietFrames
 from .stuck_values import StuckValues
-from .timing import FrameTiming
 from .untouched.currents import UntouchedCurrents
 from .untouched.guides import UntouchedGuides
 from .untouched.leak import UntouchedLeak

@@ -12,8 +12,8 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
 from .events import TouchBegan, TouchEnded, TouchMoved
-from .settings import DetectorSettings
-from .touch_reading import TouchReading
+from .frame.settings import DetectorSettings
+from .frame.touch_reading import TouchReading
 
 __all__ = ["ReportedTouch"]
 

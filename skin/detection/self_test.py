@@ -16,7 +16,7 @@ import math
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 
-from .contact_matrix import ContactMatrix
+from .frame.contact_matrix import ContactMatrix
 
 __all__ = ["FrameSelfTest"]
 

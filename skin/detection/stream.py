@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder
 
 from .detector import Detector
 from .events import SkinEvent, SkinFault
-from .faults import Fault
-from .settings import DetectorSettings
+from .frame.faults import Fault
+from .frame.settings import DetectorSettings
 
 __all__ = ["TouchStream"]
 

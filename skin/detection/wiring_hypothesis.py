@@ -13,7 +13,7 @@ from typing import NamedTuple
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
-from .faults import Fault
+from .frame.faults import Fault
 
 __all__ = ["Observation", "PointContact", "WiringHypothesis", "list_hypotheses", "observe"]
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 
 from .sheet import SectorSheet
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 
 from .coupling import Coupling
 from .sheet import SectorSheet

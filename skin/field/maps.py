@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 
 from .circles import Circles, circle, make_circles
 from .disc import Disc, Discs, bessel_ratios, check_discs

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 
 from .coupling import Coupling, admittance
 from .disc import Disc, Discs, check_discs

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.errors import MissingExtra
+from coneskin.core.errors import MissingExtra
 
 from .maps import FieldMap
 from .paper_tables import ErrorMap

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 
 from .sheet import SectorSheet
 

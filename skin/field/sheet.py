@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 
 __all__ = ["ConeShape", "SectorSheet", "log1p_over"]
 

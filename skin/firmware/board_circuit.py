@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.electronics import LeadOhms
 from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
 from coneskin.skin.sensor import Sensor

@@ -14,7 +14,7 @@ from importlib import import_module
 from itertools import permutations
 from typing import Any, Final
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 
 from .source import Source
 

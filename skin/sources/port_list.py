@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from coneskin.errors import MissingExtra
+from coneskin.core.errors import MissingExtra
 
 __all__ = ["PortFacts", "find_ports", "list_ports"]
 

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from coneskin.errors import MissingExtra, SkinConnectionError, SkinTimeout
+from coneskin.core.errors import MissingExtra, SkinConnectionError, SkinTimeout
 
 from .port_list import list_ports
 from .source import Source

@@ -11,7 +11,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from coneskin.errors import SensorError, SkinConnectionError, SkinTimeout
+from coneskin.core.errors import SensorError, SkinConnectionError, SkinTimeout
 from coneskin.skin.wire import FrameDecoder
 
 from .source import Source

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from coneskin.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError
 
 from .source import Source
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 
 __all__ = ["ContactModel", "ConverterInputs", "LayerContact", "Matrix", "WiringFaults", "measure", "solve"]

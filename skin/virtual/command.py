@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import VERSIONS

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field, fields
 
-from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.skin.wire import Frame, Status, encode
 
 from .circuit import ConverterInputs, WiringFaults

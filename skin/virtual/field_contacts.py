@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.skin.field.coupling import Coupling
 from coneskin.skin.field.disc import centre_distance
 from coneskin.skin.field.fixed_discs import FixedDiscs

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 
 from .substrate import ContactLaw, Foam
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from coneskin.errors import SkinConnectionError, SkinTimeout
+from coneskin.core.errors import SkinConnectionError, SkinTimeout
 from coneskin.skin.sources.source import Source
 
 from .skin import VirtualSkin

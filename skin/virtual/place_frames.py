@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import random
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Status, encode
 

@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from coneskin.errors import SkinConnectionError
+from coneskin.core.errors import SkinConnectionError
 from coneskin.skin.sources.source import Openable
 
 from .skin import VirtualSkin

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 
 from .circuit import ContactModel, LayerContact, Matrix

@@ -11,7 +11,7 @@ import math
 import random
 from collections.abc import Iterator, Sequence
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import VERSIONS, DrivenPotentials, Frame
 

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 
 __all__ = ["ContactLaw", "Foam", "RoundContact"]
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 
 from .scripted_touch import ScriptedTouch

@@ -11,29 +11,30 @@ Everything in ``__all__`` is public; everything else may move. Importing this pa
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .commissioning.commission import commission_virtual_skin as commission_virtual_skin
+    from .commissioning.acceptance.commission import commission_virtual_skin as commission_virtual_skin
+    from .core.errors import Collision as Collision
+    from .core.errors import ConeSkinError as ConeSkinError
+    from .core.errors import FieldError as FieldError
+    from .core.errors import GeometryError as GeometryError
+    from .core.errors import KinematicsError as KinematicsError
+    from .core.errors import MeshError as MeshError
+    from .core.errors import MissingExtra as MissingExtra
+    from .core.errors import RecordingError as RecordingError
+    from .core.errors import RobotConnectionError as RobotConnectionError
+    from .core.errors import RobotError as RobotError
+    from .core.errors import RobotRefused as RobotRefused
+    from .core.errors import RobotTimeout as RobotTimeout
+    from .core.errors import SceneError as SceneError
+    from .core.errors import SensorError as SensorError
+    from .core.errors import SkinConnectionError as SkinConnectionError
+    from .core.errors import SkinError as SkinError
+    from .core.errors import SkinTimeout as SkinTimeout
+    from .core.version import __version__ as __version__
     from .design.folder import write_design as write_design
     from .design.link_design import LinkDesign as LinkDesign
     from .design.link_design import design_link as design_link
-    from .design.sheets import DesignOptions as DesignOptions
-    from .design.sheets import design_sheets as design_sheets
-    from .errors import Collision as Collision
-    from .errors import ConeSkinError as ConeSkinError
-    from .errors import FieldError as FieldError
-    from .errors import GeometryError as GeometryError
-    from .errors import KinematicsError as KinematicsError
-    from .errors import MeshError as MeshError
-    from .errors import MissingExtra as MissingExtra
-    from .errors import RecordingError as RecordingError
-    from .errors import RobotConnectionError as RobotConnectionError
-    from .errors import RobotError as RobotError
-    from .errors import RobotRefused as RobotRefused
-    from .errors import RobotTimeout as RobotTimeout
-    from .errors import SceneError as SceneError
-    from .errors import SensorError as SensorError
-    from .errors import SkinConnectionError as SkinConnectionError
-    from .errors import SkinError as SkinError
-    from .errors import SkinTimeout as SkinTimeout
+    from .design.sheets.sheet_design import DesignOptions as DesignOptions
+    from .design.sheets.sheet_design import design_sheets as design_sheets
     from .geometry.fit.cones import find_cones as find_cones
     from .geometry.fit.fit_options import FitOptions as FitOptions
     from .geometry.frustum import Frustum as Frustum
@@ -43,22 +44,22 @@ if TYPE_CHECKING:
     from .geometry.sector import Sector as Sector
     from .geometry.sector import roll_up as roll_up
     from .geometry.sector import unroll as unroll
-    from .replay.run import Run as Run
-    from .replay.run import read_run as read_run
     from .robot.arm.ur_models import arm_model as arm_model
     from .robot.driver.waypoint import Waypoint as Waypoint
-    from .robot.guard.journal import EventName as EventName
-    from .robot.guard.journal import GuardEvent as GuardEvent
+    from .robot.guard.signals.journal import EventName as EventName
+    from .robot.guard.signals.journal import GuardEvent as GuardEvent
     from .robot.reaction.rules import Rule as Rule
     from .robot.reaction.types import Reaction as Reaction
     from .robot.sim.process import SimulatedController as SimulatedController
+    from .runs.replay.run import Run as Run
+    from .runs.replay.run import read_run as read_run
     from .runs.what_if.batch import judge_runs as judge_runs
     from .runs.what_if.what_if import what_if as what_if
     from .scene.build import place_on_arm as place_on_arm
     from .scene.reader import load_scene as load_scene
     from .scene.reader import parse_scene as parse_scene
-    from .scene.scene import Commissioning as Commissioning
-    from .scene.scene import Scene as Scene
+    from .scene.values.scene import Commissioning as Commissioning
+    from .scene.values.scene import Scene as Scene
     from .session.session import Session as Session
     from .session.session import guard as guard
     from .skin.detection.events import SkinFault as SkinFault
@@ -76,16 +77,15 @@ if TYPE_CHECKING:
     from .skin.virtual.scripted_touch import ScriptedTouch as ScriptedTouch
     from .skin.virtual.skin import VirtualSkin as VirtualSkin
 
-__version__ = "0.1.0"  # the one place: pyproject.toml reads it from here
-
 #: module -> the public names in it; a test compares them with the imports above
 _PUBLIC = {
-    "commissioning.commission": "commission_virtual_skin",
+    "commissioning.acceptance.commission": "commission_virtual_skin",
     "design.folder": "write_design",
     "design.link_design": "LinkDesign design_link",
-    "design.sheets": "DesignOptions design_sheets",
-    "errors": "Collision ConeSkinError FieldError GeometryError KinematicsError MeshError MissingExtra RecordingError "
-    "RobotConnectionError RobotError RobotRefused RobotTimeout SceneError SensorError SkinConnectionError SkinError "
+    "design.sheets.sheet_design": "DesignOptions design_sheets",
+    "core.version": "__version__",
+    "core.errors": "Collision ConeSkinError FieldError GeometryError KinematicsError MeshError MissingExtra "
+    "RecordingError RobotConnectionError RobotError RobotRefused RobotTimeout SceneError SensorError SkinConnectionError SkinError "
     "SkinTimeout",
     "geometry.fit.cones": "find_cones",
     "geometry.fit.fit_options": "FitOptions",
@@ -94,10 +94,10 @@ _PUBLIC = {
     "geometry.placed_frustum": "PlacedFrustum",
     "geometry.pose": "Pose",
     "geometry.sector": "Sector roll_up unroll",
-    "replay.run": "Run read_run",
+    "runs.replay.run": "Run read_run",
     "robot.arm.ur_models": "arm_model",
     "robot.driver.waypoint": "Waypoint",
-    "robot.guard.journal": "EventName GuardEvent",
+    "robot.guard.signals.journal": "EventName GuardEvent",
     "robot.reaction.rules": "Rule",
     "robot.reaction.types": "Reaction",
     "robot.sim.process": "SimulatedController",
@@ -105,7 +105,7 @@ _PUBLIC = {
     "runs.what_if.what_if": "what_if",
     "scene.build": "place_on_arm",
     "scene.reader": "load_scene parse_scene",
-    "scene.scene": "Commissioning Scene",
+    "scene.values.scene": "Commissioning Scene",
     "session.session": "Session guard",
     "skin.detection.events": "SkinFault TouchBegan TouchEnded TouchMoved",
     "skin.detection.stream": "TouchStream",
@@ -120,7 +120,7 @@ _PUBLIC = {
     "skin.virtual.skin": "VirtualSkin",
 }
 _HOMES = {name: module for module, names in _PUBLIC.items() for name in names.split()}
-__all__ = ["__version__", *_HOMES]
+__all__ = [*_HOMES]
 
 
 def __getattr__(name: str) -> object:

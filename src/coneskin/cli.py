@@ -10,10 +10,11 @@ import os
 import sys
 from collections.abc import Sequence
 
-from . import __version__
-from .errors import ConeSkinError
-from .shell_completion import SHELLS, complete, completed_words, shell_code
-from .terminal_text import printable
+from coneskin.core.version import __version__
+
+from .commands.shell_completion import SHELLS, complete, completed_words, shell_code
+from .core.errors import ConeSkinError
+from .core.terminal_text import printable
 
 __all__ = ["COMMANDS", "main"]
 

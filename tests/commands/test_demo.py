@@ -6,8 +6,8 @@ import pytest
 
 from coneskin.commands.demo import _Transcript
 from coneskin.commands.demonstration.report import hold_up
-from coneskin.recording import Block
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
+from coneskin.core.recording.block import Block
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 
 
 def test_a_line_of_the_program_follows_the_event_that_it_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:

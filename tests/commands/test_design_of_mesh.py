@@ -4,17 +4,17 @@ import json
 import math
 import struct
 import tomllib
-from pathlib import Path
 
 import pytest
 
 from coneskin.cli import main
 from tests.geometry.synthetic import frustum
 from tests.geometry.test_mesh import write_stl
+from tests.support.paths import SHARED_DATA
 
 from .design_run import design, sensor_of
 
-DATA = Path(__file__).parents[2].parent / "shared" / "data"
+DATA = SHARED_DATA
 
 
 @pytest.mark.parametrize(

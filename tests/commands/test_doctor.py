@@ -9,17 +9,18 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.doctor.doctor import Doctor
-from coneskin.doctor.wire_examination import WirePatch
-from coneskin.finding import Finding, Verdict
+from coneskin.commissioning.examination.doctor import Doctor
+from coneskin.commissioning.examination.wire_examination import WirePatch
+from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.sim.process import free_host
 from coneskin.scene.reader import load_scene
 from coneskin.testing.forearm import forearm_scene
+from tests.support.paths import SHARED_DATA
 
 from ..scene.scenes import SKIN_ONLY
 
 Output = pytest.CaptureFixture[str]
-MESH = Path(os.environ.get("CONESKIN_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "ur/ur5e/visual"
+MESH = Path(os.environ.get("CONESKIN_DATA", SHARED_DATA)) / "ur/ur5e/visual"
 
 
 @pytest.mark.long

@@ -7,8 +7,8 @@ import sys
 import pytest
 
 from coneskin.cli import main
-from coneskin.errors import Collision, RobotConnectionError
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.core.errors import Collision, RobotConnectionError
+from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene.reader import parse_scene
 from coneskin.session.deferred_interrupt import defer_interrupts
 from coneskin.session.outcome import exit_code, stands

@@ -13,7 +13,7 @@ import pytest
 from coneskin.cli import main
 from coneskin.commands.demonstration.report import collision_facts, print_report
 from coneskin.commands.terminal.hints import print_hint
-from coneskin.replay.run import Run
+from coneskin.runs.replay.run import Run
 from coneskin.scene.reader import parse_scene
 
 from ..scene.scenes import SKIN_ONLY
@@ -80,7 +80,7 @@ def test_the_demo_ends_with_the_replay_of_its_run(capsys: pytest.CaptureFixture[
 def test_permissible_speeds_name_the_key_and_the_next_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from coneskin.permissible_speed import speed_map
+    from coneskin.impact.permissible_speed import speed_map
 
     monkeypatch.setattr(speed_map, "_MASSES", (1.0, float("inf")))
     words = write(tmp_path)

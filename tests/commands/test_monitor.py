@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.errors import SkinTimeout
-from coneskin.monitor.line_monitor import LineMonitor
+from coneskin.commissioning.line.line_monitor import LineMonitor
+from coneskin.core.errors import SkinTimeout
 from coneskin.skin.sources.serial_port import SerialPort
 
 from ..scene.scenes import SKIN_ONLY, record

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.permissible_speed import speed_map
+from coneskin.impact.permissible_speed import speed_map
 from coneskin.testing.forearm import forearm_scene
 
 SCENE = forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n"

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-
-COLLISION = Path(__file__).parents[1] / "data" / "collision.rec"
+from tests.support.paths import COLLISION
 
 
 def test_a_what_if_shows_differences_and_invents_nothing(capsys: pytest.CaptureFixture[str]) -> None:
@@ -23,7 +22,7 @@ def test_a_what_if_shows_differences_and_invents_nothing(capsys: pytest.CaptureF
 
 
 def test_another_scene_is_a_what_if_as_well(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from coneskin.replay.run import read_run
+    from coneskin.runs.replay.run import read_run
 
     scene = tmp_path / "scene.toml"
     scene.write_text(read_run(COLLISION).header["scene"].replace('kind = "retreat"', 'kind = "stop"'))

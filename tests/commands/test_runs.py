@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-
-COLLISION = Path(__file__).parents[1] / "data" / "collision.rec"
+from tests.support.paths import COLLISION
 
 
 def facts(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> dict:

@@ -9,21 +9,21 @@ from collections.abc import Mapping
 
 import pytest
 
-from coneskin.errors import RobotRefused
-from coneskin.recording import Block
+from coneskin.core.errors import RobotRefused
+from coneskin.core.recording.block import Block
 from coneskin.robot.driver import registry
 from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath, UseStopPath
-from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.sim.companion_processes import CompanionProcesses
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.virtual.substrate import Foam
-from coneskin.testing.companion_processes import CompanionProcesses
 from coneskin.testing.guard_rig import CONE, START_Q, make_core, touch
 
 

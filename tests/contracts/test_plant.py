@@ -9,16 +9,16 @@ from itertools import pairwise
 
 import pytest
 
-from coneskin.channel import Channel, pair
+from coneskin.core.channel import Channel, pair
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.machine.options import Options
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
 from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantState
 from coneskin.robot.sim.motion.remote_plant import RemotePlant, decode_targets, encode_state
-from coneskin.robot.sim.options import Options
-from coneskin.scene.body import BodyScene
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.scene.reader import parse_scene
+from coneskin.scene.values.body import BodyScene
 from coneskin.testing.forearm import START, forearm_scene
 
 QD = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
@@ -26,7 +26,7 @@ QD = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 
 def physics() -> Plant:
     pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
-    from coneskin.physics.scene_plant import ScenePlant
+    from coneskin.impact.simulation.scene_plant import ScenePlant
 
     far = BodyScene("hand", (2.0, 0.0, 0.0), mass=0.6, stiffness=1e3)
     return ScenePlant(replace(parse_scene(forearm_scene()), bodies=(far,)), START)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import SkinConnectionError, SkinTimeout
+from coneskin.core.errors import SkinConnectionError, SkinTimeout
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.serial_port import SerialPort

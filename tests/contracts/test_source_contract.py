@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from coneskin.errors import SkinConnectionError, SkinTimeout
+from coneskin.core.errors import SkinConnectionError, SkinTimeout
 from coneskin.skin.sources.source import Source
 from coneskin.skin.wire import FrameDecoder, encode
 from coneskin.testing import source_contract

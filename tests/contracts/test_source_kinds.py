@@ -2,17 +2,16 @@
 
 import ast
 import math
-from pathlib import Path
 
 import pytest
 
-from coneskin.channel import Channel, pair
-from coneskin.errors import SceneError, SensorError, SkinConnectionError
+from coneskin.core.channel import Channel, pair
+from coneskin.core.errors import SceneError, SensorError, SkinConnectionError
+from coneskin.core.recording.block import decode_blocks
 from coneskin.geometry.frustum import Frustum
-from coneskin.recording import decode_blocks
-from coneskin.robot.guard.journal import BlockKind, decode_event
 from coneskin.robot.guard.loop import GuardLoop
 from coneskin.robot.guard.ports import GuardPorts
+from coneskin.robot.guard.signals.journal import BlockKind, decode_event
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.summary import summarize
@@ -23,8 +22,8 @@ from coneskin.skin.sources.kinds import SOURCE_KINDS, SourceKey, SourceKind, ope
 from coneskin.skin.sources.source import Source
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[2]
 FRUSTUM = Frustum(0.054, 0.054, 0.434)
 TOUCH = ScriptedTouch(0.05, 0.2, 0.2, 1.0)
 SCENE = """

@@ -16,7 +16,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.build import place_on_arm
 from coneskin.skin.detection.events import TouchEnded
 from coneskin.skin.wire import encode
-from coneskin.testing.ruled_tube import oval_tube
+from tests.support.ruled_tube import oval_tube
 
 TURN = 2.0 * math.pi
 POSE = cs.Pose.from_xyz_rpy((0.01, 0.02, 0.05), (0.1, -0.2, 0.3))

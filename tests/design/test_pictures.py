@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coneskin.design.link_picture import _covered
-from coneskin.design.sheets import DesignOptions, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.design.weights_picture import draw_weights
 from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.frustum import Frustum

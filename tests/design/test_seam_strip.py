@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import coneskin as cs
-from coneskin.design.seam_strip import blind_angle, cover_seams
-from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
+from coneskin.core.errors import GeometryError
+from coneskin.design.sheets.seam_strip import blind_angle, cover_seams
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
 from coneskin.design.workshop.build_guide import guide_lines
-from coneskin.errors import GeometryError
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone

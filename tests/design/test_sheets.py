@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from coneskin.design.sheets import design_sheets
-from coneskin.design.summary import design_summary
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
+from coneskin.design.sheets.sheet_design import design_sheets
+from coneskin.design.sheets.summary import design_summary
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.frustum import Frustum

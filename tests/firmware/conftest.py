@@ -8,8 +8,8 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.electronics import LeadOhms
 from coneskin.skin.matched_electronics import GivenElectronics, match_electronics
 from coneskin.skin.sensor import Sensor, sheet_resistances
-from coneskin.testing.firmware.emulated_board import BoardPrograms
-from coneskin.testing.firmware.firmware_build import build_emulator, build_sketch, missing_tools
+from tests.support.firmware.emulated_board import BoardPrograms
+from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 
 CONE = Frustum(0.0375, 0.0375, 0.24, math.radians(350))  # on the forearm of a UR5e
 BITS = 11  # of an Uno with its usual setting: two conversions a reading

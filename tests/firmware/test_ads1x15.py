@@ -4,15 +4,15 @@ import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import SkinFault, TouchBegan
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.firmware.board_circuit import board_circuit
 from coneskin.skin.firmware.boards import converters
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.wire import FrameDecoder, Status, encode
-from coneskin.testing.firmware.emulated_board import BoardPrograms, run_board
-from coneskin.testing.firmware.firmware_build import build_sketch
+from tests.support.firmware.emulated_board import BoardPrograms, run_board
+from tests.support.firmware.firmware_build import build_sketch
 
 from .conftest import CONE
 

@@ -9,13 +9,13 @@ from contextlib import contextmanager
 
 import pytest
 
-from coneskin.errors import SkinTimeout
+from coneskin.core.errors import SkinTimeout
 from coneskin.skin.sources.serial_port import SerialPort
 from coneskin.skin.sources.source import Source
 from coneskin.skin.wire import FRAME_LENGTH, FrameDecoder, encode
-from coneskin.testing.firmware.emulated_board import BoardPrograms, EmulatedBoard
-from coneskin.testing.firmware.firmware_build import build_sketch
 from coneskin.testing.source_contract import SOURCE_CHECKS, OpenLine
+from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard
+from tests.support.firmware.firmware_build import build_sketch
 
 pytestmark = [pytest.mark.long, pytest.mark.processes]  # the board has to be punctual
 SENDER = """

@@ -8,8 +8,8 @@ import pytest
 
 from coneskin.skin.firmware.boards import firmware_folder
 from coneskin.skin.wire import DrivenPotentials, Frame, FrameDecoder, encode
-from coneskin.testing.firmware.emulated_board import BoardPrograms, run_board
-from coneskin.testing.firmware.firmware_build import build_sketch, missing_tools
+from tests.support.firmware.emulated_board import BoardPrograms, run_board
+from tests.support.firmware.firmware_build import build_sketch, missing_tools
 
 COLUMNS = [*(name for name in Frame._fields if name != "driven"), *DrivenPotentials._fields, "bytes"]
 COUNTS = 18  # of the longest frame

@@ -10,7 +10,7 @@ from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.wire import FrameDecoder, Status, encode
-from coneskin.testing.firmware.emulated_board import run_board, sheets_at_touch
+from tests.support.firmware.emulated_board import run_board, sheets_at_touch
 
 pytestmark = pytest.mark.long
 TOUCH = ScriptedTouch(0.6, 0.9, 0.1, 2.0, 10.0)

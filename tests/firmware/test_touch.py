@@ -6,7 +6,7 @@ from coneskin.skin.detection.events import SkinFault, TouchBegan, TouchEnded, To
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.wire import FrameDecoder, Status
-from coneskin.testing.firmware.emulated_board import run_board
+from tests.support.firmware.emulated_board import run_board
 
 pytestmark = pytest.mark.long
 RADIUS = 0.0375  # m

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
 from coneskin.geometry.frustum import Frustum

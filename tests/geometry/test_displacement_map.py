@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.displacement_map import DisplacementMap, heights_by_ray, measure_displacement
 from coneskin.geometry.fit.cones import find_cones
 from coneskin.geometry.frustum import Frustum
@@ -16,11 +15,12 @@ from coneskin.geometry.mesh import load_mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
+from tests.support.paths import SHARED_DATA
+from tests.support.sweep import sweep
 
-from ..sweep import sweep
 from .synthetic import TILTED, Floats, barrel, frustum, holed, placed
 
-DATA = Path(__file__).parents[2].parent / "shared" / "data"
+DATA = SHARED_DATA
 TURN = 2.0 * math.pi
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coneskin.errors import MeshError, MissingExtra
+from coneskin.core.errors import MeshError, MissingExtra
 from coneskin.geometry.collada_asset import TO_Z_UP, ColladaAsset, read_collada_asset
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
 from coneskin.geometry.pose import Pose

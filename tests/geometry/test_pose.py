@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.placed_frustum import double_cone
 from coneskin.geometry.pose import Pose
 

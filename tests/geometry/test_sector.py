@@ -6,7 +6,7 @@ import mpmath as mp
 import pytest
 from hypothesis import assume, given
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.sector import Sector, roll_up, unroll
 

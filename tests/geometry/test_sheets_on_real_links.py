@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +16,9 @@ from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.sector import unroll
 from coneskin.skin.sensor import Sensor
+from tests.support.paths import SHARED_DATA
 
-DATA = Path(__file__).parents[2].parent / "shared" / "data"
+DATA = SHARED_DATA
 
 # The tube of UR10's upper arm: 54 mm about a line parallel to z, 45 mm off the joint's axis in -y.
 UPPER_ARM = PlacedFrustum(Frustum(0.054, 0.054, 0.4), Pose.from_xyz_rpy((0.0, -0.045, 0.12), (0.0, 0.0, 0.0)))

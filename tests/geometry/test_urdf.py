@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coneskin.errors import MeshError
+from coneskin.core.errors import MeshError
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.urdf import load_urdf_link, urdf_links
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coneskin.errors import MeshError, MissingExtra
+from coneskin.core.errors import MeshError, MissingExtra
 from coneskin.geometry.urdf import load_urdf_link, urdf_links
 
 from .synthetic import frustum

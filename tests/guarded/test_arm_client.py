@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from coneskin.errors import Collision, RobotRefused
+from coneskin.core.errors import Collision, RobotRefused
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.waypoint import Waypoint

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import coneskin as cs
-from coneskin.testing.ruled_tube import RuledTube, oval_tube, rounded_box_section
+from tests.support.ruled_tube import RuledTube, oval_tube, rounded_box_section
 
 pytestmark = [
     pytest.mark.long,

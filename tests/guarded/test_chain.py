@@ -11,8 +11,8 @@ import time
 
 import pytest
 
-from coneskin.errors import Collision, RobotConnectionError, RobotRefused, SkinConnectionError
-from coneskin.replay.run import read_run, replay
+from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused, SkinConnectionError
+from coneskin.runs.replay.run import read_run, replay
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START

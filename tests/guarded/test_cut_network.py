@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.robot.ur.heartbeat_registers import program_lines
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START

@@ -7,13 +7,13 @@ import sys
 
 import pytest
 
-from coneskin.errors import Collision, RobotRefused
-from coneskin.replay.run import read_run, replay
+from coneskin.core.errors import Collision, RobotRefused
+from coneskin.runs.replay.run import read_run, replay
 from coneskin.session.session import guard
-from coneskin.testing.firmware.emulated_board import BoardPrograms, EmulatedBoard
-from coneskin.testing.firmware.firmware_build import build_emulator, build_sketch, missing_tools
-from coneskin.testing.firmware.guarded_board import board_scene
 from coneskin.testing.forearm import START
+from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard
+from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
+from tests.support.firmware.guarded_board import board_scene
 
 from .guarded_session import assert_stopped_on_the_way, run_until_moving
 

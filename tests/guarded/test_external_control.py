@@ -14,12 +14,12 @@ import time
 
 import pytest
 
-from coneskin.errors import Collision, RobotRefused
-from coneskin.replay.run import read_run, replay
+from coneskin.core.errors import Collision, RobotRefused
+from coneskin.runs.replay.run import read_run, replay
 from coneskin.session.session import guard
 from coneskin.testing.forearm import START
+from tests.support.sweep import sweep
 
-from ..sweep import sweep
 from .guarded_session import fast, kill, scene_for, scene_text, until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")

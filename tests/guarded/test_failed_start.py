@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import SkinConnectionError
-from coneskin.replay.run import read_run
+from coneskin.core.errors import SkinConnectionError
+from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 

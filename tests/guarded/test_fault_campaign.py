@@ -3,14 +3,15 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+
+from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
 
-CAMPAIGN = Path(__file__).parents[2] / "bench" / "faults.py"
+CAMPAIGN = ROOT / "bench" / "faults.py"
 
 
 def campaign(*options):

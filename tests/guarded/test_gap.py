@@ -3,13 +3,13 @@
 import pytest
 
 from coneskin.cli import main
-from coneskin.recording import Block, decode_blocks, encode_block
-from coneskin.recording_file.reader import read_recording
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.replay import Verdict
-from coneskin.replay.run import read_run, replay
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.recording.block import Block, decode_blocks, encode_block
+from coneskin.core.recording.reader import read_recording
+from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.overflow import RecordingOverflowFilter
+from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.runs.replay.replay import Verdict
+from coneskin.runs.replay.run import read_run, replay
 
 from ..scene.scenes import record
 

@@ -11,9 +11,9 @@ from contextlib import suppress
 
 import pytest
 
-from coneskin import child_process
-from coneskin.errors import Collision, RobotConnectionError, RobotRefused
-from coneskin.replay.run import read_run, replay
+from coneskin.core import child_process
+from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused
+from coneskin.runs.replay.run import read_run, replay
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START
 

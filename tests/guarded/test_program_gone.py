@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from coneskin.errors import RobotRefused
-from coneskin.replay.run import read_run, replay
+from coneskin.core.errors import RobotRefused
+from coneskin.runs.replay.run import read_run, replay
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.skin.virtual.pseudo_terminal import PseudoTerminal

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from coneskin.errors import Collision
-from coneskin.replay.run import read_run, replay
+from coneskin.core.errors import Collision
+from coneskin.runs.replay.run import read_run, replay
 from coneskin.session.session import guard
 from coneskin.testing.forearm import START
 

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from coneskin.errors import Collision
+from coneskin.core.errors import Collision
 from coneskin.session.session import guard
 from coneskin.testing.forearm import GOAL, START
 

@@ -8,8 +8,8 @@ import pytest
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.session.session import guard
 from coneskin.testing.forearm import START
+from tests.core.test_time_slice import told_by_kernel
 
-from ..test_time_slice import told_by_kernel
 from .guarded_session import scene_for
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.sim.process import SimulatedController, free_host

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.signals.journal import EventName
+from coneskin.runs.replay.run import read_run
 from coneskin.runs.what_if.touch_labels import true_touches
 from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene

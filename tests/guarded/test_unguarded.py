@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import pytest
 
-from coneskin.errors import RobotConnectionError, RobotRefused, SensorError
+from coneskin.core.errors import RobotConnectionError, RobotRefused, SensorError
 from coneskin.session.fallback_stop import FallbackStop
 from coneskin.session.session import guard
 from coneskin.testing.forearm import START

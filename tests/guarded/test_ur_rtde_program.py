@@ -5,7 +5,6 @@ import math
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,8 +18,9 @@ pytestmark = pytest.mark.long
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
 
 from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
+from tests.support.paths import ROOT  # noqa: E402
 
-FOLDER = Path(__file__).parents[2] / "demos" / "ur_rtde"
+FOLDER = ROOT / "demos" / "ur_rtde"
 PROGRAM, GUARDED = FOLDER / "pick_and_place.py", FOLDER / "pick_and_place_guarded.py"
 
 

@@ -11,10 +11,10 @@ import os
 import subprocess
 import sys
 import threading
-from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[2]
+from tests.support.paths import ROOT
+
 _CHILD = (
     "import json, os, sys; from tests.robot import wheel_calls as calls; "
     "result = getattr(calls, sys.argv[1])(*json.loads(sys.argv[2])); "

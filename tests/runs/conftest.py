@@ -1,13 +1,10 @@
 """The recorded collision of tests/data, read and replayed once for all tests of this folder."""
 
-from pathlib import Path
-
 import pytest
 
-from coneskin.replay.run import Run, read_run
 from coneskin.runs.decisions import Decisions, decide_again
-
-COLLISION = Path(__file__).parents[1] / "data" / "collision.rec"
+from coneskin.runs.replay.run import Run, read_run
+from tests.support.paths import COLLISION
 
 
 @pytest.fixture(scope="session")

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.replay.run import Run
 from coneskin.runs.block_progress import Progress
 from coneskin.runs.cut import cut_run
 from coneskin.runs.decisions import decide_again
 from coneskin.runs.export.export import export_run
+from coneskin.runs.replay.run import Run
 from coneskin.runs.run_summary import summarise_run
 from coneskin.runs.what_if.batch import judge_runs
 from coneskin.runs.what_if.what_if import what_if

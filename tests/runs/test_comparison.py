@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.recording_file.defect import Defect, DefectKind
-from coneskin.replay.quantities import Tolerances
-from coneskin.replay.run import Run, read_run
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.core.recording.defect import Defect, DefectKind
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.arm_command import ArmCommand, first_divergence, recorded_commands
 from coneskin.runs.comparison import compare_decisions
 from coneskin.runs.comparison_text import comparison_facts, comparison_lines
 from coneskin.runs.cut import CUT_TOLERANCES, cut_run
 from coneskin.runs.decisions import Decisions, decide_again, recorded_decisions
+from coneskin.runs.replay.quantities import Tolerances
+from coneskin.runs.replay.run import Run, read_run
 
 
 def changed(decisions: Decisions, name: str, *, later: float = 0.0, **details: object) -> Decisions:

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.code_version import running_version
-from coneskin.errors import RecordingError
-from coneskin.recording_file.defect import Defect, DefectKind
-from coneskin.replay.quantities import Tolerances
-from coneskin.replay.run import Run, read_run, replay
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.errors import RecordingError
+from coneskin.core.recording.defect import Defect, DefectKind
+from coneskin.core.version import running_version
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.cut import cut_run
+from coneskin.runs.replay.quantities import Tolerances
+from coneskin.runs.replay.run import Run, read_run, replay
 from coneskin.runs.run_summary import summarise_run
 
 
@@ -97,7 +97,7 @@ def test_a_cut_that_the_disk_does_not_take_leaves_nothing(
     def full(*_: object) -> None:
         raise RecordingError("no space left on device")
 
-    monkeypatch.setattr("coneskin.recording_file.recorder.Recorder._append", full)
+    monkeypatch.setattr("coneskin.core.recording.recorder.Recorder._append", full)
     with pytest.raises(RecordingError, match="no space left"):
         cut_run(collision, tmp_path / "cut.rec", around=2.95)
     assert list(tmp_path.iterdir()) == []

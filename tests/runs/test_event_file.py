@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import RecordingError
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.core.errors import RecordingError
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.event_file import read_events, write_events
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.support.paths import ROOT
+
 COLLISION = ROOT / "tests" / "data" / "collision.rec"
 
 
@@ -52,8 +53,8 @@ def project(tmp_path: Path) -> Project:
 
 def golden(project: Project, change: object = None) -> None:
     """Write golden events that are the recorded ones, changed."""
-    from coneskin.replay.run import read_run
     from coneskin.runs.event_file import event_facts
+    from coneskin.runs.replay.run import read_run
 
     run = read_run(COLLISION)
     events = event_facts(run.events, run.start)

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.run import Run, read_run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.event_file import read_events, write_events
+from coneskin.runs.replay.run import Run, read_run
 
 HALF = "/skins/caf\udce9"  # a name in Latin-1, as Python reads it
 TOLD = r"/skins/caf\udce9"

@@ -6,19 +6,20 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.driver.messages import StatusReport
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
-from coneskin.robot.guard.outputs import Output
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
+from coneskin.robot.guard.signals.outputs import Output
 from coneskin.robot.ur import rtde_codec as rtde
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.scene import Scene
+from coneskin.scene.values.scene import Scene
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
+from tests.support.paths import ROOT
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "scene.md"
+DOCUMENT = ROOT / "docs" / "scene.md"
 SKIN_ONLY, SERIAL_RETREAT, DOUBLE_CONE, TWO_PORTS = re.findall(
     r"```toml.*?\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL
 )

@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 from coneskin.scene.reader import parse_scene
 from coneskin.testing.forearm import forearm_scene
 

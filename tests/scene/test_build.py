@@ -1,15 +1,15 @@
 """From a scene to places on the arm."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 from coneskin.robot.guard.phase import Phase
 from coneskin.scene.build import build_core, place_on_arm
 from coneskin.scene.reader import parse_scene
+from tests.support.paths import SHARED_DATA
 
 from .scenes import DOUBLE_CONE, SERIAL_RETREAT, SKIN_ONLY
 
@@ -67,7 +67,7 @@ def test_the_urdf_frame_is_at_the_start_of_the_link() -> None:
 
 def test_a_mesh_takes_the_point_down_to_its_surface() -> None:
     """The upper arm of a UR10 is a tube of 54 mm whose axis is 45 mm off its mesh's origin."""
-    mesh = Path(__file__).parents[2].parent / "shared" / "data" / "ur" / "ur10" / "collision" / "upperarm.stl"
+    mesh = SHARED_DATA / "ur" / "ur10" / "collision" / "upperarm.stl"
     if not mesh.is_file():
         pytest.skip(f"needs the link mesh {mesh.name} in the folder shared/data beside the repository")
     text = SERIAL_RETREAT.replace("UR10e", "UR10").replace('name = "upper_arm"', f'name = "upper_arm"\nmesh = "{mesh}"')

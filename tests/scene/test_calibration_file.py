@@ -8,15 +8,7 @@ from typing import Any
 
 import pytest
 
-from coneskin.errors import SceneError
-from coneskin.scene import calibration_file
-from coneskin.scene.calibration_file import (
-    CalibrationRecord,
-    TouchResult,
-    add_calibration,
-    read_calibrations,
-    sensor_fingerprint,
-)
+from coneskin.core.errors import SceneError
 from coneskin.scene.commissioning_record import (
     CommissioningRecord,
     MarkResult,
@@ -26,6 +18,14 @@ from coneskin.scene.commissioning_record import (
 )
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.summary import summarize
+from coneskin.scene.values import calibration_file
+from coneskin.scene.values.calibration_file import (
+    CalibrationRecord,
+    TouchResult,
+    add_calibration,
+    read_calibrations,
+    sensor_fingerprint,
+)
 from coneskin.testing.forearm import forearm_scene
 
 PLAIN = forearm_scene(reaction='kind = "retreat"').replace(

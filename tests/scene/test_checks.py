@@ -8,7 +8,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.scene.checks import check_links
-from coneskin.scene.scene import ArmScene, LinkScene, MotionScene, PlacedSensor, Scene
+from coneskin.scene.values.scene import ArmScene, LinkScene, MotionScene, PlacedSensor, Scene
 from coneskin.skin.sensor import Sensor
 
 

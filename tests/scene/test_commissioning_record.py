@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import SceneError
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.core.errors import SceneError
+from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene.build import build_core
 from coneskin.scene.commissioning_record import (
     fingerprint,
@@ -18,8 +18,8 @@ from coneskin.scene.commissioning_record import (
     write_record,
 )
 from coneskin.scene.reader import load_scene, parse_scene
-from coneskin.scene.scene import Commissioning, Scene
 from coneskin.scene.summary import summarize
+from coneskin.scene.values.scene import Commissioning, Scene
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.testing.commissioned import commissioned, write_passed_record
 

@@ -11,10 +11,10 @@ import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import load_scene, parse_scene
-from coneskin.scene.scene import Scene
+from coneskin.scene.values.scene import Scene
 from coneskin.session.skin_process import virtual_skin
 
 from .scenes import FULL, SERIAL_RETREAT, SKIN_ONLY

@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -29,8 +28,9 @@ from coneskin.scene.tables.schema import Key
 from coneskin.skin.electronics import Polarity, Thresholds
 from coneskin.skin.matched_electronics import match_electronics
 from coneskin.skin.sensor import Sensor
+from tests.support.paths import ROOT
 
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
+DOCUMENT = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml.*?\n(.*?)```", DOCUMENT, re.DOTALL)
 SECTIONS: dict[str, tuple[Key, ...]] = {
     "[arm]": arm_table.ARM_KEYS,

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coneskin.cli import main
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.tables.schema import MAX_SIZE
 

@@ -12,17 +12,16 @@ from pathlib import Path
 import pytest
 import tomli_w
 
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.guard.phase import Phase
 from coneskin.scene.build import _speed_limit, build_core, place_on_arm
 from coneskin.scene.reader import load_scene, parse_scene
-from coneskin.scene.scene import Scene
-from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
 from coneskin.scene.tables.speed_limit_table import limit_fingerprint
+from coneskin.scene.values.scene import Scene
+from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
 from coneskin.testing.forearm import forearm_scene
-
-from ..speed_limit_values import limit_values
+from tests.support.speed_limit_values import limit_values
 
 SCENE = forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n"
 LIMITED = SCENE.replace('model = "UR5e"', 'model = "UR5e"\nspeed_limit_from = "impact.toml"')

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 from coneskin.scene import required_packages
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.suspicions import suspicions

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.session.arm_lock import ArmLock
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names of sockets that need no file")

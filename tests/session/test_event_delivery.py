@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.session.event_delivery import EventDelivery
 from coneskin.session.event_log import EventLog
 

@@ -6,11 +6,11 @@ import threading
 
 import pytest
 
-from coneskin.channel import Channel, pair
-from coneskin.recording import Block, encode_block
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
-from coneskin.scene.scene import RecordingScene
+from coneskin.core.channel import Channel, pair
+from coneskin.core.recording.block import Block, encode_block
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
+from coneskin.runs.replay.run import read_run
+from coneskin.scene.values.scene import RecordingScene
 from coneskin.session.event_log import EventLog, new_recording
 from coneskin.session.guard_monitor import GuardMonitor
 

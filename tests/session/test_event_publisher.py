@@ -12,14 +12,15 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.errors import SceneError
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.core.errors import SceneError
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.session.event_log import EventLog
 from coneskin.session.event_publisher import EventPublisher, event_message
+from tests.support.paths import ROOT
 
 from ..scene.scenes import SKIN_ONLY
 
-FOLDER = Path(__file__).parents[2] / "demos" / "subscribers"
+FOLDER = ROOT / "demos" / "subscribers"
 CONTACT = GuardEvent(EventName.CONTACT, 12.5, {"sensor": "skin", "u": 0.1, "phi": math.nan, "normal": (0.0, math.inf)})
 ENDING = GuardEvent(EventName.ENDING, 13.0, {"what": "told to end"})
 

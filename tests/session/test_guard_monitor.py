@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from coneskin.channel import Channel, pair
-from coneskin.recording import encode_block
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.core.channel import Channel, pair
+from coneskin.core.recording.block import encode_block
+from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.session.event_log import EventLog
 from coneskin.session.guard_monitor import GuardMonitor
 

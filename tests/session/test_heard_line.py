@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from coneskin.recording import Block
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
+from coneskin.core.recording.block import Block
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.scene.reader import parse_scene
 from coneskin.session.heard_line import HeardLine
 from coneskin.session.outcome import activation_error

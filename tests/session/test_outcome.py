@@ -2,8 +2,8 @@
 
 import pytest
 
-from coneskin.errors import Collision, RobotConnectionError, RobotRefused, SkinConnectionError
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused, SkinConnectionError
+from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene.reader import parse_scene
 from coneskin.session.outcome import NOT_CONFIRMED, STANDS, STILL_RETREATING, braking_time, exit_error, stop_error
 from coneskin.session.session import Session

@@ -3,18 +3,17 @@
 import importlib.util
 import inspect
 import re
-from pathlib import Path
 
 import pytest
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.ur.ur_rtde import QUESTIONS
 from coneskin.session import ur_rtde_names
 from coneskin.session.ur_rtde_names import NAMES, UrRtdeArm
 from coneskin.session.ur_rtde_refusals import REFUSALS
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[2]
 ELSEWHERE = {"unlockProtectiveStop"}  # of the dashboard client
 
 

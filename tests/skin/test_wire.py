@@ -3,7 +3,6 @@
 import math
 import random
 import re
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -22,6 +21,7 @@ from coneskin.skin.wire import (
     encode,
     frame_at,
 )
+from tests.support.paths import ROOT
 
 from .bench_top import UR10, measured
 
@@ -93,13 +93,13 @@ def test_layout_byte_by_byte():
 
 
 def test_the_documented_bytes_are_the_encoded_ones():
-    text = (Path(__file__).parents[2] / "docs" / "wire-format.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "wire-format.md").read_text(encoding="utf-8")
     shown = bytes.fromhex("".join(re.findall(r"^    ((?:[0-9A-F]{2}[ ]*)+)$", text, re.MULTILINE)))
     assert shown == b"".join(encode(frame) for frame in DOCUMENTED)
 
 
 def test_the_worked_example_is_what_the_circuit_gives():
-    text = (Path(__file__).parents[2] / "docs" / "wire-format.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "wire-format.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (?:untouched|touched at [^|]*) \| (.*) \|$", text, re.MULTILINE)
     shown = [[int(count) for count in re.findall(r"\d+", row)] for row in rows]
     sensor = Sensor(UR10)

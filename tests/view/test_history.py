@@ -2,14 +2,13 @@
 
 import math
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from coneskin.replay.run import read_run
 from coneskin.robot.driver.registry import load_driver
-from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
+from coneskin.runs.replay.run import read_run
 from coneskin.view.contact_mark import FADING, ContactLog
 from coneskin.view.history import History
 from coneskin.view.panel_text import event_list, status
@@ -17,8 +16,9 @@ from coneskin.view.phase_words import UNKNOWN, PhaseWords, phase_after
 from coneskin.view.strand import Strand, read_strands
 from coneskin.view.timeline import timeline
 from coneskin.view.traces import trace_names, traces
+from tests.support.paths import COLLISION
 
-RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+RUN = COLLISION
 
 
 @pytest.fixture(scope="module")

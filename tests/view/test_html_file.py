@@ -4,12 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import RecordingError
+from coneskin.core.errors import RecordingError
 from coneskin.view.html_file import write_html
 from coneskin.view.page_server import page_client
 from coneskin.view.strand import read_strands
+from tests.support.paths import COLLISION
 
-RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+RUN = COLLISION
 
 
 def test_a_recording_is_not_replaced_by_a_page(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +10,9 @@ from coneskin.view.level_changes import LevelChanges
 from coneskin.view.stage.level_scale import level_words
 from coneskin.view.strand import read_strands
 from coneskin.view.trace_drawing import trace_drawings
+from tests.support.paths import COLLISION
 
-RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+RUN = COLLISION
 
 
 def test_the_last_change_is_the_level_of_the_run_within_a_percent() -> None:

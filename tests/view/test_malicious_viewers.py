@@ -5,7 +5,6 @@ import socket
 import threading
 import time
 from contextlib import ExitStack, suppress
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,7 +18,9 @@ from .socket_viewer import SocketViewer, socket_viewer
 pytest.importorskip("viser", reason="viser is not installed: no page is served")
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+from tests.support.paths import COLLISION
+
+RUN = COLLISION
 
 
 def control(viewer: SocketViewer, kind: str) -> str:

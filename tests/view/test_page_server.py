@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from coneskin.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError
 from coneskin.view.client.unpacked_client import unpacked
 from coneskin.view.page_server import PageServer, page_client
 

@@ -6,20 +6,21 @@ from typing import Any
 
 import pytest
 
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import BlockKind, EventName
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
+from coneskin.robot.guard.signals.journal import BlockKind, EventName
+from coneskin.runs.replay.run import read_run
 from coneskin.view.html_file import write_html
 from coneskin.view.live_page import LivePage
 from coneskin.view.live_run import LiveRun
 from coneskin.view.page_server import PageServer
 from coneskin.view.run_page import show_runs
 from coneskin.view.strand import Strand, read_strands
+from tests.support.paths import COLLISION
 
 from .browser import browser_page, look_closely, look_closely_at_a_file, magenta, pixels, quiet, violet, wait_for_text
 
-RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+RUN = COLLISION
 NOTICE = "No safety display"
 SMOOTHED = "() => document.querySelector('canvas[data-engine]').getContext('webgl2').getContextAttributes().antialias"
 JUMP = """(words) => [...document.querySelectorAll('#coneskin-events div')]

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import RecordingError
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
+from coneskin.core.errors import RecordingError
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
 from coneskin.view.recording_tail import RecordingTail
 
 HEADER, SKIN, EVENT = 20, 1, 10

@@ -13,11 +13,11 @@ from unittest.mock import MagicMock
 import numpy as np
 import pytest
 
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
 from coneskin.geometry.pose import Vector
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.run import Run
-from coneskin.robot.guard.journal import BlockKind, force_block
+from coneskin.robot.guard.signals.journal import BlockKind, force_block
+from coneskin.runs.replay.run import Run
 from coneskin.testing.forearm import forearm_scene
 from coneskin.view.history import History
 from coneskin.view.live_page import LivePage

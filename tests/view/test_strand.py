@@ -1,14 +1,13 @@
 """Strands: the clock of a page, and the events that count by it."""
 
-from pathlib import Path
-
 import pytest
 
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.signals.journal import EventName
+from coneskin.runs.replay.run import read_run
 from coneskin.view.strand import event_lines, read_strands
+from tests.support.paths import COLLISION
 
-RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+RUN = COLLISION
 
 
 def test_the_events_of_one_run_count_from_its_start() -> None:

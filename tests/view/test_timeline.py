@@ -1,13 +1,13 @@
 """Timeline of runs: what lies in its stretch of time, and nothing else."""
 
 from dataclasses import replace
-from pathlib import Path
 
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.signals.journal import EventName
 from coneskin.view.strand import read_strands
 from coneskin.view.timeline import timeline
+from tests.support.paths import COLLISION
 
-RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+RUN = COLLISION
 TICK = 'width="3"'
 
 

@@ -1,7 +1,6 @@
 """Plot of traces: its axes hold what is known, whatever is missing."""
 
 from contextlib import nullcontext
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,8 +9,9 @@ import pytest
 
 from coneskin.view.strand import Strand, read_strands
 from coneskin.view.trace_plot import TracePlot
+from tests.support.paths import COLLISION
 
-RUN = Path(__file__).parents[1] / "data" / "collision.rec"
+RUN = COLLISION
 
 
 class Gui:

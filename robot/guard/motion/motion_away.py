@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.guard.outputs import Outputs
-from coneskin.robot.guard.touch_record import TouchRecord
+from coneskin.robot.guard.signals.outputs import Outputs
+from coneskin.robot.guard.signals.touch_record import TouchRecord
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 if TYPE_CHECKING:  # a reaction that only stops loads it not

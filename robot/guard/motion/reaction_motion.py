@@ -14,15 +14,15 @@ from coneskin.robot.arm.workspace import TablePlane, Workspace
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.guard.journal import EventName, describe_way
-from coneskin.robot.guard.outputs import Outputs, emit
+from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
+from coneskin.robot.guard.signals.journal import EventName, describe_way
+from coneskin.robot.guard.signals.outputs import Outputs, emit
 from coneskin.robot.reaction.backtrack import PathHistory
 from coneskin.robot.reaction.contact_supervision import ContactSupervision
 from coneskin.robot.reaction.motion import ReactionMotion, plan_answer, plan_reaction_motion
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 from .following_error import FollowingErrorMonitor
-from .joint_current import JointCurrentMonitor
 
 __all__ = ["MotionStream", "ReactionPlanner"]
 

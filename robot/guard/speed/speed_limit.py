@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.guard.journal import EventName
-from coneskin.robot.guard.outputs import Outputs, emit
+from coneskin.robot.guard.signals.journal import EventName
+from coneskin.robot.guard.signals.outputs import Outputs, emit
 
 from .permissible_speeds import PermissibleSpeeds, SurfaceSpeeds
 from .slider_setting import SliderSetting

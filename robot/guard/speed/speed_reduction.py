@@ -17,14 +17,14 @@ from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.journal import EventName
-from coneskin.robot.guard.outputs import Outputs, emit
+from coneskin.robot.guard.signals.journal import EventName
+from coneskin.robot.guard.signals.outputs import Outputs, emit
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
 if TYPE_CHECKING:  # a scene without a slow reaction does not load it
-    from coneskin.robot.guard.motion.joint_current import JointCurrentMonitor
+    from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
     from coneskin.robot.reaction.contact_approach import ContactApproach
 
 __all__ = ["HOLD", "ReducedSpeedTouch", "SpeedReduction"]
@@ -134,7 +134,7 @@ class SpeedReduction:
     def __init__(self, model: ArmModel, used: bool) -> None:
         self._model = model
         if used:  # here, so that no touch waits for it
-            from coneskin.robot.guard.motion.joint_current import JointCurrentMonitor
+            from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
             from coneskin.robot.reaction.contact_approach import ContactApproach
 
             self._approach_of, self._monitor_of = ContactApproach, JointCurrentMonitor

@@ -14,14 +14,14 @@ from dataclasses import replace
 from inspect import isgeneratorfunction
 from typing import Any
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.inertia import joint_torques, mass_matrix
 from coneskin.robot.arm.inverse_kinematics import nearest, solutions
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.model import ZERO_VELOCITY
+from coneskin.robot.sim.machine.notices import PopupNotice, TextNotice
 from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
 from coneskin.robot.sim.motion.path import Path
-from coneskin.robot.sim.notices import PopupNotice, TextNotice
 from coneskin.robot.sim.urscript.math_functions import MathFunctions
 from coneskin.robot.sim.urscript.strings import StringFunctions
 from coneskin.robot.sim.urscript.values import (

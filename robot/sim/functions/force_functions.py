@@ -13,7 +13,7 @@ import math
 from collections.abc import Generator
 from typing import Any
 
-from coneskin.robot.sim.notices import ErrorNotice, Report
+from coneskin.robot.sim.machine.notices import ErrorNotice, Report
 from coneskin.robot.sim.urscript.values import Array, ScriptError, number, numbers, show
 
 from .script_host import CallingProgram, ScriptHost

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from coneskin.robot.sim.terminals import CURRENT, VOLTAGE
+from coneskin.robot.sim.machine.terminals import CURRENT, VOLTAGE
 from coneskin.robot.sim.urscript.values import ScriptError, show
 from coneskin.robot.ur.rtde_variables import VARIABLES
 

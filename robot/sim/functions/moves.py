@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.inverse_kinematics import nearest
 from coneskin.robot.sim.motion.arm import CYCLE, JOINT_ACCELERATION, Motion, MotionFault

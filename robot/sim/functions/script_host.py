@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from coneskin.robot.sim.client_inputs import ClientInputs
+from coneskin.robot.sim.machine.client_inputs import ClientInputs
+from coneskin.robot.sim.machine.notices import Notice
+from coneskin.robot.sim.machine.terminals import Terminals
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.motion.stop_cause import TRIGGERED, StopCause
-from coneskin.robot.sim.notices import Notice
-from coneskin.robot.sim.terminals import Terminals
 from coneskin.robot.sim.urscript.values import ScriptError
 
 from .script_socket import ScriptSocket

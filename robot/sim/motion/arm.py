@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.inertia import joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import flange_jacobian, forward

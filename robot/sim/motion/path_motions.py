@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.inverse_kinematics import nearest
 from coneskin.robot.sim.urscript.values import interpolate, rotation_of, rotvec_between

@@ -1,7 +1,8 @@
 """Plant: what the controller's joint targets move, and what its sensors then measure.
 
 The controller makes targets, the plant follows them as well as it can. The one here follows them exactly; another one
-may have masses, servos that give way, and things to run into (``coneskin.physics``). This package knows none of that.
+may have masses, servos that give way, and things to run into (``coneskin.impact.simulation``).
+This package knows none of that.
 """
 
 from __future__ import annotations

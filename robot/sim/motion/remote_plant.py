@@ -13,7 +13,7 @@ import math
 import struct
 from collections.abc import Sequence
 
-from coneskin.channel import Channel
+from coneskin.core.channel import Channel
 from coneskin.robot.arm.kinematics import JOINTS
 from coneskin.robot.arm.model import ArmModel
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from coneskin.robot.sim.options import Version
+from coneskin.robot.sim.machine.options import Version
+from coneskin.robot.sim.machine.safety import Runtime
 from coneskin.robot.sim.ports.rtde_session import BUGFIX_VERSION, BUILD_NUMBER
-from coneskin.robot.sim.power import POWER_COMMANDS, power
-from coneskin.robot.sim.safety import Runtime
+from coneskin.robot.sim.runtime.power import POWER_COMMANDS, power
 from coneskin.robot.sim.urscript.values import ScriptError
 
 from .user_interface import NO_MODE, SERIAL_NUMBER, UserInterface

@@ -11,8 +11,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from coneskin.robot.sim.power import power
-from coneskin.robot.sim.safety import SafetyMode
+from coneskin.robot.sim.machine.safety import SafetyMode
+from coneskin.robot.sim.runtime.power import power
 from coneskin.robot.sim.urscript.values import ScriptError
 
 from .http_message import Answer, Request, uploaded_file

@@ -8,8 +8,8 @@ import zipfile
 from collections import deque
 from collections.abc import Callable
 
-from coneskin.robot.sim.controller import Controller
-from coneskin.robot.sim.controller_state import describe
+from coneskin.robot.sim.runtime.controller import Controller
+from coneskin.robot.sim.runtime.controller_state import describe
 from coneskin.robot.sim.urscript.values import ScriptError
 
 from .external_script import ScriptRequest

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import struct
 
-from coneskin.robot.sim.notices import (
+from coneskin.robot.sim.machine.notices import (
     ErrorNotice,
     Notice,
     PopupNotice,
@@ -19,7 +19,7 @@ from coneskin.robot.sim.notices import (
     SafetyNotice,
     TextNotice,
 )
-from coneskin.robot.sim.options import Version
+from coneskin.robot.sim.machine.options import Version
 
 __all__ = ["encode_notice", "encode_version", "pack"]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from coneskin.robot.sim.controller import Controller
-from coneskin.robot.sim.notices import SafetyNotice
+from coneskin.robot.sim.machine.notices import SafetyNotice
+from coneskin.robot.sim.runtime.controller import Controller
 
 from .client_messages import encode_notice, encode_version
 from .realtime_packet import encode_realtime

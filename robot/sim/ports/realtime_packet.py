@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import struct
 
-from coneskin.robot.sim.controller import Controller
-from coneskin.robot.sim.options import Version
-from coneskin.robot.sim.safety import RobotMode
+from coneskin.robot.sim.machine.options import Version
+from coneskin.robot.sim.machine.safety import RobotMode
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.sim.urscript.values import values_of
 
 __all__ = ["encode_realtime", "realtime_size"]

@@ -16,9 +16,9 @@ import zlib
 from collections.abc import Iterable
 
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.machine.safety import MOVING, RobotMode, SafetyMode
 from coneskin.robot.sim.motion.arm import JOINT_ACCELERATION
-from coneskin.robot.sim.safety import MOVING, RobotMode, SafetyMode
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.sim.urscript.values import values_of
 
 from .client_messages import pack

@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-from coneskin.robot.sim.client_inputs import INPUTS
-from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.machine.client_inputs import INPUTS
+from coneskin.robot.sim.machine.options import Version
+from coneskin.robot.sim.machine.safety import MOVING, RobotMode, Runtime, robot_bits, safety_bits
 from coneskin.robot.sim.motion.arm import SimulatedArm
-from coneskin.robot.sim.options import Version
-from coneskin.robot.sim.safety import MOVING, RobotMode, Runtime, robot_bits, safety_bits
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.sim.urscript.values import values_of
 from coneskin.robot.ur.rtde_codec import Value
 from coneskin.robot.ur.rtde_variables import VARIABLES

@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
-from coneskin.robot.sim.controller import Controller
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.ur.rtde_codec import (
     IN_USE,
     NOT_FOUND,

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from coneskin.robot.sim.controller import Controller
-from coneskin.robot.sim.notices import ProgramFailed
-from coneskin.robot.sim.power import power
+from coneskin.robot.sim.machine.notices import ProgramFailed
+from coneskin.robot.sim.runtime.controller import Controller
+from coneskin.robot.sim.runtime.power import power
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs
 
 from .client_messages import encode_notice

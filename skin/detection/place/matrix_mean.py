@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
 
 from .matrix_noise import MatrixNoise
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 

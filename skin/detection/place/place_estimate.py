@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
 from coneskin.skin.robin_function import RobinFunction
 from coneskin.skin.sensor import Sensor
 

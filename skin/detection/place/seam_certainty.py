@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 
 from .doubt import CONTRADICTS, MOVES

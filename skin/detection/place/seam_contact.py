@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 
 from .matrix_noise import MatrixNoise

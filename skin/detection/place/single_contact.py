@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
-from coneskin.skin.detection.reading import Reading
-from coneskin.skin.detection.settings import DetectorSettings
-from coneskin.skin.detection.touch_reading import TouchReading
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
+from coneskin.skin.detection.frame.reading import Reading
+from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.frame.touch_reading import TouchReading
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.detection.untouched.leak import UntouchedLeak
 from coneskin.skin.sensor import Sensor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
 
 from .matrix_noise import MatrixNoise
 from .place_estimate import PlaceEstimator

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from coneskin.skin.detection.faults import Fault
+from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 

@@ -7,7 +7,7 @@ place alone: no threshold is compared with what is left, so that no press is los
 
 from __future__ import annotations
 
-from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.settings import DetectorSettings
 
 __all__ = ["UntouchedLevel"]
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from .terminal.person_at_terminal import LiveReading, Person
 
 if TYPE_CHECKING:
-    from coneskin.calibration.calibrate import CalibrationResult, Calibrator
-    from coneskin.scene.scene import Scene
+    from coneskin.commissioning.calibration.calibrate import CalibrationResult, Calibrator
+    from coneskin.scene.values.scene import Scene
 
 __all__ = ["add_arguments", "run"]
 
@@ -77,7 +77,7 @@ def _forces(text: str) -> tuple[float, ...]:
 
 def _check_names(scene: Scene, built: Scene) -> None:
     """Refuse a virtual skin whose sensors are not those that are touched."""
-    from coneskin.errors import SceneError
+    from coneskin.core.errors import SceneError
 
     names, others = ({placed.sensor.name for placed in each.sensors} for each in (scene, built))
     if names != others:
@@ -87,9 +87,9 @@ def _check_names(scene: Scene, built: Scene) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate the skin of a scene, or list its marks."""
-    from coneskin.calibration.calibrate import Calibrator
-    from coneskin.commissioning.commission import check_touchable
-    from coneskin.errors import SceneError
+    from coneskin.commissioning.acceptance.commission import check_touchable
+    from coneskin.commissioning.calibration.calibrate import Calibrator
+    from coneskin.core.errors import SceneError
     from coneskin.scene.reader import load_scene
     from coneskin.scene.tables.link_tables import sensor_files
     from coneskin.skin.sources.kinds import is_simulated
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
         print('blunt, and hold it until it is read. "n" and Enter: out of reach. Ctrl-C ends it.', flush=True)
     results = calibrator.run(args.by)
     if args.picture:
-        from coneskin.calibration.residuals_picture import draw_residuals
+        from coneskin.commissioning.calibration.residuals_picture import draw_residuals
 
         draw_residuals(results, args.picture)
     _write(args, scene, results)
@@ -133,8 +133,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _write(args: argparse.Namespace, scene: Scene, results: list[CalibrationResult]) -> None:
     """Add the results to the files of their devices, and show them."""
-    from coneskin.scene.calibration_file import add_calibration, calibration_path
     from coneskin.scene.tables.link_tables import named_calibrations
+    from coneskin.scene.values.calibration_file import add_calibration, calibration_path
 
     named = named_calibrations(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder)
     for result, place in zip(results, named, strict=True):

@@ -13,7 +13,7 @@ from .terminal.person_at_terminal import LiveReading, Person
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from coneskin.commissioning.procedure import Procedure
+    from coneskin.commissioning.acceptance.procedure import Procedure
 
 __all__ = ["add_arguments", "run"]
 
@@ -59,7 +59,7 @@ def _posture(text: str) -> tuple[float, ...]:
 
 def run(args: argparse.Namespace) -> int:
     """Commission the skin of a scene, or list its marks."""
-    from coneskin.commissioning.commission import Commissioner
+    from coneskin.commissioning.acceptance.commission import Commissioner
     from coneskin.scene.commissioning_record import write_record
     from coneskin.scene.reader import load_scene
 
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
     def begin(procedure: Procedure, q: Sequence[float] | None) -> None:
         if args.picture:
-            from coneskin.commissioning.marks_picture import draw_marks
+            from coneskin.commissioning.acceptance.marks_picture import draw_marks
 
             draw_marks(scene, procedure, q, args.picture)
 

@@ -17,7 +17,14 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.errors import Collision, ConeSkinError, MissingExtra, RecordingError, RobotConnectionError, RobotRefused
+from coneskin.core.errors import (
+    Collision,
+    ConeSkinError,
+    MissingExtra,
+    RecordingError,
+    RobotConnectionError,
+    RobotRefused,
+)
 from coneskin.scene.required_packages import has_physics_engine
 
 from .demonstration.report import collision_facts, hold_up, print_report
@@ -27,10 +34,10 @@ if TYPE_CHECKING:
     import socket
     from collections.abc import Callable
 
-    from coneskin.physics.impact_outcome import ImpactOutcome
-    from coneskin.replay.run import Run
-    from coneskin.robot.guard.journal import GuardEvent
-    from coneskin.scene.scene import Scene
+    from coneskin.impact.simulation.impact_outcome import ImpactOutcome
+    from coneskin.robot.guard.signals.journal import GuardEvent
+    from coneskin.runs.replay.run import Run
+    from coneskin.scene.values.scene import Scene
     from coneskin.session.session import Session
 
 __all__ = ["add_arguments", "run"]
@@ -66,8 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo."""
-    from coneskin.replay.run import read_run, replay
     from coneskin.robot.sim.process import free_host
+    from coneskin.runs.replay.run import read_run, replay
 
     folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
     try:
@@ -121,7 +128,7 @@ def _meet(scene: Scene, soft: bool, folder: Path, say: Callable[[str], None]) ->
     with contextlib.ExitStack() as stack:
         plant = None
         if soft:
-            from coneskin.physics.live_plant import LivePlant
+            from coneskin.impact.simulation.live_plant import LivePlant
 
             plant = stack.enter_context(LivePlant(scene, start_q))
         line = None if plant is None else plant.controller
@@ -139,7 +146,7 @@ def _meet(scene: Scene, soft: bool, folder: Path, say: Callable[[str], None]) ->
 
 def _cause(folder: Path) -> str:
     """Return what held the run up, by its recording; empty where nothing did, or none tells."""
-    from coneskin.replay.run import read_run
+    from coneskin.runs.replay.run import read_run
 
     try:
         return hold_up(read_run(folder).blocks)
@@ -163,7 +170,7 @@ class _Transcript:
 
     def event(self, event: GuardEvent) -> None:
         """Print an event of the guard."""
-        from coneskin.replay.event_text import describe
+        from coneskin.runs.replay.event_text import describe
 
         self._say(describe(event, self._began()))
         with self._changed:
@@ -184,7 +191,7 @@ def _commission(scene: Scene, say: Callable[[str], None]) -> None:
     Raises:
         RobotRefused: the skin has not passed.
     """
-    from coneskin.commissioning.commission import Commissioner
+    from coneskin.commissioning.acceptance.commission import Commissioner
     from coneskin.scene.commissioning_record import write_record
 
     say("commissioning of the skin, by virtual touches (a real one: a person, with `coneskin commission`)")
@@ -246,7 +253,7 @@ def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> 
 
 
 def _draw(recorded: Run, folder: Path, say: Callable[[str], None]) -> str | None:
-    from coneskin.replay.run_picture import draw_run
+    from coneskin.runs.replay.run_picture import draw_run
 
     try:
         draw_run(recorded, folder / "run.png")

@@ -10,16 +10,16 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.errors import SceneError
-from coneskin.terminal_text import painted
+from coneskin.core.errors import SceneError
+from coneskin.core.terminal_text import painted
 
 from .simulated_arm import simulated_arm
 from .terminal.hints import print_hint
 
 if TYPE_CHECKING:
-    from coneskin.doctor.doctor import Doctor
-    from coneskin.finding import Finding
-    from coneskin.scene.scene import Scene
+    from coneskin.commissioning.examination.doctor import Doctor
+    from coneskin.core.finding import Finding
+    from coneskin.scene.values.scene import Scene
 
 __all__ = ["add_arguments", "run"]
 
@@ -49,8 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Examine a scene."""
-    from coneskin.doctor.doctor import Doctor
-    from coneskin.finding import exit_code
+    from coneskin.commissioning.examination.doctor import Doctor
+    from coneskin.core.finding import exit_code
     from coneskin.scene.reader import load_scene
 
     scene = load_scene(args.scene)
@@ -82,9 +82,9 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
     Raises:
         SceneError: the scene is written in a way in which it cannot be changed, or cannot be written.
     """
-    from coneskin.doctor.scene_patch import diff_texts, set_sensor_keys
+    from coneskin.commissioning.examination.scene_patch import diff_texts, set_sensor_keys
     from coneskin.scene.reader import parse_scene
-    from coneskin.scene.whole_file import write_whole
+    from coneskin.scene.values.whole_file import write_whole
 
     old = args.scene.read_text(encoding="utf-8")
     names, text = [item.sensor.name for item in scene.sensors], old

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.skin.field.area_error import area_error
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.maps import FieldMap

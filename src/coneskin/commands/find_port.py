@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from coneskin.errors import SkinTimeout
-from coneskin.time_argument import positive_seconds
+from coneskin.core.errors import SkinTimeout
+from coneskin.core.time_argument import positive_seconds
 
 if TYPE_CHECKING:
     from coneskin.skin.sources.port_list import PortFacts
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Find a port, or list those that are there."""
-    from coneskin.monitor.port_search import port_trouble, stable_name
+    from coneskin.commissioning.line.port_search import port_trouble, stable_name
     from coneskin.skin.sources.port_list import find_ports
 
     if args.list:
@@ -79,7 +79,7 @@ def find_port(
     Raises:
         SkinTimeout: none has come.
     """
-    from coneskin.monitor.port_search import PortSearch
+    from coneskin.commissioning.line.port_search import PortSearch
 
     search = PortSearch(look())
     say(f"{search.request} (within {timeout:g} s; Ctrl-C ends)")
@@ -98,7 +98,7 @@ def find_port(
 
 def _list(ports: Sequence[PortFacts], as_json: bool) -> int:
     """List the ports with what stands against their use; return 0 where one can be used."""
-    from coneskin.monitor.port_search import port_trouble
+    from coneskin.commissioning.line.port_search import port_trouble
 
     rows = [(port, port_trouble(port.device)) for port in ports]
     for port, trouble in rows:

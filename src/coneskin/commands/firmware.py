@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from coneskin.errors import GeometryError, SceneError
+from coneskin.core.errors import GeometryError, SceneError
 
 __all__ = ["add_arguments", "run"]
 

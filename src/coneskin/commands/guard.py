@@ -15,17 +15,17 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.errors import Collision, ConeSkinError, RobotRefused
-from coneskin.robot.guard.journal import EventName
+from coneskin.core.errors import Collision, ConeSkinError, RobotRefused
+from coneskin.core.time_argument import positive_seconds
+from coneskin.robot.guard.signals.journal import EventName
 from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
-from coneskin.time_argument import positive_seconds
 
 from .simulated_arm import simulated_arm
 from .terminal.hints import print_hint
 from .terminal.typed_lines import typed_lines
 
 if TYPE_CHECKING:
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
     from coneskin.session.event_publisher import EventPublisher
     from coneskin.session.session import Session
 
@@ -94,8 +94,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPublisher]) -> int:
-    from coneskin.replay.event_text import EventLines
-    from coneskin.robot.guard.journal import GuardEvent
+    from coneskin.robot.guard.signals.journal import GuardEvent
+    from coneskin.runs.replay.event_text import EventLines
     from coneskin.session.session import guard
 
     lines = EventLines()

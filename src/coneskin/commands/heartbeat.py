@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 
 __all__ = ["add_arguments", "run"]
 

@@ -14,11 +14,11 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 
 if TYPE_CHECKING:
-    from coneskin.physics.impact_outcome import ImpactOutcome
-    from coneskin.scene.scene import Scene
+    from coneskin.impact.simulation.impact_outcome import ImpactOutcome
+    from coneskin.scene.values.scene import Scene
 
 __all__ = ["add_arguments", "run"]
 
@@ -98,8 +98,8 @@ def _with_reaction(scene: Scene, way: str) -> Scene:
 
 
 def _collide(scene: Scene, way: str, args: argparse.Namespace) -> ImpactOutcome:
-    from coneskin.physics.collision_run import CollisionRun
-    from coneskin.physics.joint_program import Waypoints
+    from coneskin.impact.simulation.collision_run import CollisionRun
+    from coneskin.impact.simulation.joint_program import Waypoints
 
     assert scene.motion is not None
     motion = scene.motion

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.errors import GeometryError, SceneError
-from coneskin.robot.sim.options import DEFAULT_MODEL
+from coneskin.core.errors import GeometryError, SceneError
+from coneskin.robot.sim.machine.options import DEFAULT_MODEL
 
 from .terminal.hints import print_hint
 
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.design.first_scene import first_scene, read_design
     from coneskin.scene.reader import parse_scene
     from coneskin.scene.suspicions import suspicions
-    from coneskin.scene.whole_file import write_whole
+    from coneskin.scene.values.whole_file import write_whole
 
     if args.output.exists() and not args.force:
         raise GeometryError(f"{args.output} exists already: name another file with -o, or replace it with --force")

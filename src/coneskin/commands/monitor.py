@@ -13,12 +13,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from coneskin.errors import SkinConnectionError, SkinTimeout
-from coneskin.time_argument import positive_seconds
+from coneskin.core.errors import SkinConnectionError, SkinTimeout
+from coneskin.core.time_argument import positive_seconds
 
 if TYPE_CHECKING:
-    from coneskin.monitor.line import Line
-    from coneskin.monitor.line_monitor import LineMonitor, LineReport
+    from coneskin.commissioning.line.line import Line
+    from coneskin.commissioning.line.line_monitor import LineMonitor, LineReport
 
 __all__ = ["add_arguments", "run"]
 
@@ -65,7 +65,7 @@ def _baud(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Listen until told to end; return 0 where the last diagnosis is good."""
-    from coneskin.monitor.line import find_line
+    from coneskin.commissioning.line.line import find_line
 
     line = find_line(args.target, args.baud)
     show = _shower(args)
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _shower(args: argparse.Namespace) -> Callable[[LineReport], None]:
     """Return what shows a report in the way that was asked for."""
-    from coneskin.monitor.report_text import describe_line, describe_report, draw_screen
+    from coneskin.commissioning.line.report_text import describe_line, describe_report, draw_screen
 
     if args.json:
         return lambda report: print(json.dumps(describe_report(report)), flush=True)
@@ -101,7 +101,7 @@ def _shower(args: argparse.Namespace) -> Callable[[LineReport], None]:
 
 def _play_file(line: Line, show: Callable[[LineReport], None]) -> LineReport:
     """Show what a file says: the report at its end, and before it each other diagnosis that it gave meanwhile."""
-    from coneskin.monitor.line_monitor import LineMonitor
+    from coneskin.commissioning.line.line_monitor import LineMonitor
 
     monitor: LineMonitor | None = None
     seen, due, now = None, 0.0, 0.0
@@ -122,7 +122,7 @@ def _play_file(line: Line, show: Callable[[LineReport], None]) -> LineReport:
 
 def _listen(line: Line, args: argparse.Namespace, show: Callable[[LineReport], None]) -> LineReport:
     """Show what arrives, until the time is over, the user ends it, or the line is gone."""
-    from coneskin.monitor.line_monitor import LineMonitor
+    from coneskin.commissioning.line.line_monitor import LineMonitor
 
     assert line.source is not None
     period = _SCREEN_PERIOD if sys.stdout.isatty() and not args.json else _LINE_PERIOD

@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 
 from .terminal.hints import print_hint
 
 if TYPE_CHECKING:
-    from coneskin.permissible_speed.speed_map import SpeedMap
+    from coneskin.impact.permissible_speed.speed_map import SpeedMap
 
 __all__ = ["add_arguments", "run"]
 
@@ -51,9 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compute, print and write the speeds."""
-    from coneskin.permissible_speed.limits_file import read_limits
-    from coneskin.permissible_speed.speed_map import map_speeds
-    from coneskin.permissible_speed.speed_map_file import write_map
+    from coneskin.impact.permissible_speed.limits_file import read_limits
+    from coneskin.impact.permissible_speed.speed_map import map_speeds
+    from coneskin.impact.permissible_speed.speed_map_file import write_map
     from coneskin.scene.reader import load_scene
 
     limits = read_limits(args.limits)
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is not None:
         write_map(found, args.output)
     if args.picture is not None:
-        from coneskin.permissible_speed.map_picture import draw_map
+        from coneskin.impact.permissible_speed.map_picture import draw_map
 
         draw_map(scene, limits, found, args.picture)
     if args.json:
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _plain(found: SpeedMap) -> dict[str, Any]:
     """Return a map for JSON: the table of the file, with the heaviest mass at each patch."""
-    from coneskin.permissible_speed.speed_map_file import map_table
+    from coneskin.impact.permissible_speed.speed_map_file import map_table
 
     table: dict[str, Any] = map_table(found)["speed_limit"]
     del table["digest"]  # of the file; this has more

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from coneskin.replay.replay import Replay
+    from coneskin.runs.replay.replay import Replay
 
 __all__ = ["add_arguments", "run"]
 
@@ -100,13 +100,13 @@ def _list_runs(folder: Path) -> int:
 
 
 def _replay_one(args: argparse.Namespace) -> int:
-    from coneskin.replay.run import read_run, replay
     from coneskin.runs.progress_bar import ProgressBar
+    from coneskin.runs.replay.run import read_run, replay
 
     recorded = read_run(args.runs[0], ProgressBar("read"))
     result = replay(recorded, progress=ProgressBar("replayed"))
     if args.picture:
-        from coneskin.replay.run_picture import draw_run
+        from coneskin.runs.replay.run_picture import draw_run
 
         draw_run(recorded, args.picture)
     start = recorded.start
@@ -131,9 +131,9 @@ def _replay_one(args: argparse.Namespace) -> int:
 
 
 def _report(result: Replay, start: float, listed: bool) -> None:
-    from coneskin.replay.event_text import describe
-    from coneskin.replay.replay import MOST_DIFFERENCES
-    from coneskin.terminal_text import printable
+    from coneskin.core.terminal_text import printable
+    from coneskin.runs.replay.event_text import describe
+    from coneskin.runs.replay.replay import MOST_DIFFERENCES
 
     if listed:
         for event in result.events:

@@ -9,21 +9,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from coneskin.errors import RecordingError, SceneError
-from coneskin.terminal_text import printable
+from coneskin.core.errors import RecordingError, SceneError
+from coneskin.core.terminal_text import printable
 
 __all__ = ["replay_many", "replay_with_settings"]
 
 
 def replay_with_settings(path: Path, words: Sequence[str], scene_file: Path | None, listed: bool, as_json: bool) -> int:
     """Say what a run would have been with other settings, or another scene, and return the exit code 0."""
-    from coneskin.replay.event_text import describe
-    from coneskin.replay.run import read_run
     from coneskin.runs.comparison import compare_decisions, without_invented
     from coneskin.runs.comparison_text import comparison_facts, comparison_lines
     from coneskin.runs.decisions import decide_again, recorded_decisions
     from coneskin.runs.event_file import event_facts
     from coneskin.runs.progress_bar import ProgressBar
+    from coneskin.runs.replay.event_text import describe
+    from coneskin.runs.replay.run import read_run
     from coneskin.scene.reader import load_scene
     from coneskin.scene.setting_overrides import parse_settings
 

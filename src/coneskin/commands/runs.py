@@ -8,15 +8,15 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.errors import ConeSkinError, RecordingError
-from coneskin.terminal_text import printable
+from coneskin.core.errors import ConeSkinError, RecordingError
+from coneskin.core.terminal_text import printable
 
 from .arguments.runs import INCOMPLETE, add_arguments
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
     from coneskin.runs.decisions import Decisions
     from coneskin.runs.progress_bar import ProgressBar
+    from coneskin.runs.replay.run import Run
     from coneskin.runs.run_summary import RunSummary
 
 __all__ = ["add_arguments", "run"]
@@ -63,7 +63,7 @@ def _summary(path: Path) -> RunSummary:
 
 
 def _read(path: Path) -> Run:
-    from coneskin.replay.run import read_run
+    from coneskin.runs.replay.run import read_run
 
     return read_run(path, _bar(f"reading {path}"))
 
@@ -151,9 +151,9 @@ def _cut(args: argparse.Namespace) -> int:
 
 
 def _diff(args: argparse.Namespace) -> int:
-    from coneskin.replay.quantities import Tolerances
     from coneskin.runs.comparison import compare_decisions
     from coneskin.runs.comparison_text import comparison_facts, comparison_lines
+    from coneskin.runs.replay.quantities import Tolerances
 
     one, other = _sides(args)
     tolerances = Tolerances.from_words(args.tolerance)

@@ -11,12 +11,12 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
-from coneskin.errors import ConeSkinError, RobotRefused
+from coneskin.core.errors import ConeSkinError, RobotRefused
 
 if TYPE_CHECKING:
-    from coneskin.physics.live_plant import LivePlant
+    from coneskin.impact.simulation.live_plant import LivePlant
     from coneskin.robot.sim.process import SimulatedController
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
 
 __all__ = ["simulated_arm"]
 
@@ -45,7 +45,7 @@ def simulated_arm(scene: Scene, bodies: bool = False) -> Iterator[socket.socket 
             f"--simulated starts a controller on this computer, but arm.host is {host}: leave --simulated out, or set "
             'host = "127.0.0.1"'
         )
-    from coneskin.robot.sim.options import START_Q
+    from coneskin.robot.sim.machine.options import START_Q
     from coneskin.robot.sim.process import SimulatedController
 
     start_q = scene.motion.waypoints[0] if scene.motion else START_Q
@@ -57,7 +57,7 @@ def simulated_arm(scene: Scene, bodies: bool = False) -> Iterator[socket.socket 
                     f'{scene.name} has bodies, which press a virtual skin only: set kind = "virtual" in [source], or '
                     "leave the bodies out"
                 )
-            from coneskin.physics.live_plant import LivePlant
+            from coneskin.impact.simulation.live_plant import LivePlant
 
             plant = stack.enter_context(LivePlant(scene, start_q))
         line = None if plant is None else plant.controller

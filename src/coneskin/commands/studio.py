@@ -11,11 +11,11 @@ import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.time_argument import positive_seconds
+from coneskin.core.time_argument import positive_seconds
 
 if TYPE_CHECKING:
     from coneskin.design.link import LinkMesh
-    from coneskin.studio.workbench import Workbench
+    from coneskin.design.studio.workbench import Workbench
 
 __all__ = ["add_arguments", "run"]
 
@@ -52,8 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show the studio."""
     from coneskin.design.link import load_link
-    from coneskin.studio.studio_page import StudioPage
-    from coneskin.studio.workbench import Workbench
+    from coneskin.design.studio.studio_page import StudioPage
+    from coneskin.design.studio.workbench import Workbench
     from coneskin.view.page_server import PageServer
 
     def bench_of(link: LinkMesh) -> Workbench:

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.errors import SceneError
-from coneskin.time_argument import positive_seconds
+from coneskin.core.errors import SceneError
+from coneskin.core.time_argument import positive_seconds
 
 if TYPE_CHECKING:
     from coneskin.view.live_run import LiveRun

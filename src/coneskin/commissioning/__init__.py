@@ -1,1 +1,1 @@
-"""Commissioning of a skin: a person touches marks, and the skin must read them where they are."""
+"""What a person does at the skin: touch marks, calibrate, examine, listen to the line."""

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.cut_sheet import CutSheet, nest_sheets
 from coneskin.geometry.drawing.dxf import ArcStyle, to_dxf
 from coneskin.geometry.drawing.nesting import MaterialBed
@@ -25,8 +25,8 @@ from coneskin.geometry.drawing.pdf import PageSize, to_pdf
 from coneskin.geometry.drawing.svg import to_svg
 from coneskin.geometry.drawing.test_piece import make_test_piece
 
-from .sheets import SheetDesign
-from .summary import material_rows, sensor_toml
+from .sheets.sheet_design import SheetDesign
+from .sheets.summary import material_rows, sensor_toml
 
 __all__ = ["DESIGN_FILE", "FileOptions", "check_target", "new_folder", "sheet_folder", "write_sheets"]
 

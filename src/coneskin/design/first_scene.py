@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
-from coneskin.bounded_file import read_file
-from coneskin.errors import GeometryError, KinematicsError
-from coneskin.json_text import read_json
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import GeometryError, KinematicsError
+from coneskin.core.json_text import read_json
 from coneskin.robot.arm.link_frames import LINK_INDEX, link_index
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.tables.sensor_table import build_sensor

@@ -6,19 +6,19 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
+from coneskin.core.terminal_text import printable
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.nesting import nest_on_beds
 from coneskin.geometry.drawing.test_piece import make_test_piece
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.solid.closed_surface import to_stl
 from coneskin.geometry.solid.step import WrappedLayer, require_step_writer, write_step
-from coneskin.terminal_text import printable
 
 from .files import FileOptions, new_folder, sheet_folder, write_sheets
 from .report import report_text
-from .sheets import SheetDesign
-from .summary import design_summary
+from .sheets.sheet_design import SheetDesign
+from .sheets.summary import design_summary
 from .workshop.build_figures import measure_build
 from .workshop.datum_faces import find_datum_faces
 

@@ -9,8 +9,8 @@ from coneskin.geometry.drawing.outline import Outline
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw_shape, drawing_point
 from coneskin.geometry.sector import unroll
 
-from .sector_text import polar_text
-from .sheets import SheetDesign
+from .sheets.sector_text import polar_text
+from .sheets.sheet_design import SheetDesign
 from .workshop.wiring import CableExit
 
 __all__ = ["FOIL_COLOUR", "INK_COLOUR", "draw_layout"]

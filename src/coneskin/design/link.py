@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import MeshError
+from coneskin.core.errors import MeshError
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
@@ -154,7 +154,7 @@ def find_link_sheets(source: LinkMesh, progress: Callable[[str], None], **search
         GeometryError: an argument of the search is out of range.
     """
     from coneskin.geometry.fit.coverage_notes import hull_note
-    from coneskin.geometry.fit.sheets import find_sheets
+    from coneskin.geometry.fit.developable.sheets import find_sheets
     from coneskin.geometry.fit.surface_samples import sample_surface
     from coneskin.geometry.ray_casting import RayCaster
 

@@ -15,8 +15,8 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from .files import FileOptions, check_target
 from .folder import write_design
 from .link import LinkMesh, fit_link, fit_mesh
-from .seam_strip import cover_seams
-from .sheets import DesignOptions, SheetDesign, design_sheets
+from .sheets.seam_strip import cover_seams
+from .sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit

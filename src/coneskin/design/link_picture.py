@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from coneskin.geometry.ray_casting import RayCaster
 
 from .layout_picture import FOIL_COLOUR, INK_COLOUR
-from .sheets import SheetDesign
+from .sheets.sheet_design import SheetDesign
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea

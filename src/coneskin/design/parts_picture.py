@@ -9,8 +9,8 @@ from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS
 from coneskin.geometry.sector import unroll
 
 from .layout_picture import INK_COLOUR
-from .sector_text import polar_text
-from .sheets import SheetDesign
+from .sheets.sector_text import polar_text
+from .sheets.sheet_design import SheetDesign
 from .workshop.guide_words import side_name
 
 __all__ = ["draw_parts"]

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import MissingExtra
+from coneskin.core.errors import MissingExtra
 
 from .jig_picture import draw_jig
 from .layout_picture import draw_layout
 from .link_picture import draw_link, drawn_triangles
 from .parts_picture import draw_parts
-from .sheets import SheetDesign
+from .sheets.sheet_design import SheetDesign
 from .stack_picture import draw_seam, draw_stack
 from .weights_picture import draw_weights
 from .workshop.build_figures import BuildFigures

@@ -11,10 +11,10 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
 
 from .files import sheet_folder
-from .sector_text import sector_text
-from .sheets import SheetDesign
-from .small_active_area import small_active_area
-from .summary import design_summary, material_rows
+from .sheets.sector_text import sector_text
+from .sheets.sheet_design import SheetDesign
+from .sheets.small_active_area import small_active_area
+from .sheets.summary import design_summary, material_rows
 from .workshop.bill_of_materials import bill_of_materials
 from .workshop.build_figures import BuildFigures
 from .workshop.build_guide import guide_lines

@@ -8,7 +8,7 @@ from typing import Any
 from coneskin.geometry.drawing.outline import Outline
 
 from .layout_picture import FOIL_COLOUR, INK_COLOUR
-from .sheets import SheetDesign
+from .sheets.sheet_design import SheetDesign
 from .workshop.build_figures import BuildFigures
 from .workshop.guide_words import side_name
 

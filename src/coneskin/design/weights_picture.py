@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from .sheets import SheetDesign
+from .sheets.sheet_design import SheetDesign
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.touch_weights import TouchWeights

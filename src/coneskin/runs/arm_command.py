@@ -7,13 +7,14 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from coneskin.recording import Block
-from coneskin.replay.quantities import Tolerances
+from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import SetJointVelocity, decode_command
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
 from coneskin.robot.driver.stop_path import UseStopPath
-from coneskin.robot.guard.journal import INPUTS, BlockKind
-from coneskin.robot.guard.outputs import Command
+from coneskin.robot.guard.signals.journal import INPUTS, BlockKind
+from coneskin.robot.guard.signals.outputs import Command
+
+from .replay.quantities import Tolerances
 
 __all__ = ["ArmCommand", "command_block", "command_of", "first_divergence", "recorded_commands"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from coneskin.recording import Block
-from coneskin.recording_file.reader import RecordedBlocks
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.reader import RecordedBlocks
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
+    from .replay.run import Run
 
 __all__ = ["Progress", "silent", "watch"]
 

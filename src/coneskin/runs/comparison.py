@@ -11,14 +11,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from coneskin.replay.detail_differences import describe_differences, distance, milliseconds
-from coneskin.replay.quantities import Tolerances
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
 from .arm_command import first_divergence
 from .decisions import Decisions
 from .event_pairs import SKIN_EVENTS, EventPair, pair_events
 from .event_subjects import either_event, event_words, pair_subjects, touched_sensor
+from .replay.detail_differences import describe_differences, distance, milliseconds
+from .replay.quantities import Tolerances
 
 __all__ = ["Comparison", "Difference", "compare_decisions", "without_invented"]
 

@@ -14,16 +14,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin import __version__
-from coneskin.code_version import code_commit
-from coneskin.draft_file import draft_of
-from coneskin.errors import RecordingError
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.quantities import Tolerances
+from coneskin.core.draft_file import draft_of
+from coneskin.core.errors import RecordingError
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
+from coneskin.core.version import __version__, code_commit
 from coneskin.robot.driver.messages import Release, StatusReport
-from coneskin.robot.guard.journal import INPUTS, BlockKind, EventName, GuardEvent
-from coneskin.robot.guard.outputs import Command, Output
+from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, EventName, GuardEvent
+from coneskin.robot.guard.signals.outputs import Command, Output
 from coneskin.scene.resolved_settings import resolved_settings
 
 from .arm_command import command_block
@@ -31,9 +29,10 @@ from .block_progress import Progress, silent
 from .comparison import Comparison, compare_decisions
 from .decisions import Decisions, decide_again, recorded_decisions
 from .event_pairs import SKIN_EVENTS
+from .replay.quantities import Tolerances
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
+    from .replay.run import Run
 
 __all__ = ["CUT_TOLERANCES", "CutRun", "cut_run", "first_touch"]
 

@@ -8,15 +8,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from coneskin.robot.driver.messages import Release
-from coneskin.robot.guard.journal import INPUTS, SESSION_EVENTS, BlockKind, GuardEvent
-from coneskin.robot.guard.outputs import Output
+from coneskin.robot.guard.signals.journal import INPUTS, SESSION_EVENTS, BlockKind, GuardEvent
+from coneskin.robot.guard.signals.outputs import Output
 
 from .arm_command import ArmCommand, command_of, recorded_commands
 from .block_progress import Progress, silent, watch
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
+
+    from .replay.run import Run
 
 __all__ = ["Decisions", "decide_again", "recorded_decisions", "scene_with"]
 

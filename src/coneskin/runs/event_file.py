@@ -8,11 +8,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from coneskin.bounded_file import read_file
-from coneskin.errors import RecordingError
-from coneskin.json_text import read_json
-from coneskin.recording import is_time
-from coneskin.robot.guard.journal import SESSION_EVENTS, EventName, GuardEvent
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import RecordingError
+from coneskin.core.json_text import read_json
+from coneskin.core.recording.block import is_time
+from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName, GuardEvent
 
 __all__ = ["event_facts", "parse_events", "read_events", "write_events"]
 

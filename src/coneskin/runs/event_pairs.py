@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
 __all__ = ["SKIN_EVENTS", "EventPair", "pair_events"]
 

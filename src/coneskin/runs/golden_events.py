@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from coneskin.errors import RecordingError
-from coneskin.replay.quantities import Tolerances
-from coneskin.replay.run import read_run
+from coneskin.core.errors import RecordingError
 
 from .comparison import Comparison, compare_decisions, without_invented
 from .comparison_text import comparison_lines
 from .decisions import Decisions, decide_again, recorded_decisions
 from .event_file import read_events, write_events
+from .replay.quantities import Tolerances
+from .replay.run import read_run
 
 __all__ = ["check_golden", "describe_failure", "golden_path", "update_golden"]
 

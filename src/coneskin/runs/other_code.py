@@ -6,7 +6,7 @@ import json
 import subprocess
 from pathlib import Path
 
-from coneskin.errors import RecordingError
+from coneskin.core.errors import RecordingError
 
 from .decisions import Decisions
 from .event_file import parse_events

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from coneskin.replay.quantities import Tolerances
     from coneskin.robot.sim.process import SimulatedController
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
     from coneskin.skin.virtual.skin import VirtualSkin
 
     from .decisions import Decisions
+    from .replay.quantities import Tolerances
 
 __all__ = [
     "RecordedRunFile",
@@ -120,8 +120,8 @@ class RecordedRunItem(pytest.Item):
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """Return the lines for a person; a traceback only where it is ours that fails."""
-        from coneskin.errors import ConeSkinError
-        from coneskin.terminal_text import printable
+        from coneskin.core.errors import ConeSkinError
+        from coneskin.core.terminal_text import printable
 
         if isinstance(excinfo.value, _RunDiffers | ConeSkinError):
             return printable(str(excinfo.value))
@@ -140,7 +140,7 @@ def _check_tolerances(config: pytest.Config) -> None:
     """Refuse a tolerance that does not exist, whatever is collected; without any, nothing of coneskin is loaded."""
     if not _tolerance_words(config):
         return
-    from coneskin.errors import RecordingError
+    from coneskin.core.errors import RecordingError
 
     try:
         _tolerances(config)
@@ -153,7 +153,7 @@ def _tolerance_words(config: pytest.Config) -> list[str]:
 
 
 def _tolerances(config: pytest.Config) -> Tolerances:
-    from coneskin.replay.quantities import Tolerances
+    from .replay.quantities import Tolerances
 
     return Tolerances.from_words(_tolerance_words(config))
 
@@ -166,9 +166,8 @@ def replayed() -> Callable[..., Decisions]:
     """
 
     def replay_file(path: Path | str, settings: Mapping[str, Any] | None = None) -> Decisions:
-        from coneskin.replay.run import read_run
-
         from .decisions import decide_again
+        from .replay.run import read_run
 
         run = read_run(path)
         if not run.complete:

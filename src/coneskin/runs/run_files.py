@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from coneskin.errors import RecordingError
+from coneskin.core.errors import RecordingError
 
 __all__ = ["find_recordings", "is_further_part", "is_run", "run_name"]
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.recording import is_time
-from coneskin.robot.guard.journal import BlockKind, EventName
+from coneskin.core.recording.block import is_time
+from coneskin.robot.guard.signals.journal import BlockKind, EventName
 
 from .block_progress import Progress, silent, watch
 from .run_files import run_name
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
+    from .replay.run import Run
 
 __all__ = ["RunSummary", "summarise_run"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import KinematicsError, SceneError
+from coneskin.core.errors import KinematicsError, SceneError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 
-    from .scene import Scene
-    from .speed_limit import SpeedLimitScene
+    from .values.scene import Scene
+    from .values.speed_limit import SpeedLimitScene
 
 __all__ = ["SensorOnArm", "build_core", "place_on_arm", "withheld_motion"]
 
@@ -48,11 +48,11 @@ def build_core(
     """
     if not scene.sensors:
         raise SceneError(["a guard needs a [[link]] with a [[link.sensor]]"], scene.name)
-    from coneskin.robot.guard.contact import GuardedSensor
     from coneskin.robot.guard.core import GuardCore
-    from coneskin.skin.detection.settings import DetectorSettings
+    from coneskin.robot.guard.signals.contact import GuardedSensor
+    from coneskin.skin.detection.frame.settings import DetectorSettings
+    from coneskin.skin.detection.frame.timing import TimingLimits
     from coneskin.skin.detection.stream import TouchStream
-    from coneskin.skin.detection.timing import TimingLimits
 
     limits = scene.monitoring_limits
     timing = TimingLimits(late=limits.skin_late, clock_drift=limits.clock_drift)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 
-from .scene import LinkScene, MotionScene, Scene
+from .values.scene import LinkScene, MotionScene, Scene
 
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import ArmModel

@@ -13,15 +13,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import SceneError
-from coneskin.json_text import read_json
+from coneskin.core.errors import SceneError
+from coneskin.core.json_text import read_json
 
-from .scene import Commissioning
-from .sensor_facts import round_facts, sensor_facts
-from .whole_file import write_whole
+from .values.scene import Commissioning
+from .values.sensor_facts import round_facts, sensor_facts
+from .values.whole_file import write_whole
 
 if TYPE_CHECKING:
-    from .scene import PlacedSensor, Scene
+    from .values.scene import PlacedSensor, Scene
 
 __all__ = [
     "CommissioningRecord",

@@ -10,10 +10,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from coneskin.bounded_file import read_file
-from coneskin.errors import SceneError
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import SceneError
 
-from . import scene as s
 from .tables.arm_table import read_arm, read_monitoring
 from .tables.link_tables import count_sensors, inline_sensor_files, read_links
 from .tables.motion_table import read_motion
@@ -21,6 +20,7 @@ from .tables.reaction_table import read_reaction
 from .tables.schema import MAX_SIZE, Key, check
 from .tables.source_table import read_sources
 from .tables.touch_table import read_touch
+from .values import scene as s
 
 if TYPE_CHECKING:
     pass

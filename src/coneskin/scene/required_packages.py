@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from coneskin.skin.sources.kinds import is_simulated
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from .values.scene import Scene
 
 __all__ = ["has_physics_engine", "missing_packages", "required_packages"]
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from .sensor_facts import sensor_facts
+from .values.sensor_facts import sensor_facts
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from .values.scene import Scene
 
 __all__ = ["changed_settings", "resolved_settings"]
 

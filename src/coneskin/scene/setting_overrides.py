@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from coneskin.errors import SceneError
+from coneskin.core.errors import SceneError
 
 from .reader import TABLES
 from .tables.detector_keys import DETECTOR, detector_settings

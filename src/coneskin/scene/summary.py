@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from coneskin.robot.stop.limits import MonitoringLimits
     from coneskin.skin.sensor import Sensor
 
-    from .scene import PlacedSensor, Scene
+    from .values.scene import PlacedSensor, Scene
 
 __all__ = ["missing_parts", "summarize"]
 
@@ -93,12 +93,12 @@ def _sensor(item: PlacedSensor, link: str, frame: str) -> str:
 
 def _certainty(sensor: Sensor, arm: bool) -> str:
     """Return when a touch's place is certain, and what that excludes."""
+    from coneskin.skin.detection.frame.settings import DetectorSettings
     from coneskin.skin.detection.place.single_contact import (
         DANGEROUS_ANGLE,
         frames_until_certain,
         weakest_pair_excluded,
     )
-    from coneskin.skin.detection.settings import DetectorSettings
 
     settings = DetectorSettings()
     frames = frames_until_certain(sensor, settings)

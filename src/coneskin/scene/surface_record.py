@@ -6,14 +6,14 @@ import json
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import RecordingError
-from coneskin.json_text import read_json
+from coneskin.core.errors import RecordingError
+from coneskin.core.json_text import read_json
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from coneskin.recording import Block
+    from coneskin.core.recording.block import Block
 
     from .build import SensorOnArm
 
@@ -29,8 +29,8 @@ def encode_surfaces(placed: Iterable[SensorOnArm], time: float) -> list[Block]:
         placed: the sensors, as the guard uses them.
         time: host clock [s].
     """
-    from coneskin.recording import Block
-    from coneskin.robot.guard.journal import BlockKind
+    from coneskin.core.recording.block import Block
+    from coneskin.robot.guard.signals.journal import BlockKind
 
     blocks = []
     for item in placed:
@@ -51,7 +51,7 @@ def decode_surfaces(blocks: Iterable[Block]) -> dict[str, NDArray[np.float64]]:
     Raises:
         RecordingError: a block of this kind holds no grid of finite heights.
     """
-    from coneskin.robot.guard.journal import BlockKind
+    from coneskin.robot.guard.signals.journal import BlockKind
 
     return dict(_decode(block) for block in blocks if block.kind == BlockKind.SURFACE)
 

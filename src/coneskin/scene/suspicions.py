@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from coneskin.geometry.pose import Pose
     from coneskin.robot.arm.model import ArmModel
 
-    from .scene import LinkScene, PlacedSensor, Scene
+    from .values.scene import LinkScene, PlacedSensor, Scene
 
 __all__ = ["suspicions"]
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from coneskin.channel import Channel
-from coneskin.errors import KinematicsError
+from coneskin.core.channel import Channel
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.driver.waypoint import Waypoint

@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 
 __all__ = ["ArmLock"]
 

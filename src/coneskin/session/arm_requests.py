@@ -11,8 +11,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from coneskin.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.errors import RobotConnectionError, RobotRefused
+from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
+from coneskin.core.errors import RobotConnectionError, RobotRefused
 
 __all__ = ["ArmRequests"]
 

@@ -9,8 +9,8 @@ import subprocess
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from coneskin.channel import Channel, encode_json, pair
-from coneskin.child_process import spawn
+from coneskin.core.channel import Channel, encode_json, pair
+from coneskin.core.child_process import spawn
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.registry import load_driver
 from coneskin.skin.sources.kinds import is_simulated
@@ -20,7 +20,7 @@ from .fallback_stop import stop_settings
 if TYPE_CHECKING:
     import socket
 
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
 
     from .skin_client import SkinClient
 

@@ -13,14 +13,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from coneskin import __version__
-from coneskin.code_version import code_commit
-from coneskin.errors import ConeSkinError, RecordingError
-from coneskin.recording import Block, decode_blocks
-from coneskin.recording_file.reader import parts_of
-from coneskin.recording_file.recorder import Recorder
-from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, decode_event
-from coneskin.scene.scene import RecordingScene
+from coneskin.core.errors import ConeSkinError, RecordingError
+from coneskin.core.recording.block import Block, decode_blocks
+from coneskin.core.recording.reader import parts_of
+from coneskin.core.recording.recorder import Recorder
+from coneskin.core.version import __version__, code_commit
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, decode_event
+from coneskin.scene.values.scene import RecordingScene
 
 from .event_delivery import EventDelivery
 from .heard_line import HeardLine

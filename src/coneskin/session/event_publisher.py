@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlsplit
 
-from coneskin.errors import SceneError
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.core.errors import SceneError
+from coneskin.robot.guard.signals.journal import GuardEvent
 
 __all__ = ["EventPublisher", "event_message"]
 

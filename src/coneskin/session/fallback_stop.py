@@ -11,7 +11,7 @@ from coneskin.robot.driver.registry import load_driver
 
 if TYPE_CHECKING:
     from coneskin.robot.stop.standstill_hold import StandstillHold
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
 
 __all__ = ["FallbackStop", "stop_settings"]
 

@@ -13,8 +13,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from coneskin.channel import Channel, wait_readable
-from coneskin.robot.guard.journal import EventName
+from coneskin.core.channel import Channel, wait_readable
+from coneskin.robot.guard.signals.journal import EventName
 
 from .event_log import EventLog
 from .outcome import NOT_CONFIRMED, STANDS, reasons

@@ -8,11 +8,11 @@ import sys
 import time
 from pathlib import Path
 
-from coneskin.channel import decode_json, wait_readable, wait_writable
-from coneskin.child_process import inherit
-from coneskin.errors import ConeSkinError
-from coneskin.recording import encode_block
-from coneskin.time_slice import shorten_time_slice
+from coneskin.core.channel import decode_json, wait_readable, wait_writable
+from coneskin.core.child_process import inherit
+from coneskin.core.errors import ConeSkinError
+from coneskin.core.recording.block import encode_block
+from coneskin.core.time_slice import shorten_time_slice
 
 __all__ = ["main"]
 
@@ -25,10 +25,10 @@ def main(arguments: list[str]) -> int:
     shorten_time_slice()
     lifeline, (session, *rest) = inherit(arguments)
     # while the other processes start; not above, because the program may be gone before all of it is loaded
-    from coneskin.robot.guard.journal import EventName, GuardEvent
     from coneskin.robot.guard.overflow import RecordingOverflowFilter
+    from coneskin.robot.guard.signals.journal import EventName, GuardEvent
     from coneskin.scene.reader import parse_scene
-    from coneskin.scene.scene import Commissioning
+    from coneskin.scene.values.scene import Commissioning
 
     from .guard_run import run_guard
 

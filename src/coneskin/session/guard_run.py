@@ -7,15 +7,15 @@ import signal
 import time
 from typing import Any
 
-from coneskin.channel import Channel
-from coneskin.child_process import Lifeline
-from coneskin.errors import RobotRefused
-from coneskin.recording import encode_block
+from coneskin.core.channel import Channel
+from coneskin.core.child_process import Lifeline
+from coneskin.core.errors import RobotRefused
+from coneskin.core.recording.block import encode_block
 from coneskin.robot.guard.loop import GuardLoop
 from coneskin.robot.guard.ports import GuardPorts
 from coneskin.scene.build import build_core, place_on_arm
-from coneskin.scene.scene import Scene
 from coneskin.scene.surface_record import encode_surfaces
+from coneskin.scene.values.scene import Scene
 from coneskin.skin.sources.kinds import is_simulated, open_source
 from coneskin.skin.sources.source_reopening import SourceReopening
 

@@ -6,11 +6,11 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from coneskin.recording import Block
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.recording.block import Block
+from coneskin.robot.guard.signals.journal import BlockKind
 
 if TYPE_CHECKING:
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
     from coneskin.skin.diagnosis.capture import CaptureWindow
 
 __all__ = ["HeardLine"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from coneskin.errors import RobotRefused
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.core.errors import RobotRefused
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
 from .event_log import EventLog
 from .outcome import reasons

@@ -6,15 +6,15 @@ import math
 import time
 from typing import TYPE_CHECKING
 
-from coneskin import errors
-from coneskin.errors import Collision, ConeSkinError, MissingExtra, RobotConnectionError, RobotRefused, SceneError
-from coneskin.robot.guard.journal import EventName
+from coneskin.core import errors
+from coneskin.core.errors import Collision, ConeSkinError, MissingExtra, RobotConnectionError, RobotRefused, SceneError
+from coneskin.robot.guard.signals.journal import EventName
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from coneskin.robot.guard.journal import GuardEvent
-    from coneskin.scene.scene import Scene
+    from coneskin.robot.guard.signals.journal import GuardEvent
+    from coneskin.scene.values.scene import Scene
 
     from .event_log import EventLog
 

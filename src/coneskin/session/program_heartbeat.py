@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 
-from coneskin.channel import Channel
+from coneskin.core.channel import Channel
 from coneskin.robot.driver.messages import REPORT_PERIOD, Heartbeat
 
 __all__ = ["ProgramHeartbeat"]

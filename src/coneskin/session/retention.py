@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from coneskin.errors import RecordingError
-from coneskin.recording import Block
-from coneskin.recording_file.defect import DefectKind
-from coneskin.recording_file.reader import MAX_SIZE, parts_of, read_recording
-from coneskin.recording_file.recording_lock import hold_against_recorder
-from coneskin.recording_file.retention import prune_file
-from coneskin.robot.guard.journal import BlockKind, EventName, decode_event
+from coneskin.core.errors import RecordingError
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.defect import DefectKind
+from coneskin.core.recording.reader import MAX_SIZE, parts_of, read_recording
+from coneskin.core.recording.recording_lock import hold_against_recorder
+from coneskin.core.recording.retention import prune_file
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_event
 
 __all__ = ["AROUND", "prune_part", "prune_run"]
 

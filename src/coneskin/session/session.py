@@ -15,14 +15,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
+from coneskin.core.errors import RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.guard.journal import EventName, GuardEvent, stopping_contact
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent, stopping_contact
 from coneskin.scene.commissioning_record import with_commissioning
 from coneskin.scene.reader import load_scene
 from coneskin.scene.resolved_settings import resolved_settings
-from coneskin.scene.scene import Scene
 from coneskin.scene.summary import missing_parts
+from coneskin.scene.values.scene import Scene
 
 from .arm_client import ArmClient
 from .child_processes import ChildProcesses

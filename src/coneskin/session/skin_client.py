@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from coneskin.channel import Channel, decode_json, encode_json, pair, wait_readable
-from coneskin.child_process import spawn
-from coneskin.errors import SensorError, SkinConnectionError
-from coneskin.recording import Block
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.channel import Channel, decode_json, encode_json, pair, wait_readable
+from coneskin.core.child_process import spawn
+from coneskin.core.errors import SensorError, SkinConnectionError
+from coneskin.core.recording.block import Block
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
 if TYPE_CHECKING:

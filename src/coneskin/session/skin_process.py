@@ -16,13 +16,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.child_process import inherit
-from coneskin.errors import ConeSkinError
-from coneskin.time_slice import shorten_time_slice
+from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
+from coneskin.core.child_process import inherit
+from coneskin.core.errors import ConeSkinError
+from coneskin.core.time_slice import shorten_time_slice
 
 if TYPE_CHECKING:  # imported once the line to the program is there, which may have ended already
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
     from coneskin.skin.virtual.skin import VirtualSkin
 

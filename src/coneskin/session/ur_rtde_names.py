@@ -12,7 +12,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 
 from . import ur_rtde_calls as calls
 from .arm_client import ArmClient

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from coneskin.scene.commissioning_record import CommissioningRecord, MarkResult, fingerprint, write_record
-from coneskin.scene.scene import Commissioning, Scene
+from coneskin.scene.values.scene import Commissioning, Scene
 
 __all__ = ["commissioned", "write_passed_record"]
 

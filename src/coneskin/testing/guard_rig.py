@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 
-from coneskin.errors import SkinConnectionError
+from coneskin.core.errors import SkinConnectionError
+from coneskin.core.recording.block import Block
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.recording import Block
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.ur_models import arm_model
@@ -16,20 +16,21 @@ from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.stop_path import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
-from coneskin.robot.guard.contact import Contact, GuardedSensor
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.sim.companion_processes import CompanionProcesses
+from coneskin.robot.sim.mock_arm import SLIDER, MockArm
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
-from coneskin.robot.ur.rtde_codec import Recipe
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.frame.touch_reading import TouchReading
 from coneskin.skin.detection.stream import TouchStream
-from coneskin.skin.detection.touch_reading import TouchReading
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.fault_injection import FaultInjection
@@ -38,17 +39,13 @@ from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.virtual.substrate import Foam
 
-from .companion_processes import CompanionProcesses
-from .mock_arm import MockArm
-
-__all__ = ["CONE", "LINK", "MODEL", "SLIDER", "START_Q", "GuardRig", "felt", "make_core", "touch"]
+__all__ = ["CONE", "LINK", "MODEL", "START_Q", "GuardRig", "felt", "make_core", "touch"]
 
 _LEAVES = 0.05  # rad/s at which the arm leaves what has touched it
 
 MODEL = arm_model("UR5e")
 START_Q = [math.radians(q) for q in (-20.0, -90.0, 90.0, -90.0, -90.0, 0.0)]
 LINK = LINK_INDEX["forearm"]
-SLIDER = Recipe(("target_speed_fraction",))
 CONE = PlacedFrustum(Frustum(0.0376, 0.0372, 0.26), dh_mesh(MODEL, "forearm") @ Pose(translation=(0.0, 0.0, 0.08)))
 
 

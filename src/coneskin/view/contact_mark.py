@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from coneskin.geometry.pose import Vector
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
 __all__ = ["FADING", "ContactLog", "ContactMark"]
 

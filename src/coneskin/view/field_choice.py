@@ -6,7 +6,7 @@ import math
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 
 from .stage.field_patches import SQUARE, FieldPatches, field_patches, linear, potential_colours
 from .stage.level_scale import gradient

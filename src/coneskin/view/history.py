@@ -13,9 +13,16 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
-from coneskin.errors import RecordingError, RobotConnectionError
-from coneskin.recording import Block
-from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent, body_places, contact_force, decode_event
+from coneskin.core.errors import RecordingError, RobotConnectionError
+from coneskin.core.recording.block import Block
+from coneskin.robot.guard.signals.journal import (
+    BlockKind,
+    EventName,
+    GuardEvent,
+    body_places,
+    contact_force,
+    decode_event,
+)
 
 from .contact_mark import ContactLog, ContactMark
 from .phase_words import UNKNOWN, PhaseWords, phase_after
@@ -27,7 +34,7 @@ if TYPE_CHECKING:
     from coneskin.geometry.pose import Vector
     from coneskin.robot.arm.model import Joints
     from coneskin.robot.driver.state import ControllerState
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["CHANNELS", "History", "PhaseChange", "Series", "history_of"]

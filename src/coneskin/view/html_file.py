@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from coneskin.draft_file import draft_of
-from coneskin.errors import RecordingError
+from coneskin.core.draft_file import draft_of
+from coneskin.core.errors import RecordingError
 
 from .level_changes import LevelChanges
 from .page_server import PageServer, page_client

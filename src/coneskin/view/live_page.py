@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from coneskin.errors import ConeSkinError
-from coneskin.replay.event_text import describe
+from coneskin.core.errors import ConeSkinError
+from coneskin.runs.replay.event_text import describe
 
 from .field_choice import FieldChoice
 from .live_run import LiveRun

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from coneskin.errors import RecordingError
-from coneskin.json_text import read_json
-from coneskin.recording import Block
-from coneskin.replay.run import Run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.errors import RecordingError
+from coneskin.core.json_text import read_json
+from coneskin.core.recording.block import Block
+from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.runs.replay.run import Run
 
 from .history import History
 from .recording_tail import RecordingTail
@@ -84,7 +84,7 @@ class LiveRun:
 
 def is_live(path: Path) -> bool:
     """Tell whether a recording grows: its newest file was written a moment ago."""
-    from coneskin.recording_file.reader import parts_of
+    from coneskin.core.recording.reader import parts_of
 
     try:
         newest = max(part.stat().st_mtime for part in parts_of(path))

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from coneskin.errors import ConeSkinError, MissingExtra
+from coneskin.core.errors import ConeSkinError, MissingExtra
 
 from .client.file_drop import with_file_drop
 from .client.software_drawing import with_plain_edges

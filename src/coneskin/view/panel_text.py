@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from coneskin.robot.guard.journal import GuardEvent
+from coneskin.robot.guard.signals.journal import GuardEvent
 
 from .phase_words import PhaseWords
 

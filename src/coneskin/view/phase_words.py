@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.signals.journal import EventName
 
 __all__ = ["UNKNOWN", "PhaseWords", "phase_after"]
 

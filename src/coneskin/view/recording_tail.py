@@ -12,10 +12,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
 
-from coneskin.bounded_file import open_file
-from coneskin.errors import RecordingError
-from coneskin.recording import END, Block
-from coneskin.recording_file.chunk import (
+from coneskin.core.bounded_file import open_file
+from coneskin.core.errors import RecordingError
+from coneskin.core.recording.block import END, Block
+from coneskin.core.recording.chunk import (
     CHUNK_HEAD_SIZE,
     FILE_HEAD_SIZE,
     SYNC,
@@ -25,8 +25,8 @@ from coneskin.recording_file.chunk import (
     decode_chunk_head,
     decode_file_head,
 )
-from coneskin.recording_file.reader import MAX_SIZE
-from coneskin.recording_file.recorder import part_path
+from coneskin.core.recording.reader import MAX_SIZE
+from coneskin.core.recording.recorder import part_path
 
 __all__ = ["RecordingTail"]
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import Any
 
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.signals.journal import EventName
 
 from .field_choice import FieldChoice
 from .page_server import PageServer

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from coneskin.errors import RecordingError
+from coneskin.core.errors import RecordingError
 from coneskin.geometry.pose import Pose, Vector
-from coneskin.replay.event_text import describe
-from coneskin.replay.run import Run, read_run
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
+from coneskin.runs.replay.event_text import describe
+from coneskin.runs.replay.run import Run, read_run
 
 from .history import History, history_of
 from .moment import Moment, moment_at

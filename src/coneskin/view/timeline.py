@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.signals.journal import EventName
 
 from .strand import Strand
 

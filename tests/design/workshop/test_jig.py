@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from coneskin.design.jig_plan import JigPlan
-from coneskin.design.sheets import DesignOptions, SheetDesign, design_sheets
+from coneskin.core.errors import GeometryError
+from coneskin.design.sheets.jig_plan import JigPlan
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
 from coneskin.design.workshop.jig import Collar, CollarPart, jig_collars
 from coneskin.design.workshop.link_excess import LinkExcess
 from coneskin.design.workshop.lip_play import lip_play
-from coneskin.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone

@@ -6,7 +6,7 @@ import sys
 import mpmath as mp
 import pytest
 
-from coneskin.errors import GeometryError, MissingExtra
+from coneskin.core.errors import GeometryError, MissingExtra
 from coneskin.geometry.drawing.cut_sheet import cut_sheets
 from coneskin.geometry.drawing.dxf import to_dxf
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet

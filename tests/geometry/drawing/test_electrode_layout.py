@@ -6,14 +6,14 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, draw_hole, draw_shape, drawing_point
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
+from tests.support.sweep import sweep
 
-from ...sweep import sweep
 from ..planar import dense, distance, distances, inside
 from ..sheet_cases import SHEETS
 

@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.cut_sheet import CutPart, cut_sheets
 from coneskin.geometry.drawing.electrode_layout import lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK

@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.cut_sheet import CutPart, CutSheet, Stroke, cut_sheets, nest_sheets
 from coneskin.geometry.drawing.dxf import to_dxf
 from coneskin.geometry.drawing.electrode_layout import lay_out_sheet
@@ -15,8 +15,8 @@ from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.drawing.outline import Outline
 from coneskin.geometry.drawing.pdf import to_pdf
 from coneskin.geometry.frustum import Frustum
+from tests.support.sweep import sweep
 
-from ...sweep import sweep
 from ..drawing_readers import pdf_objects, read_dxf, read_pdf
 from ..sheet_cases import SHEETS
 

@@ -5,7 +5,7 @@ import math
 import mpmath as mp
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.resolution import AdConverter, forecast_resolution
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.sector import Sector, roll_up, unroll

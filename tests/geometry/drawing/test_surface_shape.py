@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, draw_shape
 from coneskin.geometry.frustum import Frustum
 

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
+from tests.support.paths import SHARED_DATA
+from tests.support.sweep import sweep
 
-from ...sweep import sweep
 from ..synthetic import (
     TILTED,
     Floats,
@@ -33,7 +34,7 @@ from ..synthetic import (
 )
 from ..test_mesh import write_stl
 
-DATA = Path(__file__).parents[3].parent / "shared" / "data"
+DATA = SHARED_DATA
 AXIS = np.array(TILTED.rotation)[:, 2]
 BASE = np.array(TILTED.translation)
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.fit.cones import find_cones
+from coneskin.geometry.fit.developable.sheets import find_sheets
 from coneskin.geometry.fit.fit_options import FitOptions
-from coneskin.geometry.fit.sheets import find_sheets
 
 from ..synthetic import frustum, placed
 

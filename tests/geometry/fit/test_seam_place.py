@@ -15,7 +15,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.pose import Pose
-from coneskin.testing.ruled_tube import RuledTube, stadium_section
+from tests.support.ruled_tube import RuledTube, stadium_section
 
 from ..synthetic import TILTED, frustum, joined, placed
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.errors import MeshError
+from coneskin.core.errors import MeshError
 from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.ray_casting import RayCaster

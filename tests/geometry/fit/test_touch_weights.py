@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.fit.cones import find_cones
 from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.fit.touch_weights import LEAST_WEIGHT, TouchWeights, exposure_weights, read_touch_weights

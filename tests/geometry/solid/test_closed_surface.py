@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.solid.closed_surface import shell_surface, to_stl
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import MissingExtra
+from coneskin.core.errors import MissingExtra
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.solid.step import WrappedLayer, require_step_writer, write_step

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.compiled_kinematics import compile_contact
 from coneskin.robot.arm.damped_least_squares import damped_speeds, damping_squared
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian

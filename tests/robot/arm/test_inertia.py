@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.inertia import GRAVITY, effective_mass, joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import point_jacobian
 from coneskin.robot.arm.model import ArmModel
@@ -32,7 +32,7 @@ def test_the_links_can_exist_and_weigh_what_the_arm_weighs(name: str) -> None:
 @ARMS
 def test_the_mass_matrix_is_that_of_pinocchio(name: str) -> None:
     pytest.importorskip("pinocchio", reason="the independent dynamics are pinocchio's (PyPI: pin)")
-    from coneskin.testing.pinocchio_arm import pin_mass_matrix
+    from tests.support.pinocchio_arm import pin_mass_matrix
 
     model, inertia, source = arm_model(name), arm_inertia(name), np.random.default_rng(1)
     for _ in range(10):
@@ -45,7 +45,7 @@ def test_the_mass_matrix_is_that_of_pinocchio(name: str) -> None:
 @ARMS
 def test_the_torques_are_those_of_pinocchio(name: str) -> None:
     pytest.importorskip("pinocchio", reason="the independent dynamics are pinocchio's (PyPI: pin)")
-    from coneskin.testing.pinocchio_arm import pin_torques
+    from tests.support.pinocchio_arm import pin_torques
 
     model, inertia, source = arm_model(name), arm_inertia(name), np.random.default_rng(2)
     for _ in range(10):

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.kinematics import flange_jacobian, forward, link_pose, link_poses, point_jacobian
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.testing.pinocchio_arm import pin_jacobian, pin_place, pin_rotation
+from tests.support.pinocchio_arm import pin_jacobian, pin_place, pin_rotation
 
 from ..arms import FAR_UR10, NOMINAL, arms, joints, points
 

@@ -1,21 +1,21 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.link_frames import LINK_INDEX, dh_link, dh_mesh, link_index, link_mesh
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from tests.support.paths import SHARED_DATA
 
 from ..arms import FAR_UR10, NEAR_UR10, NOMINAL
 
-DATA = Path(__file__).parents[3].parent / "shared" / "data" / "ur"
+DATA = SHARED_DATA / "ur"
 
 # Joint origins and mesh offsets as Universal_Robots_ROS2_Description publishes them, with its rounded right angles:
 # shoulder z; forearm x; wrist_1 x, z; wrist_2 y; wrist_3 y; then mesh z of upper_arm, forearm and the three wrists

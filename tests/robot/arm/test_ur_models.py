@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from coneskin.channel import Channel, pair
+from coneskin.core.channel import Channel, pair
 from coneskin.robot.driver.deadman import Deadman
 from coneskin.robot.driver.messages import StatusReport
 
@@ -79,7 +79,7 @@ def test_a_process_that_a_library_has_frozen_ends_all_the_same(keeps_lock):
     """With and without Python's lock: ``sleep`` through PyDLL keeps it, through CDLL does not."""
     code = (
         "import ctypes, sys, time\n"
-        "from coneskin.child_process import inherit\n"
+        "from coneskin.core.child_process import inherit\n"
         "from coneskin.robot.driver.deadman import Deadman\n"
         "lifeline, (guard,) = inherit(sys.argv[1:])\n"
         "lifeline.hold()\n"

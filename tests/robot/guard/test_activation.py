@@ -3,8 +3,8 @@
 import pytest
 
 from coneskin.robot.driver.messages import Release
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.types import Reaction
 from coneskin.testing.guard_rig import GuardRig, touch
 

@@ -5,10 +5,11 @@ import pytest
 from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
-from coneskin.testing.guard_rig import SLIDER, GuardRig, touch
+from coneskin.robot.sim.mock_arm import SLIDER
+from coneskin.testing.guard_rig import GuardRig, touch
 
 
 @pytest.mark.parametrize(

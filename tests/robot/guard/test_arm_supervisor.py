@@ -2,17 +2,17 @@
 
 import pytest
 
-from coneskin.recording import Block
+from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import EndReaction
 from coneskin.robot.driver.setpoint import SetpointProgram, SetSpeedSlider
 from coneskin.robot.driver.stop_path import StopPath, UseStopPath
-from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
 from coneskin.testing.guard_rig import LINK, GuardRig, make_core, touch
+from tests.support.sweep import sweep
 
-from ...sweep import sweep
 from .reactions import SLOW, comply
 
 

@@ -7,9 +7,9 @@ import pytest
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.sensor import Sensor
-from coneskin.testing.collision_rig import CollisionRig, SkinOnLink
 from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q
-from coneskin.testing.pressing_body import Body, Pressing
+from tests.support.collision_rig import CollisionRig, SkinOnLink
+from tests.support.pressing_body import Body, Pressing
 
 U, PHI = 0.13, 1.57
 SKIN = SkinOnLink(Sensor(CONE.frustum, 0, name="one"), LINK, CONE)

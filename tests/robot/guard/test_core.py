@@ -6,20 +6,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.recording import Block
+from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import EndReaction, SetJointVelocity, StatusReport, StopProgram
 from coneskin.robot.driver.stop_path import INTERNAL_PATHS, StopPath
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.virtual.circuit import WiringFaults
 from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.testing.guard_rig import GuardRig, make_core, touch
-
-from ...sweep import sweep
+from tests.support.sweep import sweep
 
 
 def test_a_touch_stops_the_arm_in_the_same_frame_and_it_retreats_along_the_normal():

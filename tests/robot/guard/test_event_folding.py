@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.robot.guard.event_folding import EventFolding
-from coneskin.robot.guard.journal import BlockKind, EventName
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind, EventName
 from coneskin.robot.reaction.types import Reaction
 from coneskin.testing.guard_rig import GuardRig, touch
 

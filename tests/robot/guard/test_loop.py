@@ -4,13 +4,13 @@ import socket
 
 import pytest
 
-from coneskin.channel import Channel, pair
-from coneskin.recording import Block, decode_blocks, encode_block
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.channel import Channel, pair
+from coneskin.core.recording.block import Block, decode_blocks, encode_block
 from coneskin.robot.guard.loop import GuardLoop
 from coneskin.robot.guard.overflow import RecordingOverflowFilter
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.ports import GuardPorts
+from coneskin.robot.guard.signals.journal import BlockKind
 
 
 class Core:

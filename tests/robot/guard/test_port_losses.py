@@ -3,8 +3,8 @@
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from coneskin.robot.guard.journal import BlockKind, decode_loss, encode_loss
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind, decode_loss, encode_loss
 from coneskin.testing.guard_rig import GuardRig
 
 HALF = "/dev/caf\udce9"  # a name in Latin-1, as Python reads it

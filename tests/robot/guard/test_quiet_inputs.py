@@ -3,33 +3,32 @@
 import math
 import struct
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from random import Random
 
 import numpy as np
 import pytest
 
-from coneskin.recording import Block
-from coneskin.replay.run import read_run
+from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.journal import INPUTS, BlockKind
-from coneskin.robot.guard.outputs import Output
 from coneskin.robot.guard.quiet_inputs import take_inputs
+from coneskin.robot.guard.signals.journal import INPUTS, BlockKind
+from coneskin.robot.guard.signals.outputs import Output
+from coneskin.runs.replay.run import read_run
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
+from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.quiet_frames import find_quiet_frames
-from coneskin.skin.detection.reading import read
 from coneskin.skin.frame_batch import find_frames
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.wire import Frame, encode, frame_at
+from tests.support.paths import COLLISION
+from tests.support.sweep import sweep
 
 from ...scene.scenes import FULL, SKIN_ONLY, inputs
-from ...sweep import sweep
 from .guard_state import state_of
 
-COLLISION = Path(__file__).parents[2] / "data" / "collision.rec"
 Blocks = list[Block]
 
 

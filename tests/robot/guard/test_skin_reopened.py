@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.channel import Channel, pair
-from coneskin.errors import SkinConnectionError
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.channel import Channel, pair
+from coneskin.core.errors import SkinConnectionError
 from coneskin.robot.guard.loop import GuardLoop
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.ports import GuardPorts
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor

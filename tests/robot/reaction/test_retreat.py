@@ -15,8 +15,8 @@ from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.reaction.retreat import DISTANCE_TOLERANCE, RetreatPlan, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
-from coneskin.testing.pinocchio_arm import pin_jacobian
-from coneskin.testing.retreat_simulation import follow, joints_within, touch
+from tests.support.pinocchio_arm import pin_jacobian
+from tests.support.retreat_simulation import follow, joints_within, touch
 
 from ..arms import FAR_UR10, NEAR_UR10, arms, points, units
 from ..retreat_cases import FOREARM, UR10E, Q, elbow_limited, planned, six

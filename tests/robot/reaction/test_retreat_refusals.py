@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coneskin.errors import KinematicsError
+from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import Joints
 from coneskin.robot.reaction.retreat import DISTANCE_TOLERANCE, RetreatPlan, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
-from coneskin.testing.pinocchio_arm import pin_jacobian
-from coneskin.testing.retreat_simulation import follow
+from tests.support.pinocchio_arm import pin_jacobian
+from tests.support.retreat_simulation import follow
 
 from ..retreat_cases import FOREARM, UR10E, Q, planned
 

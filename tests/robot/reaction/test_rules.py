@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import KINDS, Reaction
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.robot.reaction.types import Reaction
 
 

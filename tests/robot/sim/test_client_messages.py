@@ -5,7 +5,7 @@ The bytes are those of the recorded packets in test_primary_parser.cpp of Univer
 
 import struct
 
-from coneskin.robot.sim.notices import (
+from coneskin.robot.sim.machine.notices import (
     ErrorNotice,
     PopupNotice,
     ProgramFailed,
@@ -14,8 +14,8 @@ from coneskin.robot.sim.notices import (
     SafetyNotice,
     TextNotice,
 )
+from coneskin.robot.sim.machine.safety import SafetyMode
 from coneskin.robot.sim.ports.client_messages import encode_notice, encode_version
-from coneskin.robot.sim.safety import SafetyMode
 
 _TIME = bytes(8)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from coneskin.errors import KinematicsError, RobotRefused
-from coneskin.robot.sim.controller import Controller
-from coneskin.robot.sim.options import Options
+from coneskin.core.errors import KinematicsError, RobotRefused
+from coneskin.robot.sim.machine.options import Options
+from coneskin.robot.sim.runtime.controller import Controller
 
 from .program_bench import FAR, Bench
 

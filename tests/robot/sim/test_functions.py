@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,18 +10,19 @@ import pytest
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.functions.builtins import Builtins
-from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.machine.options import Options
 from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.sim.urscript.published_functions import NOT_SIMULATED
 from coneskin.robot.sim.urscript.translator import translate
 from coneskin.robot.sim.urscript.values import ScriptError
-from coneskin.testing.pinocchio_arm import pin_mass_matrix, pin_torques
+from tests.support.paths import ROOT
+from tests.support.pinocchio_arm import pin_mass_matrix, pin_torques
 
 from .function_examples import EXAMPLES, NO_EFFECT
 
-PAGE = Path(__file__).parents[3] / "docs" / "sim-ur.md"
+PAGE = ROOT / "docs" / "sim-ur.md"
 HOME = (0.1, -1.4, 1.5, -1.7, -1.4, 0.2)
 _ALL = {name: example for examples in EXAMPLES.values() for name, example in examples.items()}
 

@@ -4,11 +4,11 @@ import struct
 
 import pytest
 
-from coneskin.robot.sim.controller import Controller
-from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.machine.options import Options
+from coneskin.robot.sim.machine.safety import SafetyMode
 from coneskin.robot.sim.ports.realtime_packet import encode_realtime, realtime_size
 from coneskin.robot.sim.ports.robot_state import encode_first_state, encode_state, robot_type
-from coneskin.robot.sim.safety import SafetyMode
+from coneskin.robot.sim.runtime.controller import Controller
 
 #: kind of a sub-package -> its size, in the packet of 1386 bytes recorded from URSim 5.24 with a UR5e
 RECORDED = {0: 47, 1: 251, 4: 101, 5: 225, 9: 53, 3: 75, 2: 37, 6: 445, 7: 61, 8: 9, 10: 43, 11: 26, 12: 8}

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import io
 import struct
-from pathlib import Path
 
 import pytest
 
-from coneskin.robot.sim.client_inputs import INPUTS
-from coneskin.robot.sim.controller import Controller
-from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.machine.client_inputs import INPUTS
+from coneskin.robot.sim.machine.options import Options
 from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs, available
 from coneskin.robot.sim.ports.rtde_session import RtdeSession
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.ur.rtde_codec import PacketKind, Recipe, pack, pack_inputs_request, pack_outputs_request, split
 from coneskin.robot.ur.rtde_variables import VARIABLES
+from tests.support.paths import ROOT
 
 
 def session(controller: Controller) -> RtdeSession:
@@ -173,7 +173,7 @@ def page_table() -> str:
 
 
 def test_the_page_lists_every_variable() -> None:
-    text = (Path(__file__).parents[3] / "docs" / "sim-ur.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "sim-ur.md").read_text(encoding="utf-8")
     shown = text.split("<!-- variables -->")[1].split("<!-- end of variables -->")[0]
     assert shown.strip() == page_table(), "python -m tests.robot.sim.test_rtde_session prints the table anew"
 

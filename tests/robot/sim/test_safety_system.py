@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coneskin.robot.sim.notices import ErrorNotice
+from coneskin.robot.sim.machine.notices import ErrorNotice
 
 from .program_bench import FAR, Bench
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from coneskin.robot.sim.controller import Controller
 from coneskin.robot.sim.functions.builtins import Builtins
 from coneskin.robot.sim.functions.script_socket import MAX_READS, MAX_UNREAD
-from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.machine.options import Options
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.sim.urscript.translator import translate
 
 PATIENCE = 5.0  # s that a read of the test waits

@@ -16,14 +16,14 @@ import pytest
 
 from coneskin.robot.sim import compiler, services
 from coneskin.robot.sim import server as server_module
-from coneskin.robot.sim.controller import Controller
-from coneskin.robot.sim.options import Options
+from coneskin.robot.sim.machine.options import Options
 from coneskin.robot.sim.ports import client as client_module
 from coneskin.robot.sim.ports.client_messages import MESSAGE
 from coneskin.robot.sim.ports.robot_state import ROBOT_STATE
 from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
 from coneskin.robot.sim.ports.rtde_session import RtdeSession
 from coneskin.robot.sim.process import free_host
+from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.sim.server import PORTS, Server
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, Translation
 from coneskin.robot.ur.rtde_codec import (
@@ -34,7 +34,7 @@ from coneskin.robot.ur.rtde_codec import (
     pack_start_request,
     split,
 )
-from coneskin.testing.malformed_packets import SERVICES, malformed_packet
+from tests.support.malformed_packets import SERVICES, malformed_packet
 
 NAMES = ("timestamp", "actual_q")
 SLOW_READER = 4096  # bytes that the operating system keeps for one that does not read

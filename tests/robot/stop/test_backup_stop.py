@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.errors import RobotConnectionError
+from coneskin.core.errors import RobotConnectionError
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.stop import backup_stop as module
 from coneskin.robot.stop.backup_stop import BackupStop

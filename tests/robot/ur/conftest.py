@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.channel import Channel, pair
+from coneskin.core.channel import Channel, pair
 from coneskin.robot.ur.driver_process import DriverProcess
 
 from .fake_wheel import arm

@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from coneskin.channel import decode_json, encode_json
+from coneskin.core.channel import decode_json, encode_json
 from coneskin.robot.driver.waypoint import Waypoint
 from coneskin.robot.ur.ur_rtde import UrArm
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.finding import Finding
+from coneskin.core.finding import Finding
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.examination import ExaminationScope
 from coneskin.robot.sim.process import SimulatedController, free_host

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from coneskin.errors import RobotConnectionError, RobotRefused
+from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.process import SimulatedController, free_host

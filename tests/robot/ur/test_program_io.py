@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from coneskin.errors import RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.variable_reader import RtdeVariableReader
 from coneskin.testing.forearm import START

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.errors import RobotConnectionError, RobotRefused
+from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.ur.rtde_codec import (
     PacketKind,
     Recipe,

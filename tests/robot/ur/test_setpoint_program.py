@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from coneskin.errors import RobotRefused
+from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.sim.process import SimulatedController, free_host

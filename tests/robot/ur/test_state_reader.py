@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from coneskin.errors import RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur import rtde_codec, rtde_connection

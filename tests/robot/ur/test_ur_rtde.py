@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.errors import RobotConnectionError, RobotRefused
+from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.waypoint import Waypoint
 from coneskin.robot.ur.control_program import rtde_errors
 from coneskin.robot.ur.ur_rtde import Mode

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coneskin.errors import RecordingError
-from coneskin.replay.run import Run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.errors import RecordingError
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.export.export import export_run
 from coneskin.runs.export.tables import Table, arm_states, run_tables, skin_frames, table_pieces
+from coneskin.runs.replay.run import Run
 from coneskin.skin.wire import DrivenPotentials, FrameDecoder, encode
 
 

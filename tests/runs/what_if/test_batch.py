@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from coneskin.errors import RecordingError
-from coneskin.replay.run import Run
+from coneskin.core.errors import RecordingError
 from coneskin.runs.comparison_text import comparison_lines
+from coneskin.runs.replay.run import Run
 from coneskin.runs.what_if.batch import judge_runs
 from coneskin.runs.what_if.variant_table import score_variants, variant_lines, write_rows
 from coneskin.runs.what_if.what_if import judge_run, what_if

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.errors import RecordingError
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.core.errors import RecordingError
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.decisions import Decisions
 from coneskin.runs.what_if.detection_score import score_detection
 from coneskin.runs.what_if.touch_labels import TouchLabel, read_labels, recorded_labels

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from coneskin.errors import RecordingError
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.run import Run, read_run
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.core.errors import RecordingError
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.cut import cut_run
+from coneskin.runs.replay.run import Run, read_run
 from coneskin.runs.what_if.touch_labels import true_touches
 from coneskin.runs.what_if.what_if import judge_run
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from coneskin.errors import SceneError, SensorError
+from coneskin.core.errors import SceneError, SensorError
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.padding import Padding
 

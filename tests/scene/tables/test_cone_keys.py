@@ -11,9 +11,9 @@ import coneskin
 from coneskin.commands import design as design_command
 from coneskin.commands import unroll as unroll_command
 from coneskin.commands.arguments.dimensions import given_dimensions, option_name
-from coneskin.design.sheets import DesignOptions, design_sheets
-from coneskin.design.summary import design_summary, sensor_toml
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
+from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
+from coneskin.design.sheets.summary import design_summary, sensor_toml
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.tables.cone_keys import CONE_KEYS, DOUBLE_CONE_KEYS, LINK_CONE_KEYS

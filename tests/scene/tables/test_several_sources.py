@@ -4,7 +4,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
-from coneskin.errors import SceneError, SensorError
+from coneskin.core.errors import SceneError, SensorError
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.summary import summarize
 from coneskin.skin.sources.kinds import GROUP, SourceKey, SourceKind, open_source

@@ -2,11 +2,11 @@
 
 import random
 
-from coneskin.errors import SkinConnectionError
+from coneskin.core.errors import SkinConnectionError
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinEvent, SkinFault
-from coneskin.skin.detection.faults import Fault
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.virtual.skin import VirtualSkin

@@ -5,8 +5,8 @@ import statistics
 
 import pytest
 
-from coneskin.skin.detection.faults import Fault
-from coneskin.skin.detection.timing import FrameTiming, TimingLimits
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.timing import FrameTiming, TimingLimits
 
 PERIOD, SECONDS = 0.01, 600.0
 WAY = 1e-3  # s; the quickest way of a frame to this computer

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
 from coneskin.skin.detection.place.matrix_noise import FrameNoise
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.field.coupling import Coupling

@@ -3,7 +3,7 @@
 import pytest
 
 from coneskin.skin.detection.contradictions import Contradictions
-from coneskin.skin.detection.faults import Fault
+from coneskin.skin.detection.frame.faults import Fault
 
 
 def test_three_in_a_row_may_be_a_contact_and_each_one_more_is_a_fault() -> None:

@@ -9,7 +9,7 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import TouchBegan
-from coneskin.skin.detection.faults import Fault
+from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.detection.untouched.guides import UntouchedGuides
 from coneskin.skin.sensor import Sensor

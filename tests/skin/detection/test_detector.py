@@ -5,12 +5,12 @@ import random
 
 import pytest
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchMoved
-from coneskin.skin.detection.faults import Fault
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.detection.untouched.currents import BLOCK
 from coneskin.skin.sensor import Sensor

@@ -9,7 +9,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection import wiring_hypothesis
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault, TouchBegan, TouchEvent
-from coneskin.skin.detection.faults import Fault
+from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import WiringFaults

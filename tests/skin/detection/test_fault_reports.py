@@ -5,8 +5,8 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault, TouchBegan
-from coneskin.skin.detection.faults import Fault
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import WiringFaults
 from coneskin.skin.virtual.fault_injection import FaultInjection

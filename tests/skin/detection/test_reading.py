@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.faults import Fault
-from coneskin.skin.detection.reading import read
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, WiringFaults, measure

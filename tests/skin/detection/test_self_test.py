@@ -6,10 +6,10 @@ import random
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.contact_matrix import FrameInversion
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault, TouchBegan
-from coneskin.skin.detection.faults import Fault
+from coneskin.skin.detection.frame.contact_matrix import FrameInversion
+from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.self_test import FrameSelfTest
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.electronics import Electronics

@@ -5,8 +5,8 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded
-from coneskin.skin.detection.faults import Fault
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch

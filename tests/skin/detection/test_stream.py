@@ -6,9 +6,9 @@ import sys
 
 import pytest
 
-from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan
-from coneskin.skin.detection.faults import Fault
+from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.fault_injection import FaultInjection

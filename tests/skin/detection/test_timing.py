@@ -5,9 +5,9 @@ import random
 
 import pytest
 
-from coneskin.errors import SensorError
-from coneskin.skin.detection.faults import Fault
-from coneskin.skin.detection.timing import FrameTiming, TimingLimits
+from coneskin.core.errors import SensorError
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.timing import FrameTiming, TimingLimits
 
 
 def started(count: int = 100, sequence: int = 0, clock_us: int = 0) -> FrameTiming:

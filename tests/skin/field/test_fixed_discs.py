@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.field.fixed_discs import FixedDiscs
 from coneskin.skin.field.model import FieldModel

@@ -14,8 +14,8 @@ from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import measure
-from coneskin.testing.field.converter_plant import ConverterPlant, leak_admittance
-from coneskin.testing.field.flat_plant import FlatPlant, PressedPatch
+from tests.support.field.converter_plant import ConverterPlant, leak_admittance
+from tests.support.field.flat_plant import FlatPlant, PressedPatch
 
 WRAP = math.radians(350)
 #: a forearm; the paper's sector wrapped all around; a cone that narrows

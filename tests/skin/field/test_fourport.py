@@ -9,12 +9,12 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.skin.field.coupling import Coupling
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.fourport import DrivePhase, Terminal, angular_phase, radial_phase, touch_phase
 from coneskin.skin.field.model import FieldModel
-from coneskin.testing.field.exact_circuit import exact_volts
+from tests.support.field.exact_circuit import exact_volts
 
 from ..field_cases import PAPER
 

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel, solve
 from coneskin.skin.field.sheet import SectorSheet
+from tests.support.sweep import sweep
 
-from ...sweep import sweep
 from ..field_cases import PAPER, SHEETS, finite_differences, guide_volts
 
 

@@ -21,8 +21,8 @@ from coneskin.skin.field.near_images import (
     pair_distance,
 )
 from coneskin.skin.field.sheet import SectorSheet
+from tests.support.sweep import sweep
 
-from ...sweep import sweep
 from ..field_cases import PAPER, SHEETS
 
 PLACES = [

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.patch import ContactPatch, solve_patch
 from coneskin.skin.field.shape import clip, disc, ellipse, rectangle
+from tests.support.sweep import sweep
 
-from ...sweep import sweep
 from ..field_cases import PAPER, SHEETS
 
 

@@ -20,10 +20,10 @@ import pytest
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.maps import FieldMap
-from coneskin.testing.field.port_solution import port_solution
-from coneskin.testing.field.problems import random_problems, standard_problems
-from coneskin.testing.field.reference import PATH, Reference, load_references, provenance
-from coneskin.testing.field.solution import field_model, solve_discs, solve_general
+from tests.support.field.port_solution import port_solution
+from tests.support.field.problems import random_problems, standard_problems
+from tests.support.field.reference import PATH, Reference, load_references, provenance
+from tests.support.field.solution import field_model, solve_discs, solve_general
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def peer(package: str) -> ModuleType:
     pytest.importorskip(package, reason=f"{package} is not installed; pip install 'coneskin[bench]' asks it live")
     if package != "ngsolve":
         pytest.importorskip("ngsolve", reason="NGSolve is not installed, and its mesh generator serves every peer")
-    return import_module(f"coneskin.testing.field.{package}_peer")
+    return import_module(f"tests.support.field.{package}_peer")
 
 
 def disagreement(ours: Any, theirs: Any) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.skin.field.disc import Disc, Discs
 from coneskin.skin.field.green import Strip
 from coneskin.skin.field.model import FieldModel
@@ -16,9 +16,9 @@ from coneskin.skin.field.order import FIRST
 from coneskin.skin.field.rim import solve_rims
 from coneskin.skin.field.rim_points import RimPoints, log_weights
 from coneskin.skin.field.sheet import SectorSheet
-from coneskin.testing.field import rim_solution
+from tests.support.field import rim_solution
+from tests.support.sweep import sweep
 
-from ...sweep import sweep
 from ..field_cases import PAPER
 
 #: r1/width, distance of the centre from end 1 over r1, sector angle, sheet ratio, ka.

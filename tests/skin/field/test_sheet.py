@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.field.sheet import SectorSheet
 

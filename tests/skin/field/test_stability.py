@@ -6,9 +6,8 @@ import math
 
 import pytest
 
-from coneskin.testing.field.extremes import extreme_cases, measure, scale_errors
-
-from ...sweep import sweep
+from tests.support.field.extremes import extreme_cases, measure, scale_errors
+from tests.support.sweep import sweep
 
 CASES = {case.name: case for case in extreme_cases()}
 

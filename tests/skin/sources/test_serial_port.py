@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from coneskin.errors import SkinConnectionError
+from coneskin.core.errors import SkinConnectionError
 from coneskin.skin.sources.port_list import list_ports
 from coneskin.skin.sources.serial_port import SerialPort
 

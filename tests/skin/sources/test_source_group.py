@@ -6,7 +6,7 @@ from contextlib import suppress
 
 import pytest
 
-from coneskin.errors import SensorError, SkinConnectionError, SkinTimeout
+from coneskin.core.errors import SensorError, SkinConnectionError, SkinTimeout
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import TouchBegan
 from coneskin.skin.detection.stream import TouchStream

@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.errors import SkinConnectionError
+from coneskin.core.errors import SkinConnectionError
 from coneskin.skin.sources.source import Source
 from coneskin.skin.sources.source_reopening import SourceReopening, open_again
 

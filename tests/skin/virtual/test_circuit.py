@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.electronics import Electronics, LeadOhms
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, WiringFaults, measure, solve

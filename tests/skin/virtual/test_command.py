@@ -10,7 +10,7 @@ from contextlib import suppress
 
 import pytest
 
-from coneskin.errors import SensorError, SkinConnectionError
+from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import TouchBegan, TouchMoved
 from coneskin.skin.detection.stream import TouchStream

@@ -9,9 +9,9 @@ import sys
 import numpy as np
 import pytest
 
-from coneskin.errors import FieldError
+from coneskin.core.errors import FieldError
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.reading import Reading, read
+from coneskin.skin.detection.frame.reading import Reading, read
 from coneskin.skin.electronics import Electronics, LeadOhms
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.model import FieldModel

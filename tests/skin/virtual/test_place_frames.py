@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import SkinFault, TouchBegan, TouchEnded
-from coneskin.skin.detection.faults import Fault
-from coneskin.skin.detection.settings import DetectorSettings
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Polarity, Sensor
 from coneskin.skin.virtual.place_frames import PlaceFrames

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from coneskin.errors import SensorError, SkinConnectionError, SkinTimeout
-from coneskin.skin.detection.reading import read
+from coneskin.core.errors import SensorError, SkinConnectionError, SkinTimeout
+from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import TouchEvent, TouchMoved
 from coneskin.skin.detection.stream import TouchStream

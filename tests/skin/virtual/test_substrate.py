@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.virtual.substrate import ContactLaw, Foam
 
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import pytest
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
-from coneskin.skin.detection.touch_reading import TouchReading
+from coneskin.skin.detection.frame.touch_reading import TouchReading
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.seam import across_seam

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coneskin.scene.body import BodyScene
+from coneskin.scene.values.body import BodyScene
 from coneskin.view.stage.body_solids import body_solids
 
 

@@ -1,17 +1,17 @@
 """Words and bars of touch levels, and forces where a calibration knows them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from coneskin.replay.run import read_run
+from coneskin.runs.replay.run import read_run
 from coneskin.skin.force_table import ForceTable
 from coneskin.view.stage.level_scale import level_bars, level_colour, level_words
 from coneskin.view.stage.sheet_surface import SheetSurface
 from coneskin.view.stage.stage import set_stage
+from tests.support.paths import COLLISION
 
-RUN = Path(__file__).parents[2] / "data" / "collision.rec"
+RUN = COLLISION
 
 
 @pytest.fixture(scope="module")

@@ -1,16 +1,16 @@
 """The potential on a sheet: straight without a contact, and with one the level that was read."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from coneskin.replay.run import read_run
+from coneskin.runs.replay.run import read_run
 from coneskin.skin.sensor import Sensor
 from coneskin.view.stage.sheet_field import PHASES, ContactOnSheet, SheetField
+from tests.support.paths import COLLISION
 
-RUN = Path(__file__).parents[2] / "data" / "collision.rec"
+RUN = COLLISION
 
 
 @pytest.fixture(scope="module")

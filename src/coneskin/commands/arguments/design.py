@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
-from coneskin.design.sheets import DesignOptions
+from coneskin.design.sheets.sheet_design import DesignOptions
 from coneskin.geometry.drawing.cut_sheet import FaceUp
 from coneskin.geometry.drawing.dxf import ArcStyle
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from coneskin.errors import GeometryError, SceneError
+from coneskin.core.errors import GeometryError, SceneError
 from coneskin.scene.tables.schema import Key, check
 
 __all__ = ["add_dimension_options", "add_setting_option", "given_dimensions", "option_name"]

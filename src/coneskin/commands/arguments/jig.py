@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import get_args
 
-from coneskin.design.jig_plan import JigPlan, JigSurface
+from coneskin.design.sheets.jig_plan import JigPlan, JigSurface
 
 __all__ = ["add_jig_options", "given_jig"]
 

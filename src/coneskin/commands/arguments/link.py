@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.scene.tables.cone_keys import DOUBLE_CONE_KEYS

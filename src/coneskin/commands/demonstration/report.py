@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.commands.terminal.hints import print_hint
-from coneskin.json_text import read_json
-from coneskin.robot.guard.journal import BlockKind, EventName, describe_way
+from coneskin.core.json_text import read_json
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, describe_way
 
 if TYPE_CHECKING:
-    from coneskin.recording import Block
-    from coneskin.replay.run import Run
+    from coneskin.core.recording.block import Block
+    from coneskin.runs.replay.run import Run
 
 __all__ = ["collision_facts", "hold_up", "print_report"]
 

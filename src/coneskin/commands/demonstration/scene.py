@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
 
 __all__ = ["FROM_DEG", "TOUCHED_U", "TO_DEG", "leading_side", "make_scene"]
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from .typed_lines import typed_lines
 
 if TYPE_CHECKING:
-    from coneskin.commissioning.procedure import Notice
-    from coneskin.skin.detection.touch_reading import TouchReading
+    from coneskin.commissioning.acceptance.procedure import Notice
+    from coneskin.skin.detection.frame.touch_reading import TouchReading
 
 __all__ = ["LiveReading", "Person"]
 

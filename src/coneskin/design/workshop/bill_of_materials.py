@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from coneskin.design.sheets import SheetDesign
+from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.nesting import MaterialBed
 
 from .build_figures import BuildFigures

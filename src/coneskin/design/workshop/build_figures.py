@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from coneskin.design.sheets import SheetDesign
+from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.surface_shape import ShapeTab, SurfaceShape, drawing_point
 from coneskin.geometry.frustum import Frustum
 

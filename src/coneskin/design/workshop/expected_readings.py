@@ -5,9 +5,9 @@ from __future__ import annotations
 import tomllib
 from typing import NamedTuple
 
-from coneskin.design.sheets import SheetDesign
-from coneskin.design.summary import sensor_toml
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
+from coneskin.design.sheets.sheet_design import SheetDesign
+from coneskin.design.sheets.summary import sensor_toml
 from coneskin.geometry.drawing.electrode_layout import SurfaceRectangle
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, SurfaceShape
 from coneskin.geometry.frustum import Frustum

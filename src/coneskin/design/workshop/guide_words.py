@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from coneskin.design.sheets import SheetDesign
+from coneskin.design.sheets.sheet_design import SheetDesign
 
 from .build_figures import BuildFigures
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.design.sheets import SheetDesign
+from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.surface_shape import ShapeTab
 from coneskin.geometry.mesh import Mesh

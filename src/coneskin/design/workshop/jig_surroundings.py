@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.design.sheets import SheetDesign
+from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh

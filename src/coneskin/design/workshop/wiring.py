@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from coneskin.errors import GeometryError
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.electrode_layout import SheetLayout
 from coneskin.geometry.drawing.surface_shape import ShapeTab
 

@@ -9,14 +9,14 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.draft_file import draft_of
-from coneskin.errors import RecordingError
+from coneskin.core.draft_file import draft_of
+from coneskin.core.errors import RecordingError
 from coneskin.runs.block_progress import Progress, silent
 
 from .tables import Pieces, Table, table_pieces
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
+    from coneskin.runs.replay.run import Run
 
 __all__ = ["FORMATS", "export_run"]
 

@@ -12,22 +12,22 @@ from heapq import merge
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.errors import ConeSkinError, MissingExtra
+from coneskin.core.errors import ConeSkinError, MissingExtra
+from coneskin.core.terminal_text import printable
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.guard.journal import EventName, GuardEvent
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.arm_command import recorded_commands
 from coneskin.runs.block_progress import Progress, silent
-from coneskin.skin.detection.reading import read
-from coneskin.terminal_text import printable
+from coneskin.skin.detection.frame.reading import read
 
 from .foxglove_schemas import SCHEMAS
 from .tables import arm_states, skin_frames, slider_positions, wall_clock
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
     from coneskin.robot.driver.state import ControllerState
+    from coneskin.runs.replay.run import Run
     from coneskin.scene.build import SensorOnArm
 
 __all__ = ["write_mcap"]

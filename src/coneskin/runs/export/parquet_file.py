@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from coneskin.errors import MissingExtra, RecordingError
+from coneskin.core.errors import MissingExtra, RecordingError
 
 from .tables import Table
 

@@ -12,19 +12,19 @@ from contextlib import suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import RobotConnectionError
-from coneskin.recording import is_time
-from coneskin.replay.quantities import QUANTITIES
+from coneskin.core.errors import RobotConnectionError
+from coneskin.core.recording.block import is_time
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.registry import load_driver
-from coneskin.robot.guard.journal import BlockKind
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.arm_command import recorded_commands
 from coneskin.runs.block_progress import Progress, silent, watch
+from coneskin.runs.replay.quantities import QUANTITIES
 from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame, FrameDecoder
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
     from coneskin.robot.driver.state import ControllerState
+    from coneskin.runs.replay.run import Run
 
 __all__ = [
     "Pieces",

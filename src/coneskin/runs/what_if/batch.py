@@ -10,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
-from coneskin.errors import RecordingError
+from coneskin.core.errors import RecordingError
 from coneskin.runs.block_progress import Progress, silent
 
 from .what_if import broken_rows, judge_run

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from coneskin.errors import MissingExtra, RecordingError
+from coneskin.core.errors import MissingExtra, RecordingError
 
 from .what_if import broken_rows
 

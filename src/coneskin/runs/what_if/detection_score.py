@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from coneskin.robot.guard.journal import EventName
+from coneskin.robot.guard.signals.journal import EventName
 from coneskin.runs.decisions import Decisions
 
 from .touch_labels import TouchLabel

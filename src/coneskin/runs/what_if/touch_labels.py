@@ -7,15 +7,15 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.bounded_file import read_file
-from coneskin.errors import RecordingError
-from coneskin.json_text import read_json
-from coneskin.recording import is_time
-from coneskin.robot.guard.journal import BlockKind, EventName, contact_force
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import RecordingError
+from coneskin.core.json_text import read_json
+from coneskin.core.recording.block import is_time
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, contact_force
 from coneskin.runs.decisions import Decisions
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
+    from coneskin.runs.replay.run import Run
 
 __all__ = ["TouchLabel", "label_path", "read_labels", "recorded_labels", "true_touches"]
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.errors import RecordingError
-from coneskin.picture_file import write_picture
+from coneskin.core.errors import RecordingError
+from coneskin.core.picture_file import write_picture
 
 from .variant_table import VariantScore, duration_words, shared_settings
 

@@ -6,20 +6,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import ConeSkinError
-from coneskin.replay.quantities import Tolerances
-from coneskin.replay.run import read_run
-from coneskin.robot.guard.journal import EventName
+from coneskin.core.errors import ConeSkinError
+from coneskin.robot.guard.signals.journal import EventName
 from coneskin.runs.block_progress import Progress, silent
 from coneskin.runs.comparison import Comparison, compare_decisions
 from coneskin.runs.decisions import Decisions, decide_again, recorded_decisions
+from coneskin.runs.replay.quantities import Tolerances
+from coneskin.runs.replay.run import read_run
 from coneskin.runs.run_files import run_name
 
 from .detection_score import score_detection
 from .touch_labels import TouchLabel, label_path, read_labels, recorded_labels, true_touches
 
 if TYPE_CHECKING:
-    from coneskin.replay.run import Run
+    from coneskin.runs.replay.run import Run
 
 __all__ = ["AS_RECORDED", "broken_rows", "judge_run", "variant_name", "what_if"]
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import ConeSkinError
-from coneskin.scene.scene import ArmScene
+from coneskin.core.errors import ConeSkinError
+from coneskin.scene.values.scene import ArmScene
 
 from .schema import Key, check
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from coneskin.scene.body import BODY_KINDS, BodyScene
+from coneskin.scene.values.body import BODY_KINDS, BodyScene
 
 from .schema import Key, check
 

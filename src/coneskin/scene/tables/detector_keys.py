@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from coneskin.errors import SceneError, SensorError
+from coneskin.core.errors import SceneError, SensorError
 
 from .schema import Key, check
 
@@ -27,7 +27,7 @@ _OF_THE_SCENE = frozenset({"stuck_frames", "timing"})  # [monitoring] has them
 
 def detector_keys() -> tuple[Key, ...]:
     """Return a key for each field of ``DetectorSettings`` that no scene sets; the unit is in its name."""
-    from coneskin.skin.detection.settings import DetectorSettings
+    from coneskin.skin.detection.frame.settings import DetectorSettings
 
     own = (item for item in fields(DetectorSettings) if item.name not in _OF_THE_SCENE)
     return tuple(Key(item.name + _UNITS.get(item.name, ""), type(item.default), None, low=0.0) for item in own)
@@ -53,7 +53,7 @@ def detector_settings(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _refusals(values: Mapping[str, Any]) -> list[str]:
-    from coneskin.skin.detection.settings import DetectorSettings
+    from coneskin.skin.detection.frame.settings import DetectorSettings
 
     try:
         DetectorSettings(**values)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from coneskin.scene.scene import LinkScene, PlacedSensor
+from coneskin.scene.values.scene import LinkScene, PlacedSensor
 
 from .schema import Key, check
 from .sensor_table import apply_calibration, build_sensor, drop_calibration, merge_sensor_file

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from coneskin.scene.scene import MotionScene
+from coneskin.scene.values.scene import MotionScene
 
 from .schema import Key, check
 

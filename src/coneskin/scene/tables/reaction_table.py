@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError
 
 from .schema import Key, check
 

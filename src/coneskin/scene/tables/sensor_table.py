@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.bounded_file import read_file
-from coneskin.errors import ConeSkinError, GeometryError, SensorError
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import ConeSkinError, GeometryError, SensorError
 
 from .cone_keys import CONE_KEYS
 from .schema import MAX_SIZE, Key, check
@@ -82,7 +82,7 @@ def apply_calibration(
     elif name is not None:
         built = build_sensor(plain, where, [])  # what is wrong with it is reported when the table itself is read
         if built is not None:
-            from coneskin.scene.calibration_file import calibration_keys
+            from coneskin.scene.values.calibration_file import calibration_keys
 
             try:
                 needed = {key: table[key] for key in (_NEEDS_CALIBRATION,) if key in table}

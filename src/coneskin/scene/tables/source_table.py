@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from coneskin.errors import SensorError
+from coneskin.core.errors import SensorError
 from coneskin.skin.sources.kinds import GROUP, SOURCE_KINDS, SourceKey, find_kind
 
 from .schema import Key, check
 
 if TYPE_CHECKING:
-    from coneskin.scene.scene import SourceScene
+    from coneskin.scene.values.scene import SourceScene
 
 __all__ = ["read_source", "read_sources", "source_keys", "source_label"]
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
+from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
 
 if TYPE_CHECKING:
     from coneskin.geometry.frustum import Frustum

@@ -15,16 +15,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.bounded_file import read_file
-from coneskin.scene.sensor_facts import round_facts
-from coneskin.scene.speed_limit import LimitedPatch, SpeedLimitScene
+from coneskin.core.bounded_file import read_file
+from coneskin.scene.values.sensor_facts import round_facts
+from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
 
 from .schema import Key, check
 from .speed_limit_check import limit_digest, uncovered, unfit
 
 if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
 
 __all__ = [
     "SPEED_LIMIT_FORMAT",

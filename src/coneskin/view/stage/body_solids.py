@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from coneskin.scene.body import BodyScene
+    from coneskin.scene.values.body import BodyScene
 
 __all__ = ["body_solids"]
 

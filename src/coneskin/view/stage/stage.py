@@ -16,7 +16,7 @@ from .solid import Solid
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.build import SensorOnArm
-    from coneskin.scene.scene import Scene
+    from coneskin.scene.values.scene import Scene
 
 __all__ = ["Stage", "set_stage"]
 

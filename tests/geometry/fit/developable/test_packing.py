@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
+from coneskin.geometry.fit.developable.sheets import find_sheets
 from coneskin.geometry.fit.developable.side_fit import fit_developable
-from coneskin.geometry.fit.sheets import find_sheets
 from coneskin.geometry.mesh import make_mesh
 from coneskin.geometry.pose import Pose
-from coneskin.testing.ruled_tube import RuledTube, Section, ellipse_section, rounded_box_section, stadium_section
+from tests.support.ruled_tube import RuledTube, Section, ellipse_section, rounded_box_section, stadium_section
 
 POSE = Pose.from_xyz_rpy((0.1, 0.2, -0.1), (0.5, -0.3, 0.8))
 TUBES = {

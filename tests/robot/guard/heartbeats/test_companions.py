@@ -7,14 +7,13 @@ import pytest
 from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.heartbeats.heartbeat_monitor import HeartbeatMonitor
-from coneskin.robot.guard.journal import BlockKind, stopping_contact
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.testing.guard_rig import GuardRig, touch
-
-from ....sweep import sweep
+from tests.support.sweep import sweep
 
 BOTH = pytest.mark.parametrize("external", [False, True], ids=["internal", "external"])
 

@@ -8,8 +8,8 @@ import pytest
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.guard.heartbeats.state_age import StateAge
-from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.testing.guard_rig import GuardRig, touch

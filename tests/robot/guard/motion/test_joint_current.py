@@ -5,8 +5,8 @@ import math
 import pytest
 
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.guard.motion.joint_current import MAX_RISE, JointCurrentMonitor
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.joint_current import MAX_RISE, JointCurrentMonitor
 from coneskin.robot.reaction.types import Reaction
 from coneskin.testing.guard_rig import GuardRig, touch
 

@@ -4,19 +4,20 @@ import math
 
 import pytest
 
-from coneskin.errors import RobotConnectionError
+from coneskin.core.errors import RobotConnectionError
 from coneskin.robot.driver.messages import SetJointVelocity, StopProgram
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.journal import BlockKind
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.sim.mock_arm import SLIDER
 from coneskin.robot.ur.speed_slider import decode_fraction
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-from coneskin.testing.guard_rig import SLIDER, GuardRig, felt, make_core, touch
+from coneskin.testing.guard_rig import GuardRig, felt, make_core, touch
+from tests.support.sweep import sweep
 
-from ....sweep import sweep
 from ..reactions import SLOW
 
 

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from coneskin.physics.joint_program import Waypoints
+from coneskin.impact.simulation.joint_program import Waypoints
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.driver.setpoint import SetSpeedSlider
-from coneskin.robot.guard.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds, SurfaceSpeeds
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.sim.mock_arm import MockArm
 from coneskin.robot.ur.driver import UR_DRIVER
 from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q, GuardRig, touch
-from coneskin.testing.mock_arm import MockArm
 
 LEVERS = (0.1, 0.2, 0.4, 0.8)
 CURVE = (0.05, 0.1, 0.2, 0.3)  # up to 0.4 m/rad: 0.5 rad/s of the leading joint

@@ -9,6 +9,7 @@ import pytest
 
 from coneskin.robot.sim.polyscope.dashboard import available
 from tests.robot.sim.polyscope.console import WAIT, Console, packed
+from tests.support.paths import ROOT
 
 
 @pytest.fixture
@@ -161,7 +162,7 @@ def test_windows_and_versions_are_answered(console: Console) -> None:
     assert console.say("loading") == "could not understand: 'loading'"
 
 
-PAGE = Path(__file__).parents[4] / "docs" / "sim-ur.md"
+PAGE = ROOT / "docs" / "sim-ur.md"
 
 
 def first_version(command: str, major: int) -> str:

@@ -6,7 +6,7 @@ import random
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.contact_matrix import FrameInversion
+from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.detection.place.matrix_noise import FrameNoise
 from coneskin.skin.detection.place.place_estimate import PlaceEstimator, SheetConductances
 from coneskin.skin.electronics import Electronics

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
+from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.frame.touch_reading import TouchReading
 from coneskin.skin.detection.place.single_contact import frames_until_certain, weakest_pair_excluded
-from coneskin.skin.detection.settings import DetectorSettings
-from coneskin.skin.detection.touch_reading import TouchReading
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import ContactModel, LayerContact, measure

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.place.doubt import CONTRADICTS, MOVES
 from coneskin.skin.detection.place.place_estimate import PlaceEstimator
 from coneskin.skin.detection.place.seam_certainty import SeamCertainty
 from coneskin.skin.detection.place.seam_contact import SeamPlace
-from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 
 MEAN = ContactMatrix(1e-4, 0.5, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

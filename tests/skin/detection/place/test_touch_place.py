@@ -10,11 +10,11 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import TouchBegan, TouchMoved
+from coneskin.skin.detection.frame.reading import read
+from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.place.place_estimate import PlaceEstimator
 from coneskin.skin.detection.place.single_contact import SingleContactTest
 from coneskin.skin.detection.place.touch_place import TouchPlace
-from coneskin.skin.detection.reading import read
-from coneskin.skin.detection.settings import DetectorSettings
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.detection.untouched.leak import UntouchedLeak
 from coneskin.skin.electronics import Electronics, Polarity

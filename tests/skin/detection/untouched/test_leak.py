@@ -6,7 +6,7 @@ import random
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.contact_matrix import ContactMatrix, FrameInversion
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
 from coneskin.skin.detection.untouched.leak import BLOCK, UntouchedLeak
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections

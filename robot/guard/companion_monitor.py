@@ -1,0 +1,125 @@
+"""Monitor of the processes beside a guard: the program that guards, and driver process or guard watchdog. Pure.
+
+Each is needed for a stop, or moves the arm. It is missed where it dies, where its heartbeat stays away, and where the
+program that it runs on the controller ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.stop.limits import MonitoringLimits
+
+from .heartbeats.heartbeat_monitor import HeartbeatMonitor
+
+if TYPE_CHECKING:
+    from coneskin.robot.guard.arm_supervisor import ArmSupervisor
+
+__all__ = ["CompanionMonitor"]
+
+_PROGRAM = "the program that guards"
+_RESTART_TIMEOUT = 5.0  # s for the driver's program to run again after an announced end
+#: process that can be lost -> the stop path that goes with it; the driver knows those of its connections
+_LOST_WITH_PROCESS: Mapping[str, frozenset[StopPath]] = {
+    "driver": frozenset({StopPath.DRIVER}),
+    "watchdog": frozenset({StopPath.WATCHDOG}),
+}
+
+
+class CompanionMonitor:
+    """Monitor of the processes beside one guard.
+
+    Args:
+        limits: of the monitoring.
+        arm: the arm under guard, or None: then there are none to miss.
+    """
+
+    def __init__(self, limits: MonitoringLimits, arm: ArmSupervisor | None) -> None:
+        self._arm = arm
+        self._helper = "the guard watchdog" if arm is None or not arm.internal_control else "the driver process"
+        silences = {} if arm is None else {_PROGRAM: limits.program_silence, self._helper: limits.process_silence}
+        self._heartbeats = HeartbeatMonitor(silences)
+        self._silent: dict[str, str] = {}  # process -> what is wrong with it now
+        self._ran = False  # the driver's program, on the controller
+        self._restart_end = math.inf  # by when it has to run again, after an announced end
+
+    @property
+    def blockers(self) -> Iterable[str]:
+        """What stood against an activation when the clocks were last looked at, one line each."""
+        return self._silent.values()
+
+    def note_program(self, now: float) -> None:
+        """Note a heartbeat of the program that guards, at a host time [s]."""
+        self._heartbeats.note(_PROGRAM, now)
+
+    def note_helper(self, now: float) -> None:
+        """Note a message of the driver process, or of the guard watchdog, at a host time [s]."""
+        self._heartbeats.note(self._helper, now)
+
+    def doubt_driver(self, now: float) -> None:
+        """Let the stop under way not count on the driver process, which has reported an error."""
+        if self._arm is not None:
+            self._arm.lose(_LOST_WITH_PROCESS["driver"], now, for_good=False)
+
+    def lose(self, what: str, now: float) -> None:
+        """Drop the stop paths that go with a process, or with a connection, that is gone."""
+        arm = self._arm
+        if arm is None:
+            return
+        if what in _LOST_WITH_PROCESS:
+            arm.backup_ready = False
+            self._heartbeats.forget(self._helper)
+        arm.lose(_LOST_WITH_PROCESS.get(what) or arm.driver.lost_with.get(what, frozenset()), now)
+
+    def note_restart(self, now: float, over: bool) -> None:
+        """Note that the driver process ends its program and starts it again, or has done so.
+
+        Nothing moves while it does not run. A start that is not reported in time counts as an end; announced again and
+        again it has no more time.
+        """
+        self._restart_end = math.inf if over else min(self._restart_end, now + _RESTART_TIMEOUT)
+        self._ran = not over  # states from before the start may still come
+
+    def program_ended(self, now: float, running: bool) -> str:
+        """Take whether a program runs on the controller, and return what is wrong; empty where nothing is.
+
+        The end of the driver's program may be the only sign that the driver process hangs.
+        """
+        if self._arm is None or not self._arm.internal_control or not self._arm.phase.watched:
+            self._ran, self._restart_end = False, math.inf
+        elif running and now >= self._restart_end:  # it was refused, and the old one goes on
+            self._ran, self._restart_end = True, math.inf
+        elif running or now < self._restart_end < math.inf:
+            self._ran = True
+        elif self._ran:
+            self._ran, self._restart_end = False, math.inf
+            return "the driver's program has ended on the controller: its process may hang"
+        return ""
+
+    def quiet_until(self) -> float:
+        """Return the host time before which no process is missed [s]; -inf where one is now."""
+        return -math.inf if self._silent else min(self._heartbeats.quiet_until(), self._restart_end)
+
+    def skip_to(self, now: float) -> None:
+        """Note a look at a host time [s] before which it was looked often, and no process was missed."""
+        self._heartbeats.skip_to(now)
+
+    def look(self, now: float) -> list[tuple[str, frozenset[StopPath]]]:
+        """Return each process that has fallen silent since the last look: why, and what a stop must not count on.
+
+        Args:
+            now: host time [s].
+        """
+        before, self._silent = self._silent, self._heartbeats.silent(now)
+        if not self._silent:
+            return []
+        internal = self._arm is not None and self._arm.internal_control
+        helper = _LOST_WITH_PROCESS["driver" if internal else "watchdog"]
+        return [
+            (why, helper if process == self._helper else frozenset())
+            for process, why in self._silent.items()
+            if process not in before
+        ]

@@ -1,0 +1,1 @@
+"""Blocks, events and outputs of a guard, and what it keeps of a touch."""

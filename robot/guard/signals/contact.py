@@ -1,0 +1,129 @@
+"""Contact on a link: a touch and its place, for the reaction and for the events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from coneskin.geometry.pose import Vector
+from coneskin.robot.reaction.types import ContactOnLink
+from coneskin.skin.detection.events import TouchEvent
+from coneskin.skin.detection.frame.touch_reading import TouchReading
+
+__all__ = ["Contact", "GuardedSensor"]
+
+_ELLIPSE = 5.991  # chi-squared of two degrees of freedom that holds 95 %
+_STEP = 1e-4  # m along, rad around; from the place to one that shows the direction
+
+
+@dataclass(frozen=True, slots=True)
+class GuardedSensor:
+    """Sensor on a link.
+
+    Attributes:
+        name: the sensor's.
+        link_name: of the link, for people.
+        link: index of the link's DH frame.
+        place: (u [m], phi [rad]) -> point [m] and outward unit normal, in the link's DH frame.
+        threshold: level from which it is touched.
+        firm: level from which a touch has a place, so that one without a place is a doubtful one.
+        force: level -> force and its standard deviation [N], or None beyond what a calibration knows; None without one.
+    """
+
+    name: str
+    link_name: str
+    link: int
+    place: Callable[[float, float], tuple[Vector, Vector]]
+    threshold: float = 0.0
+    firm: float = 0.2
+    force: Callable[[float], tuple[float, float] | None] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Touch on a link; its place is worked out only where it is asked for, because a stop does not wait for it.
+
+    Attributes:
+        touch: as the skin reports it, in an event or in a frame.
+        where: the sensor.
+        number: of the touch, from 1 on; one that begins anew has a new number.
+    """
+
+    touch: TouchEvent | TouchReading
+    where: GuardedSensor
+    number: int
+
+    def on_link(self) -> ContactOnLink:
+        """Return what the reaction has to know."""
+        touch, where = self.touch, self.where
+        point, normal = where.place(touch.u, touch.phi)
+        return ContactOnLink(
+            where.link, point, normal, touch.level, touch.location_valid, where.threshold, self.number, where.firm
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return which touch it is: number, sensor, link, place on the sensor [m, rad] and level."""
+        touch = self.touch
+        return {
+            "number": self.number,
+            "sensor": self.where.name,
+            "link": self.where.link_name,
+            "u": touch.u,
+            "phi": touch.phi,
+            "level": touch.level,
+            "location_valid": touch.location_valid,
+        }
+
+    def details(self) -> dict[str, Any]:
+        """Return the details that an event carries of it; lengths in m, angles in rad, vectors in the link's frame."""
+        touch = self.touch
+        point, normal = self.where.place(touch.u, touch.phi)
+        stamp = {"clock_us": touch.clock_us, "sequence": touch.sequence}
+        known = {
+            "covariance": touch.covariance,
+            "ellipse": self._ellipse(point),
+            "radius": touch.radius,
+            "radius_deviation": touch.radius_deviation,
+            "elongation": touch.elongation,
+            "velocity": touch.velocity,
+        }
+        if touch.elongation is not None:
+            known["line"] = self._line(point, *touch.elongation)
+        if self.where.force is not None:
+            known["force"] = self.where.force(touch.level)
+        return {**self.summary(), "point": point, "normal": normal, **known, **stamp}
+
+    def _line(self, point: Vector, half: float, direction: float) -> Vector:
+        """Return the half of the line on which contacts lie about the place, in the link's frame [m]."""
+        along, around = self._axes(point)
+        x, y = half * math.cos(direction), half * math.sin(direction)
+        return x * along[0] + y * around[0], x * along[1] + y * around[1], x * along[2] + y * around[2]
+
+    def _axes(self, point: Vector) -> tuple[Vector, Vector]:
+        """Return the unit vectors along the side and around, at the place, in the link's frame."""
+        u, phi = self.touch.u, self.touch.phi
+        return _unit(point, self.where.place(u + _STEP, phi)[0]), _unit(point, self.where.place(u, phi + _STEP)[0])
+
+    def _ellipse(self, point: Vector) -> tuple[Vector, Vector] | None:
+        """Return the two half axes of the ellipse that holds the place with 95 %, in the link's frame [m]."""
+        touch = self.touch
+        if touch.covariance is None:
+            return None
+        uu, us, ss = touch.covariance
+        along, around = self._axes(point)
+        middle, apart = 0.5 * (uu + ss), math.hypot(0.5 * (uu - ss), us)
+        angle = 0.5 * math.atan2(2.0 * us, uu - ss)
+        axes = []
+        for variance, turn in ((middle + apart, angle), (middle - apart, angle + 0.5 * math.pi)):
+            size = math.sqrt(_ELLIPSE * max(variance, 0.0))
+            x, y = size * math.cos(turn), size * math.sin(turn)
+            axes.append((x * along[0] + y * around[0], x * along[1] + y * around[1], x * along[2] + y * around[2]))
+        return axes[0], axes[1]
+
+
+def _unit(start: Vector, end: Vector) -> Vector:
+    x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    length = math.sqrt(x * x + y * y + z * z) or 1.0
+    return x / length, y / length, z / length

@@ -1,0 +1,241 @@
+"""Journal of a guard: the kinds of block that it records, and its events.
+
+Everything that goes into a guard is recorded, and everything that comes out. What goes in is enough to run the guard
+again: ``GuardCore.take`` is fed the same blocks, live and in a replay.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from enum import IntEnum, StrEnum
+from typing import Any, NamedTuple
+
+from coneskin.core.errors import RecordingError
+from coneskin.core.json_text import read_json
+from coneskin.core.recording.block import Block
+
+__all__ = [
+    "INPUTS",
+    "SESSION_EVENTS",
+    "BlockKind",
+    "EventName",
+    "GuardEvent",
+    "body_places",
+    "contact_force",
+    "decode_event",
+    "decode_loss",
+    "describe_way",
+    "encode_loss",
+    "force_block",
+    "stopping_contact",
+]
+
+
+class BlockKind(IntEnum):
+    """Kinds of block. 1 to 9, and from 30 on, go into the guard, 10 to 19 come out of it."""
+
+    SKIN = 1  #: bytes of the skin's stream, as they were read
+    ARM = 2  #: payload of a state, for the driver's ``decode_state``
+    TICK = 3  #: nothing: time has passed
+    DRIVER = 4  #: a status report of the driver process, or of the guard watchdog
+    RESET = 5  #: a manual reset: the number of the stop that it forgives, and its own, in decimal digits
+    LOST = 6  #: a source, a connection or a process is gone; the payload says which and why
+    SLIDER = 7  #: payload of the speed slider, for the driver's ``decode_speed_fraction``
+    PROGRAM = 8  #: a heartbeat of the program that guards
+    ABSENT = 9  #: a stop path that is not there from the start; the payload says which connection and why
+    EVENT = 10  #: a GuardEvent, JSON
+    COMMAND = 11  #: a command as it was sent: to whom, a line feed, its bytes
+    HEADER = 20  #: JSON: the scene and the versions
+    OVERRUN = 21  #: JSON: how late the loop was
+    SURFACE = 22  #: heights of a mesh below a sensor, see ``coneskin.scene.surface_record``
+    TRUTH = 23  #: JSON: with what a virtual skin was touched, whether it was noticed or not; the force of a contact
+    ECHO = 30  #: payload of the heartbeat's connection, for the driver's ``decode_heartbeat``
+    SUSPENDED = 31  #: for how long the loop did nothing [s], by a clock that goes on while the computer sleeps
+    REOPENED = 32  #: what was lost is open again; the payload says which: the skin
+
+
+class EventName(StrEnum):
+    """Names of everything that a guard, or the session around it, reports.
+
+    The last six are about the guard and not from it, so that a replay does not make them (``SESSION_EVENTS``).
+    """
+
+    WAITING = "waiting"  #: the guard cannot become active yet; ``reasons`` lists why
+    ACTIVATED = "activated"  #: the guard reacts from now on
+    NOT_COMMISSIONED = "not_commissioned"  #: the arm stops where its scene lets it move away; ``what`` says why
+    CONTACT = "contact"  #: a touch has begun
+    CONTACT_LOCATED = "contact_located"  #: the place of a touch has become certain
+    CONTACT_EXTENDED = "contact_extended"  #: the touch is not one disc: its centroid and its line are known
+    TOUCH_ENDED = "touch_ended"  #: a touch is over
+    FAULT = "fault"  #: something is wrong with skin, arm or a process
+    STOPPING = "stopping"  #: a stop was sent; ``why`` says what for
+    DECELERATING = "decelerating"  #: the measured speed has begun to fall
+    STOP_FAILED = "stop_failed"  #: every stop path was used and the arm does not stand
+    STANDSTILL = "standstill"  #: the arm was measured standing
+    ESCALATED = "escalated"  #: a further stop path was used
+    RETREATING = "retreating"  #: a motion away from the touch has begun
+    MOTION_LIMITED = "motion_limited"  #: that motion is slower than set; ``by`` lists the limits
+    RETREATED = "retreated"  #: that motion is over
+    SPEED_REDUCED = "speed_reduced"  #: the speed slider was lowered because of a touch
+    SPEED_LIMITED = "speed_limited"  #: the speed slider was set so that surfaces keep their permissible speeds
+    RESUMED = "resumed"  #: the speed slider is back where it was
+    LATCHED = "latched"  #: the arm stands and waits for a manual reset
+    REFUSED = "refused"  #: a reset was refused; ``reasons`` lists why
+    RESET = "reset"  #: a person has reset the guard
+    MESSAGE = "message"  #: a remark for people
+    ENDING = "ending"  #: the guard was told to end
+    GUARD_EXITED = "guard_exited"  #: the guard's process has ended
+    GUARD_UNRESPONSIVE = "guard_unresponsive"  #: the guard sends no heartbeat
+    GUARD_RESPONSIVE = "guard_responsive"  #: its heartbeat is back
+    FALLBACK_STOP = "fallback_stop"  #: the session has stopped the arm without the guard
+    RECORDING_GAP = "recording_gap"  #: blocks are missing from the recording
+    SKIN_LINE = "skin_line"  #: what is wrong with the bytes of a skin for which the guard waits
+
+
+INPUTS = frozenset(
+    {
+        BlockKind.SKIN,
+        BlockKind.ARM,
+        BlockKind.TICK,
+        BlockKind.DRIVER,
+        BlockKind.RESET,
+        BlockKind.LOST,
+        BlockKind.SLIDER,
+        BlockKind.PROGRAM,
+        BlockKind.ABSENT,
+        BlockKind.ECHO,
+        BlockKind.SUSPENDED,
+        BlockKind.REOPENED,
+    }
+)
+
+
+#: events about the guard, not from it, which a replay does not make
+SESSION_EVENTS = frozenset(
+    {
+        EventName.GUARD_EXITED,
+        EventName.GUARD_UNRESPONSIVE,
+        EventName.GUARD_RESPONSIVE,
+        EventName.FALLBACK_STOP,
+        EventName.RECORDING_GAP,
+        EventName.SKIN_LINE,
+    }
+)
+
+
+_PLACE_DIGITS = 5  # decimals of a body's place [m]: 0.01 mm
+_CONTACTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED})
+
+
+class GuardEvent(NamedTuple):
+    """Event of a run, for people and programs.
+
+    Attributes:
+        name: what happened.
+        time: host clock [s].
+        details: numbers and words that belong to it; SI and radians.
+    """
+
+    name: EventName
+    time: float
+    details: dict[str, Any]
+
+    def block(self) -> Block:
+        """Return the block that records it. Floats keep every bit."""
+        return Block(BlockKind.EVENT, self.time, json.dumps([self.name, self.details]).encode())
+
+
+def stopping_contact(stop: GuardEvent, events: Sequence[GuardEvent]) -> GuardEvent | None:
+    """Return the event of the contact that a stop was made for, once its place was certain where it has become so.
+
+    Args:
+        stop: an event "stopping".
+        events: of the run.
+
+    Returns:
+        an event "contact_located" or "contact"; None where the stop was made for something else.
+    """
+    if not (contact := stop.details.get("contact")):
+        return None
+    same = [event for event in events if event.name in _CONTACTS and event.details["number"] == contact["number"]]
+    return max(same, key=lambda event: event.name == EventName.CONTACT_LOCATED, default=None)
+
+
+def force_block(time: float, force: float, places: Sequence[Sequence[float]] = ()) -> Block:
+    """Return the block that records which force physics found between the arm and what it meets.
+
+    Args:
+        time: host clock [s].
+        force: sum of all contacts [N].
+        places: of the scene's bodies then, in the base frame [m], part by part: a grip has two.
+    """
+    facts: dict[str, Any] = {"contact_force_N": force}
+    if places:
+        facts["bodies_m"] = [[round(value, _PLACE_DIGITS) for value in place] for place in places]
+    return Block(BlockKind.TRUTH, time, json.dumps(facts).encode())
+
+
+def body_places(payload: bytes) -> tuple[tuple[float, float, float], ...]:
+    """Return the places in what ``force_block`` has recorded [m]; none for another truth, and for nonsense."""
+    try:
+        found = tuple((float(x), float(y), float(z)) for x, y, z in read_json(payload).get("bodies_m", ()))
+    except (ValueError, TypeError, AttributeError):
+        return ()
+    return found if all(math.isfinite(value) for place in found for value in place) else ()
+
+
+def contact_force(payload: bytes) -> float | None:
+    """Return the force in what ``force_block`` has recorded [N]; None for another truth, and for nonsense."""
+    try:
+        force = read_json(payload).get("contact_force_N")
+    except (ValueError, AttributeError):
+        return None
+    known = isinstance(force, int | float) and math.isfinite(force) and force >= 0.0
+    return float(force) if known else None
+
+
+def decode_event(block: Block) -> GuardEvent:
+    """Return the event in a block.
+
+    Raises:
+        RecordingError: the block holds none.
+    """
+    try:
+        text, details = read_json(block.payload)
+        name = EventName(text)
+        if block.kind != BlockKind.EVENT or not isinstance(details, dict):
+            raise ValueError(f"kind {block.kind}")
+    except (ValueError, TypeError) as exc:
+        raise RecordingError(
+            f"a block of {block.time:.6f} s holds no event that this version of coneskin knows: {exc}"
+        ) from exc
+    return GuardEvent(name, block.time, details)
+
+
+def encode_loss(what: str, why: str) -> bytes:
+    """Return the payload of a block that says which port is gone or missing, and why; half a letter is written out."""
+    return f"{what}\n{why}".encode("utf-8", "backslashreplace")
+
+
+def decode_loss(payload: bytes) -> tuple[str, str]:
+    """Return which port such a payload means, and why it is gone."""
+    what, _, why = payload.decode("utf-8", "replace").partition("\n")
+    return what, why
+
+
+def describe_way(details: Mapping[str, Any], verb: str = "retreated") -> str:
+    """Return in words how far a motion away went, from the details of the event ``retreated``.
+
+    Its progress counts from where the touch began. An arm that brakes for longer than it moves away afterwards ends on
+    the other side of that.
+    """
+    progress = 1e3 * float(details["progress"])
+    if details.get("how") == "push":
+        return f"gave way {progress:.1f} mm"
+    braking = details.get("braking")
+    if braking is None:
+        return f"{verb} {progress:.1f} mm"
+    went = 1e3 * float(braking)
+    return f"went {went:.1f} mm on while it braked and then {went + progress:.1f} mm back"

@@ -1,0 +1,1 @@
+"""State of the simulated controller: safety, power, inputs, options, notices."""

@@ -1,0 +1,101 @@
+"""Mock arm: six joints that obey the guard's commands after one cycle, or do not, on a clock of their own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from coneskin.robot.driver.messages import EndReaction, SetJointVelocity, StopProgram
+from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
+from coneskin.robot.driver.stop_path import StopPath, UseStopPath
+from coneskin.robot.ur.rtde_codec import Recipe
+from coneskin.robot.ur.state_reader import RECIPE
+
+__all__ = ["SLIDER", "MockArm"]
+
+#: what a controller reports of its speed slider
+SLIDER = Recipe(("target_speed_fraction",))
+
+_CYCLE = 0.002  # s
+
+
+@dataclass
+class MockArm:
+    """Joints at q [rad] that move at qd [rad/s]; ``obeys`` are the paths to stop that work, ``heeds`` the slider.
+
+    ``current`` is what the motors take beyond the controller's model [A].
+    """
+
+    q: list[float]
+    qd: list[float]
+    obeys: frozenset[StopPath] = frozenset(StopPath)
+    clock: float = 0.0
+    safety_bits: int = 1
+    robot_mode: int = 7
+    runtime_state: int = 2
+    target: list[float] | None = None
+    acceleration: float = 0.0
+    commands: list[object] = field(default_factory=list)
+    heeds: bool = True
+    slider: float = 1.0
+    registers: JointVelocitySetpoint | None = None
+    following: int = 0
+    current: list[float] = field(default_factory=lambda: [0.0] * 6)
+
+    def take(self, command: object) -> None:
+        """Obey a command of the guard, if this arm does."""
+        if isinstance(command, UseStopPath):
+            command = command.path
+        self.commands.append(command)
+        if isinstance(command, SetSpeedSlider):
+            self.slider = command.fraction
+        elif isinstance(command, JointVelocitySetpoint):
+            self.registers = command
+        elif isinstance(command, SetpointProgram):
+            self.following, self.runtime_state = command.token, 2
+        elif isinstance(command, StopPath):
+            if command in self.obeys:
+                self._go([0.0] * 6, 10.0)
+                if command is StopPath.SLIDER:
+                    self.slider = 0.0
+                if command is StopPath.PROTECTIVE:
+                    self.safety_bits = 0b10000000100
+        elif StopPath.DRIVER not in self.obeys:
+            return
+        elif isinstance(command, StopProgram | EndReaction):
+            self._go([0.0] * 6, command.deceleration)
+        elif isinstance(command, SetJointVelocity):
+            self._go(list(command.qd), command.acceleration)
+
+    def go(self, target: list[float], acceleration: float) -> None:
+        """Let the joints go to these speeds."""
+        self._go(target, acceleration)
+
+    def _go(self, target: list[float], acceleration: float) -> None:
+        self.target, self.acceleration = target, acceleration
+        self.following = 0
+
+    @property
+    def speed(self) -> float:
+        """Speed of the leading joint [rad/s]."""
+        return max(map(abs, self.qd))
+
+    def step(self) -> bytes:
+        """Go on by one control cycle and return the payload of its RTDE packet."""
+        self.advance()
+        return self.packet(self.q, self.qd, self.current)
+
+    def advance(self) -> None:
+        """Go on by one control cycle."""
+        self.clock += _CYCLE
+        if self.following and self.registers is not None and self.registers.token == self.following:
+            self.target, self.acceleration = list(self.registers.qd), self.registers.acceleration
+        if self.target is not None:
+            target = [self.slider * t if self.heeds else t for t in self.target]
+            gap = max(abs(t - v) for t, v in zip(target, self.qd, strict=True))
+            share = min(1.0, self.acceleration * _CYCLE / gap) if gap else 1.0
+            self.qd = [v + share * (t - v) for t, v in zip(target, self.qd, strict=True)]
+        self.q = [x + v * _CYCLE for x, v in zip(self.q, self.qd, strict=True)]
+
+    def packet(self, q: Sequence[float], qd: Sequence[float], current: Sequence[float]) -> bytes:
+        """Return the payload of an RTDE packet with these positions [rad], speeds [rad/s] and currents [A] measured."""
+        modes = self.robot_mode, self.safety_bits, self.runtime_state
+        return RECIPE.pack((self.clock, tuple(q), tuple(qd), *modes, tuple(current), (0.0,) * 6))

@@ -1,0 +1,1 @@
+"""Controller of the simulation, and the programs that it runs."""

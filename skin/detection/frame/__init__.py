@@ -1,0 +1,1 @@
+"""What one frame says: currents, matrices, timing, faults."""

@@ -1,0 +1,265 @@
+"""Sequence numbers and clocks of a sensor: tells new frames from lost, late and repeated ones.
+
+Numbers wrap: the sequence at 65536, the device clock at 2**32 us (71.6 minutes). Differences are taken modulo that and
+read as signed, so a frame from the past has a negative difference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from coneskin.core.errors import SensorError
+
+from .faults import Fault
+
+__all__ = ["FrameTiming", "TimingLimits"]
+
+_LEARNING_FRAMES = 16  # frames; from then on the period is known well enough to judge by
+_BACKLOG_TIME = 0.25  # s; in it what had piled up before the port was opened has been read, and looks like a fast clock
+_RESTART_FRAMES = 32  # frames; so many old ones in a row mean that the device has started anew
+
+
+@dataclass(frozen=True, slots=True)
+class TimingLimits:
+    """Limits of how irregular frames may be.
+
+    Attributes:
+        missing: missing frames that are allowed at once. They drain from memory at ``missing_share``.
+        missing_share: share of frames that may be missing in the long run.
+        clock_slack: device time that an interval may be off the learned period, besides half of it [s].
+        late: how much later than the quickest frame one may arrive [s].
+        clock_drift: largest difference in speed of the device's clock and the host's, as a ratio. A lag that grows
+            more slowly is not noticed. Crystals keep 1e-4; a board whose clock is a ceramic resonator needs 5e-3.
+
+    Raises:
+        SensorError: a limit is not positive, or the drift is not below 1.
+    """
+
+    missing: int = 2
+    missing_share: float = 0.02
+    clock_slack: float = 0.002
+    late: float = 0.05
+    clock_drift: float = 1e-4
+
+    def __post_init__(self) -> None:
+        if not self.missing >= 0:
+            raise SensorError(f"timing.missing must not be negative, got {self.missing!r}")
+        for name in ("missing_share", "clock_slack", "late", "clock_drift"):
+            if not getattr(self, name) > 0.0:
+                raise SensorError(f"timing.{name} must be above 0, got {getattr(self, name)!r}")
+        if not self.clock_drift < 1.0:
+            raise SensorError(f"timing.clock_drift must be below 1, got {self.clock_drift!r}")
+
+
+class FrameTiming:
+    """The sequence numbers and the clock of one sensor, followed frame by frame.
+
+    Attributes:
+        frames: frames taken.
+        missing: frames that never came.
+        old: frames that came twice or out of order.
+        period: device time from frame to frame, learned [s]; 0 before the second frame.
+        sequence: of the newest frame.
+        clock_us: of the newest frame [us].
+        lag: how much later than the quickest frame the newest one arrived [s].
+        detail: numbers that belong to the newest fault.
+    """
+
+    __slots__ = (
+        "_bucket",
+        "_device_time",
+        "_drift",
+        "_gained",
+        "_known",
+        "_offset",
+        "_old_run",
+        "_started",
+        "_valid_at",
+        "clock_us",
+        "detail",
+        "frames",
+        "lag",
+        "limits",
+        "missing",
+        "old",
+        "period",
+        "sequence",
+    )
+
+    def __init__(self, limits: TimingLimits) -> None:
+        self.limits = limits
+        self._drift = limits.clock_drift
+        self.frames = self.missing = self.old = 0
+        self.sequence = self.clock_us = 0
+        self.detail = ""
+        self._valid_at = -math.inf
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget sequence, clock and period; the counts stay."""
+        self.period = self.lag = 0.0
+        self._bucket = 0.0
+        self._device_time = 0.0
+        self._offset = math.inf
+        self._gained = self._started = 0.0
+        self._known = self._old_run = 0
+
+    def age(self, now: float) -> float:
+        """Return the time since the newest valid frame [s]; infinite before the first."""
+        return now - self._valid_at
+
+    @property
+    def valid_at(self) -> float:
+        """Host time of the newest valid frame [s]; -inf before the first."""
+        return self._valid_at
+
+    def measured_age(self, now: float) -> float:
+        """Return for how long the newest valid frame has been history, its way to this computer included [s]."""
+        return now - self._valid_at + self.lag
+
+    def seen_valid(self, now: float) -> None:
+        """Note that a valid frame came."""
+        self._valid_at = now
+
+    def advance(self, sequence: int, clock_us: int, now: float) -> Fault | None:
+        """Take the numbers of the next frame.
+
+        Args:
+            sequence: sequence number, 0..65535.
+            clock_us: device clock [us], 0..2**32 - 1.
+            now: host clock [s].
+
+        Returns:
+            what is wrong with them, or None.
+        """
+        if self._known == 0:
+            self._known = 1
+            self.frames += 1
+            self.sequence, self.clock_us = sequence, clock_us
+            self._offset = self._started = now
+            return None
+        steps = (sequence - self.sequence + 0x8000 & 0xFFFF) - 0x8000
+        elapsed = ((clock_us - self.clock_us + 0x80000000 & 0xFFFFFFFF) - 0x80000000) * 1e-6
+        if steps <= 0 or elapsed <= 0.0:
+            self.old += 1
+            self._old_run += 1
+            if self._old_run >= _RESTART_FRAMES:
+                self.restart()
+            self.detail = f"sequence {steps:+d}, clock {elapsed * 1e3:+.3f} ms"
+            return Fault.REPLAYED
+        self.frames += 1
+        self._old_run = 0
+        self.sequence, self.clock_us = sequence, clock_us
+        self._device_time += elapsed
+        settled = now - self._started > _BACKLOG_TIME
+        arrival = self._judge_arrival(now - self._device_time, elapsed * self._drift, settled)
+        return self._judge_interval(steps, elapsed) or arrival
+
+    def learn(self, sequences: Sequence[int], clocks: Sequence[int], times: Sequence[float]) -> list[float]:
+        """Take valid frames in a row as ``advance`` does, up to the first that is not in time, or not the next.
+
+        Args:
+            sequences: sequence numbers.
+            clocks: device clock [us].
+            times: host clock when each arrived [s].
+
+        Returns:
+            the period after each frame that was taken [s].
+        """
+        periods: list[float] = []
+        if self._known < _LEARNING_FRAMES:
+            return periods
+        limits, started = self.limits, self._started
+        late, share, slack, drifts = limits.late, limits.missing_share, limits.clock_slack, self._drift
+        before, clock_before, valid_at = self.sequence, self.clock_us, self._valid_at
+        period, lag, bucket, device_time = self.period, self.lag, self._bucket, self._device_time
+        offset, gained = self._offset, self._gained
+        for sequence, clock_us, now in zip(sequences, clocks, times, strict=True):
+            elapsed = ((clock_us - clock_before + 0x80000000 & 0xFFFFFFFF) - 0x80000000) * 1e-6
+            if sequence != before + 1 & 0xFFFF or elapsed <= 0.0:
+                break
+            new_time, drift = device_time + elapsed, elapsed * drifts
+            here, newest, gain = now - new_time, offset + drift, gained - 2.0 * drift
+            if gain < 0.0:
+                gain = 0.0
+            if here < newest:
+                gain += newest - here if now - started > _BACKLOG_TIME else 0.0
+                newest = here
+            off = elapsed - period if elapsed > period else period - elapsed
+            if here - newest > late or gain > late or off > 0.5 * period + slack:
+                break
+            before, clock_before, valid_at = sequence, clock_us, now
+            device_time, offset, gained, lag = new_time, newest, gain, here - newest
+            bucket -= share
+            if bucket < 0.0:
+                bucket = 0.0
+            period += (elapsed - period) / _LEARNING_FRAMES
+            periods.append(period)
+        if periods:
+            self.frames += len(periods)
+            self._old_run = 0
+        self.sequence, self.clock_us, self._valid_at = before, clock_before, valid_at
+        self.period, self.lag, self._bucket, self._device_time = period, lag, bucket, device_time
+        self._offset, self._gained = offset, gained
+        return periods
+
+    def _judge_arrival(self, offset: float, drift: float, settled: bool) -> Fault | None:
+        """Judge how late a frame has arrived, and whether the device's clock runs away from the host's.
+
+        The offset of the two clocks is known from the quickest frame. It may rise by the drift, and an older quickest
+        frame is then given up; where it falls faster than the drift explains, the device's clock is too fast, and a
+        lag would hide behind it.
+
+        Args:
+            offset: host clock minus device time [s].
+            drift: by which the clocks may have moved apart since the last frame [s].
+            settled: the first frames, which may have been waiting, are read.
+        """
+        late = self.limits.late
+        self._offset += drift
+        gained = self._gained - 2.0 * drift
+        self._gained = gained if gained > 0.0 else 0.0
+        if offset < self._offset:
+            self._gained += self._offset - offset if settled else 0.0
+            self._offset = offset
+        self.lag = lag = offset - self._offset
+        if lag > late:
+            limit = f"{self.lag * 1e3:.1f} ms late, skin_late_ms = {1e3 * late:g}"
+            self.detail = f"{limit}; a busy computer needs more, or fewer frames a second; or {self._advice('slow')}"
+            return Fault.LATE
+        if self._gained > late:
+            self._gained = 0.0
+            self.detail = f"{late * 1e3:g} ms gained; {self._advice('fast')}"
+            return Fault.CLOCK_FAST
+        return None
+
+    def _advice(self, pace: str) -> str:
+        ppm = 1e6 * self._drift
+        return f"the device's clock is {pace} by more than clock_drift_ppm = {ppm:g}; a ceramic resonator needs 5000"
+
+    def _judge_interval(self, steps: int, elapsed: float) -> Fault | None:
+        limits = self.limits
+        self._bucket -= limits.missing_share
+        if self._bucket < 0.0:
+            self._bucket = 0.0
+        fault = None
+        if steps > 1:
+            self.missing += steps - 1
+            self._bucket += steps - 1
+            if self._bucket > limits.missing:
+                self._bucket = float(limits.missing)
+                self.detail = f"{steps - 1} missing at once, {self.missing} in all"
+                fault = Fault.GAP
+        each = elapsed / steps
+        if self._known < _LEARNING_FRAMES:
+            self._known += 1
+            self.period += (each - self.period) / (self._known - 1)
+            return fault
+        off = abs(elapsed - steps * self.period)
+        if off > 0.5 * steps * self.period + limits.clock_slack:
+            self.detail = f"{elapsed * 1e3:.3f} ms for {steps} frames of {self.period * 1e3:.3f} ms"
+            return fault or Fault.CLOCK_JUMP
+        self.period += (each - self.period) / _LEARNING_FRAMES
+        return fault

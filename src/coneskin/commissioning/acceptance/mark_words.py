@@ -1,0 +1,210 @@
+"""Words for marks: distance along the link, and the side as it points in the world now.
+
+They do not name the sensor's own coordinates. So a person who follows them tests the pose of the sheet on its link, the
+direction of its normal and the model of the arm as well, and not only the wires.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from coneskin.scene.build import place_on_arm
+
+from .marks import Mark, azimuth_margin, slant_places
+
+if TYPE_CHECKING:
+    from coneskin.geometry.pose import Pose, Vector
+    from coneskin.robot.arm.model import ArmModel
+    from coneskin.scene.build import SensorOnArm
+    from coneskin.scene.values.scene import Scene
+    from coneskin.skin.sensor import Sensor
+
+__all__ = ["offer_marks", "place_sensors"]
+
+#: [i]: where link i begins
+_JOINTS = ("the floor", "the base", "the shoulder", "the elbow", "wrist 1", "wrist 2", "wrist 3", "the flange")
+_TUBES = (2, 3)  # links whose mesh begins on their joint's axis and runs along the link
+_STEPS = (30.0, 15.0, 7.5, 3.75)  # deg; an hour of the clock, and parts of one
+_ENOUGH = 9  # marks to choose from
+_TURN = 2.0 * math.pi  # rad
+_STEPS_AROUND = 720  # of a bent side, between which its azimuths are interpolated
+_ROUND = 0.005  # m; distances are multiples of it
+_FACING = 0.35  # part of a direction from which on it is named
+_UPRIGHT = math.cos(math.radians(30.0))  # from which on a link counts as upright
+
+
+def place_sensors(scene: Scene) -> list[SensorOnArm]:
+    """Return the places of a scene's sensors; meshes are not read, because only the frustum's side is needed."""
+    return place_on_arm(replace(scene, links=tuple(replace(link, mesh=None) for link in scene.links)))
+
+
+def offer_marks(sensor: Sensor, placed: SensorOnArm, q: Sequence[float] | None) -> list[Mark]:
+    """Return all places of a sensor that can be described.
+
+    Args:
+        sensor: the sensor.
+        placed: where it is; without an arm the words name its electrodes.
+        q: joint positions of the arm [rad]; None without an arm.
+    """
+    offered: list[Mark] = []
+    for step in _STEPS:
+        offered = _on_sheet(sensor, step) if placed.model is None or q is None else _on_arm(sensor, placed, q, step)
+        if len(offered) >= _ENOUGH:
+            break
+    return offered
+
+
+def _on_sheet(sensor: Sensor, step: float) -> list[Mark]:
+    cone, margin = sensor.frustum, azimuth_margin(sensor)
+    marks = []
+    for u in slant_places(sensor):
+        for number in range(1, math.ceil(math.degrees(cone.wrap) / step)):
+            phi = math.radians(number * step)
+            if margin <= phi <= cone.wrap - margin:
+                arc = 1e3 * cone.radius_at(u) * phi
+                where = f"{1e3 * u:.0f} mm from electrode B (end 1) and {arc:.0f} mm along the arc from electrode D"
+                marks.append(Mark(u, phi, where))
+    return marks
+
+
+def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float) -> list[Mark]:
+    from coneskin.robot.arm.kinematics import link_pose
+
+    assert placed.model is not None
+    cone = sensor.frustum
+    base_link = link_pose(placed.model, q, placed.link)
+    ends = [base_link.apply(placed.frustum.centre(u)) for u in (0.0, cone.slant)]
+    axis = _times(_sum(ends[1], _times(ends[0], -1.0)), 1.0 / math.dist(*ends))
+    from_end1 = _begins_at_end1(placed, q)
+    along = axis if from_end1 else _times(axis, -1.0)  # from the joint nearer the base to the farther one
+    twelve, reference = _twelve(along)
+    right = _cross(along, twelve)
+    near, far = _JOINTS[placed.link], _JOINTS[placed.link + 1]
+    margin, marks = azimuth_margin(sensor), []
+    for u in _rounded(sensor, placed, placed.model):
+        distance = _distance(sensor, placed, placed.model, u, from_end1, near)
+        azimuth = _azimuths(placed, u)
+        for number in range(round(360.0 / step)):
+            angle = math.radians(number * step)
+            side = _sum(_times(twelve, math.cos(angle)), _times(right, math.sin(angle)))
+            phi = azimuth(base_link.inverse().rotate(side))
+            if margin <= phi <= cone.wrap - margin:
+                where = (
+                    f"{distance}, along the {placed.link_name}, at {_clock(angle)} as seen from {near} towards {far} "
+                    f"(12:00 is {reference}): the side that points {_direction(side)}"
+                )
+                marks.append(Mark(u, phi, where))
+    return marks
+
+
+def _azimuths(placed: SensorOnArm, u: float) -> Callable[[Vector], float]:
+    """Return what gives the azimuth [rad] of the place at u [m] in a direction from the middle of the link there."""
+    side = placed.frustum
+    back = side.link_frustum.inverse()
+    if not side.bends:
+
+        def azimuth(way: Vector) -> float:
+            x, y, _ = back.rotate(way)
+            return math.atan2(y, x) % _TURN
+
+        return azimuth
+    centre, first = side.centre(u), side.normal(0.0)
+    ahead = _cross(_sum(side.centre(side.frustum.slant), _times(side.centre(0.0), -1.0)), first)
+    length = math.hypot(*ahead)
+
+    def angle(way: Vector) -> float:
+        """Return the angle of a direction about the middle [rad], from the normal of edge 0 on."""
+        y, x = (sum(a * b for a, b in zip(way, one, strict=True)) for one in (_times(ahead, 1.0 / length), first))
+        return math.atan2(y, x)
+
+    steps = [side.frustum.wrap * k / _STEPS_AROUND for k in range(_STEPS_AROUND + 1)]
+    angles = [angle(_sum(side.point(u, phi), _times(centre, -1.0))) for phi in steps]
+
+    def bent_azimuth(way: Vector) -> float:
+        sought = angle(way)
+        for (one, two), (low, high) in zip(pairwise(steps), pairwise(angles), strict=True):
+            span = math.remainder(high - low, _TURN)
+            part = math.remainder(sought - low, _TURN) / span if span else 0.0
+            if 0.0 <= part <= 1.0 and abs(span) < 1.0:
+                return one + part * (two - one)
+        return _TURN  # where no part of the sheet is
+
+    return bent_azimuth
+
+
+def _begins_at_end1(placed: SensorOnArm, q: Sequence[float]) -> bool:
+    """Tell whether end 1 of a sensor is nearer the joint at which its link begins."""
+    from coneskin.robot.arm.kinematics import link_poses
+
+    assert placed.model is not None
+    poses = link_poses(placed.model, q)
+    joint = poses[max(placed.link - 1, 0)].translation
+    ends = [poses[placed.link].apply(placed.frustum.centre(u)) for u in (0.0, placed.frustum.frustum.slant)]
+    return math.dist(joint, ends[0]) <= math.dist(joint, ends[1])
+
+
+def _from_joint(placed: SensorOnArm, model: ArmModel, u: float) -> float:
+    """Return the distance of a place from the axis of the joint at which a tube begins, along the link [m]."""
+    from coneskin.robot.arm.link_frames import dh_mesh
+
+    mesh: Pose = dh_mesh(model, placed.link_name)
+    return mesh.inverse().apply(placed.frustum.centre(u))[2]
+
+
+def _rounded(sensor: Sensor, placed: SensorOnArm, model: ArmModel) -> list[float]:
+    """Return slant distances of marks whose distance from the joint is a round number [m]."""
+    places = slant_places(sensor)
+    if placed.link not in _TUBES or sensor.frustum.slant < 20.0 * _ROUND:
+        return places
+    slope = (_from_joint(placed, model, places[-1]) - _from_joint(placed, model, places[0])) / (places[-1] - places[0])
+    if abs(slope) < 0.5:
+        return places
+    found = [_from_joint(placed, model, u) for u in places]
+    return [
+        u + (_ROUND * round(distance / _ROUND) - distance) / slope for u, distance in zip(places, found, strict=True)
+    ]
+
+
+def _distance(sensor: Sensor, placed: SensorOnArm, model: ArmModel, u: float, from_end1: bool, near: str) -> str:
+    if placed.link in _TUBES:
+        return f"{1e3 * _from_joint(placed, model, u):.0f} mm from the axis of {near}"
+    edge = u if from_end1 else sensor.frustum.slant - u
+    return f"{1e3 * edge:.0f} mm from the edge of the sheet's active area that is nearer {near}"
+
+
+def _twelve(along: Vector) -> tuple[Vector, str]:
+    """Return the direction of 12:00 on a clock that is seen along a link, and what it is called."""
+    up, name = ((1.0, 0.0, 0.0), "towards the base's +x") if abs(along[2]) > _UPRIGHT else ((0.0, 0.0, 1.0), "up")
+    across = sum(a * b for a, b in zip(up, along, strict=True))
+    rest = _sum(up, _times(along, -across))
+    return _times(rest, 1.0 / math.hypot(*rest)), name
+
+
+def _direction(side: Vector) -> str:
+    """Return where a direction of the base frame points, in words."""
+    x, y, z = side
+    level = [(abs(x), f"{'+' if x > 0.0 else '-'}x"), (abs(y), f"{'+' if y > 0.0 else '-'}y")]
+    named = " and ".join(name for part, name in sorted(level, reverse=True) if part > _FACING)
+    upright = "up" if z > _FACING else "down" if z < -_FACING else ""
+    return ", and ".join(part for part in (upright, f"towards the base's {named}" if named else "") if part)
+
+
+def _clock(angle: float) -> str:
+    minutes = round(2.0 * math.degrees(angle)) % 720
+    return f"{minutes // 60 or 12}:{minutes % 60:02d}"
+
+
+def _times(v: Vector, factor: float) -> Vector:
+    return v[0] * factor, v[1] * factor, v[2] * factor
+
+
+def _sum(v: Vector, w: Vector) -> Vector:
+    return v[0] + w[0], v[1] + w[1], v[2] + w[2]
+
+
+def _cross(v: Vector, w: Vector) -> Vector:
+    return v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]

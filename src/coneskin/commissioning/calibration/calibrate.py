@@ -1,0 +1,215 @@
+"""Run of a calibration: skin and touch sequence together, then the fit and its record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coneskin.commissioning.acceptance.commission import VIRTUAL_FORCE, check_touchable, start_skin
+from coneskin.commissioning.acceptance.mark_touching import touch_marks
+from coneskin.commissioning.acceptance.skin_watch import SkinWatch
+from coneskin.core.errors import SkinError
+from coneskin.core.version import __version__
+from coneskin.scene.values.calibration_file import CalibrationRecord, TouchResult, sensor_fingerprint
+
+from .fit import CalibrationFit, fit_map
+from .force_fit import fit_forces
+from .force_sequence import ForceSequence, SensorPresses
+from .marks import calibration_marks
+from .printed_marks import find_design, printed_marks
+from .touch_sequence import SensorTouches, TouchSequence
+
+if TYPE_CHECKING:
+    from coneskin.commissioning.acceptance.marks import Mark
+    from coneskin.commissioning.acceptance.procedure import Notice
+    from coneskin.scene.values.scene import Scene
+    from coneskin.session.skin_client import SkinClient
+    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.sensor import Sensor
+
+__all__ = ["CalibrationResult", "Calibrator"]
+
+_VIRTUAL_PRESS = 4.0  # s of a press with a known force, likewise
+_ASKS = ("mark", "again", "press")  # kinds of notice on which the person touches the skin
+_VIRTUAL_DURATION = 1.5  # s of a touch of a virtual skin; it ends by itself
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationResult:
+    """Result for one sensor.
+
+    Attributes:
+        touches: of its marks.
+        sheet_ohms: what its untouched sheets have per square, upper and lower, as their currents say [ohm].
+        fit: None where the sensor was refused.
+        record: to be added to the file of its device; None where it was refused.
+        refusal: why it cannot be calibrated; empty where it can.
+    """
+
+    touches: SensorTouches
+    sheet_ohms: tuple[float, float]
+    fit: CalibrationFit | None = None
+    record: CalibrationRecord | None = None
+    refusal: str = ""
+
+
+class Calibrator:
+    """One calibration of all sensors of a scene.
+
+    Args:
+        scene: with a source, read without calibrations.
+        marks: on each sensor, one of MARK_COUNTS; 0: those that its design has printed, else 9.
+        mark_error: standard deviation with which marks are placed and found, at least [m].
+        notice: called with what the person is told.
+        reading: called some 50 times a second with what the sensors read now.
+        refused: tells whether the person has said since the last call that a mark cannot be reached.
+        simulated: touch the scene's virtual skin at the marks.
+        forces: known ones to press with after the marks [N]; none: no table of forces.
+        files: sensor file of each sensor, whose design may have printed marks; none where it has none.
+        wired_as: scene from which the virtual skin is made, where it is another.
+
+    Raises:
+        SceneError: the scene has no source, or no sensor.
+        SkinConnectionError: it is to be simulated, and its skin is not virtual, or the other way round.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        marks: int = 0,
+        mark_error: float = 0.3e-3,
+        notice: Callable[[Notice], None] = lambda _: None,
+        reading: Callable[[dict[str, TouchReading | None]], None] = lambda _: None,
+        refused: Callable[[], bool] = lambda: False,
+        simulated: bool = False,
+        forces: Sequence[float] = (),
+        files: Sequence[Path | None] = (),
+        wired_as: Scene | None = None,
+    ) -> None:
+        check_touchable(scene, simulated)
+        self.scene = scene
+        self._notice, self._reading, self._refused = notice, reading, refused
+        self._mark_error = mark_error
+        self._simulated, self._wired_as = simulated, wired_as or scene
+        self._client: SkinClient | None = None
+        self.sensors = [
+            SensorTouches(item.sensor, _marks(item.sensor, marks, files[n] if files else None))
+            for n, item in enumerate(scene.sensors)
+        ]
+        self._forces = tuple(forces)
+        self._pressed = [SensorPresses(item.sensor, _pressed_marks(item.marks)) for item in self.sensors]
+
+    def run(self, by: str = "") -> list[CalibrationResult]:
+        """Carry it out.
+
+        Args:
+            by: who touches.
+
+        Returns:
+            the result of each sensor; no file is written.
+
+        Raises:
+            SkinError: the skin has a fault, cannot be read, or too few marks can be reached.
+        """
+        with ExitStack() as stack:
+            port = ""
+            if self._simulated:
+                self._client = start_skin(self._wired_as, stack)
+                port = self._client.port()
+            watch = stack.enter_context(SkinWatch(self.scene, port))
+            watch.await_ready()
+            ohms = [watch.untouched_ohms(item.sensor) for item in self.sensors]
+            self._carry_out(TouchSequence(self.sensors, self._mark_error), watch)
+            if self._forces:
+                self._carry_out(ForceSequence(self._pressed, self._forces), watch)
+        results = [self._result(item, found, by) for item, found in zip(self.sensors, ohms, strict=True)]
+        return [_judged(result, watch.contradiction(result.touches.sensor.name)) for result in results]
+
+    def _carry_out(self, sequence: TouchSequence | ForceSequence, watch: SkinWatch) -> None:
+        touch_marks(sequence, watch, partial(self._tell, sequence), self._reading, self._refused)
+        if sequence.incomplete:
+            raise SkinError(sequence.incomplete)
+
+    def _tell(self, sequence: TouchSequence | ForceSequence, notices: list[Notice]) -> None:
+        """Tell the person; a virtual skin is touched in the person's place."""
+        if isinstance(sequence, ForceSequence):
+            force, duration = sequence.force, _VIRTUAL_PRESS
+        else:
+            force, duration = VIRTUAL_FORCE, _VIRTUAL_DURATION
+        for notice in notices:
+            self._notice(notice)
+            if self._client is not None and notice.kind in _ASKS and sequence.mark is not None:
+                self._client.touch(*sequence.mark.place, force, duration, sequence.current.sensor.name)
+            elif self._client is not None and notice.kind == "read":
+                self._client.release()
+
+    def _result(self, item: SensorTouches, ohms: tuple[float, float], by: str) -> CalibrationResult:
+        sensor, valid = item.sensor, item.valid
+        try:
+            fit = fit_map(sensor, [item.touches[number] for number in valid], self._mark_error, ohms)
+            presses = self._pressed[self.sensors.index(item)].presses
+            forces = fit_forces(presses) if presses else None
+        except SkinError as exc:
+            return CalibrationResult(item, ohms, refusal=str(exc))
+        used = dict(zip(valid, fit.used, strict=True))
+        touches = tuple(
+            TouchResult(
+                round(1e3 * mark.u, 3),
+                round(math.degrees(mark.phi), 4),
+                round(1e3 * read.u, 3),
+                round(math.degrees(read.phi), 4),
+                used.get(number, False),
+            )
+            for number, (mark, read) in enumerate(item.touches)
+        )
+        record = CalibrationRecord(
+            sensor=sensor.sensor_id,
+            name=sensor.name,
+            date=datetime.now(UTC).isoformat(timespec="seconds"),
+            coneskin=__version__,
+            by=by,
+            simulated=self._simulated,
+            fingerprint=sensor_fingerprint(sensor),
+            map_along=fit.place_map.along,
+            map_around=fit.place_map.around,
+            fitted_along=fit.along,
+            fitted_around=fit.around,
+            before_rms_mm=round(1e3 * fit.before.rms, 3),
+            before_largest_mm=round(1e3 * fit.before.largest, 3),
+            after_rms_mm=round(1e3 * fit.after.rms, 3),
+            after_largest_mm=round(1e3 * fit.after.largest, 3),
+            map_error_mm=round(1e3 * fit.map_error, 3),
+            extra_ohm=tuple(round(value, 1) for value in fit.extra_ohms),
+            sheet_ohm=tuple(round(value, 1) for value in ohms),
+            touches=touches,
+            forces_n=forces.forces if forces else (),
+            force_levels=forces.levels if forces else (),
+            force_error=forces.error if forces else 0.0,
+        )
+        return CalibrationResult(item, ohms, fit, record)
+
+
+def _pressed_marks(marks: Sequence[Mark]) -> tuple[Mark, ...]:
+    """Return the marks that are pressed with known forces: the first, the middle and the last."""
+    return tuple(dict.fromkeys((marks[0], marks[len(marks) // 2], marks[-1])))
+
+
+def _marks(sensor: Sensor, count: int, file: Path | None) -> tuple[Mark, ...]:
+    """Return the marks of a sensor: as many as are asked for, or those that its design has printed on it."""
+    sheet = None if count or file is None else find_design(file)
+    printed = () if sheet is None else printed_marks(sensor, sheet)
+    return printed or calibration_marks(sensor, count or 9)
+
+
+def _judged(result: CalibrationResult, contradiction: str) -> CalibrationResult:
+    """Return a result, refused where the frames contradict themselves and no other mistake was named."""
+    if not contradiction or result.refusal:
+        return result
+    name = result.touches.sensor.name
+    return replace(result, fit=None, record=None, refusal=f"{name} cannot be calibrated: {contradiction}")

@@ -1,0 +1,283 @@
+"""Fit of a place map to touches of known places: robust, and no richer than the touches support.
+
+For each of the two fractions in turn: nothing, an offset, offset and gain (which unknown leads, joints, and electrodes
+that are off their drawing make), and three terms that bend (sheets that are not uniform). A richer one is taken only
+where it predicts the touches that it was not fitted to better: leave-one-out cross-validation (Stone 1974).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from coneskin.commissioning.acceptance.misreadings import Place
+from coneskin.skin.place_map import MAP_LIMITS, PlaceMap, map_terms
+
+from .refusals import KnownTouch, check_bends, check_offsets_and_gains, check_touches
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from coneskin.skin.sensor import Sensor
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["CalibrationFit", "Errors", "agreeing", "fit_map"]
+
+#: names of what is fitted to a fraction -> its number of terms, and by which factor it must predict better
+_MODELS = {"nothing": (0, 1.0), "offset": (1, 0.95), "offset and gain": (2, 0.95), "offset, gain and bend": (5, 0.7)}
+_LEAST_FOR_ROBUSTNESS = 6  # touches; among fewer none can be called wrong
+_MOST_WRONG = 0.25  # part of the touches that may be left out
+_DEVIATIONS = 3.5  # by which a touch that is left out misses what most others say
+_MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
+_APART = 0.3  # of a fraction, between two touches that a first line is laid through
+_EXPLAINED = 1.2  # mark errors; what marks that were placed so explain by themselves needs no map
+_NEGLIGIBLE = 0.02e-3  # m; a model that predicts so well needs no richer one
+_GRID = 21  # places along and around at which the error of the map is looked at
+
+
+class Errors(NamedTuple):
+    """Distances between touches and what is read there, along the surface [m]."""
+
+    rms: float
+    largest: float
+
+    @classmethod
+    def of(cls, along: Floats, around: Floats) -> Errors:
+        """Return those of differences along and around [m]."""
+        distance = np.hypot(along, around)
+        return cls(float(np.sqrt(np.mean(distance**2))), float(distance.max()))
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationFit:
+    """Result of a calibration's fit.
+
+    Attributes:
+        place_map: of the sensor.
+        along: what was fitted along, in words.
+        around: what was fitted around.
+        used: of each touch, whether it was used; the others miss what most touches say.
+        before: errors of the touches that were used, without a map.
+        after: the same with maps fitted without the touch that is judged: cross-validated. Both hold the error with
+            which the marks were placed and found, so that the map is better than this.
+        left: of each touch, along and around, what a map fitted without it misses its mark by [m].
+        map_error: standard error of the map at the worst place of the sheet [m].
+        extra_ohms: of A, B, C and D: what the offsets and gains are if they are unknown leads and joints [ohm].
+    """
+
+    place_map: PlaceMap
+    along: str
+    around: str
+    used: tuple[bool, ...]
+    before: Errors
+    after: Errors
+    left: tuple[tuple[float, float], ...]
+    map_error: float
+    extra_ohms: tuple[float, float, float, float]
+
+
+class _Axis(NamedTuple):
+    """One fraction of all touches: what is missing to the mark, in parts; the terms; metres for one part."""
+
+    missing: Floats
+    terms: Floats
+    metres: Floats
+
+    def pick(self, chosen: NDArray[np.bool_]) -> _Axis:
+        return _Axis(self.missing[chosen], self.terms[chosen], self.metres[chosen])
+
+
+def fit_map(
+    sensor: Sensor,
+    touches: Sequence[KnownTouch],
+    mark_error: float = 0.3e-3,
+    sheet_ohms: tuple[float, float] | None = None,
+) -> CalibrationFit:
+    """Fit a place map.
+
+    Args:
+        sensor: that was touched; its own place map plays no part.
+        touches: at 4 different places or more.
+        mark_error: standard deviation along and around with which marks were placed and found, at least [m].
+        sheet_ohms: what its untouched sheets have per square, upper and lower, for the message of a refusal [ohm].
+
+    Raises:
+        SkinError: there are too few touches, or the sensor reads so wrongly that it is another sheet, or is wired or
+            mounted otherwise than it should be; the message says the likely cause.
+    """
+    check_touches(sensor, touches)
+    axes = _axes(sensor, touches)
+    used = _agreeing(axes, mark_error)
+    inside = [axis.pick(used) for axis in axes]
+    affine = [_solve(axis, 2).tolist() for axis in inside]
+    check_offsets_and_gains(sensor, affine[0][:2], affine[1][:2], sheet_ohms)
+    chosen = [_choose(axis, mark_error) for axis in inside]
+    numbers = [_solve(axis, _MODELS[name][0]).tolist() for axis, name in zip(inside, chosen, strict=True)]
+    check_bends(sensor, *numbers)
+    place_map = PlaceMap(sensor.frustum, tuple(numbers[0]), tuple(numbers[1]))
+    left = [_left_out(axis, _MODELS[name][0]) * axis.metres for axis, name in zip(inside, chosen, strict=True)]
+    every = [
+        (axis.missing - axis.terms @ np.array(values)) * axis.metres for axis, values in zip(axes, numbers, strict=True)
+    ]
+    for whole, part in zip(every, left, strict=True):
+        whole[used] = part
+    return CalibrationFit(
+        place_map,
+        chosen[0],
+        chosen[1],
+        tuple(bool(value) for value in used),
+        Errors.of(inside[0].missing * inside[0].metres, inside[1].missing * inside[1].metres),
+        Errors.of(left[0], left[1]),
+        tuple(zip(every[0].tolist(), every[1].tolist(), strict=True)),
+        _worst_error(sensor, inside, chosen, mark_error),
+        _extra_ohms(sensor, place_map),
+    )
+
+
+def agreeing(sensor: Sensor, touches: Sequence[KnownTouch], mark_error: float) -> tuple[bool, ...]:
+    """Return of each touch whether it agrees with what most of them say; arguments as of ``fit_map``."""
+    return tuple(bool(value) for value in _agreeing(_axes(sensor, touches), mark_error))
+
+
+def _axes(sensor: Sensor, touches: Sequence[KnownTouch]) -> tuple[_Axis, _Axis]:
+    cone, along, around = sensor.frustum, [], []
+    for mark, read in touches:
+        (x, y), (seen_x, seen_y) = _fractions(sensor, mark), _fractions(sensor, read)
+        turned = y - seen_y
+        if cone.wrap > math.pi:  # the nearer way, which may be across the seam
+            turn = 2.0 * math.pi / cone.wrap
+            turned -= turn * round(turned / turn)
+        for_x, for_y = map_terms(seen_x, seen_y)
+        along.append((x - seen_x, for_x, cone.slant / _slope(sensor, mark.u)))
+        around.append((turned, for_y, cone.wrap * cone.radius_at(mark.u)))
+    return _axis(along), _axis(around)
+
+
+def _axis(rows: Sequence[tuple[float, tuple[float, ...], float]]) -> _Axis:
+    missing, terms, metres = zip(*rows, strict=True)
+    return _Axis(np.array(missing), np.array(terms), np.array(metres))
+
+
+def _fractions(sensor: Sensor, place: Place) -> tuple[float, float]:
+    """Return the fraction of the potential from end 1, and of the wrap."""
+    radial, angular = sensor.fractions(*place)
+    return 1.0 - radial if sensor.b_positive else radial, angular if sensor.c_positive else 1.0 - angular
+
+
+def _slope(sensor: Sensor, u: float) -> float:
+    """Return the change of the fraction along for the whole slant at the slope of a place."""
+    return abs(sensor.radial_sensitivity(u)) / sensor.electronics.supply_volts * sensor.frustum.slant
+
+
+def _solve(axis: _Axis, count: int) -> Floats:
+    """Return the numbers that fit best in metres; those that are not fitted are zero."""
+    numbers = np.zeros(len(MAP_LIMITS))
+    if count:
+        weighed = axis.terms[:, :count] * axis.metres[:, None]
+        numbers[:count] = np.linalg.lstsq(weighed, axis.missing * axis.metres, rcond=None)[0]
+    return numbers
+
+
+def _left_out(axis: _Axis, count: int) -> Floats:
+    """Return what is missing to each mark with the numbers that fit the other touches [parts]."""
+    rest = axis.missing - axis.terms @ _solve(axis, count)
+    if not count:
+        return rest
+    q, _ = np.linalg.qr(axis.terms[:, :count] * axis.metres[:, None])
+    leverage = np.sum(q * q, axis=1)
+    left: Floats = rest / np.maximum(1.0 - leverage, 1e-9)
+    return left
+
+
+def _choose(axis: _Axis, mark_error: float) -> str:
+    """Return the richest model that predicts better than each simpler one by its factor."""
+    best, error = "nothing", math.inf
+    if np.sqrt(np.mean((axis.missing * axis.metres) ** 2)) < _EXPLAINED * mark_error:
+        return best
+    for name, (count, factor) in _MODELS.items():
+        independent = np.linalg.matrix_rank(axis.terms[:, :count], tol=1e-3) if count else 0
+        if len(axis.missing) < count + 2 or independent < count:
+            continue
+        found = float(np.sqrt(np.mean((_left_out(axis, count) * axis.metres) ** 2)))
+        if best == name or (found < factor * error and error > _NEGLIGIBLE):
+            best, error = name, found
+    return best
+
+
+def _agreeing(axes: Sequence[_Axis], mark_error: float) -> NDArray[np.bool_]:
+    """Return which touches agree with what most of them say, by offset and gain."""
+    count = len(axes[0].missing)
+    used = np.ones(count, bool)
+    if count < _LEAST_FOR_ROBUSTNESS:
+        return used
+    rest = [np.abs(_least_median(axis)) for axis in axes]
+    for _ in range(4):
+        scales = [
+            max(_MEDIAN_TO_SIGMA * (1.0 + 5.0 / (count - 2)) * float(np.median(part)), mark_error) for part in rest
+        ]
+        misses = np.maximum(*(part / scale for part, scale in zip(rest, scales, strict=True)))
+        most = int(_MOST_WRONG * count)
+        limit = max(_DEVIATIONS, float(np.sort(misses)[count - most - 1]))
+        used = misses <= limit
+        fitted = [_solve(axis.pick(used), 2) for axis in axes]
+        rest = [
+            np.abs(axis.missing - axis.terms @ numbers) * axis.metres
+            for axis, numbers in zip(axes, fitted, strict=True)
+        ]
+    return used
+
+
+def _least_median(axis: _Axis) -> Floats:
+    """Return what is missing [m] from the line through two touches that is nearest to most others (Rousseeuw 1984)."""
+    at, best, least = axis.terms[:, 1], axis.missing * axis.metres, math.inf
+    for i, j in combinations(range(len(at)), 2):
+        if abs(at[i] - at[j]) >= _APART:
+            gain = (axis.missing[j] - axis.missing[i]) / (at[j] - at[i])
+            rest = (axis.missing - axis.missing[i] - gain * (at - at[i])) * axis.metres
+            if (median := float(np.median(np.abs(rest)))) < least:
+                best, least = rest, median
+    return best
+
+
+def _worst_error(sensor: Sensor, axes: Sequence[_Axis], models: Sequence[str], mark_error: float) -> float:
+    cone, worst = sensor.frustum, 0.0
+    covariances = []
+    for axis, name in zip(axes, models, strict=True):
+        count = max(_MODELS[name][0], 2)  # an offset and a gain that were not fitted are not known any better
+        rest = (axis.missing - axis.terms @ _solve(axis, count)) * axis.metres
+        variance = max(float(rest @ rest) / max(len(rest) - count, 1), mark_error**2)
+        weighed = axis.terms[:, :count] * axis.metres[:, None]
+        covariances.append(variance * np.linalg.inv(weighed.T @ weighed))
+    for i in range(_GRID):
+        for j in range(_GRID):
+            u, phi = cone.slant * i / (_GRID - 1), cone.wrap * j / (_GRID - 1)
+            metres = cone.slant / _slope(sensor, u), cone.wrap * cone.radius_at(u)
+            variance = 0.0
+            for covariance, terms, metre in zip(
+                covariances, map_terms(*_fractions(sensor, Place(u, phi))), metres, strict=True
+            ):
+                term = np.array(terms[: len(covariance)])
+                variance += metre**2 * float(term @ covariance @ term)
+            worst = max(worst, variance)
+    return math.sqrt(worst)
+
+
+def _extra_ohms(sensor: Sensor, place_map: PlaceMap) -> tuple[float, float, float, float]:
+    """Return what A, B, C and D have more in series than the scene says, if offset and gain are due to that.
+
+    b ohm where a fraction x begins and a where it ends make (x R + b) / (R + a + b) of it, which the map takes back.
+    """
+    (offset1, gain1, *_), (offset2, gain2, *_) = place_map.along, place_map.around
+    radial, angular = sensor.radial_ohms, sensor.angular_ohms
+    return (
+        radial * (0.5 * gain1 + offset1),
+        radial * (0.5 * gain1 - offset1),
+        angular * (0.5 * gain2 + offset2),
+        angular * (0.5 * gain2 - offset2),
+    )

@@ -1,0 +1,243 @@
+"""Examination of a scene's hardware, item by item: port, skin, wires, arm. Nothing is moved, and nothing is guarded."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from coneskin.commissioning.acceptance.commission import start_skin
+from coneskin.core.errors import ConeSkinError, SkinConnectionError
+from coneskin.core.finding import Finding
+from coneskin.scene.required_packages import missing_packages, required_packages
+from coneskin.scene.summary import missing_parts
+from coneskin.scene.suspicions import suspicions
+from coneskin.skin.sources.kinds import is_simulated, open_source
+
+from .skin_examination import examine_line, examine_sensor
+from .skin_session import collect, guided_touches
+from .touch_examination import examine_touches
+from .wire_examination import WirePatch, examine_wires
+from .wire_order import touch_places
+
+if TYPE_CHECKING:
+    from coneskin.scene.values.scene import ArmScene, Scene, SourceScene
+    from coneskin.skin.sensor import Sensor
+    from coneskin.skin.sources.source import Source
+    from coneskin.skin.wire import Frame
+
+    from .skin_statistics import SensorStatistics
+
+__all__ = ["Doctor", "Toucher"]
+
+_LISTEN = 2.0  # s of an untouched skin
+_PATIENCE = 60.0  # s for a person to touch
+_START = 1.0  # s for the first bytes, after which the port counts as silent
+_FORCE, _DURATION = 5.0, 3.0  # N and s, of the touches of a virtual skin
+
+
+class Toucher(Protocol):
+    """What touches a virtual skin."""
+
+    def touch(self, u: float, phi: float, force: float, duration: float, sensor: str) -> object:
+        """Touch a sensor now, at u [m] and phi [rad], with a force [N], for a time [s]."""
+
+    def release(self) -> None:
+        """End the touches that there are now."""
+
+
+class Doctor:
+    """Examination of one scene.
+
+    Args:
+        scene: to be examined.
+        tell: called with each finding as it is made.
+        ask: called with what a person is asked to do.
+        touches: False to leave the guided touches out.
+        clock: monotonic [s].
+
+    Attributes:
+        findings: so far.
+        patches: keys of the scene that would mend what was found.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        tell: Callable[[Finding], None] = lambda _: None,
+        ask: Callable[[str], None] = lambda _: None,
+        touches: bool = True,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.scene = scene
+        self.findings: list[Finding] = []
+        self.patches: list[WirePatch] = []
+        self._tell, self._ask, self._touches, self._clock = tell, ask, touches, clock
+
+    def examine(self) -> None:
+        """Examine everything that the scene names."""
+        self._note(*_packages(self.scene))
+        self._note(*(Finding("scene", "warning", line) for line in suspicions(self.scene) if "pip install" not in line))
+        self._examine_source()
+        if self.scene.arm is None:
+            self._note(Finding("arm", "not tried", "the scene has no [arm]"))
+        else:
+            self._note(*_arm(self.scene, self.scene.arm))
+
+    def _note(self, *findings: Finding) -> None:
+        for finding in findings:
+            self.findings.append(finding)
+            self._tell(finding)
+
+    def _examine_source(self) -> None:
+        scene, source = self.scene, self.scene.source
+        if source is None or not scene.sensors:
+            if scene.arm is None:  # there is nothing to examine at all
+                self._note(
+                    *(
+                        Finding("scene", "bad", line, "", "add it, or see coneskin init")
+                        for line in missing_parts(scene)
+                    )
+                )
+            self._note(Finding("skin", "not tried", "the scene has no [source], or no sensor"))
+            return
+        self._note(*_port(source))
+        with ExitStack() as stack:
+            port, client = "", None
+            try:
+                if is_simulated(source.kind):
+                    client = start_skin(scene, stack)
+                    port = client.port()
+                opened = stack.enter_context(open_source(source.kind, source.settings, port))
+            except ConeSkinError as exc:
+                self._note(Finding("skin, port", "bad", str(exc), "it can be opened"))
+                self._note(*(Finding(item, "not tried", "no port") for item in ("skin, frames", "skin, wires")))
+                return
+            if getattr(opened, "low_latency", None) is not None:
+                self._note(_latency_timer(source, opened))
+            try:
+                self.examine_skin(opened, source.settings, client)
+            except SkinConnectionError as exc:
+                self._note(Finding("skin, port", "bad", str(exc), "it stays open", "look at the plug and the cable"))
+
+    def examine_skin(self, source: Source, settings: Mapping[str, object], toucher: Toucher | None = None) -> None:
+        """Examine what an open source sends, untouched and touched.
+
+        Args:
+            source: open.
+            settings: of the scene's source.
+            toucher: touches a virtual skin as a person is asked to; None for a real one.
+
+        Raises:
+            SkinConnectionError: the source is gone.
+        """
+        sensors = [item.sensor for item in self.scene.sensors]
+        self._ask("do not touch the skin")
+        collect(source, _START, self._clock)  # a device that starts with its port, and what has piled up
+        seen = collect(source, _LISTEN, self._clock)
+        self._note(*examine_line(seen, sensors, settings, self._clock()))
+        limits = self.scene.monitoring_limits
+        for sensor in sensors:
+            statistics = seen.sensors.get((sensor.device_id, sensor.sensor_id))
+            if statistics is None:
+                self._note(Finding(f"{sensor.name}, wires", "not tried", "it sends nothing"))
+                continue
+            self._note(*examine_sensor(sensor, statistics, limits.clock_drift, limits.skin_silence))
+            self._examine_wires(source, sensor, statistics, toucher)
+
+    def _examine_wires(
+        self, source: Source, sensor: Sensor, untouched: SensorStatistics, toucher: Toucher | None
+    ) -> None:
+        if not self._touches:
+            self._note(Finding(f"{sensor.name}, wires", "not tried", "no touches were asked for"))
+            return
+        places = touch_places(sensor)
+
+        def ask(electrode: str, words: str) -> None:
+            self._ask(f"touch {words}, firmly, and hold it" if electrode else words)
+            if toucher is not None and electrode:
+                toucher.touch(*places[electrode], _FORCE, _DURATION, sensor.name)
+            elif toucher is not None:
+                toucher.release()
+
+        kept: list[Frame] = []
+        touched = guided_touches(source, sensor, ask, _PATIENCE, self._clock, kept.append)
+        if touched is None:
+            why = f"no touch that rests came within {_PATIENCE:g} s"
+            self._note(
+                Finding(f"{sensor.name}, wires", "not tried", why, "", "a touch must change its readings by 4 %")
+            )
+            return
+        finding, patch = examine_wires(sensor, touched)
+        self._note(finding)
+        if patch is not None:
+            self.patches.append(patch)
+        if finding.verdict == "ok":
+            period = untouched.host_time() / max(len(untouched.frames) - 1, 1)
+            self._note(examine_touches(sensor, [frame for _, frame in untouched.frames], kept, period))
+        else:
+            self._note(Finding(f"{sensor.name}, chi-squared", "not tried", "the wires are not in order"))
+
+
+def _packages(scene: Scene) -> Iterator[Finding]:
+    """Name all packages together that the scene needs and that are not installed."""
+    missing = missing_packages(scene)
+    if missing:
+        yield Finding("packages", "bad", f"{', '.join(missing)} missing", "", f"pip install {' '.join(missing)}")
+    else:
+        yield Finding("packages", "ok", ", ".join(required_packages(scene).values()) or "none needed")
+
+
+def _port(source: SourceScene) -> Iterator[Finding]:
+    """Look at a device file before it is opened."""
+    name = str(source.settings.get("port", ""))
+    if not name.startswith("/dev/"):
+        return
+    path, item = Path(name), "skin, permission"
+    if not path.exists():
+        from coneskin.skin.sources.port_list import list_ports
+
+        there = ", ".join(list_ports()) or "none at all"
+        yield Finding(item, "bad", f"there is no {name}; present: {there}", "", "plug it in, or correct source.port")
+    elif not os.access(path, os.R_OK | os.W_OK):
+        group = _group(path)
+        remedy = f"sudo usermod -aG {group} $USER, then log in again; or the udev rule in packaging/"
+        yield Finding(item, "bad", f"{name} may not be read and written", f"group {group}", remedy)
+    else:
+        yield Finding(item, "ok", f"{name} may be read and written")
+
+
+def _group(path: Path) -> str:
+    try:
+        return path.group()
+    except (KeyError, OSError, NotImplementedError):  # a number without a name; Windows has none
+        return "dialout"
+
+
+def _latency_timer(source: SourceScene, opened: Source) -> Finding:
+    item, rule = "skin, latency timer", "1 ms, or a device that has none"
+    name = Path(str(source.settings.get("port", ""))).resolve().name
+    timer = Path(f"/sys/bus/usb-serial/devices/{name}/latency_timer")
+    try:
+        value = int(timer.read_text())
+    except (OSError, ValueError):
+        return Finding(item, "ok", "this port has none")
+    if value <= 1 or getattr(opened, "low_latency", False):
+        return Finding(item, "ok", f"{value} ms", rule)
+    return Finding(item, "warning", f"{value} ms", rule, f"echo 1 | sudo tee {timer}, or the udev rule in packaging/")
+
+
+def _arm(scene: Scene, arm: ArmScene) -> list[Finding]:
+    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.driver.examination import ExaminationScope
+    from coneskin.robot.driver.registry import load_driver
+
+    internal = arm.control == "internal"
+    moves = scene.moves_away and not internal
+    slows = "slow" in {scene.default_reaction.kind, *(rule.reaction.kind for rule in scene.rules)}
+    scope = ExaminationScope(internal, arm.slider_stop or slows, moves, not internal)
+    model = arm_model(arm.model)
+    return load_driver(model.family).examine(model, arm.host, scope)

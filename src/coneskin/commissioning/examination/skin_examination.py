@@ -1,0 +1,200 @@
+"""Examination of an untouched skin: its line, its rates and clock, its noise and its currents. Pure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from coneskin.core.finding import Finding, Verdict
+from coneskin.skin.diagnosis.diagnose import diagnose
+from coneskin.skin.wire import FRAME_LENGTH, Status
+
+from .skin_statistics import CHANNELS, SensorStatistics, SkinStatistics
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from coneskin.skin.sensor import Sensor
+
+__all__ = ["examine_line", "examine_sensor"]
+
+_BITS_PER_BYTE = 10  # on a serial line: start, eight, stop
+_LINE_LOAD = 0.95  # part of a line's bytes that frames may take
+_GOOD_RATE, _LOW_RATE = 200.0, 100.0  # Hz, docs/wire-format.md
+_PATIENT = 4.0  # frames in the time after which the skin is silent: a scene that is made for so low a rate
+_CLOCK = 0.01  # part by which the device's clock may be off as far as a few seconds show it
+_LOST = 0.02  # part of the frames, as the detector allows
+_NEAR, _FAR = 1.25, 2.0  # factors between a current and the design's: remarkable, refused
+_QUIET = 0.01  # of the supply, on an untouched guide
+_SUPPLY = 0.10  # of the supply
+_NOISY = 8.0  # counts of 12 bits
+_STATUS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
+
+
+def examine_line(
+    seen: SkinStatistics, sensors: Sequence[Sensor], settings: Mapping[str, Any], now: float
+) -> list[Finding]:
+    """Examine what came from the source as a whole.
+
+    Args:
+        seen: from a few seconds.
+        sensors: that the scene has there.
+        settings: of the source; ``baud`` is asked for.
+        now: when the listening ended [s].
+    """
+    count, baud = seen.decoder.frames, settings.get("baud")
+    named = diagnose(seen.window.capture(now), sensors, baud)
+    value = f"{count} frames in {seen.received} bytes, {seen.decoder.crc_errors} damaged"
+    if not named.good:
+        found = [Finding("frames", "warning" if count else "bad", f"{value}; {named.what}", "", named.cause.value)]
+    else:
+        found = [Finding("frames", "ok" if count else "bad", value)]
+    expected = {(sensor.device_id, sensor.sensor_id) for sensor in sensors}
+    for device, number in sorted(expected - seen.sensors.keys()):
+        there = ", ".join(f"{d}/{s}" for d, s in sorted(seen.sensors)) or "none"
+        found.append(
+            Finding(
+                f"sensor {device}/{number}",
+                "bad",
+                f"it sends nothing; there are {there} (device/sensor)",
+                "each sensor of the scene sends",
+                "correct `device` and `id` of the sensor in the scene, or the numbers in the firmware",
+            )
+        )
+    for device, number in sorted(seen.sensors.keys() - expected):
+        found.append(
+            Finding(f"sensor {device}/{number}", "warning", "it sends, and the scene does not know it", "", "add it")
+        )
+    if baud is not None and expected & seen.sensors.keys():
+        rate = sum(_rate(one) for one in seen.sensors.values())
+        load = rate * FRAME_LENGTH * _BITS_PER_BYTE / baud
+        value = f"{rate:.0f} frames/s take {100.0 * load:.0f} % of {baud} baud"
+        full = load > _LINE_LOAD
+        remedy = (
+            "raise `baud` in the scene and in the firmware; a USB device of its own has no such limit" if full else ""
+        )
+        found.append(Finding("line", "warning" if full else "ok", value, f"at most {100 * _LINE_LOAD:.0f} %", remedy))
+    return found
+
+
+def examine_sensor(sensor: Sensor, seen: SensorStatistics, drift: float, silence: float) -> list[Finding]:
+    """Examine one untouched sensor.
+
+    Args:
+        sensor: as the scene has it.
+        seen: its frames, of a few seconds.
+        drift: that the scene allows the device's clock, a part of the time.
+        silence: after which the scene takes the skin for silent [s].
+    """
+    name = sensor.name
+    if len(seen.frames) < 20:
+        return [Finding(f"{name}, rate", "bad", f"{len(seen.frames)} frames only", "200 Hz or more", "see `frames`")]
+    return [
+        *_timing(name, seen, drift, silence),
+        *_levels(sensor, seen),
+        *_noise(sensor, seen),
+        *_currents(sensor, seen),
+    ]
+
+
+def _rate(seen: SensorStatistics) -> float:
+    return (len(seen.frames) - 1) / max(seen.host_time(), 1e-6) if len(seen.frames) > 1 else 0.0
+
+
+def _timing(name: str, seen: SensorStatistics, drift: float, silence: float) -> list[Finding]:
+    rate = _rate(seen)
+    enough = rate >= _LOW_RATE or rate * silence >= _PATIENT
+    verdict: Verdict = "ok" if rate >= _GOOD_RATE else "warning" if enough else "bad"
+    remedy = "" if verdict == "ok" else "shorten the settling, raise the baud rate, or raise monitoring.skin_silence_ms"
+    found = [Finding(f"{name}, rate", verdict, f"{rate:.0f} frames/s", "200 to 1000", remedy)]
+    steps = seen.steps()
+    lost = sum(step - 1 for step in steps if 0 < step < 1000) / max(sum(step for step in steps if step < 1000), 1)
+    verdict = "ok" if lost <= _LOST else "bad"
+    remedy = "" if verdict == "ok" else "the line is too slow or disturbed, or this computer too busy"
+    found.append(Finding(f"{name}, lost", verdict, f"{100.0 * lost:.1f} % of the frames", "at most 2 %", remedy))
+    ratio = seen.device_time() / max(seen.host_time(), 1e-6)
+    verdict = "ok" if abs(ratio - 1.0) <= max(_CLOCK, drift) else "bad"
+    remedy = (
+        "" if verdict == "ok" else "the frame's clock counts microseconds: correct the firmware's timer or prescaler"
+    )
+    value = f"{ratio:.3f} device seconds in a second"
+    found.append(Finding(f"{name}, clock", verdict, value, "1 +- 0.01, as far as a few seconds show it", remedy))
+    return found
+
+
+def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
+    name, parts = sensor.name, sensor.electronics
+    expected = parts.supply_volts / parts.adc_volts * parts.full_count
+    supply = seen.mean("touch_supply")
+    good = abs(supply - expected) <= _SUPPLY * expected
+    remedy = "" if good else "correct supply_v, adc_v and adc_bits of the sensor, or the supply itself"
+    found = [
+        Finding(f"{name}, supply", "ok" if good else "bad", f"{supply:.0f} counts", f"{expected:.0f} +- 10 %", remedy)
+    ]
+    guides = [channel for channel in CHANNELS if not channel.endswith(("current", "supply"))]
+    worst = max(guides, key=seen.mean)
+    part = seen.mean(worst) / max(supply, 1.0)
+    good = part <= _QUIET
+    remedy = "" if good else "nothing may touch it now; else shield the wires, lower input_ohm, look for a short"
+    value = f"at most {100.0 * part:.2f} % of the supply, on {worst}"
+    found.append(Finding(f"{name}, guides", "ok" if good else "bad", value, "untouched: at most 1 %", remedy))
+    status = seen.status & _STATUS
+    if status:
+        names = ", ".join(bit.name or str(bit.value) for bit in Status if bit & status)
+        found.append(Finding(f"{name}, status", "bad", f"the device reports {names}", "none", "docs/wire-format.md"))
+    return found
+
+
+def _noise(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
+    name = sensor.name
+    noise = {channel: seen.noise(channel) for channel in CHANNELS}
+    still = [channel for channel in ("radial_current", "angular_current", "touch_supply") if noise[channel] == 0.0]
+    scale = sensor.electronics.full_count / 4095.0
+    loud = [channel for channel, value in noise.items() if value > _NOISY * scale]
+    value = ", ".join(f"{channel} {value:.1f}" for channel, value in noise.items())
+    verdict: Verdict = "bad" if still else "warning" if loud else "ok"
+    remedy = ""
+    if still:
+        remedy = f"{', '.join(still)} never changed: a converter of more bits, or monitoring.stuck_frames = 0"
+    elif loud:
+        remedy = f"{', '.join(loud)}: ground and shield the sensor, settle longer, average in the firmware"
+    return [Finding(f"{name}, noise", verdict, f"counts rms: {value}", "each current and supply moves", remedy)]
+
+
+def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
+    parts, found = sensor.electronics, []
+    ampere = parts.current_full_scale / parts.full_count
+    for phase, design, wires, key, ohms, sheet, leads in (
+        (
+            "radial",
+            sensor.radial_amperes,
+            "A and B",
+            "upper_sheet_ohm",
+            sensor.radial_ohms,
+            sensor.upper_sheet_ohms,
+            (0, 1),
+        ),
+        (
+            "angular",
+            sensor.angular_amperes,
+            "C and D",
+            "lower_sheet_ohm",
+            sensor.angular_ohms,
+            sensor.lower_sheet_ohms,
+            (2, 3),
+        ),
+    ):
+        measured = seen.mean(f"{phase}_current") * ampere
+        ratio = measured / design
+        verdict: Verdict = "ok" if 1.0 / _NEAR <= ratio <= _NEAR else "warning"
+        remedy = ""
+        if ratio < 1.0 / _FAR or ratio > _FAR:
+            verdict = "bad"
+        if ratio < 0.02:
+            remedy = f"no current: the wires of {wires} are open, or on the electrodes of both sheets"
+        elif verdict != "ok":
+            lead = sum(parts.lead_ohms[number] for number in leads)
+            own = (parts.supply_volts / measured - lead) * sheet / ohms
+            remedy = f"if nothing is broken your layer has {own:.0f} ohm per square: write {key} = {own:.0f}"
+        value, rule = f"{1e3 * measured:.3f} mA", f"the design's {1e3 * design:.3f} mA, within {_NEAR:g} times"
+        found.append(Finding(f"{sensor.name}, {phase} current", verdict, value, rule, remedy))
+    return found

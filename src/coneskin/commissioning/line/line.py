@@ -1,0 +1,133 @@
+"""Line that a monitor listens to: a port, the source of a scene, a recording, or a file of bytes."""
+
+from __future__ import annotations
+
+import time
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import SceneError, SkinConnectionError
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.sources.kinds import open_source
+from coneskin.skin.sources.source import Source
+
+__all__ = ["Line", "find_line"]
+
+_MAX_SIZE = 1 << 28  # bytes of a file of bytes
+_PIECE = 4096  # bytes of a file that are taken at once
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line to listen to; either a source or a file.
+
+    Attributes:
+        name: for messages.
+        source: not open yet; None for a file.
+        path: of a file.
+        recorded: the file is a recording, which has the times of its bytes.
+        sensors: that a scene expects.
+        baud: rate of the port [1/s]; None where there is none.
+    """
+
+    name: str
+    source: Source | None = None
+    path: Path | None = None
+    recorded: bool = False
+    sensors: tuple[Sensor, ...] = field(default=())
+    baud: int | None = None
+
+    def pieces(self) -> Iterator[tuple[float, bytes]]:
+        """Yield the bytes of a file with their times [s]; all of them are 0 where the file has none.
+
+        Raises:
+            RecordingError: the recording cannot be read.
+            SkinConnectionError: the file cannot be read.
+        """
+        assert self.path is not None
+        if self.recorded:
+            from coneskin.core.recording.reader import read_recording
+            from coneskin.robot.guard.signals.journal import BlockKind
+
+            recording = read_recording(self.path)
+            for block in recording.select(kinds=frozenset({BlockKind.SKIN})):
+                yield block.time, block.payload
+            return
+        try:
+            data = read_file(self.path, _MAX_SIZE)
+        except OSError as error:
+            raise SkinConnectionError(f"{self.path}: cannot be read ({error.strerror or error})") from error
+        for at in range(0, len(data), _PIECE):
+            yield 0.0, data[at : at + _PIECE]
+
+
+def find_line(target: str, baud: int) -> Line:
+    """Return the line that a word of the user means.
+
+    Args:
+        target: a port or URL, a scene file, a run's folder, a recording, or a file of bytes.
+        baud: for a port [1/s].
+
+    Raises:
+        SceneError: the scene has mistakes, or no source.
+        SkinConnectionError: the word means a folder without a run, or the file of a sensor.
+    """
+    path = Path(target)
+    if (path / "run.rec").is_file():
+        path /= "run.rec"
+    if path.is_dir():
+        raise SkinConnectionError(f"{target}: {_folder_advice(path)}")
+    if not path.is_file():
+        return Line(target, open_source("serial", {"port": target, "baud": baud}), baud=baud)
+    if path.suffix == ".toml":
+        return _line_of_scene(path)
+    from coneskin.core.recording.chunk import MAGIC
+
+    with path.open("rb") as file:
+        head = file.read(len(MAGIC))
+    return Line(target, path=path, recorded=head == MAGIC or path.suffix == ".rec")
+
+
+def _folder_advice(path: Path) -> str:
+    """Return what to name instead of a folder in which there is no run."""
+    if (path / "scene.toml").is_file():
+        return f"a folder has no line; its scene has one: coneskin monitor {path / 'scene.toml'}"
+    if (path / "design.json").is_file():
+        return "this is the folder of a design, which has no line: name the port, or write its scene (coneskin init)"
+    return "a folder without a recorded run (run.rec) has no line: name a port, a scene, a run or a file of bytes"
+
+
+def _refuse_sensor(path: Path) -> None:
+    """Refuse the file of a sensor, which says nothing of a port."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return  # the reader of scenes says it better
+    if "radius1_mm" in table and not {"source", "link", "arm"} & table.keys():
+        raise SkinConnectionError(
+            f"{path}: this is the file of a sensor, which has no line: name the port to which its board is connected, "
+            "or the scene that refers to it"
+        )
+
+
+def _line_of_scene(path: Path) -> Line:
+    from coneskin.scene.reader import load_scene
+
+    _refuse_sensor(path)
+    scene = load_scene(path)
+    if scene.source is None:
+        raise SceneError(["there is no [source], so there is no line to listen to"], scene.name)
+    sensors = tuple(item.sensor for item in scene.sensors)
+    settings = scene.source.settings
+    baud = settings.get("baud")
+    if scene.source.kind == "virtual":
+        from coneskin.session.skin_process import virtual_skin
+        from coneskin.skin.virtual.memory_source import MemorySource
+
+        source: Source = MemorySource(virtual_skin(scene), time.monotonic, time.sleep)
+    else:
+        source = open_source(scene.source.kind, settings)
+    return Line(scene.name, source, sensors=sensors, baud=baud)

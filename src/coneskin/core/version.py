@@ -1,0 +1,55 @@
+"""Version of the code that runs: that of the package, and the commit where it runs from a repository."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+__all__ = ["__version__", "code_commit", "recorded_version", "running_version"]
+
+__version__ = "0.1.0"  # the one place: pyproject.toml reads it from here
+
+_SHOWN = 7  # digits of a commit, for people
+
+
+@cache
+def code_commit() -> str:
+    """Return the commit that the code was checked out from; empty where it was installed otherwise.
+
+    It is read from the files of git, without git. Changes that are not committed do not show.
+    """
+    git = Path(__file__).resolve().parents[3] / ".git"
+    try:
+        if git.is_file():  # a work tree of its own
+            git = Path(git.read_text(encoding="utf-8").removeprefix("gitdir:").strip())
+        head = (git / "HEAD").read_text(encoding="ascii").strip()
+        if not head.startswith("ref: "):
+            return head
+        shared = git / "commondir"
+        common = git / shared.read_text(encoding="utf-8").strip() if shared.is_file() else git
+        name = head.removeprefix("ref: ")
+        if (common / name).is_file():
+            return (common / name).read_text(encoding="ascii").strip()
+        packed = (common / "packed-refs").read_text(encoding="ascii").splitlines()
+        return next((line.split()[0] for line in packed if line.endswith(f" {name}")), "")
+    except (OSError, ValueError):
+        return ""
+
+
+def running_version() -> str:
+    """Return the version of this code for people, such as ``0.1.0 (984714c)``."""
+    return _words(__version__, code_commit())
+
+
+def recorded_version(header: Mapping[str, Any]) -> str:
+    """Return the version of the code that made a recording, from its header; empty where that does not tell."""
+    version, commit = header.get("coneskin"), header.get("commit")
+    if not isinstance(version, str) or not version:
+        return ""
+    return _words(version, commit if isinstance(commit, str) else "")
+
+
+def _words(version: str, commit: str) -> str:
+    return f"{version} ({commit[:_SHOWN]})" if commit else version

@@ -1,0 +1,1 @@
+"""Sheets of one link, as they are designed."""

@@ -1,0 +1,280 @@
+"""Design of sheets from their places on a link: trimmed, laid out, and drawn for every layer."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from coneskin.core.errors import GeometryError, SensorError
+from coneskin.geometry.drawing.cut_sheet import CutSheet, FaceUp, cut_sheets
+from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, SheetLayout, lay_out_sheet
+from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
+from coneskin.geometry.drawing.resolution import AdConverter, ResolutionForecast, forecast_resolution
+from coneskin.geometry.drawing.surface_shape import SheetSide
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.scene.tables.sensor_table import with_key_names
+from coneskin.skin.electronics import Electronics
+from coneskin.skin.matched_electronics import GivenElectronics, match_electronics
+from coneskin.skin.sensor import sheet_resistances
+from coneskin.skin.sheet_materials import SheetMaterial, match_sheet_materials
+
+from .jig_plan import JigPlan
+from .sheet_joint import SheetJoint, adjoin, find_joint
+
+if TYPE_CHECKING:
+    from coneskin.geometry.fit.cones import LinkFit
+    from coneskin.geometry.fit.fitted_sheet import FittedSheet
+
+__all__ = ["DesignOptions", "SheetDesign", "design_sheets"]
+
+_TURN = 2.0 * math.pi
+_LOWER_CONDUCTIVE, _UPPER_CONDUCTIVE = 1, 3  # indices of the layers in the stack
+_MOST_STRAIN = 0.4  # of a face of a wrapped layer; foam wrinkles or tears beyond
+_STRAIGHT = 0.02  # of the fit's tolerance; a taper below it is noise of the mesh, and the side a cylinder's
+
+
+@dataclass(frozen=True, slots=True)
+class DesignOptions:
+    """Materials, widths and electronics of a design; lengths in metres.
+
+    Attributes:
+        stack: the five layers.
+        plan: electrodes, tabs, holes.
+        wires: side where the wires leave, for all sheets; None for end 1, but end 2 of the last of several on one axis:
+            tabs do not run into the neighbour.
+        electronics: as far as they are fixed; the rest is chosen to match each sheet (``match_electronics``).
+        upper_sheet_ohms: sheet resistance of the upper conductive layer [ohm per square]; None to choose a material
+            for the shape of each sheet (``match_sheet_materials``).
+        lower_sheet_ohms: the same of the lower conductive layer.
+        seam_gap: gap of the seam of a full wrap, at the narrow end of the innermost face.
+        overlap: width of a flap on the upper substrate that closes the seam.
+        cover_seam: True for a strip over the seam of each full wrap, a sensor of its own that closes it.
+        sheet_gap: smallest distance between neighbouring sheets along the axis.
+        kerf: width of the cut.
+        snap: a pattern is cut as a rectangle if that moves no cut by more.
+        face_up: face that is up in the drawings.
+        link: name of the link, on every part.
+        connector: distance from the rim of the sheet to the connector in which its wires end.
+        jig: printed collars that hold the sheet at its place on the link.
+    """
+
+    stack: LayerStack = PAPER_STACK
+    plan: ElectrodePlan = field(default_factory=ElectrodePlan)
+    wires: SheetSide | None = None
+    electronics: GivenElectronics = field(default_factory=GivenElectronics)
+    upper_sheet_ohms: float | None = None
+    lower_sheet_ohms: float | None = None
+    seam_gap: float = 0.0
+    overlap: float = 0.0
+    cover_seam: bool = False
+    sheet_gap: float = 1e-3
+    kerf: float = 0.0
+    snap: float = 1e-5
+    face_up: FaceUp = "work"
+    link: str = ""
+    connector: float = 0.06
+    jig: JigPlan = field(default_factory=JigPlan)
+
+
+@dataclass(frozen=True, slots=True)
+class SheetDesign:
+    """One sheet, ready to be written.
+
+    Attributes:
+        name: "sheet 1" and so on.
+        place: the side of the link that the sheet covers, with its pose.
+        layout: electrodes and holes.
+        cuts: seven cut sheets, from the link outwards.
+        active: the upper conductive sheet between the inner edges of B, A (end 1, end 2) and D, C (phi = 0, wrap);
+            a touch is located on it.
+        options: of the design.
+        conductive: the upper and the lower conductive sheet, given or chosen.
+        electronics: those given, and those that match.
+        next_joint: joint with the next sheet; None for the last one.
+        fit: fit of the place to the mesh; None for a link given by its dimensions.
+        above: name of the sheet on which it lies, where it is a strip over the seam of that.
+        seam_offset: angle from edge 0 of such a strip to the middle of the seam below it [rad].
+    """
+
+    name: str
+    place: PlacedFrustum
+    layout: SheetLayout
+    cuts: tuple[CutSheet, ...]
+    active: PlacedFrustum
+    options: DesignOptions
+    conductive: tuple[SheetMaterial, SheetMaterial]
+    electronics: Electronics
+    next_joint: SheetJoint | None = None
+    fit: FittedSheet | None = None
+    above: str = ""
+    seam_offset: float = 0.0
+
+    @property
+    def has_seam(self) -> bool:
+        """Whether its two edges meet, or nearly; otherwise the link is bare between them."""
+        return self.place.frustum.wrap > 2.0 * math.pi - 0.5
+
+    def forecasts(self, count: int = 5) -> list[ResolutionForecast]:
+        """Return the resolution at evenly spaced places from end 1 to end 2 of the active area."""
+        slant = self.active.frustum.slant
+        parts = self.electronics
+        converter = AdConverter(parts.adc_bits, parts.adc_volts, parts.supply_volts)
+        return [forecast_resolution(self.active.frustum, converter, slant * i / (count - 1)) for i in range(count)]
+
+    @property
+    def drive_currents(self) -> tuple[float, float]:
+        """Drive currents of the untouched sensor in the radial and in the angular phase [A]."""
+        parts = self.electronics
+        radial, angular = _resistances(self.active.frustum, self.conductive)
+        leads = parts.lead_ohms
+        return parts.supply_volts / (radial + leads.a + leads.b), parts.supply_volts / (angular + leads.c + leads.d)
+
+
+def design_sheets(
+    places: LinkFit | Sequence[PlacedFrustum], options: DesignOptions | None = None, first: int = 1
+) -> tuple[SheetDesign, ...]:
+    """Design a sheet for each place on a link.
+
+    Args:
+        places: the sheets found on a link; or places in order along one axis, in the frame of the link.
+        options: of the design.
+        first: number of the first sheet.
+
+    Raises:
+        GeometryError: there is no place, or a sheet cannot be made for one; the message says why, or names the sheet.
+    """
+    options = options or DesignOptions()
+    fits: Sequence[FittedSheet] = () if isinstance(places, Sequence) else places.sheets
+    links = places if isinstance(places, Sequence) else [sheet.placed for sheet in fits]
+    if not links:
+        why = "no place was given" if isinstance(places, Sequence) else places.reason
+        raise GeometryError(f"there is no sheet to design: {why}")
+    if not isinstance(places, Sequence):
+        links = [_straightened(link, _STRAIGHT * places.tolerance) for link in links]
+    if not (math.isfinite(options.sheet_gap) and options.sheet_gap >= 0.0):
+        raise GeometryError(f"sheet gap must be finite and not negative, got {options.sheet_gap * 1e3:.4g} mm")
+    joints = [
+        find_joint(a, b, options.stack, options.sheet_gap) if adjoin(a, b) else None
+        for a, b in itertools.pairwise(links)
+    ]
+    cuts = [0.0, *(0.5 * joint.trimmed if joint else 0.0 for joint in joints), 0.0]
+    designs = []
+    for i, link in enumerate(links):
+        name = f"sheet {i + first}"
+        try:
+            _check_wrap(link, options)
+            place = _seam_opened(_trimmed(link, cuts[i], cuts[i + 1]), options.seam_gap)
+            before, after = (i > 0 and joints[i - 1]), (i < len(joints) and joints[i])
+            auto: SheetSide = "end2" if before and not after else "end1"
+            layout = lay_out_sheet(place.frustum, replace(options.plan, wires=options.wires or auto))
+            active = _active(place, layout, options.stack)
+            squares = sheet_resistances(active.frustum, 1.0, 1.0)[0]
+            conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
+            drawn = cut_sheets(
+                layout,
+                _with_materials(options.stack, conductive),
+                place,
+                title=f"{options.link}: {name}" if options.link else name,
+                kerf=options.kerf,
+                overlap=options.overlap,
+                snap=options.snap,
+                face_up=options.face_up,
+            )
+            electronics = match_electronics(*_resistances(active.frustum, conductive), options.electronics)
+        except GeometryError as exc:
+            raise GeometryError(f"{name}: {exc}") from exc
+        except SensorError as exc:
+            raise GeometryError(f"{name}: {with_key_names(str(exc))}") from exc
+        designs.append(
+            SheetDesign(
+                name=name,
+                place=place,
+                layout=layout,
+                cuts=drawn,
+                active=active,
+                options=options,
+                conductive=conductive,
+                electronics=electronics,
+                next_joint=joints[i] if i < len(joints) else None,
+                fit=fits[i] if i < len(fits) else None,
+            )
+        )
+    return tuple(designs)
+
+
+def _with_materials(stack: LayerStack, conductive: tuple[SheetMaterial, SheetMaterial]) -> LayerStack:
+    """Return the stack with the conductive sheets that were chosen, where the stack names none of its own."""
+    layers = list(stack.layers)
+    for index, sheet in ((_UPPER_CONDUCTIVE, conductive[0]), (_LOWER_CONDUCTIVE, conductive[1])):
+        if layers[index].material == PAPER_STACK.layers[index].material:
+            layers[index] = replace(layers[index], material=sheet.label)
+    a, b, c, d, e = layers
+    return replace(stack, layers=(a, b, c, d, e))
+
+
+def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
+    """Refuse layers that are too thick for the link, and a flap where there is no seam to close."""
+    if min(link.frustum.radius1, link.frustum.radius2) > 0.0:
+        for index, layer in enumerate(options.stack.layers):
+            strain = max(options.stack.strain(link, index), key=abs)
+            if abs(strain) > _MOST_STRAIN:
+                raise GeometryError(
+                    f"{layer.name} is strained by {strain:+.0%} at the narrow end, at most {_MOST_STRAIN:.0%} is "
+                    f"possible: make it thinner than {layer.thickness * 1e3:g} mm, or choose another --assembly"
+                )
+    if options.overlap and link.frustum.wrap < _TURN - 1e-9:
+        wrap = math.degrees(link.frustum.wrap)
+        raise GeometryError(f"an overlap closes the seam of a full wrap, this one is of {wrap:.4g} deg: leave it out")
+
+
+def _straightened(link: PlacedFrustum, tolerance: float) -> PlacedFrustum:
+    """Return a cylinder in the place of a cone whose radii differ from their mean by less than a tolerance [m]."""
+    side = link.frustum
+    if link.bends or side.radius1 == side.radius2 or 0.5 * abs(side.radius2 - side.radius1) > tolerance:
+        return link
+    mean = 0.5 * (side.radius1 + side.radius2)
+    return PlacedFrustum(Frustum(mean, mean, side.height, side.wrap), link.link_frustum)
+
+
+def _resistances(active: Frustum, conductive: tuple[SheetMaterial, SheetMaterial]) -> tuple[float, float]:
+    """Return the resistances of the two sheets [ohm]."""
+    return sheet_resistances(active, conductive[0].ohms, conductive[1].ohms)
+
+
+def _trimmed(link: PlacedFrustum, start: float, end: float) -> PlacedFrustum:
+    """Return a place, shortened by lengths along the axis at its start and end [m]."""
+    if start == end == 0.0:
+        return link
+    side = link.frustum
+    if side.cos_half_angle == 0.0 or start + end >= side.height:
+        raise GeometryError(
+            f"the gap to its neighbours takes {1e3 * (start + end):.4g} mm of a sheet "
+            f"{1e3 * side.height:.4g} mm high: reduce the sheet gap"
+        )
+    return link.part(start / side.cos_half_angle, side.slant - end / side.cos_half_angle, 0.0, side.wrap)
+
+
+def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
+    """Return a full wrap with a gap of the seam [m], half of it on either side of phi = 0; a partial wrap as it is."""
+    side = link.frustum
+    narrow = min(side.radius1, side.radius2)
+    if not (math.isfinite(gap) and gap >= 0.0):
+        raise GeometryError(f"seam gap must be finite and not negative, got {gap * 1e3:.4g} mm; for a flap use overlap")
+    if gap == 0.0 or side.wrap < _TURN - 1e-9:
+        return link
+    if gap >= _TURN * narrow:
+        raise GeometryError(f"seam gap of {gap * 1e3:.4g} mm takes the whole narrow end, {_TURN * narrow * 1e3:.4g} mm")
+    turn = gap / narrow
+    return link.part(0.0, side.slant, 0.5 * turn, side.wrap - 0.5 * turn)
+
+
+def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> PlacedFrustum:
+    """Return the cone between the electrodes, on the middle surface of the wrapped upper conductive layer."""
+    height = stack.middle(_UPPER_CONDUCTIVE)
+    box = layout.field
+    phi1, phi2 = (place.azimuth_above(height, phi) for phi in (box.phi1, box.phi2))
+    return place.parallel(height).part(box.u1, box.u2, phi1, phi2)

@@ -1,0 +1,217 @@
+"""Studio's page: the link with its sheets in 3D, handles beside it, and the layers flat."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import tempfile
+import threading
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from coneskin.core.errors import ConeSkinError
+from coneskin.design.link import LinkMesh, load_link
+from coneskin.geometry.ray_casting import RayCaster
+from coneskin.view.page_server import PageServer
+from coneskin.view.stage_nodes import light_plainly
+
+from .design_text import design_facts, flat_drawing, legend, warning_list
+from .deviation_bands import deviation_bands
+from .electrode_marks import ELECTRODE_COLOURS, electrode_marks
+from .first_view import first_view
+from .workbench import Handles, Workbench
+
+__all__ = ["StudioPage"]
+
+_LINK = (205, 208, 214)
+_SUFFIXES = {".stl", ".obj", ".dae", ".ply"}
+_LETTER = 1.6  # of viser's own size of letters, 12 pixels
+_SHOWN_FIRST = "lower conductive"  # layer of the flat drawing that says most
+_STEP = 0.5  # mm and deg of the handles
+
+
+class StudioPage:
+    """Page of the studio, for one person.
+
+    Args:
+        server: of the page.
+        bench: with the link and its sheets.
+        folder: where the design is written.
+        overwrite: an earlier design there may be replaced.
+        load: makes the workbench of a mesh file that was put onto the page.
+    """
+
+    def __init__(
+        self,
+        server: PageServer,
+        bench: Workbench,
+        folder: Path,
+        overwrite: bool,
+        load: Callable[[LinkMesh], Workbench],
+    ) -> None:
+        self._server, self._bench, self._folder, self._overwrite, self._load = server, bench, folder, overwrite, load
+        self._lock = threading.Lock()  # the page's callbacks come from several threads
+        self._handles: list[Any] = []
+        gui = server.gui
+        self._legend = gui.add_html("")
+        self._said = gui.add_html("")
+        self._upload = gui.add_upload_button("another link (STL, OBJ, DAE, PLY), or drop it here", mime_type="*/*")
+        self._upload.on_upload(lambda _event: self._take_upload())
+        self._layer = gui.add_dropdown("layer", ["none"], initial_value="none")
+        self._layer.on_update(lambda _event: self._draw_flat())
+        self._flat = gui.add_html("")
+        self._folder_of_handles = gui.add_folder("handles")
+        self._warnings = gui.add_html("")
+        self._facts = gui.add_html("")
+        self._write = gui.add_button(f"write {folder}")
+        self._write.on_click(lambda _event: self._written())
+        self._told = gui.add_html("")  # where a person looks who has pressed the button
+        self._stand()
+
+    def _stand(self) -> None:
+        """Draw the link of the workbench, and make a set of handles for each of its sheets."""
+        bench, scene, gui = self._bench, self._server.scene, self._server.gui
+        scene.reset()
+        scene.set_up_direction("+z")
+        light_plainly(scene)
+        vertices = bench.link.mesh.vertices
+        self._rays = RayCaster(bench.link.mesh)
+        self._server.look_from(*first_view(bench.designs, self._rays, vertices))
+        self._legend.content = legend(bench.fit.tolerance)
+        scene.add_mesh_simple(
+            "/link",
+            vertices.astype("float32"),
+            bench.link.mesh.faces,
+            color=_LINK,
+            side="double",
+            flat_shading=True,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        for handle in self._handles:
+            handle.remove()
+        self._handles = []
+        with self._folder_of_handles:
+            for number, sheet in enumerate(bench.fit.sheets):
+                self._handles += self._handles_of(gui, number, sheet.frustum.height, sheet.frustum.wrap)
+        self._draw()
+
+    def _handles_of(self, gui: Any, number: int, height: float, wrap: float) -> list[Any]:
+        name = f"sheet {number + 1}: "
+        room, widest = math.floor(1e3 * height - 10.0), round(math.degrees(wrap), 1)
+        turn = 360.0 if wrap >= 2.0 * math.pi else widest
+        sliders = [
+            gui.add_slider(name + "end 1 [mm off]", 0.0, float(max(room, 1)), _STEP, 0.0),
+            gui.add_slider(name + "end 2 [mm off]", 0.0, float(max(room, 1)), _STEP, 0.0),
+            gui.add_slider(name + "wrap [deg]", 30.0, widest, 0.1, widest),
+            gui.add_slider(name + "seam [deg]", 0.0, turn, _STEP, 0.0),
+        ]
+
+        def changed(_event: Any) -> None:
+            end1, end2, covered, seam = (float(slider.value) for slider in sliders)
+            full = None if covered >= widest else math.radians(covered)
+            with self._lock:
+                self._bench.handle(number, Handles(1e-3 * end1, 1e-3 * end2, full, math.radians(seam)))
+                self._draw()
+
+        for slider in sliders:
+            slider.on_update(changed)
+        return sliders
+
+    def _draw(self) -> None:
+        """Draw the sheets as they are now, on the link and in the panel."""
+        bench, scene = self._bench, self._server.scene
+        with self._server.together():
+            scene.add_frame("/sheets", show_axes=False)  # replaces the one before, and all that was below it
+            for design in bench.designs:
+                name = f"/sheets/{design.name}"
+                for number, band in enumerate(deviation_bands(self._rays, design.place, bench.fit.tolerance)):
+                    scene.add_mesh_simple(
+                        f"{name}/band {number}",
+                        band.vertices.astype("float32"),
+                        band.faces,
+                        color=band.colour,
+                        side="double",
+                        cast_shadow=False,
+                        receive_shadow=False,
+                    )
+                for mark in electrode_marks(design):
+                    colour, line = ELECTRODE_COLOURS[mark.letter], f"{name}/{mark.letter}"
+                    scene.add_line_segments(line, mark.segments, colors=colour, thickness=0.002)
+                    for place, at in enumerate(mark.letters.tolist()):
+                        scene.add_label(
+                            f"{line}/letter {place}",
+                            mark.letter,
+                            position=at,
+                            font_screen_scale=_LETTER,
+                            depth_test=True,
+                            anchor="center-center",
+                        )
+        self._facts.content = design_facts(bench.designs)
+        self._warnings.content = warning_list(bench.warnings() or ([bench.fit.reason] if bench.fit.reason else []))
+        layers = [f"{design.name}: {cut.name}" for design in bench.designs for cut in design.cuts] or ["none"]
+        if list(self._layer.options) != layers:
+            self._layer.options = layers
+            self._layer.value = next((layer for layer in layers if layer.endswith(_SHOWN_FIRST)), layers[0])
+        self._draw_flat()
+
+    def _draw_flat(self) -> None:
+        chosen = str(self._layer.value)
+        for design in self._bench.designs:
+            for cut in design.cuts:
+                if f"{design.name}: {cut.name}" == chosen:
+                    self._flat.content = flat_drawing(cut)
+                    return
+        self._flat.content = ""
+
+    def _take_upload(self) -> None:
+        """Find the sheets of a mesh file that was put onto the page."""
+        file = self._upload.value
+        suffix = Path(file.name).suffix.lower()
+        if suffix not in _SUFFIXES:
+            self._say(f"{file.name} is no {', '.join(sorted(_SUFFIXES))} file")
+            return
+        self._say(f"looking for sheets in {file.name} ...")
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / f"link{suffix}"  # the name that a page sends is no path of ours
+                path.write_bytes(file.content)
+                found = next(iter(load_link(str(path))))
+            stem = "".join(letter for letter in Path(file.name).stem if letter.isalnum() or letter in "-_ ")[:40]
+            bench = self._load(LinkMesh(stem or "link", found.mesh, found.frame, found.notes))
+        except (ConeSkinError, OSError) as exc:
+            self._say(f"{file.name}: {exc}")
+            return
+        with self._lock:
+            if self._upload.value is not file:  # another was dropped meanwhile, and is the one that is wanted
+                return
+            self._bench = bench
+            self._stand()
+        self._say(f"{file.name}: {len(bench.fit.sheets)} sheets")
+
+    def _written(self) -> None:
+        self._write.disabled = True
+        self._tell(f"writing {self._folder} ... (drawings and pictures take some seconds)")
+        try:
+            with self._lock:
+                files = self._bench.write(self._folder, self._overwrite)
+        except ConeSkinError as exc:
+            self._tell(str(exc))
+        else:
+            next_step = f"coneskin init {shlex.quote(str(self._folder))} --simulated"
+            self._tell(f"written: {len(files)} files in {self._folder}; next: {next_step}")
+        finally:
+            self._write.disabled = False
+
+    def _say(self, text: str) -> None:
+        self._said.content = _note("coneskin-said", text)
+
+    def _tell(self, text: str) -> None:
+        self._told.content = _note("coneskin-told", text)
+
+
+def _note(name: str, text: str) -> str:
+    """Return a line for the panel, with a name by which a browser finds it."""
+    return f'<div id="{name}" style="font-size:13px;margin:4px 10px"><b>{escape(text)}</b></div>'

@@ -1,0 +1,202 @@
+"""File of the limits that are to be kept: whose they are, who checked them, and what was measured on the arm.
+
+None of these values comes with this package. Copies of the tables of ISO/TS 15066 that circulate contradict each other:
+whoever uses them buys the edition that applies, transcribes it and lets somebody else compare. The keys are described
+in docs/permissible-speed.md.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from coneskin.core.bounded_file import read_file
+from coneskin.core.errors import ConeSkinError, SceneError
+from coneskin.robot.arm.link_frames import link_index
+from coneskin.scene.tables.schema import MAX_SIZE, Key, check
+
+from .speed_search import ForceLimits
+from .two_mass_contact import StruckBody
+
+__all__ = ["BodyRegion", "LimitsFile", "MeasuredReaction", "parse_limits", "read_limits"]
+
+_LIMITS = (
+    Key("edition", str),
+    Key("transcribed_by", str),
+    Key("verified_by", str),
+    Key("region", dict),
+)
+_MEASURED = (
+    Key("reaction_ms", low=0.0, high=1000.0),
+    Key("deceleration_rad_s2", low=0.1, high=100.0),
+    Key("by", str),
+    Key("servo_hz", float, 17.0, low=0.1, high=200.0),
+)
+_REGION = (
+    Key("name", str),
+    Key("links", list, None),
+    Key("mass_kg", float, None, low=1e-3, high=1000.0),
+    Key("clamped", bool, False),
+    Key("tissue_n_per_mm", float, None, low=0.1, high=10_000.0),
+    Key("support_n_per_mm", float, 0.0, low=0.0, high=10_000.0),
+    Key("transient_force_n", float, None, low=1.0, high=10_000.0),
+    Key("lasting_force_n", float, None, low=1.0, high=10_000.0),
+    Key("transient_pressure_n_per_cm2", float, None, low=0.1, high=10_000.0),
+    Key("lasting_pressure_n_per_cm2", float, None, low=0.1, high=10_000.0),
+    Key("area_cm2", float, None, low=0.01, high=1000.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyRegion:
+    """Part of a body that the arm may strike.
+
+    Attributes:
+        name: of it.
+        body: mass and stiffness.
+        limits: of the force on it.
+        links: indices of the links that may strike it; empty for all.
+    """
+
+    name: str
+    body: StruckBody
+    limits: ForceLimits
+    links: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredReaction:
+    """How the guarded arm stops, as somebody has measured it.
+
+    Attributes:
+        reaction: from the closing of the layers until the arm brakes [s].
+        deceleration: of the leading joint then [rad/s^2].
+        by: what measured it, and when.
+        servo: frequency of the joints' servos [Hz]; assumed where nobody has measured it.
+    """
+
+    reaction: float
+    deceleration: float
+    by: str
+    servo: float = 17.0
+
+
+@dataclass(frozen=True, slots=True)
+class LimitsFile:
+    """Content of a limits file.
+
+    Attributes:
+        edition: document and edition that the limits are from.
+        transcribed_by: who copied them from it.
+        verified_by: who compared them with it.
+        regions: that may be struck.
+        measured: how the arm stops.
+    """
+
+    edition: str
+    transcribed_by: str
+    verified_by: str
+    regions: tuple[BodyRegion, ...]
+    measured: MeasuredReaction
+
+
+def read_limits(path: Path | str) -> LimitsFile:
+    """Read a limits file.
+
+    Raises:
+        SceneError: the file cannot be read, or has mistakes; all of them are listed.
+    """
+    path = Path(path)
+    try:
+        text = read_file(path, MAX_SIZE).decode("utf-8-sig")
+    except OSError as exc:
+        hint = "; docs/permissible-speed.md has one to begin with" if isinstance(exc, FileNotFoundError) else ""
+        raise SceneError([f"the file cannot be read: {exc.strerror or exc}{hint}"], str(path)) from exc
+    except UnicodeDecodeError as exc:
+        raise SceneError([f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8"], str(path)) from exc
+    return parse_limits(text, path.name)
+
+
+def parse_limits(text: str, name: str = "limits") -> LimitsFile:
+    """Read the text of a limits file.
+
+    Raises:
+        SceneError: with every mistake.
+    """
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as exc:
+        raise SceneError([f"not TOML: {exc}"], name) from exc
+    problems = [f"unknown table [{table}]; known: limits, measured" for table in tables if table not in _TABLES]
+    for table, what in _TABLES.items():
+        if not isinstance(tables.get(table), dict):
+            problems.append(f"[{table}] is missing: {what}")
+    if problems:
+        raise SceneError(problems, name)
+    limits = check(tables["limits"], _LIMITS, "limits", problems)
+    measured = check(tables["measured"], _MEASURED, "measured", problems)
+    for key in ("edition", "transcribed_by", "verified_by"):
+        if not str(limits.get(key, "?")).strip():
+            problems.append(f"limits.{key} must not be empty: a limit that nobody vouches for is none")
+    same = str(limits.get("transcribed_by", "")).strip().casefold()
+    if same and same == str(limits.get("verified_by", "")).strip().casefold():
+        problems.append(f"limits.verified_by must be somebody else than transcribed_by, got {limits['verified_by']!r}")
+    if not str(measured.get("by", "?")).strip():
+        problems.append("measured.by must say what measured it, and when")
+    rows = limits.get("region", ())
+    if "region" in limits and not rows:
+        problems.append("[[limits.region]]: at least one is needed")
+    regions = [_region(row, f"limits.region {number}", problems) for number, row in enumerate(rows, 1)]
+    if problems:
+        raise SceneError(problems, name)
+    return LimitsFile(
+        limits["edition"],
+        limits["transcribed_by"],
+        limits["verified_by"],
+        tuple(region for region in regions if region is not None),
+        MeasuredReaction(measured["reaction"], measured["deceleration"], measured["by"], measured["servo"]),
+    )
+
+
+_TABLES = {
+    "limits": "edition, transcribed_by, verified_by and [[limits.region]]",
+    "measured": "reaction_ms, deceleration_rad_s2 and by; how the guarded arm stops was measured by somebody",
+}
+
+
+def _region(row: Mapping[str, Any], where: str, problems: list[str]) -> BodyRegion | None:
+    before = len(problems)
+    names = row.get("links", [])
+    values = check({key: value for key, value in row.items() if key != "links"}, _REGION, where, problems)
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        problems.append(f"{where}.links must be a list of names of links, got {names!r}")
+        names = []
+    links = set()
+    for name in names:
+        try:
+            links.add(link_index(name))
+        except ConeSkinError as exc:
+            problems.append(f"{where}.links: {exc}")
+    mass, clamped = values["mass"], values["clamped"]
+    if mass is None and not clamped:
+        problems.append(f"{where} needs mass_kg, or clamped = true for a body that cannot give way")
+    area = values["area"]
+    found = {}
+    for kind in ("transient", "lasting"):
+        force, pressure = values[f"{kind}_force"], values[f"{kind}_pressure"]
+        if pressure is not None and area is None:
+            problems.append(f"{where}.{kind}_pressure_n_per_cm2 needs area_cm2, the area of the contact")
+        by_pressure = math.inf if pressure is None or area is None else pressure * area
+        found[kind] = min(math.inf if force is None else force, by_pressure)
+        if math.isinf(found[kind]) and pressure is None:
+            problems.append(f"{where} needs {kind}_force_n, or {kind}_pressure_n_per_cm2 with area_cm2")
+    if len(problems) > before:
+        return None
+    body = StruckBody(
+        math.inf if clamped else mass, math.inf if values["tissue"] is None else values["tissue"], values["support"]
+    )
+    return BodyRegion(values["name"], body, ForceLimits(found["transient"], found["lasting"]), frozenset(links))

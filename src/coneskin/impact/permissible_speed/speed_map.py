@@ -1,0 +1,290 @@
+"""Map of permissible speeds over the skins of an arm: which part of which link may move how fast.
+
+A patch has a speed for each lever, the ratio of its speed along the normal and that of the leading joint: with a short
+one, that joint turns fast, brakes for long, and the surface goes far. The mass of a patch is the heaviest in the
+positions of the scene's motion; where the arm may be anywhere it may be any. The force nearly always grows with the
+mass, but servos swing, so that the least speed of all masses in the range counts. What the surface goes beyond the way
+of one driven mass is the most of those positions (``extra_way``), or of a sample of all.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from typing import TYPE_CHECKING
+
+from coneskin.core.errors import SceneError
+from coneskin.core.version import __version__
+from coneskin.scene.tables.speed_limit_table import SPEED_LIMIT_FORMAT, limit_fingerprint
+from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
+from coneskin.skin.padding import Padding
+
+from .arm_patches import motion_positions, patches_of, weigh
+from .extra_way import ExtraWay, extra_ways
+from .limits_file import BodyRegion, LimitsFile, MeasuredReaction
+from .speed_search import LEAST_SPEED, TOP_SPEED, keeps, permissible_speed
+from .two_mass_contact import DrivenArm, TwoMassContact
+
+if TYPE_CHECKING:
+    from coneskin.scene.values.scene import Scene
+
+    from .arm_patches import ArmPatch
+
+__all__ = ["LEVERS", "SpeedCurve", "SpeedMap", "contact_at", "map_speeds"]
+
+#: m/rad; a UR20 reaches 1.75 m
+LEVERS = (0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28, 1.8)
+#: kg; a range of masses is looked at at these within it, and at the next beyond
+_MASSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)
+_IMMOVABLE = 1e6  # kg; no contact slows it down, but where it brakes it goes beyond as its servos do
+_NO_WAY = ExtraWay()
+_ANYWHERE = 300  # joint positions that are looked at where the arm may be anywhere
+_MISSED = 1.1  # factor for what they may miss of the most
+_FASTEST = 100.0  # m/s of a contact
+_MARGIN = 0.05  # rad around a motion, within which its curves hold
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedCurve:
+    """Permissible speeds for a range of masses.
+
+    Attributes:
+        region: of the body that allows the least, at the longest lever.
+        mass: heaviest of the arm [kg].
+        extra: way that a surface goes at most beyond that of one driven mass.
+        speeds: for each of ``LEVERS`` [m/s].
+    """
+
+    region: str
+    mass: float
+    extra: ExtraWay
+    speeds: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedMap:
+    """Map of one scene.
+
+    Attributes:
+        table: as a scene takes it.
+        curves: of the table.
+        patches: of the skins, in the order of the table.
+        masses: of the arm at each patch [kg], the heaviest.
+    """
+
+    table: SpeedLimitScene
+    curves: tuple[SpeedCurve, ...]
+    patches: tuple[ArmPatch, ...]
+    masses: tuple[float, ...]
+
+
+def contact_at(
+    speed: float,
+    lever: float,
+    mass: float,
+    region: BodyRegion,
+    measured: MeasuredReaction,
+    padding: Padding,
+    extra: ExtraWay = _NO_WAY,
+) -> TwoMassContact:
+    """Return the contact of a patch with a part of a body.
+
+    Args:
+        speed: of the patch along its normal [m/s].
+        lever: that speed over that of the leading joint [m/rad].
+        mass: of the arm there [kg].
+        region: that is struck.
+        measured: how the arm stops.
+        padding: of the skin.
+        extra: way of the patch: the arm brakes as much later as it overshoots further, and moves with the mean lever of
+            its way.
+    """
+    turn = 2.0 * math.pi * measured.servo
+    mass = min(mass, _IMMOVABLE)
+    servo = mass * turn * turn, 2.0 * mass * turn
+    reaction = measured.reaction + extra.delay(speed, lever, measured.deceleration, turn)
+
+    def driven(stretch: float) -> TwoMassContact:
+        towards = min(stretch * speed, _FASTEST)
+        return TwoMassContact(
+            DrivenArm(towards, mass, *servo, reaction=reaction, deceleration=stretch * measured.deceleration * lever),
+            region.body,
+            padding,
+        )
+
+    straight = driven(1.0)
+    if extra.bend <= 0.0 or speed <= 0.0:
+        return straight
+    closing = straight.way_to_close
+    if math.isinf(closing):  # of a free body: by the padding alone
+        closing = straight.law.under(straight.closing_force)
+    rate = speed / lever
+    angle = closing / lever + rate * reaction + 0.5 * rate * rate / measured.deceleration
+    return driven(extra.stretch(angle, lever))
+
+
+def map_speeds(
+    scene: Scene, limits: LimitsFile, *, any_position: bool = False, note: Callable[[str], None] = lambda _: None
+) -> SpeedMap:
+    """Return the map of a scene.
+
+    Args:
+        scene: with an arm, skins, and its [padding].
+        limits: to be kept.
+        any_position: True to let the arm be anywhere, also where the scene has a [motion].
+        note: is told what is being computed.
+
+    Raises:
+        SceneError: the scene lacks something, a reaction does not stop the arm or brakes less than was measured, no
+            region can be struck by a link, or no speed keeps the limits.
+    """
+    _check(scene, limits)
+    patches = patches_of(scene)
+    padding = scene.padding or Padding()
+    free = any_position or scene.motion is None
+    lightest, masses = [0.0] * len(patches), [math.inf] * len(patches)
+    assert scene.arm is not None  # or there were no patches
+    everywhere = extra_ways(scene.arm.model, patches, _any_positions())
+    extras = everywhere
+    lowest: tuple[float, ...] = ()
+    highest: tuple[float, ...] = ()
+    if not free and scene.motion is not None:
+        positions = motion_positions(scene)
+        weights = weigh(scene.arm.model, patches, positions)
+        extras = extra_ways(scene.arm.model, patches, positions)
+        lightest, masses = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
+        lowest = tuple(min(values) - _MARGIN for values in zip(*scene.motion.waypoints, strict=True))
+        highest = tuple(max(values) + _MARGIN for values in zip(*scene.motion.waypoints, strict=True))
+    maker = _CurveMaker(limits, padding, note)
+    rows = []
+    most = {link: _most([*extras, *everywhere], link, patches) for link in {patch.link for patch in patches}}
+    for patch, light, heavy, extra in zip(patches, lightest, masses, extras, strict=True):
+        anywhere = maker.number(patch.link, 0.0, math.inf, most[patch.link])
+        own = anywhere if free else maker.number(patch.link, light, heavy, extra.rounded_up().up_to(most[patch.link]))
+        rows.append(LimitedPatch(patch.sensor, patch.u, patch.phi, own, anywhere))
+    found = maker.curves
+    _check_speeds(scene, found)
+    table = SpeedLimitScene(
+        format=SPEED_LIMIT_FORMAT,
+        fingerprint=limit_fingerprint(scene),
+        date=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        coneskin=__version__,
+        edition=limits.edition,
+        transcribed_by=limits.transcribed_by,
+        verified_by=limits.verified_by,
+        measured_by=limits.measured.by,
+        reaction=limits.measured.reaction,
+        deceleration=limits.measured.deceleration,
+        lowest=lowest,
+        highest=highest,
+        levers=LEVERS,
+        curves=tuple(curve.speeds for curve in found),
+        patches=tuple(rows),
+    )
+    return SpeedMap(table, tuple(found), tuple(patches), tuple(masses))
+
+
+def _any_positions() -> list[tuple[float, ...]]:
+    chance = random.Random(0)
+    return [tuple(chance.uniform(-math.pi, math.pi) for _ in range(6)) for _ in range(_ANYWHERE)]
+
+
+def _most(extras: Sequence[ExtraWay], link: int, patches: Sequence[ArmPatch]) -> ExtraWay:
+    """Return the most of the ways of a link's patches, and what a sample may miss."""
+    own = [extra for extra, patch in zip(extras, (*patches, *patches), strict=True) if patch.link == link]
+    return ExtraWay(_MISSED * max(extra.lag for extra in own), _MISSED * max(extra.bend for extra in own))
+
+
+_Contacts = list[TwoMassContact]
+
+
+class _CurveMaker:
+    """Maker of curves, each of them once."""
+
+    def __init__(self, limits: LimitsFile, padding: Padding, note: Callable[[str], None]) -> None:
+        self.curves: list[SpeedCurve] = []
+        self._limits, self._padding, self._note = limits, padding, note
+        self._numbers: dict[tuple[tuple[BodyRegion, ...], tuple[float, ...], ExtraWay], int] = {}
+        # two regions may have one name
+        self._speeds: dict[tuple[BodyRegion, float, ExtraWay], tuple[float, ...]] = {}
+
+    def number(self, link: int, lightest: float, heaviest: float, extra: ExtraWay) -> int:
+        """Return the number of the curve of a link, for a range of masses [kg] and an extra way."""
+        regions = tuple(region for region in self._limits.regions if not region.links or link in region.links)
+        first = max((n for n, mass in enumerate(_MASSES) if mass <= lightest), default=0)
+        last = min(n for n, mass in enumerate(_MASSES) if mass >= heaviest)
+        masses = _MASSES[first : last + 1]
+        key = regions, masses, extra
+        if key not in self._numbers:
+            least = min((self._search(r, mass, extra)[-1], r.name) for r in regions for mass in masses)[1]
+            speeds = zip(*(self._search(region, mass, extra) for region in regions for mass in masses), strict=True)
+            curve = SpeedCurve(least, masses[-1], extra, tuple(map(min, speeds)))
+            if curve not in self.curves:
+                self.curves.append(curve)
+            self._numbers[key] = self.curves.index(curve)
+        return self._numbers[key]
+
+    def _search(self, region: BodyRegion, mass: float, extra: ExtraWay) -> tuple[float, ...]:
+        """Return the permissible speeds of one mass against one region, for each lever."""
+        key = region, mass, extra
+        if key not in self._speeds:
+            self._note(f"{region.name} struck by {mass:g} kg")
+            speeds: list[float] = []
+            for number, lever in enumerate(LEVERS):
+
+                def contacts(speed: float, lever: float = lever, ways: Sequence[ExtraWay] = (extra,)) -> _Contacts:
+                    common = region, self._limits.measured, self._padding
+                    return [contact_at(speed, lever, mass, *common, way) for way in ways]
+
+                least, top = LEAST_SPEED, TOP_SPEED
+                if number and speeds[-1] > 0.0:  # a longer lever brakes sooner, but not by more than it is longer
+                    least, top = speeds[-1], min(TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
+                found = permissible_speed(contacts, region.limits, least, top)
+                both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
+                if found > 0.0 and not all(keeps(contact, region.limits) for contact in both(found)):
+                    found = permissible_speed(both, region.limits, least, top)
+                speeds.append(found)
+            for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
+                speeds[number] = min(speeds[number], speeds[number + 1])
+            self._speeds[key] = tuple(speeds)
+        return self._speeds[key]
+
+
+def _check(scene: Scene, limits: LimitsFile) -> None:
+    problems = []
+    if scene.padding is None:
+        problems.append("permissible speeds need the [padding] of the skins; press yours on a scale (docs/physics.md)")
+    for reaction in (scene.default_reaction, *(rule.reaction for rule in scene.rules)):
+        braking = reaction.deceleration
+        if reaction.kind == "slow":
+            problems.append("permissible speeds are those of an arm that stops when it is touched; a reaction is slow")
+        if braking < limits.measured.deceleration:
+            problems.append(
+                f"measured.deceleration_rad_s2 = {limits.measured.deceleration:g} must not be above what the scene "
+                f"asks for, deceleration_rad_s2 = {braking:g}: the arm would brake less"
+            )
+    if scene.arm is not None:
+        for item in scene.links:
+            from coneskin.robot.arm.link_frames import link_index
+
+            index = link_index(item.name)
+            if index and item.sensors and not any(not r.links or index in r.links for r in limits.regions):
+                problems.append(f"no [[limits.region]] may be struck by the {item.name}, which has a skin")
+    if problems:
+        raise SceneError(problems, scene.name)
+
+
+def _check_speeds(scene: Scene, curves: list[SpeedCurve]) -> None:
+    for curve in curves:
+        if curve.speeds[-1] <= 0.0:
+            raise SceneError(
+                [
+                    f"no speed of 1 mm/s or more keeps the limits of {curve.region}: a softer or thicker padding, a "
+                    "shorter reaction or a harder braking is needed"
+                ],
+                scene.name,
+            )

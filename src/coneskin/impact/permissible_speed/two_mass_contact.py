@@ -1,0 +1,208 @@
+"""Model of one contact along its normal: a driven arm, the padding of its skin, and a body that is struck.
+
+    symbol    meaning
+    p(t)      where the controller wants the surface of the arm, from the first contact on [m]
+    x1, x2    where surface and body are [m]; 0 at the first contact
+    s         compression between them, x1 - x2 [m]
+    f         force between them [N]
+
+    m1 x1'' = k1 (p - x1) + c1 (p' - x1') - f,   m2 x2'' = f - k2 x2 - c2 x2',   f = e(s) (1 + loss s')
+
+The compression is that of the padding and of the body's tissue in series. The force closes the layers of the sensor;
+a reaction time later p begins to brake. An infinite m1 moves as the controller wants, an infinite m2 does not give way;
+without k1 and c1 this is the two-mass model of ISO/TS 15066, annex A: a free mass, a spring, a free mass.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from coneskin.core.errors import SensorError
+from coneskin.skin.padding import Padding
+
+__all__ = ["CompressionLaw", "DrivenArm", "StruckBody", "TwoMassContact"]
+
+#: N; closes the layers of the sensor, "A Flexible Annular Sectorial Sensor ...", section 4.2
+_CLOSING_FORCE = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenArm:
+    """Arm as the contact feels it, along the normal.
+
+    Attributes:
+        speed: of the surface towards the body [m/s].
+        mass: effective mass [kg]; infinite where the arm moves as it is driven, whatever the force.
+        stiffness: of the joints' servos [N/m]; 0 for an arm that moves freely.
+        damping: of the servos [N s/m].
+        reaction: from the closing of the layers until the arm brakes [s], as measured; infinite where it never does.
+        deceleration: of the surface then [m/s^2], as measured.
+
+    Raises:
+        SensorError: a value is out of its range.
+    """
+
+    speed: float
+    mass: float = math.inf
+    stiffness: float = 0.0
+    damping: float = 0.0
+    reaction: float = math.inf
+    deceleration: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check("arm.speed", self.speed, "m/s", least=0.0, most=100.0)
+        _check("arm.mass", self.mass, "kg", above=0.0, infinite=True)
+        _check("arm.stiffness", self.stiffness, "N/m", least=0.0)
+        _check("arm.damping", self.damping, "N s/m", least=0.0)
+        _check("arm.reaction", self.reaction, "s", least=0.0, infinite=True)
+        _check("arm.deceleration", self.deceleration, "m/s^2", above=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class StruckBody:
+    """Body that the arm strikes. Its values are the user's: none is known that holds for every person.
+
+    Attributes:
+        mass: effective mass [kg]; infinite for one that cannot give way.
+        tissue: stiffness of what is between its surface and its mass [N/m]; infinite for none.
+        support: stiffness of the spring that holds it [N/m]; 0 for a free one.
+        damping: of that spring [N s/m].
+
+    Raises:
+        SensorError: a value is out of its range.
+    """
+
+    mass: float
+    tissue: float = math.inf
+    support: float = 0.0
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check("body.mass", self.mass, "kg", above=0.0, infinite=True)
+        _check("body.tissue", self.tissue, "N/m", above=0.0, infinite=True)
+        _check("body.support", self.support, "N/m", least=0.0)
+        _check("body.damping", self.damping, "N s/m", least=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class CompressionLaw:
+    """Force over the compression of padding and tissue in series: two straight pieces, and a factor for the speed.
+
+    Attributes:
+        soft: slope until the padding bottoms out [N/m].
+        hard: slope beyond [N/m].
+        end: compression at which it bottoms out [m].
+        loss: damping [s/m], by the share that the padding has in the compression until then.
+    """
+
+    soft: float
+    hard: float
+    end: float
+    loss: float
+
+    @classmethod
+    def of(cls, padding: Padding, tissue: float = math.inf) -> CompressionLaw:
+        """Return the law of a padding on a tissue [N/m]."""
+        soft = 1.0 / (1.0 / padding.stiffness + 1.0 / tissue)
+        hard = 1.0 / (1.0 / padding.hard_stiffness + 1.0 / tissue)
+        end = padding.stiffness * padding.thickness / soft
+        return cls(soft, hard, end, padding.loss * soft / padding.stiffness)
+
+    @property
+    def end_force(self) -> float:
+        """Force at rest at which the padding bottoms out [N]."""
+        return self.soft * self.end
+
+    def elastic(self, compression: float) -> float:
+        """Return the force of a compression at rest [N]; 0 without one."""
+        if compression <= 0.0:
+            return 0.0
+        if compression <= self.end:
+            return self.soft * compression
+        return self.end_force + self.hard * (compression - self.end)
+
+    def energy(self, compression: float) -> float:
+        """Return the energy stored in a compression [J]."""
+        if compression <= 0.0:
+            return 0.0
+        soft, beyond = min(compression, self.end), max(0.0, compression - self.end)
+        return 0.5 * self.soft * soft**2 + beyond * (self.end_force + 0.5 * self.hard * beyond)
+
+    def under(self, force: float) -> float:
+        """Return the compression at rest under a force [m]."""
+        if force <= self.end_force:
+            return max(0.0, force) / self.soft
+        return self.end + (force - self.end_force) / self.hard
+
+
+@dataclass(frozen=True, slots=True)
+class TwoMassContact:
+    """One contact.
+
+    Attributes:
+        arm: that is driven into the body.
+        body: that it strikes.
+        padding: of the skin between them.
+        closing_force: at which the layers of the sensor close [N].
+        law: of the compression; follows from padding and body.
+    """
+
+    arm: DrivenArm
+    body: StruckBody
+    padding: Padding = field(default_factory=Padding)
+    closing_force: float = _CLOSING_FORCE
+    law: CompressionLaw = field(init=False)
+
+    def __post_init__(self) -> None:
+        _check("closing_force", self.closing_force, "N", least=0.0)
+        object.__setattr__(self, "law", CompressionLaw.of(self.padding, self.body.tissue))
+
+    @property
+    def yielding(self) -> float:
+        """What arm and body give way at rest [m/N], beside the compression; infinite where one of them is free."""
+        arm, body = self.arm, self.body
+        found = 0.0 if math.isinf(arm.mass) else 1.0 / arm.stiffness if arm.stiffness > 0.0 else math.inf
+        if not math.isinf(body.mass):
+            found += 1.0 / body.support if body.support > 0.0 else math.inf
+        return found
+
+    @property
+    def way_to_close(self) -> float:
+        """How far a slow arm goes until its layers close [m]; infinite where they never do."""
+        return self.law.under(self.closing_force) + (self.closing_force * self.yielding if self.closing_force else 0.0)
+
+    def static(self, way: float) -> tuple[float, float]:
+        """Return force [N] and compression [m] once all is at rest, with the controller's surface at a place [m]."""
+        if way <= 0.0:
+            return 0.0, min(0.0, way)
+        law, yielding = self.law, self.yielding
+        if math.isinf(yielding):
+            return 0.0, 0.0
+        force = way / (1.0 / law.soft + yielding)
+        if force > law.end_force:
+            force = (way - law.end + law.end_force / law.hard) / (1.0 / law.hard + yielding)
+        return force, law.under(force)
+
+
+def _check(
+    name: str,
+    value: float,
+    unit: str,
+    *,
+    least: float = -math.inf,
+    above: float = -math.inf,
+    most: float = math.inf,
+    infinite: bool = False,
+) -> None:
+    if (
+        isinstance(value, float | int)
+        and (math.isfinite(value) or (infinite and value == math.inf))
+        and value >= least
+        and value > above
+        and value <= most
+    ):
+        return
+    rule = f"above {above:g}" if above > -math.inf else f"at least {least:g}"
+    rule += f" and at most {most:g}" if most < math.inf else "" if infinite else " and finite"
+    raise SensorError(f"{name} must be {rule} {unit}, got {value!r} {unit}")

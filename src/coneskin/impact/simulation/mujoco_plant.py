@@ -1,0 +1,333 @@
+"""Plant: an arm with skins among bodies, simulated by MuJoCo, driven by the targets of a controller.
+
+MuJoCo has the dynamics (inertias, servos, springs, Coriolis forces) and finds the contacts; the force of a contact is
+the padding's. It acts on the skin and on the body, equal and opposite, along the normal at the deepest point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coneskin.core.errors import MissingExtra
+from coneskin.geometry.pose import Vector
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.ur_inertias import arm_inertia
+from coneskin.scene.values.body import BodyScene
+from coneskin.skin.padding import Padding
+
+from .arm_description import body_link
+from .held_body import HeldPart
+from .scene_description import SheetOnLink, describe_scene
+
+__all__ = ["STEP", "BodyContact", "MujocoPlant", "Touch"]
+
+STEP = 2e-4  #: s of the integration; the stiffest contact, 1e6 N/m against 0.3 kg, swings with 1800 rad/s
+_ARM = 6  # degrees of freedom of the arm, the first ones
+
+
+class BodyContact(NamedTuple):
+    """Contact of a skin with a part of a body, at one instant."""
+
+    sheet: int  #: number of the skin
+    part: int  #: number of the part, over all bodies
+    u: float  #: slant distance from end 1 [m]
+    phi: float  #: azimuth [rad]
+    depth: float  #: indentation of the padding [m]
+    rate: float  #: its growth [m/s]
+    force: float  #: [N]
+    normal: Vector  #: outward unit normal of the skin, in the base frame
+    point: Vector  #: in the base frame [m]
+
+
+class Touch(NamedTuple):
+    """Contact as one step of the integration needs it; fields as of `BodyContact`."""
+
+    sheet: int
+    part: int
+    depth: float
+    rate: float
+    force: float
+    normal: NDArray[np.float64]
+    point: NDArray[np.float64]
+    jacobian: NDArray[np.float64]  #: of the point, for the arm's joints, 3 x 6
+
+
+class MujocoPlant:
+    """Plant of one arm and its surroundings.
+
+    Args:
+        model: the arm.
+        sheets: its skins.
+        bodies: around it.
+        padding: of the skins.
+        q: joint positions at the beginning [rad].
+        qd: joint speeds then [rad/s].
+        step: of the integration [s].
+        held: joints whose servos are on, all by default.
+
+    Attributes:
+        time: since the beginning [s].
+        contacts: at the end of the last step.
+        impulse: that all contacts together have given, over time [N s].
+        deepest: greatest indentation so far [m].
+        peak: greatest force of one skin on one body so far [N].
+        lost: energy that damping in padding and springs has taken [J].
+
+    Raises:
+        MissingExtra: MuJoCo is not installed.
+    """
+
+    def __init__(
+        self,
+        model: ArmModel,
+        sheets: Sequence[SheetOnLink],
+        bodies: Sequence[BodyScene],
+        padding: Padding,
+        q: Sequence[float],
+        qd: Sequence[float] = (0.0,) * _ARM,
+        step: float = STEP,
+        held: Sequence[bool] = (True,) * _ARM,
+    ) -> None:
+        try:
+            import mujoco
+        except ImportError as exc:
+            raise MissingExtra("mujoco", "physics in the loop", "physics") from exc
+        self._mj: Any = mujoco
+        mujoco.set_mju_user_warning(lambda _: None)  # it would write a file into the current folder: see `diverged`
+        inertia = arm_inertia(model)
+        self._m: Any = mujoco.MjModel.from_xml_string(describe_scene(model, inertia, q, sheets, bodies, step))
+        self._d: Any = mujoco.MjData(self._m)
+        self._padding = padding
+        self._sheets = tuple(sheets)
+        self._back = [body_link(model, sheet.link).inverse() for sheet in sheets]
+        self._links = [self._m.body(f"link{sheet.link}").id for sheet in sheets]
+        self._sheet_of = {self._m.geom(f"sheet{n}").id: n for n in range(len(sheets))}
+        self.parts: list[HeldPart] = []
+        self._part_of: dict[int, int] = {}
+        self._address: list[int | None] = []  # of a part's first coordinate; None where it does not move
+        for number, body in enumerate(bodies):
+            for part, _ in enumerate(body.parts):
+                name = f"body{number}.{part}"
+                self._part_of[self._m.geom(name).id] = len(self.parts)
+                self._address.append(int(self._m.joint(f"{name}.x").dofadr[0]) if body.gives_way else None)
+                self.parts.append(HeldPart(body, part))
+        self._lead = self._m.actuator_biasprm[:, 2] / self._m.actuator_biasprm[:, 1]  # kv / kp [s]
+        for joint, on in enumerate(held):
+            if not on:
+                self._m.actuator_gainprm[joint] = 0.0
+                self._m.actuator_biasprm[joint] = 0.0
+        self._step = step
+        self._d.qpos[:_ARM], self._d.qvel[:_ARM] = q, qd
+        self._starts = [place for body in bodies for place in body.parts]
+        self._moving = [(number, at) for number, at in enumerate(self._address) if at is not None]
+        self._damping = [0.0 if at is None else float(self._m.dof_damping[at]) for at in self._address]
+        self._touched: dict[int, float] = {}  # body -> when it was first touched
+        self._body_numbers = [n for n, body in enumerate(bodies) for _ in body.parts]
+        self.time = 0.0
+        self.contacts: tuple[BodyContact, ...] = ()
+        self.impulse = self.deepest = self.peak = self.lost = 0.0
+        mujoco.mj_forward(self._m, self._d)
+
+    # state
+
+    @property
+    def q(self) -> tuple[float, ...]:
+        """Joint positions [rad]."""
+        return tuple(self._d.qpos[:_ARM].tolist())
+
+    @property
+    def qd(self) -> tuple[float, ...]:
+        """Joint speeds [rad/s]."""
+        return tuple(self._d.qvel[:_ARM].tolist())
+
+    @property
+    def torque(self) -> tuple[float, ...]:
+        """Torques of the servos [N m]."""
+        return tuple(self._d.actuator_force[:_ARM].tolist())
+
+    @property
+    def external(self) -> tuple[float, ...]:
+        """Torque that the contacts put on the joints [N m]."""
+        return tuple(self._d.qfrc_applied[:_ARM].tolist())
+
+    @property
+    def force(self) -> float:
+        """Sum of the forces of all contacts now [N]."""
+        return sum(contact.force for contact in self.contacts)
+
+    @property
+    def energy(self) -> float:
+        """Energy of motion, of springs and of the padding [J]."""
+        self._mj.mj_energyPos(self._m, self._d)
+        self._mj.mj_energyVel(self._m, self._d)
+        stored = sum(self._padding.energy(contact.depth) for contact in self.contacts)
+        return float(self._d.energy[0] + self._d.energy[1]) + stored
+
+    @property
+    def diverged(self) -> bool:
+        """True once the integration has met what is not a number; MuJoCo then starts anew without a word."""
+        kinds = self._mj.mjtWarning
+        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+        return any(self._d.warning[int(kind)].number for kind in bad)
+
+    def mass_matrix(self) -> NDArray[np.float64]:
+        """Return the mass matrix of the arm at its present position [kg m^2], 6 x 6."""
+        columns = np.zeros((_ARM, self._m.nv))
+        for joint, unit in enumerate(np.eye(_ARM, self._m.nv)):
+            self._mj.mj_mulM(self._m, self._d, columns[joint], unit)
+        return columns[:, :_ARM]
+
+    def momentum(self) -> NDArray[np.float64]:
+        """Return linear momentum [N s] and angular momentum about the base [N m s] of all that moves, shape (6,).
+
+        The rotors of the motors are not in it: they turn about their own axes.
+        """
+        linear, angular = np.zeros(3), np.zeros(3)
+        for body in range(1, self._m.nbody):
+            spin = np.zeros(6)
+            self._mj.mj_objectVelocity(self._m, self._d, self._mj.mjtObj.mjOBJ_BODY, body, spin, 0)
+            mass, axes = self._m.body_mass[body], self._d.ximat[body].reshape(3, 3)
+            linear += mass * spin[3:]
+            angular += axes @ (self._m.body_inertia[body] * (axes.T @ spin[:3]))
+            angular += np.cross(self._d.xipos[body], mass * spin[3:])
+        return np.concatenate([linear, angular])
+
+    def part_state(self, part: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return how far a part is from where it began [m] and its velocity [m/s]; zeros where it does not move."""
+        at = self._address[part]
+        if at is None:
+            return np.zeros(3), np.zeros(3)
+        return self._d.qpos[at : at + 3].copy(), self._d.qvel[at : at + 3].copy()
+
+    @property
+    def places(self) -> list[Vector]:
+        """Places of the bodies' parts now, in the base frame [m]."""
+        found: list[Vector] = []
+        for start, at in zip(self._starts, self._address, strict=True):
+            moved = (0.0, 0.0, 0.0) if at is None else self._d.qpos[at : at + 3].tolist()
+            found.append((start[0] + moved[0], start[1] + moved[1], start[2] + moved[2]))
+        return found
+
+    # time
+
+    def advance(self, q: Sequence[float], qd: Sequence[float], duration: float) -> None:
+        """Let time pass while the controller's targets move evenly.
+
+        Args:
+            q: targets of the joints at the beginning [rad].
+            qd: their speeds [rad/s].
+            duration: a multiple of the step [s].
+        """
+        m, d, step = self._m, self._d, self._step
+        step1, step2 = self._mj.mj_step1, self._mj.mj_step2
+        speed = np.asarray(qd, float)
+        moved = step * speed
+        target = np.asarray(q, float) + self._lead * speed  # a servo that damps its speed would follow behind by this
+        for _ in range(round(duration / step)):
+            step1(m, d)
+            d.ctrl[:_ARM] = target
+            self._press()
+            step2(m, d)
+            target += moved
+            self.time += step
+        self._look()
+
+    def _look(self) -> None:
+        """Look where skins and bodies touch now."""
+        self._mj.mj_fwdPosition(self._m, self._d)
+        self.contacts = tuple(self._contact(touch) for touch in self._find())
+
+    def _press(self) -> None:
+        """Put the forces of the contacts on skins and bodies, and let people act."""
+        d, step, padding = self._d, self._step, self._padding
+        applied = d.qfrc_applied
+        applied[:] = 0.0
+        felt: dict[int, Touch] = {}
+        for touch in self._find():
+            push = touch.force * touch.normal
+            applied[:_ARM] -= push @ touch.jacobian
+            if (at := self._address[touch.part]) is not None:
+                applied[at : at + 3] += push
+            self.impulse += touch.force * step
+            self.deepest = max(self.deepest, touch.depth)
+            self.peak = max(self.peak, touch.force)
+            self.lost += (touch.force - padding.elastic(touch.depth)) * touch.rate * step
+            self._touched.setdefault(self._body_numbers[touch.part], self.time)
+            if touch.part not in felt or felt[touch.part].force < touch.force:
+                felt[touch.part] = touch
+        for number, at in self._moving:
+            speed = d.qvel[at : at + 3].tolist()
+            self.lost += self._damping[number] * (speed[0] ** 2 + speed[1] ** 2 + speed[2] ** 2) * step
+        self._let_people_act(felt)
+
+    def _let_people_act(self, felt: Mapping[int, Touch]) -> None:
+        """Let people move what holds the bodies, for one step, by the firmest touch of each part."""
+        for number, at in self._moving:
+            part = self.parts[number]
+            if not part.acts:
+                continue
+            began = self._touched.get(self._body_numbers[number])
+            since = -1.0 if began is None else self.time - began
+            by = felt.get(number)
+            away = None if by is None else tuple(by.normal.tolist())
+            if part.advance(since, by.force if by else 0.0, away, self._step):
+                self._m.qpos_spring[at : at + 3] = part.rest
+
+    def _find(self, near: float = 0.0) -> list[Touch]:
+        """Return what touches, or is nearer than that [m]: one contact for each skin and part, amid MuJoCo's points."""
+        d = self._d
+        if not d.ncon:
+            return []
+        contact = d.contact
+        distances = contact.dist.tolist()
+        if min(distances) >= near:
+            return []
+        points: dict[tuple[int, int], list[tuple[float, int, float]]] = {}
+        for index, ((first, second), distance) in enumerate(zip(contact.geom.tolist(), distances, strict=True)):
+            if distance < near:
+                swapped = first not in self._sheet_of
+                pair = (second, first) if swapped else (first, second)
+                key = self._sheet_of[pair[0]], self._part_of[pair[1]]
+                points.setdefault(key, []).append((-distance, index, -1.0 if swapped else 1.0))
+        frames, places = contact.frame, contact.pos
+        return [self._touch(*key, found, frames, places) for key, found in points.items()]
+
+    def _touch(
+        self,
+        sheet: int,
+        part: int,
+        found: list[tuple[float, int, float]],
+        frames: NDArray[np.float64],
+        places: NDArray[np.float64],
+    ) -> Touch:
+        depth, index, sign = max(found)
+        normal, point = sign * frames[index, :3], places[index]
+        found = [item for item in found if item[0] > 0.0]
+        if len(found) > 1:
+            whole = math.fsum(item[0] for item in found)
+            point = sum((item[0] / whole * places[item[1]] for item in found), np.zeros(3))
+        jacobian = np.empty((3, self._m.nv))
+        self._mj.mj_jac(self._m, self._d, jacobian, None, point, self._links[sheet])
+        jacobian = jacobian[:, :_ARM]
+        speed = jacobian @ self._d.qvel[:_ARM]
+        if (at := self._address[part]) is not None:
+            speed -= self._d.qvel[at : at + 3]
+        rate = float(speed @ normal)
+        return Touch(sheet, part, depth, rate, self._padding.force(depth, rate), normal, point, jacobian)
+
+    def _contact(self, touch: Touch) -> BodyContact:
+        link = self._links[touch.sheet]
+        axes = self._d.xmat[link].reshape(3, 3)
+        x, y, z = (axes.T @ (touch.point - self._d.xpos[link])).tolist()
+        at = self._back[touch.sheet].apply((x, y, z))
+        u, phi, _ = self._sheets[touch.sheet].cone.locate(at)
+        px, py, pz = touch.point.tolist()
+        nx, ny, nz = touch.normal.tolist()
+        return BodyContact(
+            touch.sheet, touch.part, u, phi, touch.depth, touch.rate, touch.force, (nx, ny, nz), (px, py, pz)
+        )

@@ -1,0 +1,102 @@
+"""Physics process: the plant of a scene in real time. Started by ``coneskin.impact.simulation.live_plant``.
+
+It is driven by the control cycles of a simulated controller: each targets that come let 2 ms pass, what is measured
+goes back, and what presses on the skins goes to the virtual skin's process. It makes up for nothing and leaves nothing
+out, so a computer that is too slow shows as answers that come late, which the controller judges.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import math
+import os
+import sys
+import time
+from pathlib import Path
+
+from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
+from coneskin.core.child_process import inherit
+from coneskin.core.errors import ConeSkinError, MissingExtra
+
+__all__ = ["main"]
+
+_PATIENCE = 1.0  # s between two looks at whether anybody is left
+_TRUTH_PERIOD = 0.01  # s from one recorded force to the next
+_PRECEDENCE = -10  # niceness; behind the guard
+_RELAXED = 500  # cycles after which the foam of a skin that nothing presses has come back: it need not be told more
+
+
+def main(arguments: list[str]) -> int:
+    """Take the channels and the scene, and follow the controller until it ends, or the program does."""
+    _, (program, controller, skin) = inherit(arguments)  # it ends with the program at once
+    from coneskin.robot.sim.motion.arm import CYCLE
+    from coneskin.robot.sim.motion.plant import PlantLost
+    from coneskin.robot.sim.motion.remote_plant import decode_targets, encode_state
+    from coneskin.scene.reader import parse_scene
+
+    from .impact_outcome import ImpactMeter
+    from .scene_plant import ScenePlant
+    from .touch_recorder import TouchRecorder
+    from .truth_recorder import TruthRecorder
+
+    while not (hello := program.receive()) and not program.closed:
+        wait_readable([program], _PATIENCE)
+    if not hello:
+        return 1
+    start = decode_json(hello[0])
+    try:
+        scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
+        plant = ScenePlant(scene, start["q"])
+        plant.advance(start["q"], (0.0,) * 6)  # what is loaded on first use is loaded now
+    except (ConeSkinError, PlantLost) as exc:
+        program.send(encode_json({"refused": str(exc), "missing": isinstance(exc, MissingExtra)}))
+        return 1
+    with contextlib.suppress(OSError):
+        os.nice(_PRECEDENCE)  # allowed for root, and where the user's limits say so: nature waits for no process
+    program.send(encode_json({"ready": True}))
+    gc.collect()
+    gc.freeze()
+    meter, recorder, touches = ImpactMeter(), TruthRecorder(_TRUTH_PERIOD), TouchRecorder()
+    quiet = _RELAXED  # cycles since something pressed
+    while not controller.closed and not program.closed:
+        ready = wait_readable([program, controller], _PATIENCE)
+        for message in controller.receive():
+            try:
+                state = plant.advance(*decode_targets(message))
+            except (PlantLost, ValueError) as exc:
+                print(f"coneskin physics: {exc}", file=sys.stderr, flush=True)
+                return 1
+            controller.send(encode_state(state))
+            now = time.monotonic()  # before the skin can feel it: no touch begins after what is seen of it
+            presses = plant.presses()
+            quiet = 0 if presses else quiet + 1
+            if quiet < _RELAXED:
+                pressing = [[*key, *press] for key, press in presses.items()]
+                skin.send(encode_json({"step": CYCLE, "presses": pressing}))
+            physics = plant.physics
+            for truth in (recorder.take(now, physics.force, physics.places), touches.take(now, presses.values())):
+                if truth is not None:
+                    skin.send(encode_json({"truth": truth.payload.decode(), "time": truth.time}))
+            rate = max((contact.rate for contact in physics.contacts), default=0.0)
+            speed = max(map(abs, state.qd))
+            meter.take(now, physics.force, rate, physics.peak, physics.deepest, physics.impulse, speed)
+        if program in ready:
+            _report(program, meter)
+    return 0
+
+
+def _report(program: Channel, meter: object) -> None:
+    """Answer the program, which asks what has come of it so far."""
+    from .impact_outcome import ImpactMeter
+
+    assert isinstance(meter, ImpactMeter)
+    for _ in program.receive():
+        outcome = meter.outcome
+        values = {name: getattr(outcome, name) for name in outcome.__slots__}
+        values["began"] = meter.began
+        program.send(encode_json({name: None if math.isnan(value) else value for name, value in values.items()}))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,127 @@
+"""Description of an arm with skins and of the bodies around it in MJCF; text only.
+
+MuJoCo finds where skins and bodies meet; it makes no force of it, because its own contacts have no stiffness in N/m.
+The force is the padding's (``mujoco_plant``). Friction is left out, and so is gravity: an arm carries its own weight,
+and a person that of the hand. The bare arm meets nothing: what touches it beside its skins is felt by no skin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.pose import Vector
+from coneskin.robot.arm.inertia import ArmInertia, mass_matrix
+from coneskin.robot.arm.model import ArmModel
+from coneskin.scene.values.body import BodyScene
+
+from .arm_description import body_link, describe_arm, describe_servos, numbers
+
+__all__ = ["SheetOnLink", "describe_scene"]
+
+_MARGIN = -1.0  # m; of MuJoCo's own force, so far inside that it makes none
+_GAP = 1.002  # m; beyond the margin, in which it reports contacts all the same: from 2 mm before two surfaces touch
+_SIDES = 96  # of the prism that a sheet is: its radius is wrong by at most 0.03 mm on a link of 50 mm
+_WALL = 0.02  # m; thickness of a wall
+_STIFF = 1e-9  # kg m^2 and the like, where MuJoCo wants a number above 0
+
+
+@dataclass(frozen=True, slots=True)
+class SheetOnLink:
+    """Skin on a link of the arm.
+
+    Attributes:
+        name: of its sensor.
+        link: index of the link's DH frame.
+        cone: its surface in that frame.
+    """
+
+    name: str
+    link: int
+    cone: PlacedFrustum
+
+
+def describe_scene(
+    model: ArmModel,
+    inertia: ArmInertia,
+    q: Sequence[float],
+    sheets: Sequence[SheetOnLink],
+    bodies: Sequence[BodyScene],
+    step: float,
+) -> str:
+    """Return the whole model as MJCF.
+
+    Args:
+        model: the arm.
+        inertia: of the arm.
+        q: joint positions at which its servos are tuned [rad].
+        sheets: on its links; geoms ``sheet0`` and so on.
+        bodies: around it; geoms ``body0.0`` and so on, of which the second number counts the parts.
+        step: of the integration [s].
+    """
+    geoms: dict[int, str] = {}
+    meshes = ""
+    for number, sheet in enumerate(sheets):
+        meshes += f'<mesh name="mesh{number}" vertex="{numbers(_vertices(model, sheet))}"/>'
+        geoms[sheet.link] = geoms.get(sheet.link, "") + f'<geom name="sheet{number}" type="mesh" mesh="mesh{number}"/>'
+    names = [f"body{n}.{part}" for n, body in enumerate(bodies) for part, _ in enumerate(body.parts)]
+    pairs = "".join(
+        f'<pair geom1="sheet{number}" geom2="{name}" margin="{_MARGIN!r}" gap="{_GAP!r}" condim="1"/>'
+        for number in range(len(sheets))
+        for name in names
+    )
+    placed = "".join(
+        _body(f"body{n}.{part}", body, place) for n, body in enumerate(bodies) for part, place in enumerate(body.parts)
+    )
+    masses = [row[i] for i, row in enumerate(mass_matrix(model, inertia, q))]
+    return (
+        f'<mujoco><compiler angle="radian" autolimits="true"/>'
+        f'<option timestep="{step!r}" integrator="implicitfast" gravity="0 0 0"/>'
+        f'<default><geom contype="0" conaffinity="0" mass="0"/></default>'
+        f"<asset>{meshes}</asset><worldbody>{describe_arm(model, inertia, geoms)}{placed}</worldbody>"
+        f"<contact>{pairs}</contact><actuator>{describe_servos(inertia, masses)}</actuator></mujoco>"
+    )
+
+
+def _vertices(model: ArmModel, sheet: SheetOnLink) -> list[float]:
+    """Return the corners of the prism that stands for a sheet, in the MJCF body of its link [m].
+
+    A partial wrap is a whole cone here: what is beside the sheet touches the link.
+    """
+    place = body_link(model, sheet.link)
+    cone = sheet.cone.frustum
+    if sheet.cone.bends:
+        azimuths = [cone.wrap * side / _SIDES for side in range(_SIDES)]
+        corners = [sheet.cone.point(u, phi) for u in (0.0, cone.slant) for phi in azimuths]
+        return [value for corner in corners for value in place.apply(corner)]
+    grown = 1.0 / math.cos(math.pi / _SIDES) ** 0.5  # half of the facets' error outside, half inside
+    found: list[float] = []
+    for height, radius in ((0.0, cone.radius1), (cone.height, cone.radius2)):
+        for side in range(_SIDES):
+            angle = 2.0 * math.pi * side / _SIDES
+            corner = (grown * radius * math.cos(angle), grown * radius * math.sin(angle), height)
+            found += place.apply(sheet.cone.link_frustum.apply(corner))
+    return found
+
+
+def _body(name: str, body: BodyScene, place: Vector) -> str:
+    if body.kind == "wall":
+        x, y, z = (p - 0.5 * _WALL * a for p, a in zip(place, body.axis, strict=True))
+        size = numbers((body.radius, body.radius, 0.5 * _WALL))
+        return f'<geom name="{name}" type="box" size="{size}" pos="{numbers((x, y, z))}" zaxis="{numbers(body.axis)}"/>'
+    if body.kind == "post":
+        size = numbers((body.radius, 0.5 * body.length))
+        return f'<geom name="{name}" type="capsule" size="{size}" pos="{numbers(place)}" zaxis="{numbers(body.axis)}"/>'
+    rate = math.sqrt(body.stiffness / body.mass)
+    spring = f'stiffness="{body.stiffness!r}" damping="{2.0 * body.damping * rate * body.mass!r}"'
+    slides = "".join(
+        f'<joint name="{name}.{axis}" type="slide" axis="{vector}" {spring}/>'
+        for axis, vector in (("x", "1 0 0"), ("y", "0 1 0"), ("z", "0 0 1"))
+    )
+    return (
+        f'<body name="{name}" pos="{numbers(place)}">{slides}'
+        f'<inertial pos="0 0 0" mass="{body.mass!r}" diaginertia="{_STIFF!r} {_STIFF!r} {_STIFF!r}"/>'
+        f'<geom name="{name}" type="sphere" size="{body.radius!r}"/></body>'
+    )

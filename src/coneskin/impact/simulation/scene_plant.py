@@ -1,0 +1,85 @@
+"""Plant of a scene: its arm among its bodies, behind the protocol of the simulated controller, cycle by cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coneskin.core.errors import SceneError
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.sim.motion.arm import CYCLE
+from coneskin.robot.sim.motion.plant import PlantLost, PlantState
+from coneskin.scene.build import place_on_arm
+from coneskin.scene.values.scene import Scene
+from coneskin.skin.padding import Padding
+from coneskin.skin.virtual.pressed_skin import Press
+
+from .mujoco_live_plant import LiveMujocoPlant
+from .mujoco_plant import MujocoPlant
+from .scene_description import SheetOnLink
+
+__all__ = ["ScenePlant", "currents_of", "presses_of", "sheets_of"]
+
+_TORQUE_PER_AMPERE = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)  # N m/A of a joint, as the guard assumes
+
+
+def sheets_of(scene: Scene) -> list[SheetOnLink]:
+    """Return the skins of a scene on its arm."""
+    return [SheetOnLink(item.name, item.link, item.frustum) for item in place_on_arm(scene)]
+
+
+def currents_of(plant: MujocoPlant) -> list[float]:
+    """Return the current that each motor takes against the contacts [A]."""
+    return [-torque / each for torque, each in zip(plant.external, _TORQUE_PER_AMPERE, strict=True)]
+
+
+def presses_of(plant: MujocoPlant, skins: Sequence[SheetOnLink]) -> dict[tuple[int, int], Press]:
+    """Return what the skins feel now, by skin and part of a body: contacts within their active area."""
+    found = {}
+    for contact in plant.contacts:
+        skin = skins[contact.sheet]
+        cone = skin.cone.frustum
+        if 0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap:
+            found[contact.sheet, contact.part] = Press(skin.name, contact.u, contact.phi, contact.force)
+    return found
+
+
+class ScenePlant:
+    """Plant of a scene; methods as of ``coneskin.robot.sim.motion.plant.Plant``.
+
+    In lock-step it is deterministic: the same targets give the same measurements, bit by bit.
+
+    Args:
+        scene: with an arm, skins and bodies.
+        q: joint positions at the start [rad].
+        engine: what simulates it; `MujocoPlant` is more exact, and takes three times as long.
+
+    Attributes:
+        physics: what MuJoCo simulates.
+
+    Raises:
+        MissingExtra: MuJoCo is not installed.
+        SceneError: the scene has no arm.
+    """
+
+    def __init__(self, scene: Scene, q: Sequence[float], engine: type[MujocoPlant] = LiveMujocoPlant) -> None:
+        if scene.arm is None:
+            raise SceneError(["a scene whose bodies are to be met needs an [arm]"], scene.name)
+        self._skins = sheets_of(scene)
+        self.physics = engine(
+            arm_model(scene.arm.model), self._skins, scene.bodies, scene.padding or Padding(), list(q)
+        )
+
+    def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
+        """Let one control cycle pass; see the protocol."""
+        start = [at - CYCLE * speed for at, speed in zip(q, qd, strict=True)]
+        self.physics.advance(start, qd, CYCLE)
+        if self.physics.diverged:
+            raise PlantLost("the physics engine has diverged: the bodies are too light for their stiffness, perhaps")
+        return PlantState(self.physics.q, self.physics.qd, currents_of(self.physics))
+
+    def close(self) -> None:
+        """Do nothing: it has no process and no connection."""
+
+    def presses(self) -> dict[tuple[int, int], Press]:
+        """Return what the skins feel now; see `presses_of`."""
+        return presses_of(self.physics, self._skins)

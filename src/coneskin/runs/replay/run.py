@@ -1,0 +1,267 @@
+"""Recorded run: its blocks, events and scene, what it lacks, and how it is replayed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.core.errors import RecordingError
+from coneskin.core.json_text import read_json
+from coneskin.core.recording.block import Block, is_time
+from coneskin.core.recording.defect import Defect, DefectKind
+from coneskin.core.recording.reader import RecordedBlocks, read_recording
+from coneskin.core.version import recorded_version, running_version
+from coneskin.robot.guard.signals.journal import INPUTS, SESSION_EVENTS, BlockKind, EventName, GuardEvent, decode_event
+from coneskin.robot.guard.signals.outputs import Output
+from coneskin.scene.values.scene import Commissioning, Scene
+
+from .event_differences import event_differences
+from .replay import MOST_DIFFERENCES, Replay
+
+if TYPE_CHECKING:
+    from coneskin.scene.build import SensorOnArm
+
+__all__ = ["Run", "read_run", "replay"]
+
+_TOLD = 1.0  # s of a run between two words on how far it is
+_HEADER = {"scene": str, "name": str, "folder": str, "clocks": dict}
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Recorded run.
+
+    Attributes:
+        header: scene, versions and times; see ``coneskin.session.session``.
+        blocks: all that was recorded after the header, in the order in which it was written; to be iterated over as
+            often as one likes. Those of a file are read from it anew each time, so that a long run is never in memory.
+        defects: what the recording lacks, or what stands in it at the wrong place; empty where it is whole and closed.
+        copies: blocks that stand at another place as well: the header, and the surfaces below the sensors.
+    """
+
+    header: dict[str, Any]
+    blocks: Iterable[Block]
+    defects: tuple[Defect, ...] = ()
+    copies: tuple[Block, ...] = ()
+
+    @property
+    def start(self) -> float:
+        """Host time at which the run was started [s]."""
+        start: float = self.header["clocks"]["monotonic"]
+        return start
+
+    @property
+    def complete(self) -> bool:
+        """True where nothing is missing and nothing is out of place."""
+        return not self.defects
+
+    @property
+    def missing(self) -> str:
+        """The defects in a sentence; empty where there are none."""
+        return "; ".join(defect.describe(self.start, _kind_name) for defect in self.defects)
+
+    @property
+    def gap(self) -> float:
+        """Time from which on inputs are missing [s]: what follows cannot be compared. Infinite where none are."""
+        return min(
+            (min(defect.since, defect.until) for defect in self.defects if defect.inputs_missing), default=math.inf
+        )
+
+    @property
+    def events(self) -> list[GuardEvent]:
+        """Events of the run, as they were recorded."""
+        return [decode_event(block) for block in self.select(kinds=frozenset({BlockKind.EVENT}))]
+
+    def select(
+        self, since: float = -math.inf, until: float = math.inf, kinds: frozenset[int] | None = None
+    ) -> Iterator[Block]:
+        """Yield blocks of a time and of kinds; what is outside is not read from the file, as far as it can be.
+
+        Args:
+            since: the smallest time [s, host clock].
+            until: the largest.
+            kinds: of block, see ``BlockKind``; None for all.
+        """
+        if isinstance(self.blocks, RecordedBlocks):
+            yield from self.blocks.select(since, until, kinds)
+            return
+        for block in self.blocks:
+            if since <= block.time <= until and (kinds is None or block.kind in kinds):
+                yield block
+
+    def scene(self) -> Scene:
+        """Return the scene of the run. No file that it names is looked for or opened.
+
+        Raises:
+            SceneError: this version of coneskin cannot read it.
+        """
+        from coneskin.scene.reader import parse_scene
+
+        header = self.header
+        folder = Path(header["folder"])
+        return parse_scene(header["scene"], header["name"], folder, recorded=True, commissioning=self.commissioning)
+
+    @property
+    def commissioning(self) -> Commissioning | None:
+        """What was known of the scene's commissioning; a replay does not look again.
+
+        A recording from before there were records has none, and its arm moved away without.
+        """
+        before = {"valid": True, "note": "recorded before there were commissioning records"}
+        return Commissioning.from_message(self.header.get("commissioning", before))
+
+    @property
+    def recorded_by(self) -> str:
+        """Version of coneskin that recorded the run, such as ``0.1.0 (984714c)``; empty where it does not tell."""
+        return recorded_version(self.header)
+
+    def other_code(self) -> tuple[str, ...]:
+        """Return in what today's code differs from what recorded the run, before any input: version, filled-in values.
+
+        Raises:
+            SceneError: this version of coneskin cannot read the scene.
+        """
+        from coneskin.scene.resolved_settings import changed_settings
+
+        then, now = self.recorded_by or "an unknown version", running_version()
+        words = () if then == now else (f"recorded by coneskin {then}, replayed by {now}",)
+        changed = changed_settings(self.header.get("resolved"), self.scene())
+        return *words, *(f"the scene is filled in otherwise than when it was recorded: {what}" for what in changed)
+
+    def place_sensors(self) -> list[SensorOnArm]:
+        """Return the places of the sensors on the arm, with the surfaces of links that the recording carries.
+
+        Raises:
+            SceneError: this version of coneskin cannot read the scene, or a sensor lies on a mesh that is not carried.
+            RecordingError: a surface is damaged.
+        """
+        from coneskin.scene.build import place_on_arm
+        from coneskin.scene.surface_record import decode_surfaces
+
+        surfaces = frozenset({BlockKind.SURFACE})
+        carried = [*self.copies, *self.select(kinds=surfaces)]
+        return place_on_arm(self.scene(), decode_surfaces(block for block in carried if block.kind in surfaces))
+
+    def replay(self, scene: Scene | None = None) -> Replay:
+        """Run the recording again through today's guard; arguments and errors as of ``replay``."""
+        return replay(self, scene)
+
+    def timeline(self, events: Sequence[GuardEvent] | None = None) -> list[str]:
+        """Return a line of text for each event, with its time since the start of the run.
+
+        Args:
+            events: those of a replay; by default the recorded ones.
+        """
+        from .event_text import describe
+
+        return [describe(event, self.start) for event in (self.events if events is None else events)]
+
+
+def read_run(path: Path | str, progress: Callable[[float], None] | None = None) -> Run:
+    """Read a recorded run.
+
+    Args:
+        path: the recording, or the folder of a run with one in it.
+        progress: called now and then with the fraction of the files that is scanned.
+
+    Raises:
+        RecordingError: there is none, or it has no header.
+    """
+    path = Path(path)
+    if path.is_dir():
+        if not (path / "run.rec").exists() and (runs := sorted(path.glob("*/run.rec"))):
+            raise RecordingError(f"{path} is a folder of {len(runs)} runs: name one of them, such as {runs[-1].parent}")
+        path = path / "run.rec"
+    recording = read_recording(path, progress)
+    first = next(iter(recording.blocks), None)
+    if first is None or first.kind != BlockKind.HEADER:
+        first = next((block for block in recording.copies if block.kind == BlockKind.HEADER), None)
+    if first is None:
+        raise RecordingError(f"{path} has no header: the run ended before it began")
+    try:
+        header = read_json(first.payload)
+        if wrong := [key for key, kind in _HEADER.items() if not isinstance(header[key], kind)]:
+            raise ValueError(f"{', '.join(wrong)} of another kind")
+        if not is_time(header["clocks"]["monotonic"]):
+            raise ValueError("clocks.monotonic is no time in seconds")
+        Commissioning.from_message(header.get("commissioning"))
+    except (ValueError, TypeError, KeyError) as exc:
+        raise RecordingError(f"{path} has a header that this coneskin cannot read: {exc}") from exc
+    blocks: Iterable[Block] = recording.blocks
+    if isinstance(blocks, RecordedBlocks):
+        blocks = replace(blocks, hidden=blocks.hidden | {BlockKind.HEADER})
+    else:
+        blocks = tuple(block for block in blocks if block.kind != BlockKind.HEADER)
+    run = Run(header, blocks, recording.defects, recording.copies)
+    return replace(run, defects=tuple(sorted((*_left_out(run.events), *run.defects), key=lambda found: found.since)))
+
+
+def replay(run: Run, scene: Scene | None = None, progress: Callable[[float], None] = lambda _: None) -> Replay:
+    """Feed the run's inputs to a new guard.
+
+    Args:
+        run: the recorded run.
+        scene: another scene than the run's own, to see what it would have done.
+        progress: called now and then with the fraction of a run in a file that is done.
+
+    Raises:
+        SceneError: the scene cannot be read or built.
+        RecordingError: a block holds what no guard records.
+    """
+    from coneskin.robot.guard.quiet_inputs import BATCH, take_inputs
+    from coneskin.scene.build import build_core
+
+    if scene is not None and scene.commissioning is None:
+        scene = replace(scene, commissioning=run.commissioning)
+    core = build_core(run.scene(), run.place_sensors()) if scene is None else build_core(scene)
+    outputs: list[Output] = []
+    take = partial(core.take, out=outputs)
+    gap, recorded = run.gap, run.events
+    first = last = None
+    frames = 0
+    begin, end = (run.blocks.since, run.blocks.until) if isinstance(run.blocks, RecordedBlocks) else (0.0, math.inf)
+    told = begin
+    inputs: list[Block] = []
+    for block in run.blocks:
+        if block.time - told > _TOLD:
+            told = block.time
+            progress((told - begin) / (end - begin))
+        first, last = block.time if first is None else first, block.time
+        if block.kind in INPUTS and block.time < gap:
+            inputs.append(block)
+            if block.kind == BlockKind.SKIN:
+                frames += len(block.payload)
+            if len(inputs) == BATCH:
+                take_inputs(core, inputs, take)
+                inputs.clear()
+    take_inputs(core, inputs, take)
+    progress(1.0)
+    events = [output for output in outputs if isinstance(output, GuardEvent)]
+    then = [event for event in recorded if event.name not in SESSION_EVENTS and event.time < gap]
+    again = events
+    if gap < math.inf:  # an input is recorded before its events, so a run that was cut off may lack the last of these
+        again = again[: len(then)]
+    differences = list(islice(event_differences(then, again, run.start), MOST_DIFFERENCES))
+    duration = 0.0 if first is None or last is None else last - first
+    return Replay(events, recorded, len(then), differences, frames, duration, run.missing, run.other_code())
+
+
+def _kind_name(kind: int) -> str:
+    return BlockKind(kind).name if kind in BlockKind.__members__.values() else str(kind)
+
+
+def _left_out(events: Sequence[GuardEvent]) -> Iterator[Defect]:
+    """Yield what the guard says that it left out."""
+    for event in events:
+        if event.name == EventName.RECORDING_GAP:
+            since, until = event.details.get("since"), event.details.get("until")
+            if not (is_time(since) and is_time(until)):
+                raise RecordingError(f"the event {event.name} of {event.time:.6f} s does not say from and until when")
+            count = event.details.get("blocks")
+            blocks = count if type(count) is int else 0
+            yield Defect(DefectKind.LEFT_OUT, since, until, blocks=blocks, note=str(event.details.get("what")))

@@ -1,0 +1,232 @@
+"""Picture of a recorded run: joint speeds, speed slider and touch over time, and the arm with the point touched."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coneskin.core.errors import RecordingError, RobotConnectionError
+from coneskin.core.picture_file import write_picture
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent, stopping_contact
+from coneskin.scene.values.scene import Scene
+
+from .run import Run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from coneskin.scene.build import SensorOnArm
+
+__all__ = ["draw_run"]
+
+_MARKS = {"speed_reduced": "slows", "resumed": "goes on", "standstill": "stands", "latched": "latched"}
+_MAX_GAP = 0.05  # s between two states, from which on nothing is drawn between them: nobody has measured it
+_MIN_SPACING = 0.08  # of the width; marks that are closer share a label
+_JOINTS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:cyan")  # red is the touch
+
+
+def draw_run(run: Run, path: Path) -> None:
+    """Draw a run into a file, in the format of its suffix (png, svg, pdf).
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+        RecordingError: the file cannot be written, or its suffix is another.
+    """
+    write_picture(path, "the picture of a run", lambda: _compose(run), RecordingError)
+
+
+def _compose(run: Run) -> Figure:
+    from matplotlib.figure import Figure
+
+    scene = run.scene()
+    states, slider = _measured(run, scene)
+    contact = _first(run.events, "contact")
+    stopping = _first(run.events, "stopping")
+    origin = next((event for event in (contact, stopping) if event is not None), None)
+    first = next(iter(run.blocks), None)
+    zero = origin.time if origin else 0.0 if first is None else first.time
+    word = "touch" if contact else "stop" if stopping else "start"  # of what happens at zero
+    window = (zero - 0.3, _last(run.events, zero) + 0.2)
+    stop = next((event for event in run.events if event.name == "stopping" and "contact" in event.details), None)
+    contact = (stopping_contact(stop, run.events) if stop else _first(run.events, "contact_located", zero)) or contact
+    figure = Figure(figsize=(12.0, 7.6 if slider else 6.4), layout="constrained")
+    heights = (1.0, 0.4, 1.0) if slider else (1.0, 1.0)
+    grid = figure.add_gridspec(len(heights), 2, width_ratios=(1.5, 1.0), height_ratios=heights)
+    _draw_speeds(figure.add_subplot(grid[0, 0]), states, run.events, zero, window, word)
+    if slider:
+        _draw_slider(figure.add_subplot(grid[1, 0]), slider, zero, window)
+    _draw_touch(figure.add_subplot(grid[-1, 0]), run, scene, zero, window)
+    figure.axes[-1].set_xlabel(f"time since the {'touch was seen' if contact else word} [ms]")
+    if scene.arm is not None and states:
+        axes = figure.add_subplot(grid[:, 1], projection="3d")
+        _draw_arm(axes, scene, run.place_sensors(), states, contact, zero, word)
+    return figure
+
+
+def _vector(event: GuardEvent, key: str) -> tuple[float, float, float]:
+    found = event.details.get(key)
+    if not isinstance(found, list) or len(found) != 3 or not all(isinstance(x, float) and abs(x) < 1e3 for x in found):
+        raise RecordingError(f"the event {event.name} of {event.time:.6f} s has no {key} of 3 numbers")
+    x, y, z = found
+    return x, y, z
+
+
+def _first(events: list[GuardEvent], name: str, since: float = 0.0) -> GuardEvent | None:
+    return next((event for event in events if event.name == name and event.time >= since), None)
+
+
+def _last(events: list[GuardEvent], zero: float) -> float:
+    """Return when the reaction is over [s]: the arm is latched, or goes on; a guard that ends does not count."""
+    latched, ending = _first(events, "latched", zero), _first(events, "ending", zero)
+    if latched is not None and ending is not None and latched.time >= ending.time:
+        latched = None
+    over = latched or _first(events, "resumed", zero)
+    return zero + 1.0 if over is None else over.time
+
+
+def _marks(events: list[GuardEvent], zero: float, window: tuple[float, float]) -> list[tuple[float, str]]:
+    """Return the moments after the touch [s] in the window and their labels; moments close together share one."""
+    found = [(event.time, words) for name, words in _MARKS.items() if (event := _first(events, name, zero)) is not None]
+    marks: list[tuple[float, str]] = []
+    for time, words in sorted((item for item in found if item[0] <= window[1]), key=lambda item: item[0]):
+        if marks and time - marks[-1][0] < _MIN_SPACING * (window[1] - window[0]):
+            marks[-1] = (marks[-1][0], f"{marks[-1][1]}, {words}")
+        else:
+            marks.append((time, words))
+    return marks
+
+
+def _draw_slider(axes: Any, slider: list[tuple[float, float]], zero: float, window: tuple[float, float]) -> None:
+    axes.plot(
+        [1e3 * (t - zero) for t, _ in slider], [100.0 * f for _, f in slider], drawstyle="steps-post", color="0.2"
+    )
+    axes.axvline(0.0, color="tab:red", lw=1.0)
+    axes.set_ylabel("speed slider [%]")
+    axes.set_ylim(0.0, 105.0)
+    axes.set_xlim(*(1e3 * (t - zero) for t in window))
+    axes.grid(alpha=0.3)
+
+
+def _measured(run: Run, scene: Scene) -> tuple[list[ControllerState], list[tuple[float, float]]]:
+    """Return the states of the arm, and time and position of its speed slider."""
+    if scene.arm is None:
+        return [], []
+    driver = load_driver(arm_model(scene.arm.model).family)
+    states: list[ControllerState] = []
+    slider: list[tuple[float, float]] = []
+    for block in run.select(kinds=frozenset({BlockKind.ARM})):
+        with suppress(RobotConnectionError):  # what the guard could not read either, and has reported
+            states.append(driver.decode_state(block.time, block.payload))
+    for block in run.select(kinds=frozenset({BlockKind.SLIDER})):
+        with suppress(RobotConnectionError):
+            slider.append((block.time, driver.decode_speed_fraction(block.payload)))
+    return states, slider
+
+
+def _draw_speeds(
+    axes: Any,
+    states: list[ControllerState],
+    events: list[GuardEvent],
+    zero: float,
+    window: tuple[float, float],
+    word: str,
+) -> None:
+    shown = [state for state in states if window[0] <= state.time <= window[1]]
+    times: list[float] = []
+    measured: list[Sequence[float]] = []
+    for before, state in zip([None, *shown], shown, strict=False):
+        if before is not None and state.time - before.time > _MAX_GAP:
+            gap = 1e3 * (before.time - zero), 1e3 * (state.time - zero)
+            axes.axvspan(*gap, color="0.9", label="_")
+            axes.text(sum(gap) / 2.0, 0.02, "no states", ha="center", fontsize=7, transform=axes.get_xaxis_transform())
+            times.append(gap[0])
+            measured.append([math.nan] * 6)
+        times.append(1e3 * (state.time - zero))
+        measured.append(state.qd)
+    for joint in range(6):
+        speeds = [qd[joint] for qd in measured]
+        axes.plot(times, speeds, lw=1.3, color=_JOINTS[joint], label=f"joint {joint + 1}")
+    axes.axvline(0.0, color="tab:red", lw=1.0)
+    style = {"transform": axes.get_xaxis_transform(), "fontsize": 8}
+    axes.text(0.0, 1.01, f"{word} ", color="tab:red", ha="right", **style)
+    for time, words in _marks(events, zero, window):
+        axes.axvline(1e3 * (time - zero), color="0.6", lw=0.7, ls=":")
+        axes.text(1e3 * (time - zero), 1.01, f" {words}", color="0.3", ha="left", **style)
+    axes.set_ylabel("joint speed [rad/s]")
+    axes.set_xlim(*(1e3 * (t - zero) for t in window))
+    axes.legend(fontsize=7, ncols=2, loc="best")
+    axes.grid(alpha=0.3)
+
+
+def _draw_touch(axes: Any, run: Run, scene: Scene, zero: float, window: tuple[float, float]) -> None:
+    from coneskin.skin.detection.frame.reading import read
+    from coneskin.skin.wire import FrameDecoder
+
+    sensors = {(item.sensor.device_id, item.sensor.sensor_id): item.sensor for item in scene.sensors}
+    series: dict[str, tuple[list[float], list[float]]] = {item.sensor.name: ([], []) for item in scene.sensors}
+    decoder = FrameDecoder()
+    for block in run.select(kinds=frozenset({BlockKind.SKIN})):
+        for frame in decoder.feed(block.payload):
+            sensor = sensors.get((frame.device, frame.sensor))
+            if sensor is not None and window[0] <= block.time <= window[1]:
+                times, levels = series[sensor.name]
+                times.append(1e3 * (block.time - zero))
+                levels.append(read(sensor, frame).level)
+    for item in scene.sensors:
+        axes.plot(*series[item.sensor.name], lw=1.2, label=item.sensor.name)
+        axes.axhline(item.sensor.thresholds.touch_level, color="tab:red", lw=0.8, ls="--")
+        axes.axhline(item.sensor.thresholds.release_level, color="0.5", lw=0.8, ls="--")
+    axes.set_ylabel("touch level (dashed: on, off)")
+    axes.set_xlim(*(1e3 * (t - zero) for t in window))
+    axes.set_ylim(-0.02, 1.0)
+    axes.legend(fontsize=7)
+    axes.grid(alpha=0.3)
+
+
+def _draw_arm(
+    axes: Any,
+    scene: Scene,
+    sensors: list[SensorOnArm],
+    states: list[ControllerState],
+    contact: GuardEvent | None,
+    zero: float,
+    word: str,
+) -> None:
+    from coneskin.robot.arm.kinematics import link_pose
+    from coneskin.robot.arm.skeleton import skeleton
+    from coneskin.robot.arm.ur_models import arm_model
+
+    assert scene.arm is not None
+    arm = arm_model(scene.arm.model)
+    touched = min(states, key=lambda state: abs(state.time - zero))
+    for state, colour, label in ((states[-1], "0.7", "at the end"), (touched, "tab:blue", f"at the {word}")):
+        axes.plot(*zip(*skeleton(arm, state.q), strict=True), "-o", ms=3, lw=3, color=colour, label=label)
+    label = "sensor: ends and middle"
+    for placed in sensors:
+        base_link = link_pose(arm, touched.q, placed.link)
+        for u in (0.0, 0.5, 1.0):
+            frustum = placed.frustum.frustum
+            ring = [base_link.apply(placed.frustum.point(u * frustum.slant, frustum.wrap * k / 48)) for k in range(49)]
+            axes.plot(*zip(*ring, strict=True), lw=0.8, color="tab:green", label=label)
+            label = "_"  # once is enough
+        if contact is not None and contact.details.get("sensor") == placed.name:
+            point = base_link.apply(_vector(contact, "point"))
+            normal = base_link.rotate(_vector(contact, "normal"))
+            axes.scatter(*([value] for value in point), color="tab:red", s=30, label="touch and normal")
+            axes.quiver(*point, *normal, length=0.2, color="tab:red", lw=1.5)
+    axes.set_box_aspect((1, 1, 1), zoom=0.88)  # room for the label of z, which the layout does not know
+    reach = 0.6 * (abs(arm.a[1]) + abs(arm.a[2]))
+    middle = [0.5 * (min(c) + max(c)) for c in zip(*skeleton(arm, touched.q), strict=True)]
+    for centre, setter in zip(middle, (axes.set_xlim, axes.set_ylim, axes.set_zlim), strict=True):
+        setter(centre - reach, centre + reach)
+    axes.set_xlabel("x [m]", labelpad=9.0)
+    axes.set_ylabel("y [m]", labelpad=9.0)
+    axes.set_zlabel("z [m]", labelpad=6.0)
+    axes.legend(fontsize=7, loc="upper left")
+    axes.set_title(f"{arm.name}, base frame", fontsize=9)

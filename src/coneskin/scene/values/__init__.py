@@ -1,0 +1,1 @@
+"""Values that a scene file is read into."""

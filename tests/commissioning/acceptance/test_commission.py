@@ -1,0 +1,96 @@
+"""A commissioning with the process of a virtual skin: a right one passes, a wrong one is named; the command itself."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from coneskin.cli import main
+from coneskin.commissioning.acceptance.commission import Commissioner, commission_virtual_skin
+from coneskin.core.errors import SkinConnectionError
+from coneskin.scene.reader import load_scene, parse_scene
+from coneskin.scene.values.scene import Scene
+from coneskin.testing.forearm import forearm_scene
+
+TEXT = forearm_scene(reaction='kind = "retreat"').replace("[[link.sensor]]", '[[link.sensor]]\nname = "forearm skin"')
+Output = pytest.CaptureFixture[str]
+
+
+def saved(folder: Path, text: str = TEXT) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def wired(keys: str) -> Scene:
+    """The scene of a skin whose wires are exchanged against TEXT."""
+    return parse_scene(TEXT.replace("radius1_mm", f"{keys}\nradius1_mm"))
+
+
+@pytest.mark.long
+@pytest.mark.processes
+def test_a_right_skin_passes_and_the_record_is_valid(tmp_path: Path, capsys: Output) -> None:
+    path = saved(tmp_path)
+    assert main(["guard", str(path), "--check"]) == 0
+    assert "NOT VALID: the arm only stops; there is no commissioning record" in capsys.readouterr().out
+    assert main(["commission", str(path), "--simulated", "--by", "a test", "--json"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [line["kind"] for line in lines if line["kind"] != "reading"] == ["mark", "passed"] * 5 + ["sensor", "end"]
+    assert lines[-1]["passed"] is True
+    assert main(["guard", str(path), "--check", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["commissioning"].endswith("by a test, 5 marks")
+
+
+@pytest.mark.long
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    ("keys", "cause"),
+    [
+        ('radial_positive = "A"', "A and B were exchanged (their wires"),
+        ('angular_positive = "D"', "C and D were exchanged (their wires"),
+        ('radial_positive = "A"\nangular_positive = "D"', "A and B, and C and D, were exchanged"),
+    ],
+)
+def test_exchanged_wires_fail_and_are_named(keys: str, cause: str) -> None:
+    record = Commissioner(parse_scene(TEXT), simulated=True, wired_as=wired(keys)).run()
+    assert not record.passed
+    assert f"it reads as if {cause}" in record.cause
+    assert not all(mark.passed for mark in record.marks)
+
+
+@pytest.mark.long
+@pytest.mark.processes
+def test_a_program_commissions_its_virtual_skin() -> None:
+    known = commission_virtual_skin(parse_scene(TEXT)).commissioning
+    assert known is not None
+    assert known.valid
+    assert "5 marks touched by this program" in known.note
+
+
+def test_simulated_touches_are_refused_for_a_real_skin(tmp_path: Path, capsys: Output) -> None:
+    path = saved(tmp_path, TEXT.replace('kind = "virtual"', 'kind = "serial"\nport = "/dev/null"'))
+    assert main(["commission", str(path), "--simulated"]) == 1
+    assert "only a person can touch it" in capsys.readouterr().err
+    with pytest.raises(SkinConnectionError, match="nobody can touch it: use --simulated"):
+        Commissioner(load_scene(saved(tmp_path)))
+    assert [item.name for item in tmp_path.iterdir()] == ["scene.toml"]
+
+
+def test_an_interrupt_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Commissioner, "run", interrupted)
+    assert main(["commission", str(saved(tmp_path)), "--simulated"]) == 130
+    assert [item.name for item in tmp_path.iterdir()] == ["scene.toml"]
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_the_marks_are_listed_for_a_posture(tmp_path: Path, capsys: Output) -> None:
+    path = saved(tmp_path, TEXT.replace('kind = "virtual"', 'kind = "serial"\nport = "/dev/null"'))
+    assert main(["commission", str(path), "--list", "--posture-deg=0,-90,0,0,0,0"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert len(listed) == 5
+    assert all("(12:00 is towards the base's +x)" in line for line in listed), "the forearm is upright"
+    with pytest.raises(SystemExit):
+        main(["commission", str(path), "--list", "--posture-deg=0,1"])

@@ -1,0 +1,49 @@
+"""Skin watch of commissioning and calibration: a touch whose inputs contradict each other is told, not passed on."""
+
+import pytest
+
+from coneskin.commissioning.acceptance import skin_watch
+from coneskin.scene.reader import parse_scene
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
+from coneskin.skin.wire import FrameDecoder, encode
+from coneskin.testing.forearm import forearm_scene
+
+SCENE = parse_scene(forearm_scene())
+SENSOR = SCENE.sensors[0].sensor
+
+
+class Line:
+    """A source of frames of a touch off the middle, one every millisecond; an input of C has this gain."""
+
+    def __init__(self, gain: float) -> None:
+        skin = VirtualSkin([SENSOR], [ScriptedTouch(0.3, 9.0, 0.05, 1.0, force=5.0)], seed=1)
+        self._packets, self._gain, self._decoder = skin.packets(), gain, FrameDecoder()
+        self.time = 0.0
+
+    def __enter__(self) -> "Line":
+        return self
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def read(self, timeout: float) -> bytes:
+        self.time += 1e-3
+        (frame,) = self._decoder.feed(next(self._packets)[1])
+        return encode(
+            frame._replace(touch_c=round(self._gain * frame.touch_c), radial_c=round(self._gain * frame.radial_c))
+        )
+
+
+@pytest.mark.parametrize(("gain", "words"), [(1.0, ""), (0.93, "check their gains and wires")])
+def test_inputs_that_contradict_each_other_are_told(gain: float, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    line = Line(gain)
+    monkeypatch.setattr(skin_watch, "open_source", lambda *_: line)
+    monkeypatch.setattr(skin_watch.time, "monotonic", lambda: line.time)
+    with skin_watch.SkinWatch(SCENE) as watch:
+        watch.await_ready()
+        for _ in range(600):
+            readings = watch.read(0.0)  # the procedure goes on: it names exchanged wires by the places
+        assert readings[SENSOR.name] is not None
+        assert watch.contradiction(SENSOR.name).endswith(words)
+        assert bool(watch.contradiction(SENSOR.name)) == bool(words)

@@ -1,0 +1,207 @@
+"""Examination of a virtual skin in simulated time: a right one is found right, each wrong one is named."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from coneskin.commissioning.examination.doctor import Doctor
+from coneskin.commissioning.examination.scene_patch import set_sensor_keys
+from coneskin.commissioning.examination.wire_order import touch_places
+from coneskin.core.finding import Finding
+from coneskin.scene.reader import parse_scene
+from coneskin.skin.detection.events import SkinFault, TouchMoved
+from coneskin.skin.detection.stream import TouchStream
+from coneskin.skin.electronics import Polarity
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.virtual.imperfections import Imperfections
+from coneskin.skin.virtual.memory_source import MemorySource
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
+
+TEXT = """\
+[[link]]
+name = "tube"
+[[link.sensor]]
+name = "skin"
+radius1_mm = 41
+radius2_mm = 40
+height_mm = 240
+wrap_deg = 330
+[source]
+kind = "serial"
+port = "/dev/nothing"
+baud = 115200
+"""
+#: wires, electrode that the firmware drives in the angular phase, and what the scene must have
+MENDED = [
+    ("BACD", "C", {"radial_positive": "A"}),
+    ("ABCD", "D", {"angular_positive": "D"}),
+    ("BACD", "D", {"radial_positive": "A", "angular_positive": "D"}),
+]
+
+
+class Finger:
+    """What touches the virtual skin on the source's own clock."""
+
+    def __init__(self, skin: VirtualSkin, source: MemorySource) -> None:
+        self._skin, self._source = skin, source
+
+    def touch(self, u: float, phi: float, force: float, duration: float, sensor: str) -> None:
+        start = self._source.clock() + 0.01
+        self._skin.touch(ScriptedTouch(start, start + duration, u, phi, force=force, sensor=sensor))
+
+    def release(self) -> None:
+        self._skin.release(self._source.clock() + 0.01)
+
+
+def examine(text: str = TEXT, touches: bool = True, **skin_options: object) -> Doctor:
+    """The examination of a skin that may differ from the scene."""
+    scene = parse_scene(text)
+    sensors = skin_options.pop("sensors", parse_scene(TEXT).sensors[0].sensor)
+    options = {"rate_hz": 250.0, "model": "ladder", **skin_options}
+    skin = VirtualSkin(sensors, **options)  # type: ignore[arg-type]
+    source = MemorySource(skin)
+    doctor = Doctor(scene, touches=touches, clock=source.clock)
+    assert scene.source is not None
+    with source:
+        doctor.examine_skin(source, scene.source.settings, Finger(skin, source))
+    return doctor
+
+
+def finding(doctor: Doctor, item: str) -> Finding:
+    (found,) = (one for one in doctor.findings if one.item == item)
+    return found
+
+
+def test_a_right_skin_is_found_right() -> None:
+    doctor = examine()
+    assert {one.verdict for one in doctor.findings} == {"ok"}
+    assert doctor.patches == []
+    assert finding(doctor, "skin, rate").value == "250 frames/s"
+    assert finding(doctor, "line").value == "250 frames/s take 78 % of 115200 baud"
+
+
+@pytest.mark.parametrize("wires", ["CDAB", "ACBD", "ABDC"])
+def test_wires_that_must_be_moved_are_named(wires: str) -> None:
+    doctor = examine(wires=wires)
+    found = finding(doctor, "skin, wires")
+    moved = [pair for pair in zip("ABCD", wires, strict=True) if pair[0] != pair[1]]
+    assert found.value == "; ".join(f"terminal {terminal} has electrode {letter}" for terminal, letter in moved)
+    assert found.remedy.endswith(", ".join(f"{terminal} to {letter}" for terminal, letter in moved))
+    assert doctor.patches == []
+
+
+@pytest.mark.parametrize(("wires", "firmware", "keys"), MENDED)
+def test_what_the_scene_can_mend_is_patched_and_then_read_where_it_is_touched(
+    wires: str, firmware: str, keys: dict[str, str]
+) -> None:
+    right = parse_scene(TEXT).sensors[0].sensor
+    made = replace(right, polarity=Polarity("B", firmware))  # type: ignore[arg-type]
+    doctor = examine(wires=wires, sensors=made)
+    assert finding(doctor, "skin, wires").verdict == "bad"
+    assert [(patch.sensor, patch.keys) for patch in doctor.patches] == [("skin", keys)]
+    patched = parse_scene(set_sensor_keys(TEXT, 0, keys)).sensors[0].sensor
+    place = 0.07, math.radians(80.0)
+    read, faults = _touch(made, patched, wires, place)
+    assert faults == []
+    assert read is not None
+    assert math.hypot(read.u - place[0], 0.04 * (read.phi - place[1])) < 0.003
+    read, faults = _touch(made, right, wires, place)
+    astray = read is None or math.hypot(read.u - place[0], 0.04 * (read.phi - place[1])) > 0.05
+    assert astray or faults, "without the patch it is mirrored, or contradicts itself"
+
+
+def _touch(
+    made: Sensor, read: Sensor, wires: str, place: tuple[float, float]
+) -> tuple[TouchMoved | None, list[SkinFault]]:
+    """The last place of a touch of 1 s, read as a scene says, if it has one, and the faults."""
+    touch = ScriptedTouch(1.0, 2.0, *place, force=8.0, radius=0.006)
+    skin = VirtualSkin(made, [touch], rate_hz=250.0, wires=wires, duration=2.0)
+    stream, events = TouchStream([read]), []
+    for time, data in skin.packets():
+        if time > 1.95:
+            break
+        events += stream.feed(data, time)
+    places = [event for event in events if isinstance(event, TouchMoved)]
+    return places[-1] if places else None, [event for event in events if isinstance(event, SkinFault)]
+
+
+@pytest.mark.parametrize(
+    ("skin", "item", "verdict", "said"),
+    [
+        ({"imperfections": Imperfections(clock_ratio=2.0)}, "skin, clock", "bad", "2.000 device seconds in a second"),
+        ({"imperfections": Imperfections(noise_counts=0.0)}, "skin, noise", "bad", "radial_current 0.0"),
+        ({"imperfections": Imperfections(noise_counts=12.0)}, "skin, noise", "warning", "touch_supply 1"),
+        ({"imperfections": Imperfections(supply_ratio=0.8)}, "skin, supply", "bad", "2482 counts"),
+        ({"rate_hz": 150.0}, "skin, rate", "warning", "150 frames/s"),
+        ({"rate_hz": 50.0}, "skin, rate", "bad", "50 frames/s"),
+        ({"rate_hz": 320.0}, "line", "warning", "100 % of 115200 baud"),
+    ],
+)
+def test_what_an_untouched_skin_has_wrong_is_named(skin: dict[str, object], item: str, verdict: str, said: str) -> None:
+    found = finding(examine(touches=False, **skin), item)
+    assert found.verdict == verdict
+    assert said in found.value
+    assert found.remedy
+
+
+def test_a_low_rate_for_which_the_scene_is_made_is_a_warning() -> None:
+    patient = TEXT + "[monitoring]\nskin_silence_ms = 100\n"
+    assert finding(examine(patient, touches=False, rate_hz=41.0), "skin, rate").verdict == "warning"
+    assert finding(examine(patient, touches=False, rate_hz=38.0), "skin, rate").verdict == "bad"
+
+
+def test_frames_of_touches_are_held_against_themselves() -> None:
+    right = finding(examine(), "skin, chi-squared")
+    assert right.verdict == "ok"
+    off = finding(examine(TEXT.replace("wrap_deg = 330", "wrap_deg = 330\npulldown_ohm = 11000")), "skin, chi-squared")
+    assert off.verdict == "bad"
+    assert "measure pulldown_ohm" in off.remedy
+    mirrored = finding(examine(wires="BACD"), "skin, chi-squared")
+    assert (mirrored.verdict, mirrored.value) == ("not tried", "the wires are not in order")
+
+
+def test_another_sheet_resistance_is_named_with_what_to_write() -> None:
+    sensor = parse_scene(TEXT.replace("wrap_deg = 330", "wrap_deg = 330\nupper_sheet_ohm = 1400\n")).sensors[0].sensor
+    parts = parse_scene(TEXT).sensors[0].sensor.electronics
+    made = Sensor(sensor.frustum, electronics=parts, upper_sheet_ohms=1400.0, name="skin")
+    found = finding(examine(touches=False, sensors=made), "skin, radial current")
+    assert found.verdict == "warning"
+    assert "write upper_sheet_ohm = 14" in found.remedy
+    assert finding(examine(touches=False, wires="ACBD"), "skin, radial current").remedy == (
+        "no current: the wires of A and B are open, or on the electrodes of both sheets"
+    )
+
+
+def test_a_skin_with_another_number_is_named() -> None:
+    doctor = examine(TEXT.replace('name = "skin"', 'name = "skin"\nid = 3'))
+    assert finding(doctor, "sensor 0/3").value == "it sends nothing; there are 0/0 (device/sensor)"
+    assert finding(doctor, "sensor 0/0").verdict == "warning"
+    assert finding(doctor, "skin, wires").verdict == "not tried"
+
+
+def test_a_stream_that_is_no_frame_is_named_by_the_diagnosis() -> None:
+    class Text(MemorySource):
+        def read(self, timeout: float) -> bytes:
+            return super().read(timeout) and b"sensor 1: 1023 1020\r\n"
+
+    source = Text(VirtualSkin(parse_scene(TEXT).sensors[0].sensor, model="ladder"))
+    doctor = Doctor(parse_scene(TEXT), clock=source.clock)
+    with source:
+        doctor.examine_skin(source, {"baud": 115200})
+    found = finding(doctor, "frames")
+    assert found.verdict == "bad"
+    assert "sensor 1: 1023" in found.value
+    assert "binary" in found.remedy
+
+
+def test_touches_that_nobody_makes_are_not_tried() -> None:
+    assert finding(examine(touches=False), "skin, wires").verdict == "not tried"
+
+
+def test_the_four_places_are_on_the_sensor_near_their_electrodes() -> None:
+    sensor = parse_scene(TEXT).sensors[0].sensor
+    places = touch_places(sensor)
+    assert places["B"][0] < 0.2 * sensor.frustum.slant < 0.8 * sensor.frustum.slant < places["A"][0]
+    assert places["D"][1] < 0.2 * sensor.frustum.wrap < 0.8 * sensor.frustum.wrap < places["C"][1]

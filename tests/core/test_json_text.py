@@ -1,0 +1,63 @@
+"""JSON of strangers: what is wrong with it is a ValueError, and no number overflows where it meets a float."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from coneskin.core.json_text import read_json
+from coneskin.core.recording.block import Block
+from coneskin.robot.guard.signals.journal import BlockKind, body_places, contact_force, decode_event
+
+ANY_TEXT = st.text(st.characters())  # half pairs of UTF-16 among them
+VALUES = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(), st.lists)
+
+
+@given(VALUES)
+def test_what_json_writes_is_read_as_it_was(value: Any) -> None:
+    assert read_json(json.dumps(value).encode()) == value
+
+
+@given(st.integers(-(10**99), 10**99))
+@example(-(10**99))
+def test_whole_numbers_of_a_hundred_digits_are_exact(value: int) -> None:
+    found = read_json(b"%d" % value)
+    assert (type(found), found) == (int, value)
+
+
+def test_longer_whole_numbers_are_floats() -> None:
+    assert read_json(b"1" + b"0" * 200) == 1e200
+    assert read_json(b"1" * 400) == math.inf
+    assert read_json(b"[-" + b"1" * 5000 + b"]") == [-math.inf]
+
+
+@given(st.recursive(ANY_TEXT, lambda inner: st.lists(inner) | st.dictionaries(ANY_TEXT, inner)))
+@example("\udcff")
+@example({"\ud800": ["\udfff"]})
+def test_every_string_can_be_written_as_utf_8(value: Any) -> None:
+    found = json.dumps(read_json(json.dumps(value).encode()), ensure_ascii=False)
+    assert found.encode().decode() == found  # a lone half would raise
+
+
+def test_half_a_pair_is_written_out_and_a_whole_one_is_its_letter() -> None:
+    assert read_json(rb'["a\udcffb", "\\udcff", "\ud83e\udd16"]') == [r"a\udcffb", r"\udcff", "\N{ROBOT FACE}"]
+
+
+@pytest.mark.parametrize("text", [b"", b"{", b"\xff\xfe", b"[" * 100_000, b"nothing", b'"\xed\xa0\x80"'])
+def test_whatever_is_wrong_is_a_value_error(text: bytes) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        read_json(text)
+
+
+def test_huge_numbers_of_a_recording_are_no_force_and_no_place() -> None:
+    digits = b"1" * 400
+    assert contact_force(b'{"contact_force_N": ' + digits + b"}") is None
+    assert body_places(b'{"bodies_m": [[' + digits + b", 0, 0]]}") == ()
+
+
+def test_an_event_with_a_huge_number_can_be_told() -> None:
+    block = Block(BlockKind.EVENT, 1.0, b'["decelerating", {"speed": ' + b"1" * 400 + b"}]")
+    assert f"{decode_event(block).details['speed']:.3f} rad/s" == "inf rad/s"

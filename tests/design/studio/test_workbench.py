@@ -1,0 +1,229 @@
+"""Workbench of the studio: what its handles do, and that it writes what ``coneskin design`` writes."""
+
+import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from coneskin.core.errors import GeometryError
+from coneskin.design.link import LinkMesh
+from coneskin.design.link_design import design_link
+from coneskin.design.sheets.sheet_design import DesignOptions
+from coneskin.design.studio.design_text import design_facts, flat_drawing, warning_list
+from coneskin.design.studio.deviation_bands import deviation_bands
+from coneskin.design.studio.studio_page import StudioPage
+from coneskin.design.studio.workbench import Handles, Workbench, adjusted
+from coneskin.geometry.bend import Bend
+from coneskin.geometry.fit.cones import LinkFit
+from coneskin.geometry.fit.fitted_sheet import FittedSheet
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.placed_developable import PlacedDevelopable
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.pose import Pose
+from coneskin.geometry.ray_casting import RayCaster
+from coneskin.scene.reader import load_scene
+from coneskin.view.page_server import PageServer
+from tests.geometry.fit.test_seam_place import tube_with_wing
+from tests.geometry.synthetic import placed, revolve
+from tests.support.ruled_tube import oval_tube
+
+FULL = PlacedFrustum(Frustum(0.04, 0.06, 0.20), Pose.from_xyz_rpy((0.1, -0.2, 0.3), (0.4, 0.5, -0.6)))
+ROUND = math.tau * 0.03 + 0.08  # m; around a stadium of two flats of 40 mm and two half circles of 60 mm
+BENDS = tuple(
+    Bend(math.tau * arc / ROUND, turn)
+    for arc, turn in ((0.02, 0.0), (math.pi * 0.03, math.pi), (0.04, 0.0), (math.pi * 0.03, math.pi), (0.02, 0.0))
+)
+OVAL = PlacedDevelopable(Frustum(ROUND / math.tau, ROUND / math.tau, 0.20), FULL.link_frustum, BENDS)
+PART = PlacedFrustum(Frustum(0.04, 0.06, 0.20, math.radians(200.0)), FULL.link_frustum)
+HANDLES = Handles(0.03, 0.05, math.radians(150.0), math.radians(20.0))
+
+
+@pytest.mark.parametrize("found", [FULL, PART, OVAL], ids=["a full wrap", "a partial wrap", "an oval"])
+def test_an_adjusted_sheet_lies_within_the_found_one(found: PlacedFrustum) -> None:
+    sheet = adjusted(found, HANDLES)
+    for u in (0.0, sheet.frustum.slant):
+        for phi in (0.0, 1.0, sheet.frustum.wrap):
+            was_u, was_phi, off = found.locate(sheet.point(u, phi))
+            assert off == pytest.approx(0.0, abs=1e-12)
+            assert was_phi == pytest.approx(phi + math.radians(20.0))
+            along = was_u / found.frustum.slant * found.frustum.height
+            assert along == pytest.approx(0.03 if u == 0.0 else 0.15)
+            assert sheet.normal(phi) == pytest.approx(found.normal(was_phi))
+
+
+@pytest.mark.parametrize("found", [FULL, OVAL], ids=["a cone", "an oval"])
+def test_nothing_set_changes_nothing(found: PlacedFrustum) -> None:
+    assert adjusted(found, Handles()) == found
+
+
+def test_a_seam_that_is_turned_on_an_oval_leaves_it_where_it_was() -> None:
+    turned = adjusted(OVAL, Handles(seam=math.radians(60.0)))
+    assert turned.frustum == OVAL.frustum
+    assert turned.point(0.05, 0.4) == pytest.approx(OVAL.point(0.05, 0.4 + math.radians(60.0)), abs=1e-12)
+
+
+@pytest.mark.long
+def test_an_oval_link_is_found_shown_and_written(tmp_path: Path) -> None:
+    """The colours of the bands say what the tube is: its corners lie on the sheet, within the height of its facets."""
+    mesh = oval_tube(FULL.link_frustum, 0.1).mesh(around=120)
+    made = Workbench.of(LinkMesh("oval", mesh, "its own", ()))
+    (sheet,) = made.fit.sheets
+    bands = deviation_bands(RayCaster(mesh), sheet.placed, made.fit.tolerance)
+    assert {(band.low < 0.0 or band.high > 0.0) and max(-band.low, band.high) < 5e-4 for band in bands} == {True}
+    made.handle(0, Handles(0.01, 0.005, math.radians(200.0), math.radians(30.0)))
+    assert "<td>general cylinder</td>" in design_facts(made.designs)
+    made.write(tmp_path / "skin", pictures=False)
+    text = (tmp_path / "skin" / "sensor.toml").read_text(encoding="utf-8")
+    assert "bend_wrap_deg" in text
+    (tmp_path / "scene.toml").write_text(
+        '[[link]]\nname = "shell"\n[[link.sensor]]\nfile = "skin/sensor.toml"\n[source]\nkind = "virtual"\n'
+    )
+    (item,) = load_scene(tmp_path / "scene.toml").links[0].sensors
+    assert item.placed.point(0.03, 1.0) == pytest.approx(made.designs[0].active.point(0.03, 1.0), abs=1e-6)
+
+
+@pytest.mark.long
+def test_what_nobody_touched_is_written_as_by_design(tmp_path: Path) -> None:
+    """A tube with a wing at its foot, behind which the seam goes."""
+    link = LinkMesh("wing", tube_with_wing(0.7), "its own", ())
+    made = Workbench.of(link)
+    assert any("the link itself shields" in note for note in made.link.notes)
+    made.write(tmp_path / "studio", pictures=False)
+    design_link(link.mesh, tmp_path / "design", pictures=False)
+    written = [tomllib.loads((tmp_path / name / "sensor.toml").read_text()) for name in ("studio", "design")]
+    for one in written:
+        one.pop("name", None)
+    assert written[0] == written[1]
+
+
+def test_a_partial_wrap_is_not_turned_beyond_what_was_found() -> None:
+    sheet = adjusted(PART, Handles(wrap=math.radians(150.0), seam=math.radians(170.0)))
+    _, last, _ = PART.locate(sheet.point(0.05, sheet.frustum.wrap))
+    assert last == pytest.approx(PART.frustum.wrap)
+
+
+@pytest.mark.parametrize("handles", [Handles(0.1, 0.095), Handles(-0.01), Handles(0.0, -0.01), Handles(wrap=0.0)])
+def test_what_is_no_sheet_is_refused(handles: Handles) -> None:
+    with pytest.raises(GeometryError):
+        adjusted(FULL, handles)
+
+
+@pytest.fixture(scope="module")
+def bench() -> Workbench:
+    """A cone of 40 to 55 mm with shorter ones at its ends; the search for cones has tests of its own."""
+    mesh = placed(revolve([(0.0, 0.030), (0.02, 0.040), (0.18, 0.055), (0.20, 0.03)], 96, 4), Pose())
+    side = PlacedFrustum(Frustum(0.040, 0.055, 0.16), Pose(translation=(0.0, 0.0, 0.02)))
+    sheet = FittedSheet(side, 0.0, 2e-4, 1e-4, 0.0, 0.0, 0.8, 0.8, 0.0)
+    fit = LinkFit((sheet,), None, (), 1e-3, 0.2, 0.05, (), "", 1, "grid")
+    made = Workbench(LinkMesh("a <link>", mesh, "its own", ("a <note>",)), fit, DesignOptions(link="a link"))
+    made.handles = [Handles()]
+    made.update()
+    return made
+
+
+def test_the_bands_show_how_far_the_link_is_off_the_sheet(bench: Workbench) -> None:
+    (sheet,) = bench.fit.sheets
+    rays = RayCaster(bench.link.mesh)
+    on_it = {band.low for band in deviation_bands(rays, sheet.placed, 0.001)}
+    assert on_it == {-0.001 / 7.0} or max(map(abs, on_it)) < 0.0005
+    cone = sheet.frustum
+    inside = PlacedFrustum(
+        Frustum(cone.radius1 - 0.0008, cone.radius2 - 0.0008, cone.height), sheet.placed.link_frustum
+    )
+    bands = deviation_bands(rays, inside, 0.001)
+    assert all(band.low < 0.0008 for band in bands)
+    strongest = max(bands, key=lambda band: len(band.faces))
+    assert strongest.low < 0.0008 * math.cos(cone.half_angle) < strongest.high
+    assert strongest.colour[0] > 2 * strongest.colour[2], "what stands out is red"
+    assert sum(len(band.faces) for band in bands) == 2 * 40 * 96
+
+
+def test_a_handle_designs_the_sheet_again_and_is_said(bench: Workbench) -> None:
+    before = bench.designs[0].place.frustum.height
+    bench.handle(0, Handles(from_end1=0.02))
+    assert bench.designs[0].place.frustum.height == pytest.approx(before - 0.02)
+    assert f"{1e3 * (before - 0.02):.1f} mm" in design_facts(bench.designs)
+    bench.handle(0, Handles(from_end1=0.2))
+    assert bench.designs == ()
+    assert "a sheet needs 10 mm" in bench.warnings()[0]
+    bench.handle(0, Handles())
+    assert bench.designs[0].place.frustum.height == pytest.approx(before)
+
+
+def test_what_a_file_says_is_never_taken_for_html(bench: Workbench) -> None:
+    drawn = flat_drawing(bench.designs[0].cuts[0])
+    assert "<link>" not in drawn + warning_list(bench.warnings()) + design_facts(bench.designs)
+    assert "&lt;note&gt;" in warning_list(bench.warnings())
+    assert drawn.count("<svg") == 1
+
+
+@pytest.mark.long
+def test_it_writes_the_folder_that_a_scene_reads(bench: Workbench, tmp_path: Path) -> None:
+    bench.handle(0, Handles(from_end1=0.02))
+    files = bench.write(tmp_path / "skin", pictures=False)
+    assert {"report.md", "sensor.toml", "design.json"} <= set(files)
+    assert sum(name.startswith("cut/") and name.endswith(".dxf") for name in files) >= 7
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[[link]]\nname = "tube"\n[[link.sensor]]\nfile = "skin/sensor.toml"\n')
+    (sensor,) = load_scene(scene).sensors
+    assert sensor.placed.frustum.height == pytest.approx(bench.designs[0].active.frustum.height, abs=1e-6)
+    with pytest.raises(GeometryError, match="skin"):
+        bench.write(tmp_path / "skin", pictures=False)
+    bench.handle(0, Handles())
+
+
+def stl(mesh: Mesh) -> bytes:
+    corners = mesh.vertices[mesh.faces]
+    record = np.zeros(len(corners), np.dtype([("n", "<3f4"), ("v", "<9f4"), ("a", "<u2")]))
+    record["v"] = corners.reshape(-1, 9)
+    return bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes()
+
+
+def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench, tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="viser is not installed: no page is served")
+    other: list[LinkMesh] = []
+
+    def load(link: LinkMesh) -> Workbench:
+        other.append(link)
+        return bench
+
+    with PageServer("studio", port=18190, uploads=True) as server:
+        page = StudioPage(server, bench, tmp_path / "skin", False, load)
+        nodes = set(server.scene._handle_from_node_name)
+        assert {"/link", "/sheets/sheet 1/A", "/sheets/sheet 1/B", "/sheets/sheet 1/C", "/sheets/sheet 1/D"} <= nodes
+        assert "cm2" in page._facts.content
+        assert "<svg" in page._flat.content
+        page._upload = SimpleNamespace(value=SimpleNamespace(name="../evil<b>.txt", content=b"x"))
+        page._take_upload()
+        assert "&lt;b&gt;.txt is no" in page._said.content
+        page._upload.value = SimpleNamespace(name="../../tube.stl", content=b"solid nothing")
+        page._take_upload()
+        assert "tube.stl" in page._said.content
+        assert other == []
+        page._upload.value = SimpleNamespace(name="../../tube.stl", content=stl(bench.link.mesh))
+        page._take_upload()
+        assert [link.name for link in other] == ["tube"]
+        assert "1 sheets" in page._said.content
+
+
+def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: Workbench, tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="viser is not installed: no page is served")
+    data = stl(bench.link.mesh)
+
+    def load(link: LinkMesh) -> Workbench:
+        if link.name == "slow":  # while its sheets are looked for
+            page._upload.value = SimpleNamespace(name="quick.stl", content=data)
+            page._take_upload()
+        return replace(bench, link=link)
+
+    with PageServer("studio", port=18190, uploads=True) as server:
+        page = StudioPage(server, bench, tmp_path / "skin", False, load)
+        page._upload = SimpleNamespace(value=SimpleNamespace(name="slow.stl", content=data))
+        page._take_upload()
+        assert page._bench.link.name == "quick"
+        assert "quick.stl: 1 sheets" in page._said.content

@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coneskin.core.errors import SceneError
+from coneskin.impact.permissible_speed import speed_map
+from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
+from coneskin.impact.permissible_speed.extra_way import ExtraWay, extra_ways
+from coneskin.impact.permissible_speed.limits_file import parse_limits
+from coneskin.impact.permissible_speed.speed_map import LEVERS, contact_at, map_speeds
+from coneskin.impact.permissible_speed.speed_map_file import write_map
+from coneskin.impact.permissible_speed.speed_search import ForceLimits, keeps
+from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
+from coneskin.robot.arm.inertia import effective_mass
+from coneskin.robot.arm.kinematics import link_pose
+from coneskin.robot.arm.ur_inertias import arm_inertia
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.scene.reader import load_scene, parse_scene
+from coneskin.skin.padding import Padding
+from coneskin.testing.forearm import forearm_scene
+
+from .test_limits_file import TEXT
+
+MOTION = """
+[motion]
+waypoints_deg = [[-10, -90, 90, -90, -90, 0], [60, -90, 90, -90, -90, 0]]
+speed_deg_s = 60
+acceleration_deg_s2 = 400
+"""
+SCENE = forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n" + MOTION
+#: a free body: its contacts are over soon, and so is the test
+FREE = TEXT.replace("support_n_per_mm = 20\n", "")
+
+
+def test_the_masses_are_those_of_the_mass_matrix() -> None:
+    scene = parse_scene(SCENE)
+    patches = patches_of(scene)
+    assert len(patches) == 48
+    model, q = arm_model("UR5e"), scene.motion.waypoints[0] if scene.motion else ()
+    found = weigh("UR5e", patches, [q])[0]
+    for patch, mass in list(zip(patches, found, strict=True))[::7]:
+        normal = link_pose(model, q, patch.link).rotate(patch.normal)
+        exact = effective_mass(model, arm_inertia(model), q, patch.link, patch.point, normal)
+        assert mass == pytest.approx(exact, rel=1e-9)
+
+
+def test_the_positions_are_those_of_the_motion() -> None:
+    positions = np.array(motion_positions(parse_scene(SCENE)))
+    assert positions[:, 0].min() == pytest.approx(math.radians(-10.0))
+    assert positions[:, 0].max() == pytest.approx(math.radians(60.0))
+    assert np.ptp(positions[:, 1:], axis=0) == pytest.approx(0.0)
+
+
+@pytest.mark.long
+def test_a_map_keeps_the_limits_it_was_made_for_and_a_scene_takes_it(tmp_path: Path) -> None:
+    scene, limits = parse_scene(SCENE), parse_limits(FREE)
+    found = map_speeds(scene, limits)
+    (hand,) = limits.regions
+    for curve in found.curves:
+        assert curve.region == "hand"
+        assert all(a <= b for a, b in zip(curve.speeds, curve.speeds[1:], strict=False))
+        for lever, speed in zip(LEVERS[::3], curve.speeds[::3], strict=True):
+            contact = contact_at(speed, lever, curve.mass, hand, limits.measured, scene.padding, curve.extra)  # type: ignore[arg-type]
+            assert keeps(contact, hand.limits)
+    ways = extra_ways("UR5e", found.patches, motion_positions(scene))
+    for row, mass, way in zip(found.table.patches, found.masses, ways, strict=True):
+        assert found.curves[row.curve].mass >= mass
+        assert found.curves[row.curve].extra.up_to(way) == way
+        assert all(own >= anywhere for own, anywhere in zip(*_speeds(found, row), strict=True))
+    write_map(found, tmp_path / "impact.toml")
+    text = SCENE.replace('model = "UR5e"', 'model = "UR5e"\nspeed_limit_from = "impact.toml"')
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    taken = load_scene(tmp_path / "scene.toml").speed_limit
+    assert taken is not None
+    assert len(taken.patches) == len(found.patches)
+    for curve, read in zip(found.curves, taken.curves, strict=True):
+        assert read == pytest.approx(curve.speeds, abs=1.1e-5)
+        assert all(a <= b for a, b in zip(read, curve.speeds, strict=True))  # rounded down
+    assert taken.lowest == pytest.approx(found.table.lowest)
+    assert taken.verified_by == "other"
+
+
+def _speeds(found: object, row: object) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    curves = found.curves  # type: ignore[attr-defined]
+    return curves[row.curve].speeds, curves[row.any_curve].speeds  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("scene", "limits", "message"),
+    [
+        (forearm_scene(), TEXT, "need the \\[padding\\]"),
+        (SCENE.replace('kind = "stop"', 'kind = "slow"'), TEXT, "a reaction is slow"),
+        (SCENE, TEXT.replace("deceleration_rad_s2 = 9", "deceleration_rad_s2 = 11"), "must not be above"),
+        (SCENE, TEXT.replace('links = ["forearm"]', 'links = ["wrist_1"]'), "no .* may be struck by the forearm"),
+        (SCENE[SCENE.index("[padding]") : SCENE.index("[motion]")], TEXT, "need an \\[arm\\]"),
+    ],
+)
+def test_a_scene_without_what_is_needed_is_refused(scene: str, limits: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        map_speeds(parse_scene(scene), parse_limits(limits))
+
+
+def test_two_regions_of_one_name_keep_their_own_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second was searched with the limits of the first."""
+    limits = parse_limits(FREE)
+    (hand,) = limits.regions
+    softer = replace(hand, limits=ForceLimits(0.5 * hand.limits.transient, 0.5 * hand.limits.lasting))
+    monkeypatch.setattr(speed_map, "_MASSES", (8.0,))
+    monkeypatch.setattr(speed_map, "LEVERS", LEVERS[-1:])
+    speeds = []
+    for regions in ((softer,), (hand, softer)):
+        maker = speed_map._CurveMaker(replace(limits, regions=regions), Padding(), lambda _: None)
+        number = maker.number(3, 8.0, 8.0, ExtraWay())
+        speeds.append(maker.curves[number].speeds)
+    assert speeds[0] == speeds[1]
+
+
+def test_a_speed_keeps_the_limits_also_without_the_extra_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A body that swings may meet the arm harder where that goes less far; here, because it is made so."""
+    limits = parse_limits(FREE)
+
+    def gentler(speed: float, lever: float, *rest: Any) -> TwoMassContact:
+        *others, extra = rest
+        return contact_at(0.5 * speed if extra.lag else speed, lever, *others)
+
+    monkeypatch.setattr(speed_map, "contact_at", gentler)
+    monkeypatch.setattr(speed_map, "_MASSES", (8.0,))
+    monkeypatch.setattr(speed_map, "LEVERS", LEVERS[-1:])
+    maker = speed_map._CurveMaker(limits, Padding(), lambda _: None)
+    without, with_it = (maker.curves[maker.number(3, 8.0, 8.0, ExtraWay(lag))].speeds for lag in (0.0, 0.8))
+    assert with_it == without

@@ -1,0 +1,28 @@
+"""Scene of a simulated arm whose forearm has a sensor on an emulated Uno."""
+
+from __future__ import annotations
+
+from coneskin.scene.reader import parse_scene
+from coneskin.scene.values.scene import Scene
+from coneskin.testing.commissioned import commissioned
+from coneskin.testing.forearm import forearm_scene
+
+__all__ = ["board_scene"]
+
+# what the board's page says of an Uno: its bits, the resistance of its pins and switches, its rate on the line
+_SENSOR = "adc_bits = 11\nlead_ohm = [26, 3, 3, 26]"
+_BAUD = 500_000
+# patient, as the computer that emulates board and arm at once may stall; the watchdog of the board bites after 250 ms
+_LIMITS = "skin_silence_ms = 600\nskin_late_ms = 1000\narm_silence_ms = 300\nprogram_silence_ms = 500"
+
+
+def board_scene(host: str, port: str) -> Scene:
+    """Return the scene, commissioned.
+
+    Args:
+        host: of the simulated controller.
+        port: of the board.
+    """
+    text = forearm_scene(host, port=port, reaction='kind = "retreat"\ndistance_mm = 30', limits=_LIMITS)
+    text = text.replace("xyz_mm =", f"{_SENSOR}\nxyz_mm =")
+    return commissioned(parse_scene(text.replace('kind = "serial"', f'kind = "serial"\nbaud = {_BAUD}')))
