@@ -27,9 +27,9 @@ _HANG = 30.0  # s of processor time for one trial
 _CHILD = """
 import sys, time
 from pathlib import Path
-from coneskin.recording import Block
-from coneskin.recording_file.recorder import Recorder
-from coneskin.replay.run import read_run
+from coneskin.core.recording.block import Block
+from coneskin.core.recording.recorder import Recorder
+from coneskin.runs.replay.run import read_run
 blocks = list(read_run(sys.argv[1]).blocks)
 header = read_run(sys.argv[1]).header
 import json

@@ -85,8 +85,8 @@ _PUBLIC = {
     "design.sheets.sheet_design": "DesignOptions design_sheets",
     "core.version": "__version__",
     "core.errors": "Collision ConeSkinError FieldError GeometryError KinematicsError MeshError MissingExtra "
-    "RecordingError RobotConnectionError RobotError RobotRefused RobotTimeout SceneError SensorError SkinConnectionError SkinError "
-    "SkinTimeout",
+    "RecordingError RobotConnectionError RobotError RobotRefused RobotTimeout SceneError SensorError "
+    "SkinConnectionError SkinError SkinTimeout",
     "geometry.fit.cones": "find_cones",
     "geometry.fit.fit_options": "FitOptions",
     "geometry.frustum": "Frustum",

@@ -21,7 +21,7 @@ told_by_kernel = pytest.mark.skipif(
 _PROGRAM = """
 import os, subprocess, threading
 from pathlib import Path
-from coneskin.time_slice import shorten_time_slice
+from coneskin.core.time_slice import shorten_time_slice
 tell = lambda: print(Path("/proc/thread-self/sched").read_text().partition("se.slice")[2].split()[1])
 os.nice(3)
 tell()

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from coneskin import __version__
-from coneskin.core import version as code_version
+from coneskin.core import version
 from coneskin.core.version import code_commit, recorded_version, running_version
 
 
 def commit_of(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setattr(code_version, "__file__", str(folder / "src" / "coneskin" / "code_version.py"))
+    monkeypatch.setattr(version, "__file__", str(folder / "src" / "coneskin" / "core" / "version.py"))
     code_commit.cache_clear()
     try:
         return code_commit()
@@ -43,7 +43,7 @@ def test_code_that_was_installed_without_git_has_its_version_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert commit_of(tmp_path, monkeypatch) == ""
-    monkeypatch.setattr(code_version, "code_commit", lambda: "")
+    monkeypatch.setattr(version, "code_commit", lambda: "")
     assert running_version() == __version__
 
 

@@ -97,7 +97,7 @@ from pathlib import Path
 
 import distributed
 
-from coneskin.errors import RecordingError
+from coneskin.core.errors import RecordingError
 from coneskin.runs.what_if import dask_cluster
 from coneskin.runs.what_if.batch import judge_runs
 
