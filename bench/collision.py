@@ -31,8 +31,7 @@ from pathlib import Path
 from collision_cases import KINDS, RUN_UP_ACCELERATION, draw
 from report import commit, head, quantile
 
-from coneskin.impact.simulation.collision_run import CollisionRun
-from coneskin.impact.simulation.joint_program import ConstantSpeed
+from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
 from coneskin.skin.padding import Padding
 
 REACTIONS = ("stop", "retreat", "comply", "slow")

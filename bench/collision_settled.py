@@ -19,9 +19,8 @@ from collision_cases import RUN_UP_ACCELERATION, draw
 from report import head
 
 from coneskin.core.recording.block import Block
-from coneskin.impact.simulation.collision_run import CollisionRun
+from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
 from coneskin.impact.simulation.impact_outcome import CLAMP_TIME
-from coneskin.impact.simulation.joint_program import ConstantSpeed
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_event
 

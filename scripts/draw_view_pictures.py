@@ -45,8 +45,7 @@ def collision(folder: Path) -> Path:
     """Make the collision of docs/physics.md, and return its recording."""
     from coneskin.core.recording.block import Block
     from coneskin.core.recording.recorder import Recorder
-    from coneskin.impact.simulation.collision_run import CollisionRun
-    from coneskin.impact.simulation.joint_program import Waypoints
+    from coneskin.impact.simulation.collision_run import CollisionRun, Waypoints
     from coneskin.robot.guard.signals.journal import BlockKind
     from coneskin.scene.reader import parse_scene
 

@@ -61,7 +61,7 @@ HOMES = {
     "viser": ("src/coneskin/view/page_server.py",),
     "pinocchio": ("tests/support/pinocchio_arm.py",),
     "tomli_w": (
-        "src/coneskin/impact/permissible_speed/speed_map_file.py",
+        "src/coneskin/impact/permissible_speed/speed_map.py",
         "src/coneskin/scene/tables/link_tables.py",
         "src/coneskin/scene/setting_overrides.py",
     ),

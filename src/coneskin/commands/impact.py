@@ -98,8 +98,7 @@ def _with_reaction(scene: Scene, way: str) -> Scene:
 
 
 def _collide(scene: Scene, way: str, args: argparse.Namespace) -> ImpactOutcome:
-    from coneskin.impact.simulation.collision_run import CollisionRun
-    from coneskin.impact.simulation.joint_program import Waypoints
+    from coneskin.impact.simulation.collision_run import CollisionRun, Waypoints
 
     assert scene.motion is not None
     motion = scene.motion

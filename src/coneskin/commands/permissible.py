@@ -52,8 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute, print and write the speeds."""
     from coneskin.impact.permissible_speed.limits_file import read_limits
-    from coneskin.impact.permissible_speed.speed_map import map_speeds
-    from coneskin.impact.permissible_speed.speed_map_file import write_map
+    from coneskin.impact.permissible_speed.speed_map import map_speeds, write_map
     from coneskin.scene.reader import load_scene
 
     limits = read_limits(args.limits)
@@ -84,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _plain(found: SpeedMap) -> dict[str, Any]:
     """Return a map for JSON: the table of the file, with the heaviest mass at each patch."""
-    from coneskin.impact.permissible_speed.speed_map_file import map_table
+    from coneskin.impact.permissible_speed.speed_map import map_table
 
     table: dict[str, Any] = map_table(found)["speed_limit"]
     del table["digest"]  # of the file; this has more

@@ -8,9 +8,8 @@ from numpy.polynomial import polynomial
 from scipy.linalg import expm
 
 from coneskin.impact.permissible_speed import taylor_integrator
-from coneskin.impact.permissible_speed.collocation import POINTS, collocate
-from coneskin.impact.permissible_speed.contact_state import ContactState
-from coneskin.impact.permissible_speed.taylor_integrator import integrate
+from coneskin.impact.permissible_speed.contact_course import ContactState
+from coneskin.impact.permissible_speed.taylor_integrator import POINTS, collocate, integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.padding import Padding
 
@@ -119,7 +118,7 @@ def test_a_body_of_grams_that_stays_pressed_is_that_of_the_series_alone(
 ) -> None:
     course = integrate(pressed(body), 0.1)
     assert any(len(stretch.force) == POINTS + 1 for stretch in course.stretches)
-    monkeypatch.setattr(taylor_integrator, "_PATIENCE", 10**9)
+    monkeypatch.setattr(taylor_integrator, "_STEPS_TO_IMPLICIT", 10**9)
     alone = integrate(pressed(body), 0.1)
     assert all(len(stretch.force) > POINTS + 1 for stretch in alone.stretches)
     for name in ("peak", "last", "deepest", "impulse"):

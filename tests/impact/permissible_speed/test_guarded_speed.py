@@ -17,8 +17,7 @@ from coneskin.testing.forearm import forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
-from coneskin.impact.simulation.collision_run import CollisionRun
-from coneskin.impact.simulation.joint_program import ConstantSpeed
+from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
 
 #: the hand of tests/impact/simulation, behind more room for the slider to act
 START = tuple(math.radians(angle) for angle in (-30.0, -90.0, 90.0, -90.0, -90.0, 0.0))
@@ -45,7 +44,9 @@ by = "the constants of coneskin.impact.simulation.collision_run"
 def test_an_arm_that_asks_for_too_much_meets_the_hand_with_less_than_the_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(speed_map, "_MASSES", (8.0, 32.0, math.inf))  # others change little, and cost a search each
+    monkeypatch.setattr(
+        speed_map, "_CURVE_MASSES", (8.0, 32.0, math.inf)
+    )  # others change little, and cost a search each
     scene = parse_scene(
         forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n"
         "[motion]\nwaypoints_deg = [[-30, -90, 90, -90, -90, 0], [20, -90, 90, -90, -90, 0]]\n"

@@ -13,8 +13,7 @@ from coneskin.impact.permissible_speed import speed_map
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.impact.permissible_speed.extra_way import ExtraWay, extra_ways
 from coneskin.impact.permissible_speed.limits_file import parse_limits
-from coneskin.impact.permissible_speed.speed_map import LEVERS, contact_at, map_speeds
-from coneskin.impact.permissible_speed.speed_map_file import write_map
+from coneskin.impact.permissible_speed.speed_map import LEVERS, contact_at, map_speeds, write_map
 from coneskin.impact.permissible_speed.speed_search import ForceLimits, keeps
 from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
 from coneskin.robot.arm.inertia import effective_mass
@@ -111,7 +110,7 @@ def test_two_regions_of_one_name_keep_their_own_limits(monkeypatch: pytest.Monke
     limits = parse_limits(FREE)
     (hand,) = limits.regions
     softer = replace(hand, limits=ForceLimits(0.5 * hand.limits.transient, 0.5 * hand.limits.lasting))
-    monkeypatch.setattr(speed_map, "_MASSES", (8.0,))
+    monkeypatch.setattr(speed_map, "_CURVE_MASSES", (8.0,))
     monkeypatch.setattr(speed_map, "LEVERS", LEVERS[-1:])
     speeds = []
     for regions in ((softer,), (hand, softer)):
@@ -130,7 +129,7 @@ def test_a_speed_keeps_the_limits_also_without_the_extra_way(monkeypatch: pytest
         return contact_at(0.5 * speed if extra.lag else speed, lever, *others)
 
     monkeypatch.setattr(speed_map, "contact_at", gentler)
-    monkeypatch.setattr(speed_map, "_MASSES", (8.0,))
+    monkeypatch.setattr(speed_map, "_CURVE_MASSES", (8.0,))
     monkeypatch.setattr(speed_map, "LEVERS", LEVERS[-1:])
     maker = speed_map._CurveMaker(limits, Padding(), lambda _: None)
     without, with_it = (maker.curves[maker.number(3, 8.0, 8.0, ExtraWay(lag))].speeds for lag in (0.0, 0.8))

@@ -20,8 +20,7 @@ from coneskin.testing.forearm import forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
-from coneskin.impact.simulation.collision_run import CollisionRun
-from coneskin.impact.simulation.joint_program import ConstantSpeed
+from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
 
 START = tuple(math.radians(angle) for angle in (-2.0, -90.0, 90.0, -90.0, -90.0, 0.0))
 QD = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)

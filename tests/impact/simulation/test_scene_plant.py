@@ -16,9 +16,8 @@ from coneskin.testing.forearm import forearm_scene, start_with
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
-from coneskin.impact.simulation.mujoco_live_plant import LiveMujocoPlant
 from coneskin.impact.simulation.mujoco_plant import MujocoPlant
-from coneskin.impact.simulation.scene_plant import ScenePlant
+from coneskin.impact.simulation.scene_plant import LiveMujocoPlant, ScenePlant
 
 START = start_with(-10.0)
 PLACE = (-0.192, -0.120, 0.5875)

@@ -28,7 +28,7 @@ __all__ = ["ALONG", "AROUND", "ArmPatch", "motion_positions", "patches_of", "wei
 
 ALONG = 3  #: patches along a sheet: its two ends, and the middle
 AROUND = 16  #: around a whole turn
-_SAMPLES = 200  # joint positions of a motion that are looked at
+_SAMPLE_COUNT = 200  # joint positions of a motion that are looked at
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ def motion_positions(scene: Scene) -> list[tuple[float, ...]]:
         for step in range(21):
             found.append(tuple(p + (r - p) * step / 20 for p, r in zip(a, b, strict=True)))
     chance = random.Random(0)
-    while len(found) < _SAMPLES:
+    while len(found) < _SAMPLE_COUNT:
         found.append(tuple(chance.uniform(low, high) for low, high in zip(lowest, highest, strict=True)))
     return found
 

@@ -41,11 +41,11 @@ __all__ = ["ExtraWay", "extra_ways", "levers_and_changes", "worst_bend", "worst_
 
 #: m; radius of what is struck. The flatter it is, the sooner a link that tilts has pressed it
 BODY_RADIUS = 0.1
-_FARTHEST = 2.0  # rad of the leading joint; the mean lever of any way is at most that of this one
+_MAX_EXTRA_WAY = 2.0  # rad of the leading joint; the mean lever of any way is at most that of this one
 #: ways are rounded up to these, so that patches share their curves; larger ones are left
-_LAGS = (0.0, 0.2, 0.8, 1.6, 3.2, 6.4, 12.8)
-_BENDS = (0.0, 0.4, 0.8, 1.6, 3.2, 6.4, 12.8, 25.6)
-_NOTHING = 1e-9
+_LAG_GRID = (0.0, 0.2, 0.8, 1.6, 3.2, 6.4, 12.8)
+_BEND_GRID = (0.0, 0.4, 0.8, 1.6, 3.2, 6.4, 12.8, 25.6)
+_NO_EXTRA_WAY = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class ExtraWay:
 
     def rounded_up(self) -> ExtraWay:
         """Return the way with both rounded up to one of few values."""
-        return ExtraWay(_rounded_up(self.lag, _LAGS), _rounded_up(self.bend, _BENDS))
+        return ExtraWay(_rounded_up(self.lag, _LAG_GRID), _rounded_up(self.bend, _BEND_GRID))
 
     def up_to(self, most: ExtraWay) -> ExtraWay:
         """Return the way, with neither lag nor bend above those of another."""
@@ -89,7 +89,7 @@ class ExtraWay:
 
         A straight way with the mean lever ends where the bent one ends, and is ahead of it until then.
         """
-        return 1.0 + 0.5 * self.bend * min(angle, _FARTHEST) / lever
+        return 1.0 + 0.5 * self.bend * min(angle, _MAX_EXTRA_WAY) / lever
 
 
 def extra_ways(
@@ -173,4 +173,4 @@ def levers_and_changes(
 
 
 def _rounded_up(value: float, steps: Sequence[float]) -> float:
-    return min((step for step in steps if value <= step + _NOTHING), default=value)
+    return min((step for step in steps if value <= step + _NO_EXTRA_WAY), default=value)

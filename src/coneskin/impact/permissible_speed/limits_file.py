@@ -24,19 +24,19 @@ from .two_mass_contact import StruckBody
 
 __all__ = ["BodyRegion", "LimitsFile", "MeasuredReaction", "parse_limits", "read_limits"]
 
-_LIMITS = (
+_LIMIT_KEYS = (
     Key("edition", str),
     Key("transcribed_by", str),
     Key("verified_by", str),
     Key("region", dict),
 )
-_MEASURED = (
+_MEASURED_KEYS = (
     Key("reaction_ms", low=0.0, high=1000.0),
     Key("deceleration_rad_s2", low=0.1, high=100.0),
     Key("by", str),
     Key("servo_hz", float, 17.0, low=0.1, high=200.0),
 )
-_REGION = (
+_REGION_KEYS = (
     Key("name", str),
     Key("links", list, None),
     Key("mass_kg", float, None, low=1e-3, high=1000.0),
@@ -131,14 +131,14 @@ def parse_limits(text: str, name: str = "limits") -> LimitsFile:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as exc:
         raise SceneError([f"not TOML: {exc}"], name) from exc
-    problems = [f"unknown table [{table}]; known: limits, measured" for table in tables if table not in _TABLES]
-    for table, what in _TABLES.items():
+    problems = [f"unknown table [{table}]; known: limits, measured" for table in tables if table not in _TABLE_KEYS]
+    for table, what in _TABLE_KEYS.items():
         if not isinstance(tables.get(table), dict):
             problems.append(f"[{table}] is missing: {what}")
     if problems:
         raise SceneError(problems, name)
-    limits = check(tables["limits"], _LIMITS, "limits", problems)
-    measured = check(tables["measured"], _MEASURED, "measured", problems)
+    limits = check(tables["limits"], _LIMIT_KEYS, "limits", problems)
+    measured = check(tables["measured"], _MEASURED_KEYS, "measured", problems)
     for key in ("edition", "transcribed_by", "verified_by"):
         if not str(limits.get(key, "?")).strip():
             problems.append(f"limits.{key} must not be empty: a limit that nobody vouches for is none")
@@ -162,7 +162,7 @@ def parse_limits(text: str, name: str = "limits") -> LimitsFile:
     )
 
 
-_TABLES = {
+_TABLE_KEYS = {
     "limits": "edition, transcribed_by, verified_by and [[limits.region]]",
     "measured": "reaction_ms, deceleration_rad_s2 and by; how the guarded arm stops was measured by somebody",
 }
@@ -171,7 +171,7 @@ _TABLES = {
 def _region(row: Mapping[str, Any], where: str, problems: list[str]) -> BodyRegion | None:
     before = len(problems)
     names = row.get("links", [])
-    values = check({key: value for key, value in row.items() if key != "links"}, _REGION, where, problems)
+    values = check({key: value for key, value in row.items() if key != "links"}, _REGION_KEYS, where, problems)
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         problems.append(f"{where}.links must be a list of names of links, got {names!r}")
         names = []

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_map"]
 
-_LEVER = 4  # of LEVERS: 0.32 m/rad, about that of a forearm
-_MOST = 6  # sheets that are drawn
+_LEVER_INDEX = 4  # of LEVERS: 0.32 m/rad, about that of a forearm
+_MAX_SHEETS = 6  # sheets that are drawn
 
 
 def draw_map(scene: Scene, limits: LimitsFile, found: SpeedMap, path: Path) -> None:
@@ -44,16 +44,18 @@ def draw_map(scene: Scene, limits: LimitsFile, found: SpeedMap, path: Path) -> N
 def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:
     from matplotlib.figure import Figure
 
-    sheets = list(dict.fromkeys(patch.sensor for patch in found.patches))[:_MOST]
+    sheets = list(dict.fromkeys(patch.sensor for patch in found.patches))[:_MAX_SHEETS]
     figure = Figure(figsize=(12.0, 3.4 * max(2, len(sheets))), layout="constrained")
     left, right = figure.subfigures(1, 2, squeeze=False)[0]
-    highest = max(curve.speeds[_LEVER] for curve in found.curves)
-    lowest = min(curve.speeds[_LEVER] for curve in found.curves)
+    highest = max(curve.speeds[_LEVER_INDEX] for curve in found.curves)
+    lowest = min(curve.speeds[_LEVER_INDEX] for curve in found.curves)
     rows = left.subplots(len(sheets), 1, squeeze=False)[:, 0]
     for axes, name in zip(rows, sheets, strict=True):
         drawn = _draw_sheet(axes, scene, found, name, (0.98 * lowest, 1.02 * highest))
     left.colorbar(
-        drawn, ax=list(rows), label=f"permissible speed along the normal at a lever of {LEVERS[_LEVER]:g} m/rad [m/s]"
+        drawn,
+        ax=list(rows),
+        label=f"permissible speed along the normal at a lever of {LEVERS[_LEVER_INDEX]:g} m/rad [m/s]",
     )
     curves, forces = right.subplots(2, 1)
     _draw_curves(curves, found)
@@ -67,7 +69,7 @@ def _draw_sheet(axes: Any, scene: Scene, found: SpeedMap, name: str, scale: tupl
     rows = [(patch, row) for patch, row in zip(found.patches, found.table.patches, strict=True) if patch.sensor == name]
     along = sorted({patch.u for patch, _ in rows})
     around = sorted({patch.phi for patch, _ in rows})
-    speeds = {(patch.u, patch.phi): found.curves[row.curve].speeds[_LEVER] for patch, row in rows}
+    speeds = {(patch.u, patch.phi): found.curves[row.curve].speeds[_LEVER_INDEX] for patch, row in rows}
     columns = around if around[-1] > wrap - 1e-6 else [*around, wrap]  # a full wrap ends where it begins
     grid = [[speeds[u, around[n % len(around)]] for n in range(len(columns))] for u in along]
     drawn = axes.pcolormesh(
@@ -90,7 +92,7 @@ def _draw_curves(axes: Any, found: SpeedMap) -> None:
     own, anywhere = ({getattr(row, name) for row in found.table.patches} for name in ("curve", "any_curve"))
     named: dict[int, str] = {}
     for what, numbers in (("any position", anywhere), *([("motion", own)] if found.table.lowest else [])):
-        ranked = sorted(numbers, key=lambda number: found.curves[number].speeds[_LEVER])
+        ranked = sorted(numbers, key=lambda number: found.curves[number].speeds[_LEVER_INDEX])
         for word, number in {ranked[-1]: ("fastest", ranked[-1]), ranked[0]: ("slowest", ranked[0])}.values():
             named[number] = f"{what}, {word}" if len(ranked) > 1 else what
     for number, curve in enumerate(found.curves):
@@ -116,8 +118,8 @@ def _draw_forces(axes: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -
         curve = next((item for item in found.curves if item.region == region.name), None)
         if curve is None:
             continue
-        speed = curve.speeds[_LEVER]
-        contact = contact_at(speed, LEVERS[_LEVER], curve.mass, region, limits.measured, padding, curve.extra)
+        speed = curve.speeds[_LEVER_INDEX]
+        contact = contact_at(speed, LEVERS[_LEVER_INDEX], curve.mass, region, limits.measured, padding, curve.extra)
         course = integrate(contact)
         (line,) = axes.plot(
             [1e3 * t for t in times], [course.force(t) for t in times], label=f"{region.name} at {speed:.2f} m/s"

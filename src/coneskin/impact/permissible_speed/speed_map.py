@@ -15,12 +15,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
 from coneskin.core.version import __version__
+from coneskin.scene.tables.speed_limit_check import limit_digest
 from coneskin.scene.tables.speed_limit_table import SPEED_LIMIT_FORMAT, limit_fingerprint
 from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
+from coneskin.scene.values.whole_file import write_whole
 from coneskin.skin.padding import Padding
 
 from .arm_patches import motion_positions, patches_of, weigh
@@ -34,18 +37,18 @@ if TYPE_CHECKING:
 
     from .arm_patches import ArmPatch
 
-__all__ = ["LEVERS", "SpeedCurve", "SpeedMap", "contact_at", "map_speeds"]
+__all__ = ["LEVERS", "SpeedCurve", "SpeedMap", "contact_at", "map_speeds", "map_table", "write_map"]
 
 #: m/rad; a UR20 reaches 1.75 m
 LEVERS = (0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28, 1.8)
 #: kg; a range of masses is looked at at these within it, and at the next beyond
-_MASSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)
-_IMMOVABLE = 1e6  # kg; no contact slows it down, but where it brakes it goes beyond as its servos do
+_CURVE_MASSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)
+_IMMOVABLE_MASS = 1e6  # kg; no contact slows it down, but where it brakes it goes beyond as its servos do
 _NO_WAY = ExtraWay()
-_ANYWHERE = 300  # joint positions that are looked at where the arm may be anywhere
-_MISSED = 1.1  # factor for what they may miss of the most
-_FASTEST = 100.0  # m/s of a contact
-_MARGIN = 0.05  # rad around a motion, within which its curves hold
+_POSITION_COUNT = 300  # joint positions that are looked at where the arm may be anywhere
+_SAMPLING_FACTOR = 1.1  # factor for what they may miss of the most
+_MAX_CONTACT_SPEED = 100.0  # m/s of a contact
+_MOTION_MARGIN = 0.05  # rad around a motion, within which its curves hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +107,12 @@ def contact_at(
             its way.
     """
     turn = 2.0 * math.pi * measured.servo
-    mass = min(mass, _IMMOVABLE)
+    mass = min(mass, _IMMOVABLE_MASS)
     servo = mass * turn * turn, 2.0 * mass * turn
     reaction = measured.reaction + extra.delay(speed, lever, measured.deceleration, turn)
 
     def driven(stretch: float) -> TwoMassContact:
-        towards = min(stretch * speed, _FASTEST)
+        towards = min(stretch * speed, _MAX_CONTACT_SPEED)
         return TwoMassContact(
             DrivenArm(towards, mass, *servo, reaction=reaction, deceleration=stretch * measured.deceleration * lever),
             region.body,
@@ -157,8 +160,8 @@ def map_speeds(
         weights = weigh(scene.arm.model, patches, positions)
         extras = extra_ways(scene.arm.model, patches, positions)
         lightest, masses = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
-        lowest = tuple(min(values) - _MARGIN for values in zip(*scene.motion.waypoints, strict=True))
-        highest = tuple(max(values) + _MARGIN for values in zip(*scene.motion.waypoints, strict=True))
+        lowest = tuple(min(values) - _MOTION_MARGIN for values in zip(*scene.motion.waypoints, strict=True))
+        highest = tuple(max(values) + _MOTION_MARGIN for values in zip(*scene.motion.waypoints, strict=True))
     maker = _CurveMaker(limits, padding, note)
     rows = []
     most = {link: _most([*extras, *everywhere], link, patches) for link in {patch.link for patch in patches}}
@@ -190,13 +193,15 @@ def map_speeds(
 
 def _any_positions() -> list[tuple[float, ...]]:
     chance = random.Random(0)
-    return [tuple(chance.uniform(-math.pi, math.pi) for _ in range(6)) for _ in range(_ANYWHERE)]
+    return [tuple(chance.uniform(-math.pi, math.pi) for _ in range(6)) for _ in range(_POSITION_COUNT)]
 
 
 def _most(extras: Sequence[ExtraWay], link: int, patches: Sequence[ArmPatch]) -> ExtraWay:
     """Return the most of the ways of a link's patches, and what a sample may miss."""
     own = [extra for extra, patch in zip(extras, (*patches, *patches), strict=True) if patch.link == link]
-    return ExtraWay(_MISSED * max(extra.lag for extra in own), _MISSED * max(extra.bend for extra in own))
+    return ExtraWay(
+        _SAMPLING_FACTOR * max(extra.lag for extra in own), _SAMPLING_FACTOR * max(extra.bend for extra in own)
+    )
 
 
 _Contacts = list[TwoMassContact]
@@ -215,9 +220,9 @@ class _CurveMaker:
     def number(self, link: int, lightest: float, heaviest: float, extra: ExtraWay) -> int:
         """Return the number of the curve of a link, for a range of masses [kg] and an extra way."""
         regions = tuple(region for region in self._limits.regions if not region.links or link in region.links)
-        first = max((n for n, mass in enumerate(_MASSES) if mass <= lightest), default=0)
-        last = min(n for n, mass in enumerate(_MASSES) if mass >= heaviest)
-        masses = _MASSES[first : last + 1]
+        first = max((n for n, mass in enumerate(_CURVE_MASSES) if mass <= lightest), default=0)
+        last = min(n for n, mass in enumerate(_CURVE_MASSES) if mass >= heaviest)
+        masses = _CURVE_MASSES[first : last + 1]
         key = regions, masses, extra
         if key not in self._numbers:
             least = min((self._search(r, mass, extra)[-1], r.name) for r in regions for mass in masses)[1]
@@ -288,3 +293,62 @@ def _check_speeds(scene: Scene, curves: list[SpeedCurve]) -> None:
                 ],
                 scene.name,
             )
+
+
+_FILE_HEADER = """\
+# Permissible speeds of a scene's skins, written by `coneskin permissible`. No safety assessment.
+# A scene takes them with speed_limit_from in [arm]. Change the limits, not this file, and write it anew.
+"""
+
+
+def map_table(found: SpeedMap) -> dict[str, Any]:
+    """Return the table of a map, in the units of the file."""
+    table = found.table
+    values: dict[str, Any] = {
+        "format": table.format,
+        "fingerprint": table.fingerprint,
+        "date": table.date,
+        "coneskin": table.coneskin,
+        "edition": table.edition,
+        "transcribed_by": table.transcribed_by,
+        "verified_by": table.verified_by,
+        "measured_by": table.measured_by,
+        "reaction_ms": 1e3 * table.reaction,
+        "deceleration_rad_s2": table.deceleration,
+    }
+    if table.lowest:
+        values["lowest_deg"] = [math.degrees(q) for q in table.lowest]
+        values["highest_deg"] = [math.degrees(q) for q in table.highest]
+    values["levers_mm"] = [1e3 * lever for lever in table.levers]
+    values["curve"] = [
+        {"region": curve.region}
+        | ({} if math.isinf(curve.mass) else {"mass_kg": curve.mass})
+        | {"lag_mm": 1e3 * curve.extra.lag, "bend_mm": 1e3 * curve.extra.bend}
+        | {"speeds_mm_s": [math.floor(1e5 * speed) / 1e2 for speed in curve.speeds]}
+        for curve in found.curves
+    ]
+    values["patch"] = [
+        {
+            "sensor": patch.sensor,
+            "u_mm": round(1e3 * patch.u, 6),
+            "phi_deg": round(math.degrees(patch.phi), 6),
+            "curve": patch.curve,
+            "any_curve": patch.any_curve,
+        }
+        for patch in table.patches
+    ]
+    return {"speed_limit": {"digest": limit_digest(values)} | values}
+
+
+def write_map(found: SpeedMap, path: Path) -> None:
+    """Write the file of a map, whole or not at all.
+
+    Raises:
+        SceneError: it cannot be written.
+    """
+    import tomli_w
+
+    try:
+        write_whole(path, _FILE_HEADER + tomli_w.dumps(map_table(found)))
+    except OSError as exc:
+        raise SceneError([f"the speeds {path} cannot be written: {exc.strerror or exc}"], path.name) from exc

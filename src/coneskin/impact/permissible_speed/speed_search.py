@@ -15,7 +15,7 @@ __all__ = ["LEAST_SPEED", "TOP_SPEED", "ForceLimits", "keeps", "permissible_spee
 TOP_SPEED = 5.0
 #: m/s; below, no speed counts as permissible
 LEAST_SPEED = 1e-3
-_PRECISION = 4e-3  # of the speed that is found
+_SPEED_TOLERANCE = 4e-3  # of the speed that is found
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def permissible_speed(
         low, high = LEAST_SPEED, least
         if low == high or not all_keep(low):
             return 0.0
-    while high > low * (1.0 + _PRECISION):
+    while high > low * (1.0 + _SPEED_TOLERANCE):
         middle = math.sqrt(low * high)
         if all_keep(middle):
             low = middle

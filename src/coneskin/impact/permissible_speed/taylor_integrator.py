@@ -5,33 +5,196 @@ beginning and the end of braking, separation. There the Taylor coefficients foll
 series, so that a step of order 18 costs little more than a dozen evaluations, and an event is a root of a polynomial
 that is there already. No step of it is ever repeated, and none has to creep across a kink.
 
-Where friction has had the time to end the fastest motion, as that of a body of grams that stays pressed, an implicit
-step is tried (``collocation``), which is a polynomial, too, and events are located on it in the same way. Where the arm
-stands and the vibration has died away the rest is its equilibrium.
+A light body that a heavy arm presses swings or creeps within microseconds, and from then on follows the arm. Once
+friction has ended that motion, an implicit step is tried: collocation at Radau points. It is L-stable, as long as the
+slow rest is smooth, and a polynomial too, so events are located on it in the same way. Once the arm stands and the
+vibration has died away, the rest is the equilibrium.
+
+Sources: length of the Taylor steps, Jorba and Zou, "A software package for the numerical integration of ODEs by means
+of high-order Taylor methods", Experimental Mathematics 14 (2005); implicit step, Hairer and Wanner, "Solving Ordinary
+Differential Equations II", section IV.5 (Radau IIA).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from operator import mul
+from typing import TYPE_CHECKING, Any
 
-from .collocation import POINTS, collocate
-from .contact_course import ContactCourse, Stretch
-from .contact_state import ContactState
-from .polynomial import evaluate, first_fall, greatest
-from .taylor_series import expand, reach
+from .contact_course import ContactCourse, ContactState, Stretch, evaluate, first_fall, greatest
 from .two_mass_contact import TwoMassContact
 
-__all__ = ["HORIZON", "integrate"]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["HORIZON", "POINTS", "Collocation", "collocate", "expand", "integrate", "reach"]
+
+_SERIES_ORDER = 18
+_SERIES_TOLERANCE = 1e-14  # of the last coefficients of a step, relative to the largest
+
+
+def expand(model: TwoMassContact, start: ContactState) -> tuple[list[float], ...]:
+    """Return the coefficients of compression [m], rate [m/s], place [m], speed [m/s] and force [N], lowest power first.
+
+    Args:
+        model: of the contact.
+        start: state around which they are taken; without a slope of the force there is no contact.
+    """
+    arm, body = model.arm, model.body
+    m1, m2, k2, c2 = 1.0 / arm.mass, 1.0 / body.mass, body.support, body.damping  # 0 of an infinite mass
+    k1, c1, loss = arm.stiffness, arm.damping, model.law.loss
+    s, w, x, v = [start.s], [start.w], [start.x], [start.v]
+    way = (start.way, start.drive, -0.5 * start.braking)
+    drive = (start.drive, -start.braking)
+    touching, slope = start.slope > 0.0, start.slope
+    e = [start.elastic]
+    f: list[float] = []
+    for n in range(_SERIES_ORDER):
+        if touching:
+            if n:
+                e.append(slope * s[n])
+            f.append(e[n] + loss * sum(map(mul, e, reversed(w))) if loss else e[n])
+        else:
+            f.append(0.0)
+        if m1:
+            p_n, d_n = way[n] if n < 3 else 0.0, drive[n] if n < 2 else 0.0
+            a1 = m1 * (k1 * (p_n - s[n] - x[n]) + c1 * (d_n - w[n] - v[n]) - f[n])
+        else:
+            a1 = -start.braking if n == 0 else 0.0
+        a2 = m2 * (f[n] - k2 * x[n] - c2 * v[n]) if m2 else 0.0
+        s.append(w[n] / (n + 1))
+        x.append(v[n] / (n + 1))
+        w.append((a1 - a2) / (n + 1))
+        v.append(a2 / (n + 1))
+    return s, w, x, v, f
+
+
+def reach(series: Sequence[Sequence[float]]) -> float:
+    """Return how far series reach [s]: until the last two terms of the first four would count."""
+    longest = math.inf
+    for terms in series[:4]:
+        scale = max(abs(terms[0]), abs(terms[1]) * 1e-9, 1e-12)
+        for power in (_SERIES_ORDER, _SERIES_ORDER - 1):
+            if last := abs(terms[power]):
+                longest = min(longest, (_SERIES_TOLERANCE * scale / last) ** (1.0 / power))
+    return longest
+
+
+#: of a step; its order is 2 POINTS - 1
+POINTS = 8
+_MAX_TURNS = 8
+_MIN_LENGTH = 1e-12  # m
+_NEWTON_TOLERANCE = 1e-10  # a change of this share of compression or place leaves its square of an error
+
+
+@dataclass(frozen=True, slots=True)
+class Collocation:
+    """Step that was found.
+
+    Attributes:
+        series: polynomials of compression, rate, place, speed and force in the time since the beginning, lowest power
+            first.
+        end: compression, rate, place and speed at its end.
+        tail: size of the last term, relative to the largest compression, place or force.
+    """
+
+    series: tuple[list[float], ...]
+    end: tuple[float, float, float, float]
+    tail: float
+
+
+def collocate(model: TwoMassContact, start: ContactState, length: float) -> Collocation | None:
+    """Return the step of a length [s], in contact throughout; None where Newton's method finds none.
+
+    Args:
+        model: of the contact.
+        start: state at the beginning, with padding and body touching.
+        length: of the step [s].
+    """
+    import numpy as np
+
+    arm, body, loss = model.arm, model.body, model.law.loss
+    m1, m2 = 1.0 / arm.mass, 1.0 / body.mass  # 0 of an infinite one
+    times, integral, powers, legendre = _rule()
+    times, ahead = times * length, integral * length
+    one, n = np.eye(POINTS), POINTS
+    way = start.way + times * (start.drive - 0.5 * start.braking * times) - start.s - start.x
+    drive = start.drive - start.braking * times
+    support = body.support * ahead + body.damping * one
+    servo = arm.stiffness * ahead + arm.damping * one if m1 else 0.0 * one
+    matrix = np.empty((2 * n, 2 * n))
+    matrix[:n, n:] = ahead @ (m1 * servo - m2 * support)
+    matrix[n:, n:] = one + ahead @ (m2 * support)
+    w, v = np.full(n, start.w), np.full(n, start.v)
+    for _ in range(_MAX_TURNS):
+        ds, dx = ahead @ w, ahead @ v
+        elastic, lossy = start.elastic + start.slope * ds, 1.0 + loss * w
+        force = elastic * lossy
+        a2 = m2 * (force - body.support * (start.x + dx) - body.damping * v)
+        if m1:
+            a1 = m1 * (arm.stiffness * (way - ds - dx) + arm.damping * (drive - w - v) - force)
+        else:
+            a1 = np.full(n, -start.braking)
+        pressed = (start.slope * lossy)[:, None] * ahead + loss * elastic[:, None] * one  # force over rate
+        pushed = ahead @ pressed
+        matrix[:n, :n] = one + ahead @ (m1 * servo) + (m1 + m2) * pushed
+        matrix[n:, :n] = -m2 * pushed
+        miss = np.concatenate((start.w + ahead @ (a1 - a2) - w, start.v + ahead @ a2 - v))
+        try:
+            change = np.linalg.solve(matrix, miss)
+        except np.linalg.LinAlgError:
+            return None
+        w, v = w + change[:n], v + change[n:]
+        size = max(_MIN_LENGTH, abs(start.s), float(np.abs(start.x + dx).max()))
+        if length * float(np.abs(change).max()) <= _NEWTON_TOLERANCE * size:
+            break
+    else:
+        return None
+    ds, dx = ahead @ w, ahead @ v
+    force = (start.elastic + start.slope * ds) * (1.0 + loss * w)
+    begins = np.array([start.s, start.w, start.x, start.v, start.elastic * (1.0 + loss * start.w)])
+    gains = np.stack((ds, w - start.w, dx, v - start.v, force - begins[4]))
+    sizes = np.array([size, size / length, size, size / length, float(np.abs(force).max())])
+    tail = float(np.max(np.abs(gains @ legendre) / sizes))
+    terms = gains @ powers / length ** np.arange(1.0, POINTS + 1.0)
+    series = tuple([float(first), *row] for first, row in zip(begins, terms.tolist(), strict=True))
+    return Collocation(series, (start.s + float(ds[-1]), float(w[-1]), start.x + float(dx[-1]), float(v[-1])), tail)
+
+
+@cache
+def _rule() -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return points in (0, 1], matrix of integrals up to them, and what gives powers and last term of gains there."""
+    import numpy as np
+    from numpy.polynomial import legendre
+
+    ends = np.zeros(POINTS + 1)
+    ends[-2:] = -1.0, 1.0
+    points = np.sort(legendre.legroots(ends).real)
+    for _ in range(3):
+        points -= legendre.legval(points, ends) / legendre.legval(points, legendre.legder(ends))
+    points[-1] = 1.0
+    basis = legendre.legvander(points, POINTS - 1)
+    sums = np.stack([legendre.legval(points, legendre.legint(row, lbnd=-1.0)) for row in np.eye(POINTS)], axis=1)
+    integral = 0.5 * np.linalg.solve(basis.T, sums.T).T
+    times = 0.5 * (points + 1.0)
+    powers = np.linalg.inv(times[:, None] ** np.arange(1, POINTS + 1)).T
+    whole = np.linalg.inv(legendre.legvander(np.concatenate(([-1.0], points)), POINTS))
+    for array in (times, integral, powers, whole):
+        array.setflags(write=False)
+    return times, integral, powers, whole[-1, 1:]
+
 
 #: s after which a contact is no transient one any more; ISO/TS 15066, 5.5.5.3
 HORIZON = 0.5
-_TAIL = 1e-9  # of the last term of an implicit step, relative to the largest
-_GAIN = 12.0  # times as long as one of the series an implicit step must be: so much more it costs
-_FADED = 20.0  # the fastest motion is over when it has fallen by this exponent
-_PATIENCE = 24  # steps without an event before an implicit one is tried
+_MAX_TAIL = 1e-9  # of the last term of an implicit step, relative to the largest
+_MIN_GAIN = 12.0  # times as long as one of the series an implicit step must be: so much more it costs
+_FADED_EXPONENT = 20.0  # the fastest motion is over when it has fallen by this exponent
+_STEPS_TO_IMPLICIT = 24  # steps without an event before an implicit one is tried
 _MAX_STEPS = 2_000_000
-_SETTLED = 1e-11  # of the force at rest, below which a vibration is over
+_SETTLED_SHARE = 1e-11  # of the force at rest, below which a vibration is over
 _SETTLED_COARSE = 1e-4  # the same, where only peak and rest are asked for
 _FREE, _SOFT, _HARD, _RELEASED = range(4)  #: apart; padding; bottomed out; receding faster than the padding follows
 
@@ -73,7 +236,7 @@ class _Integration:
         self.peak = self.peak_time = self.deepest = self.impulse = self.last = 0.0
         self.stretches: list[Stretch] = []
         self.pace = self.faded = self.ahead = 0.0
-        self.calm, self.patience = 0, _PATIENCE
+        self.calm, self.patience = 0, _STEPS_TO_IMPLICIT
 
     # one step
 
@@ -104,14 +267,16 @@ class _Integration:
 
     def _by_collocation(self, room: float) -> _Step | None:
         """Return a step of many times the length, where the fastest motion has died away; None where it has not."""
-        if self.mode not in (_SOFT, _HARD) or (not self.ahead and (self.calm < self.patience or self.faded < _FADED)):
+        if self.mode not in (_SOFT, _HARD) or (
+            not self.ahead and (self.calm < self.patience or self.faded < _FADED_EXPONENT)
+        ):
             return None
         start = self._state()
-        tried = self.ahead or _GAIN * self.pace  # shorter ones cost more than the series
-        while (h := min(tried, room)) >= _GAIN * self.pace:
+        tried = self.ahead or _MIN_GAIN * self.pace  # shorter ones cost more than the series
+        while (h := min(tried, room)) >= _MIN_GAIN * self.pace:
             found = collocate(self.model, start, h)
-            better = 0.85 * h * (_TAIL / max(found.tail, 1e-30)) ** (1.0 / POINTS) if found else 0.1 * h
-            if found and found.tail <= _TAIL:
+            better = 0.85 * h * (_MAX_TAIL / max(found.tail, 1e-30)) ** (1.0 / POINTS) if found else 0.1 * h
+            if found and found.tail <= _MAX_TAIL:
                 self.ahead = max(min(better, 4.0 * h), h if h < tried else 0.0)
                 return found.series, h, found.end
             tried = min(better, 0.5 * h)
@@ -160,7 +325,7 @@ class _Integration:
             if at is not None and (at < h or not event):
                 h, event = at, name
         if event:
-            after, self.calm, self.faded, self.patience, self.ahead = None, 0, 0.0, _PATIENCE, 0.0
+            after, self.calm, self.faded, self.patience, self.ahead = None, 0, 0.0, _STEPS_TO_IMPLICIT, 0.0
         self._note(s, f, h)
         if self.keep:
             self.stretches.append(Stretch(self.time, h, tuple(s), tuple(w), tuple(x), tuple(v), tuple(f)))
@@ -230,7 +395,7 @@ class _Integration:
             energy += 0.5 * arm.stiffness * lag * lag + 0.5 * (self.w + self.v) ** 2 / self.arm_mobility
         if self.body_mobility:
             energy += 0.5 * body.support * (self.x - x) ** 2 + 0.5 * self.v**2 / self.body_mobility
-        if math.sqrt(2.0 * energy * slope) > (_SETTLED if self.keep else _SETTLED_COARSE) * force:
+        if math.sqrt(2.0 * energy * slope) > (_SETTLED_SHARE if self.keep else _SETTLED_COARSE) * force:
             return False
         self.impulse += force * (self.horizon - self.time)
         if self.keep:

@@ -3,6 +3,11 @@
 One step is 1 ms: a frame of each sensor, which the guard reads a frame late. The controller has its cycle of 2 ms and
 obeys a command as late as was measured (bench/RESULTS.md: 5 ms from a stop sent to the first slower state); its targets
 move the plant, and what the plant measures is what the guard sees. The same seed gives the same run, bit by bit.
+
+In place of the guard, the force limit of a controller can be imitated: that of Universal Robots' safety system ("Tool
+force", "Elbow force": 150 N is a common setting, 100 to 250 N can be set). How it estimates the force is not published.
+Assumed: it knows the torques from outside without error, low-passed by 10 ms, and takes them for a force at the tool,
+or at the elbow, by least squares.
 """
 
 from __future__ import annotations
@@ -10,8 +15,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from coneskin.core.recording.block import Block
+from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
+from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetSpeedSlider
@@ -20,30 +31,115 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.sim.companion_processes import CompanionProcesses
 from coneskin.robot.sim.mock_arm import SLIDER, MockArm
+from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.scene.build import build_core
 from coneskin.scene.values.body import BodyScene
 from coneskin.scene.values.scene import Scene
 from coneskin.skin.padding import Padding
 from coneskin.skin.virtual.pressed_skin import PressedSkin
 
-from .force_limit import ForceLimit
-from .impact_outcome import ImpactMeter, ImpactOutcome
-from .joint_program import JointProgram
+from .impact_outcome import ImpactMeter, ImpactOutcome, TouchRecorder, TruthRecorder
 from .mujoco_plant import MujocoPlant
 from .scene_plant import currents_of, presses_of, sheets_of
-from .touch_recorder import TouchRecorder
-from .truth_recorder import TruthRecorder
 
-__all__ = ["PROTECTIONS", "CollisionRun"]
+__all__ = ["PROTECTIONS", "CollisionRun", "ConstantSpeed", "ForceLimit", "JointProgram", "Waypoints"]
+
+_FILTER_TIME = 0.01  # s
+_ELBOW_LINK = 2  # index of the link at whose far end it is
+_MIN_LEVER = 0.1  # of the longest; shorter ones say nothing of a force
+
+
+class ForceLimit:
+    """Force limit of one arm.
+
+    Args:
+        model: the arm.
+        limit: force at which it stops the arm [N].
+    """
+
+    def __init__(self, model: ArmModel, limit: float = 150.0) -> None:
+        self._model, self._limit = model, limit
+        self._torque: NDArray[np.float64] = np.zeros(JOINTS)
+
+    def exceeded(self, q: Sequence[float], torque: Sequence[float], step: float) -> bool:
+        """Take the torques from outside [N m] that have acted for a time [s]; tell whether the arm must stop."""
+        share = math.exp(-step / _FILTER_TIME)
+        self._torque = share * self._torque + (1.0 - share) * np.asarray(torque, float)
+        if not self._torque.any():
+            return False
+        return max(self._force(q, JOINTS), self._force(q, _ELBOW_LINK)) > self._limit
+
+    def _force(self, q: Sequence[float], link: int) -> float:
+        """Return the force at the end of a link that explains the torques best [N]."""
+        levers = np.array(point_jacobian(self._model, q, link)).T
+        force, *_ = np.linalg.lstsq(levers, self._torque, rcond=_MIN_LEVER)
+        return float(np.linalg.norm(force))
+
+
+_ARRIVAL_TOLERANCE = 1e-4  # rad from a waypoint
+
+
+class JointProgram(Protocol):
+    """Program that moves the arm."""
+
+    def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:
+        """Return joint speeds [rad/s] to go to and the acceleration of the leading joint; None at its end.
+
+        Args:
+            time: since it began [s].
+            q: commanded joint positions [rad].
+        """
+
+
+class ConstantSpeed:
+    """Program that turns the joints at constant speeds.
+
+    Args:
+        qd: joint speeds [rad/s].
+        acceleration: of the leading joint until then [rad/s^2].
+    """
+
+    def __init__(self, qd: Joints, acceleration: float = 20.0) -> None:
+        self._qd, self._acceleration = list(qd), acceleration
+
+    def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:  # noqa: ARG002
+        """Return the speeds; see `JointProgram`."""
+        return self._qd, self._acceleration
+
+
+class Waypoints:
+    """Program that goes through waypoints along straight lines in joint space, with a stop at each.
+
+    Args:
+        points: joint positions [rad].
+        speed: of the leading joint [rad/s].
+        acceleration: of the leading joint [rad/s^2].
+    """
+
+    def __init__(self, points: Sequence[Sequence[float]], speed: float, acceleration: float) -> None:
+        self._points = [list(point) for point in points]
+        self._speed, self._acceleration = speed, acceleration
+
+    def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:  # noqa: ARG002
+        """Return the speeds towards the next waypoint; see `JointProgram`."""
+        while self._points:
+            way = [goal - at for goal, at in zip(self._points[0], q, strict=True)]
+            left = max(map(abs, way))
+            if left > _ARRIVAL_TOLERANCE:
+                braking = math.sqrt(2.0 * 0.8 * self._acceleration * left)  # it sees a cycle late that it must brake
+                speed = min(self._speed, braking, left / CYCLE)
+                return [speed * value / left for value in way], self._acceleration
+            self._points.pop(0)
+        return None
+
 
 #: what protects the bodies: the scene's guard, the controller's own force limit, nothing
 PROTECTIONS = ("guard", "force limit", "nothing")
-_STEP = 0.001  # s
-_CYCLE = 0.002  # s
-_LATE = 5  # steps from a command to the control cycle that obeys it
-_LIMIT_LATE = 4  # steps from the force limit's decision to that cycle; assumed
-_ACTIVATION = 10.0  # s within which the guard must become active
-_AFTER = 0.01  # s for which a run goes on after the clamping force was taken
+_STEP_TIME = 0.001  # s
+_COMMAND_DELAY = 5  # steps from a command to the control cycle that obeys it
+_FORCE_LIMIT_DELAY = 4  # steps from the force limit's decision to that cycle; assumed
+_ACTIVATION_TIMEOUT = 10.0  # s within which the guard must become active
+_SETTLE_TIME = 0.01  # s for which a run goes on after the clamping force was taken
 
 
 class CollisionRun:
@@ -103,14 +199,14 @@ class CollisionRun:
         self._began = math.nan
         self._steps = 0
         self._note = note
-        self._truth, self._touches = TruthRecorder(_STEP), TouchRecorder()
+        self._truth, self._touches = TruthRecorder(_STEP_TIME), TouchRecorder()
 
     @property
     def outcome(self) -> ImpactOutcome:
         """Outcome so far."""
         return self.meter.outcome
 
-    def run(self, program: JointProgram, longest: float = 3.0, after: float = _AFTER) -> ImpactOutcome:
+    def run(self, program: JointProgram, longest: float = 3.0, after: float = _SETTLE_TIME) -> ImpactOutcome:
         """Wait until the guard is active, let the program move the arm, and see what comes of it.
 
         Args:
@@ -123,7 +219,7 @@ class CollisionRun:
         """
         while self._core is not None and self._core.phase is not Phase.ACTIVE:
             self._step(moving=False)
-            if self.now > 100.0 + _ACTIVATION:
+            if self.now > 100.0 + _ACTIVATION_TIMEOUT:
                 raise RuntimeError(f"the guard does not become active: {self._core.blockers(self.now)}")
         self._steps += self._steps % 2  # the program begins with a control cycle
         self._program, self._began = program, self.now
@@ -131,11 +227,11 @@ class CollisionRun:
         while self.now - self._began < longest and left > 0.0:
             self._step()
             if self.meter.over:
-                left = min(left, after) - _STEP
+                left = min(left, after) - _STEP_TIME
         return self.outcome
 
     def _step(self, moving: bool = True) -> None:
-        self.now += _STEP
+        self.now += _STEP_TIME
         self._steps += 1
         first = self._steps % 2 == 1  # half of a control cycle
         while self._commands and self._commands[0][0] <= self._steps:
@@ -144,14 +240,14 @@ class CollisionRun:
             self._drive()
             self.arm.advance()
         if moving:
-            since = _CYCLE if first else _STEP
+            since = CYCLE if first else _STEP_TIME
             start = [q - since * v for q, v in zip(self.arm.q, self.arm.qd, strict=True)]
-            self.plant.advance(start, self.arm.qd, _STEP)
+            self.plant.advance(start, self.arm.qd, _STEP_TIME)
             self._measure()
         if self._core is not None:
             self._guard(first)
-        elif self._protection == "force limit" and self._limit.exceeded(self.plant.q, self.plant.external, _STEP):
-            self._send(StopPath.PROTECTIVE, _LIMIT_LATE)
+        elif self._protection == "force limit" and self._limit.exceeded(self.plant.q, self.plant.external, _STEP_TIME):
+            self._send(StopPath.PROTECTIVE, _FORCE_LIMIT_DELAY)
 
     def _drive(self) -> None:
         """Let the program say where to go, as long as it is the one that moves the arm."""
@@ -176,19 +272,19 @@ class CollisionRun:
         plant = self.plant
         rate = max((contact.rate for contact in plant.contacts), default=0.0)
         speed = max(map(abs, plant.qd))
-        touches = self._touches.take(self.now, presses_of(plant, self._skins).values())
-        for block in (self._truth.take(self.now, plant.force, plant.places), touches):
+        touches = self._touches.feed(self.now, presses_of(plant, self._skins).values())
+        for block in (self._truth.feed(self.now, plant.force, plant.places), touches):
             if block is not None:
                 self._note(block)
-        self.meter.take(self.now, plant.force, rate, plant.peak, plant.deepest, plant.impulse, speed)
+        self.meter.feed(self.now, plant.force, rate, plant.peak, plant.deepest, plant.impulse, speed)
 
     # guard
 
     def _guard(self, first: bool) -> None:
         """Show the guard what skin, controller and processes send in this step."""
         for block in list(self._companions.blocks(self.now)):
-            self._take(block)
-        self._device.press(presses_of(self.plant, self._skins), _STEP)
+            self._feed(block)
+        self._device.press(presses_of(self.plant, self._skins), _STEP_TIME)
         if self._unread:
             self._feed(BlockKind.SKIN, self._unread)
         self._unread = b"".join([next(self._packets)[1] for _ in self._device.sensors])
@@ -200,9 +296,9 @@ class CollisionRun:
         self._feed(BlockKind.TICK)
 
     def _feed(self, kind: BlockKind, payload: bytes = b"") -> None:
-        self._take(Block(kind, self.now, payload))
+        self._feed(Block(kind, self.now, payload))
 
-    def _take(self, block: Block) -> None:
+    def _feed(self, block: Block) -> None:
         assert self._core is not None
         self._note(block)
         out: list[object] = []
@@ -213,7 +309,7 @@ class CollisionRun:
                 self.events.append(output)
                 self._note(output.block())
             elif not isinstance(output, Release):
-                self._send(output, _LATE)
+                self._send(output, _COMMAND_DELAY)
 
     def event(self, name: EventName) -> GuardEvent | None:
         """Return the first event of a name; None where there is none."""

@@ -1,17 +1,116 @@
-"""Outcome of a collision in physics: what the body had to bear, and how soon the arm stood."""
+"""Outcome of a collision in physics: what the body had to bear, and how soon the arm stood.
+
+The recorders keep what only physics knows for a recording: forces, places of the bodies, and touches, by which the
+run's detected touches are judged. All of it is pure.
+"""
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-__all__ = ["CLAMP_TIME", "ImpactMeter", "ImpactOutcome"]
+from coneskin.core.recording.block import Block
+from coneskin.geometry.pose import Vector
+from coneskin.robot.guard.signals.journal import BlockKind, force_block
+from coneskin.skin.virtual.pressed_skin import Press
+from coneskin.skin.virtual.substrate import ContactLaw
+
+__all__ = ["CLAMP_TIME", "ImpactMeter", "ImpactOutcome", "TouchRecorder", "TruthRecorder"]
+
+_REPEAT_PERIOD = 10.0  # s after which what was told is told again, for who looks on from later
+_MIN_BODY_MOTION = 1e-4  # m by which a body that nothing touches must have moved
+
+
+class TruthRecorder:
+    """Recorder that makes a block of what has changed, at a bounded rate.
+
+    Args:
+        period: least time from one block to the next while a force only changes [s].
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._time = -math.inf
+        self._force = 0.0
+        self._places: tuple[Vector, ...] = ()
+
+    def feed(self, time: float, force: float, places: Sequence[Vector]) -> Block | None:
+        """Return the block of an instant; None where it tells nothing new, or comes too soon.
+
+        The first force, and its end, are told whenever they come.
+
+        Args:
+            time: host clock [s].
+            force: sum of all contacts [N].
+            places: of the bodies' parts, in the base frame [m].
+        """
+        turned = (force > 0.0) != (self._force > 0.0)
+        if not turned and time - self._time < self._period:
+            return None
+        moved = max(map(math.dist, places, self._places), default=0.0) if self._places else 0.0
+        if force == self._force and moved < _MIN_BODY_MOTION and not -math.inf < self._time <= time - _REPEAT_PERIOD:
+            if not self._places:
+                self._places = tuple(places)
+            return None
+        self._time, self._force, self._places = time, force, tuple(places)
+        return force_block(time, force, places)
+
+
+_MIN_TOUCH_FORCE = ContactLaw().threshold_force  # N
+_TOUCH_GAP = 0.1  # s without a press after which a touch is over; a body that rebounds sooner has made one touch
+
+
+class TouchRecorder:
+    """Recorder of touches: of one sensor at a time, whatever number of bodies makes it.
+
+    A touch is a force above that at which the layers of a skin meet: below it no skin feels anything. It is told twice,
+    as it begins, with the end None, and once it is over: a run may end while a body rests on the arm.
+    """
+
+    def __init__(self) -> None:
+        self._open: dict[str, dict[str, Any]] = {}
+        self._pressed: dict[str, float] = {}  # when each of them was last
+        self._silent = True
+
+    def feed(self, time: float, presses: Iterable[Press]) -> Block | None:
+        """Return the block of what has begun or ended; None where nothing has. The first one is always there.
+
+        Args:
+            time: host clock [s].
+            presses: that there are now.
+        """
+        sums: dict[str, float] = {}
+        strongest: dict[str, Press] = {}
+        for press in presses:
+            sums[press.sensor] = sums.get(press.sensor, 0.0) + press.force
+            if press.force > strongest.get(press.sensor, press._replace(force=-math.inf)).force:
+                strongest[press.sensor] = press
+        told = []
+        for sensor, force in sums.items():
+            if force <= _MIN_TOUCH_FORCE:
+                continue
+            if sensor not in self._open:
+                at = strongest[sensor]
+                place = {"u": at.u, "phi": at.phi, "force": force, "radius": at.radius}
+                self._open[sensor] = {"sensor": sensor, "start": time, "end": None, **place}
+                told.append(self._open[sensor])
+            self._pressed[sensor] = time
+        for sensor in [name for name in self._open if time - self._pressed[name] > _TOUCH_GAP]:
+            told.append(self._open.pop(sensor) | {"end": self._pressed[sensor]})
+        if not told and not self._silent:
+            return None
+        self._silent = False  # nothing told would be nothing known
+        return Block(BlockKind.TRUTH, time, json.dumps({"pressed": told}).encode())
+
 
 #: s after the first contact from which on a force counts as clamping; ISO/TS 15066, 5.5.5.3: a transient contact is
 #: over by then
 CLAMP_TIME = 0.5
-_STANDS = 0.01  # rad/s below which a joint counts as standing
-_RESTED = 0.005  # s for which all must; a reaction moves the arm again soon after
+_STANDSTILL_SPEED = 0.01  # rad/s below which a joint counts as standing
+_STANDSTILL_TIME = 0.005  # s for which all must; a reaction moves the arm again soon after
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +153,7 @@ class ImpactMeter:
         """True once the clamping force was taken."""
         return self._now - self.began > CLAMP_TIME
 
-    def take(
+    def feed(
         self, time: float, force: float, rate: float, peak: float, depth: float, impulse: float, speed: float
     ) -> None:
         """Take a step.
@@ -75,9 +174,9 @@ class ImpactMeter:
         self._peak, self._depth = peak, depth
         if time - self.began <= CLAMP_TIME:
             self._impulse, self._clamp = impulse, force
-        if self._now - self._stood < _RESTED and speed > _STANDS:
+        if self._now - self._stood < _STANDSTILL_TIME and speed > _STANDSTILL_SPEED:
             self._stood = math.nan
-        elif math.isnan(self._stood) and speed <= _STANDS:
+        elif math.isnan(self._stood) and speed <= _STANDSTILL_SPEED:
             self._stood = time
         self._now = time
 
@@ -89,7 +188,7 @@ class ImpactMeter:
     @property
     def outcome(self) -> ImpactOutcome:
         """Outcome so far."""
-        stood = self._stood if self._now - self._stood >= _RESTED else math.nan
+        stood = self._stood if self._now - self._stood >= _STANDSTILL_TIME else math.nan
         return ImpactOutcome(
             self._peak,
             self._clamp,

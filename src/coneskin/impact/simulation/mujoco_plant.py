@@ -1,13 +1,15 @@
 """Plant: an arm with skins among bodies, simulated by MuJoCo, driven by the targets of a controller.
 
 MuJoCo has the dynamics (inertias, servos, springs, Coriolis forces) and finds the contacts; the force of a contact is
-the padding's. It acts on the skin and on the body, equal and opposite, along the normal at the deepest point.
+the padding's. It acts on the skin and on the body, equal and opposite, along the normal at the deepest point. Springs
+hold the bodies; a person moves their rest, to push back or to grip.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,14 +22,61 @@ from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.scene.values.body import BodyScene
 from coneskin.skin.padding import Padding
 
-from .arm_description import body_link
-from .held_body import HeldPart
-from .scene_description import SheetOnLink, describe_scene
+from .scene_description import SheetOnLink, body_link, describe_scene
 
-__all__ = ["STEP", "BodyContact", "MujocoPlant", "Touch"]
+__all__ = ["STEP", "BodyContact", "HeldPart", "MujocoPlant", "Touch"]
+
+_FORCE_BAND = (
+    100.0  # N between the force wanted and felt at which a person moves at full speed; faster, hands would hammer
+)
+
+
+@dataclass
+class HeldPart:
+    """Part of a body on a spring, and where that spring rests.
+
+    Attributes:
+        body: of the scene.
+        part: 1 for the second hand of a grip.
+        rest: how far the spring's rest has been moved [m].
+    """
+
+    body: BodyScene
+    part: int = 0
+    rest: Vector = (0.0, 0.0, 0.0)
+    _towards: Vector = field(default=(0.0, 0.0, 0.0))
+
+    @property
+    def acts(self) -> bool:
+        """True where a person moves the rest."""
+        return self.body.kind in ("person", "grip")
+
+    def advance(self, since: float, force: float, away: Vector | None, step: float) -> bool:
+        """Let a person move the rest; return whether it has moved.
+
+        Args:
+            since: the body was first touched [s]; negative before.
+            force: that this part feels now [N].
+            away: unit vector from the arm to the part where the two touch; None where they do not.
+            step: time [s].
+        """
+        body = self.body
+        if away is not None and body.kind == "person":
+            self._towards = (-away[0], -away[1], -away[2])
+        elif body.kind == "grip" and self._towards == (0.0, 0.0, 0.0):
+            x, y, z = body.axis
+            self._towards = (-x, -y, -z) if self.part else (x, y, z)
+        if not self.acts or since < body.delay:
+            return False
+        share = max(-1.0, min(1.0, (body.force - force) / _FORCE_BAND))
+        way = share * body.speed * step
+        x, y, z = (r + way * t for r, t in zip(self.rest, self._towards, strict=True))
+        self.rest = (x, y, z)
+        return True
+
 
 STEP = 2e-4  #: s of the integration; the stiffest contact, 1e6 N/m against 0.3 kg, swings with 1800 rad/s
-_ARM = 6  # degrees of freedom of the arm, the first ones
+_ARM_DOF = 6  # degrees of freedom of the arm, the first ones
 
 
 class BodyContact(NamedTuple):
@@ -89,9 +138,9 @@ class MujocoPlant:
         bodies: Sequence[BodyScene],
         padding: Padding,
         q: Sequence[float],
-        qd: Sequence[float] = (0.0,) * _ARM,
+        qd: Sequence[float] = (0.0,) * _ARM_DOF,
         step: float = STEP,
-        held: Sequence[bool] = (True,) * _ARM,
+        held: Sequence[bool] = (True,) * _ARM_DOF,
     ) -> None:
         try:
             import mujoco
@@ -122,7 +171,7 @@ class MujocoPlant:
                 self._m.actuator_gainprm[joint] = 0.0
                 self._m.actuator_biasprm[joint] = 0.0
         self._step = step
-        self._d.qpos[:_ARM], self._d.qvel[:_ARM] = q, qd
+        self._d.qpos[:_ARM_DOF], self._d.qvel[:_ARM_DOF] = q, qd
         self._starts = [place for body in bodies for place in body.parts]
         self._moving = [(number, at) for number, at in enumerate(self._address) if at is not None]
         self._damping = [0.0 if at is None else float(self._m.dof_damping[at]) for at in self._address]
@@ -138,22 +187,22 @@ class MujocoPlant:
     @property
     def q(self) -> tuple[float, ...]:
         """Joint positions [rad]."""
-        return tuple(self._d.qpos[:_ARM].tolist())
+        return tuple(self._d.qpos[:_ARM_DOF].tolist())
 
     @property
     def qd(self) -> tuple[float, ...]:
         """Joint speeds [rad/s]."""
-        return tuple(self._d.qvel[:_ARM].tolist())
+        return tuple(self._d.qvel[:_ARM_DOF].tolist())
 
     @property
     def torque(self) -> tuple[float, ...]:
         """Torques of the servos [N m]."""
-        return tuple(self._d.actuator_force[:_ARM].tolist())
+        return tuple(self._d.actuator_force[:_ARM_DOF].tolist())
 
     @property
     def external(self) -> tuple[float, ...]:
         """Torque that the contacts put on the joints [N m]."""
-        return tuple(self._d.qfrc_applied[:_ARM].tolist())
+        return tuple(self._d.qfrc_applied[:_ARM_DOF].tolist())
 
     @property
     def force(self) -> float:
@@ -177,10 +226,10 @@ class MujocoPlant:
 
     def mass_matrix(self) -> NDArray[np.float64]:
         """Return the mass matrix of the arm at its present position [kg m^2], 6 x 6."""
-        columns = np.zeros((_ARM, self._m.nv))
-        for joint, unit in enumerate(np.eye(_ARM, self._m.nv)):
+        columns = np.zeros((_ARM_DOF, self._m.nv))
+        for joint, unit in enumerate(np.eye(_ARM_DOF, self._m.nv)):
             self._mj.mj_mulM(self._m, self._d, columns[joint], unit)
-        return columns[:, :_ARM]
+        return columns[:, :_ARM_DOF]
 
     def momentum(self) -> NDArray[np.float64]:
         """Return linear momentum [N s] and angular momentum about the base [N m s] of all that moves, shape (6,).
@@ -230,7 +279,7 @@ class MujocoPlant:
         target = np.asarray(q, float) + self._lead * speed  # a servo that damps its speed would follow behind by this
         for _ in range(round(duration / step)):
             step1(m, d)
-            d.ctrl[:_ARM] = target
+            d.ctrl[:_ARM_DOF] = target
             self._press()
             step2(m, d)
             target += moved
@@ -250,7 +299,7 @@ class MujocoPlant:
         felt: dict[int, Touch] = {}
         for touch in self._find():
             push = touch.force * touch.normal
-            applied[:_ARM] -= push @ touch.jacobian
+            applied[:_ARM_DOF] -= push @ touch.jacobian
             if (at := self._address[touch.part]) is not None:
                 applied[at : at + 3] += push
             self.impulse += touch.force * step
@@ -313,8 +362,8 @@ class MujocoPlant:
             point = sum((item[0] / whole * places[item[1]] for item in found), np.zeros(3))
         jacobian = np.empty((3, self._m.nv))
         self._mj.mj_jac(self._m, self._d, jacobian, None, point, self._links[sheet])
-        jacobian = jacobian[:, :_ARM]
-        speed = jacobian @ self._d.qvel[:_ARM]
+        jacobian = jacobian[:, :_ARM_DOF]
+        speed = jacobian @ self._d.qvel[:_ARM_DOF]
         if (at := self._address[part]) is not None:
             speed -= self._d.qvel[at : at + 3]
         rate = float(speed @ normal)

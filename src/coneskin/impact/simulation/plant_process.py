@@ -21,10 +21,12 @@ from coneskin.core.errors import ConeSkinError, MissingExtra
 
 __all__ = ["main"]
 
-_PATIENCE = 1.0  # s between two looks at whether anybody is left
+_POLL_TIMEOUT = 1.0  # s between two looks at whether anybody is left
 _TRUTH_PERIOD = 0.01  # s from one recorded force to the next
-_PRECEDENCE = -10  # niceness; behind the guard
-_RELAXED = 500  # cycles after which the foam of a skin that nothing presses has come back: it need not be told more
+_PROCESS_NICENESS = -10  # niceness; behind the guard
+_RELAXED_CYCLES = (
+    500  # cycles after which the foam of a skin that nothing presses has come back: it need not be told more
+)
 
 
 def main(arguments: list[str]) -> int:
@@ -35,13 +37,11 @@ def main(arguments: list[str]) -> int:
     from coneskin.robot.sim.motion.remote_plant import decode_targets, encode_state
     from coneskin.scene.reader import parse_scene
 
-    from .impact_outcome import ImpactMeter
+    from .impact_outcome import ImpactMeter, TouchRecorder, TruthRecorder
     from .scene_plant import ScenePlant
-    from .touch_recorder import TouchRecorder
-    from .truth_recorder import TruthRecorder
 
     while not (hello := program.receive()) and not program.closed:
-        wait_readable([program], _PATIENCE)
+        wait_readable([program], _POLL_TIMEOUT)
     if not hello:
         return 1
     start = decode_json(hello[0])
@@ -53,14 +53,14 @@ def main(arguments: list[str]) -> int:
         program.send(encode_json({"refused": str(exc), "missing": isinstance(exc, MissingExtra)}))
         return 1
     with contextlib.suppress(OSError):
-        os.nice(_PRECEDENCE)  # allowed for root, and where the user's limits say so: nature waits for no process
+        os.nice(_PROCESS_NICENESS)  # allowed for root, and where the user's limits say so: nature waits for no process
     program.send(encode_json({"ready": True}))
     gc.collect()
     gc.freeze()
     meter, recorder, touches = ImpactMeter(), TruthRecorder(_TRUTH_PERIOD), TouchRecorder()
-    quiet = _RELAXED  # cycles since something pressed
+    quiet = _RELAXED_CYCLES  # cycles since something pressed
     while not controller.closed and not program.closed:
-        ready = wait_readable([program, controller], _PATIENCE)
+        ready = wait_readable([program, controller], _POLL_TIMEOUT)
         for message in controller.receive():
             try:
                 state = plant.advance(*decode_targets(message))
@@ -71,16 +71,16 @@ def main(arguments: list[str]) -> int:
             now = time.monotonic()  # before the skin can feel it: no touch begins after what is seen of it
             presses = plant.presses()
             quiet = 0 if presses else quiet + 1
-            if quiet < _RELAXED:
+            if quiet < _RELAXED_CYCLES:
                 pressing = [[*key, *press] for key, press in presses.items()]
                 skin.send(encode_json({"step": CYCLE, "presses": pressing}))
             physics = plant.physics
-            for truth in (recorder.take(now, physics.force, physics.places), touches.take(now, presses.values())):
+            for truth in (recorder.feed(now, physics.force, physics.places), touches.feed(now, presses.values())):
                 if truth is not None:
                     skin.send(encode_json({"truth": truth.payload.decode(), "time": truth.time}))
             rate = max((contact.rate for contact in physics.contacts), default=0.0)
             speed = max(map(abs, state.qd))
-            meter.take(now, physics.force, rate, physics.peak, physics.deepest, physics.impulse, speed)
+            meter.feed(now, physics.force, rate, physics.peak, physics.deepest, physics.impulse, speed)
         if program in ready:
             _report(program, meter)
     return 0

@@ -2,30 +2,98 @@
 
 MuJoCo finds where skins and bodies meet; it makes no force of it, because its own contacts have no stiffness in N/m.
 The force is the padding's (``mujoco_plant``). Friction is left out, and so is gravity: an arm carries its own weight,
-and a person that of the hand. The bare arm meets nothing: what touches it beside its skins is felt by no skin.
+and a person that of the hand. The bare arm meets nothing: no skin feels what touches it elsewhere.
+
+A body of MJCF turns about its own origin, a link of a DH table about the axis of the frame before it. So body i stands
+in DH frame i - 1, turned by the joint, and what the tables give in DH frame i is moved by that frame's constant part.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.pose import Vector
-from coneskin.robot.arm.inertia import ArmInertia, mass_matrix
+from coneskin.geometry.pose import Pose, Vector
+from coneskin.robot.arm.inertia import ArmInertia, LinkInertia, mass_matrix
+from coneskin.robot.arm.kinematics import JOINTS, cos_sin
 from coneskin.robot.arm.model import ArmModel
 from coneskin.scene.values.body import BodyScene
 
-from .arm_description import body_link, describe_arm, describe_servos, numbers
+__all__ = ["SheetOnLink", "body_link", "describe_arm", "describe_scene", "describe_servos", "numbers"]
 
-__all__ = ["SheetOnLink", "describe_scene"]
+SERVO_FREQUENCY = 15.0  #: Hz; of the position loop of a joint, critically damped; assumed, UR publishes none
 
-_MARGIN = -1.0  # m; of MuJoCo's own force, so far inside that it makes none
-_GAP = 1.002  # m; beyond the margin, in which it reports contacts all the same: from 2 mm before two surfaces touch
-_SIDES = 96  # of the prism that a sheet is: its radius is wrong by at most 0.03 mm on a link of 50 mm
-_WALL = 0.02  # m; thickness of a wall
-_STIFF = 1e-9  # kg m^2 and the like, where MuJoCo wants a number above 0
+
+def body_link(model: ArmModel, link: int) -> Pose:
+    """Return the pose of a link's DH frame in its MJCF body, 1 (shoulder) to 6."""
+    c, s = cos_sin(model.alpha[link - 1])
+    turned = ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
+    return Pose(turned, (model.a[link - 1], 0.0, model.d[link - 1]))
+
+
+def describe_arm(model: ArmModel, inertia: ArmInertia, geoms: Mapping[int, str]) -> str:
+    """Return the bodies of an arm, nested; ``link1`` is the shoulder, ``joint1`` turns it.
+
+    Args:
+        model: the arm.
+        inertia: of its links.
+        geoms: what else stands in the body of a link, by the link's index.
+    """
+    opened: list[str] = []
+    place = Pose()
+    for link in range(1, JOINTS + 1):
+        c, s = math.cos(model.theta[link - 1]), math.sin(model.theta[link - 1])
+        here = place @ Pose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+        x, y, _ = zip(*here.rotation, strict=True)
+        place = body_link(model, link)
+        opened.append(
+            f'<body name="link{link}" pos="{numbers(here.translation)}" xyaxes="{numbers((*x, *y))}">'
+            f'<joint name="joint{link}" axis="0 0 1" armature="{inertia.rotor[link - 1]!r}"/>'
+            + _inertial(inertia.links[link - 1], place)
+            + geoms.get(link, "")
+        )
+    return "\n".join(opened) + "</body>" * JOINTS
+
+
+def describe_servos(inertia: ArmInertia, masses: Sequence[float]) -> str:
+    """Return the servos of the joints: stiff position loops that saturate at the joint's highest torque.
+
+    Args:
+        inertia: for the torques.
+        masses: what each servo turns [kg m^2]: the diagonal of the mass matrix.
+    """
+    rate = 2.0 * math.pi * SERVO_FREQUENCY
+    return "".join(
+        f'<position name="servo{i}" joint="joint{i}" kp="{mass * rate * rate!r}" kv="{2.0 * mass * rate!r}" '
+        f'forcerange="{-torque!r} {torque!r}"/>'
+        for i, (mass, torque) in enumerate(zip(masses, inertia.torque, strict=True), 1)
+    )
+
+
+def numbers(values: Sequence[float]) -> str:
+    """Return numbers as MJCF has them, with every digit."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _inertial(link: LinkInertia, place: Pose) -> str:
+    """Return mass, centre and tensor of a link in its MJCF body, whose DH frame is at a place in it."""
+    rows = place.rotation
+    half = [[sum(rows[i][k] * link.tensor[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
+    t = [[sum(half[i][k] * rows[j][k] for k in range(3)) for j in range(3)] for i in range(3)]
+    centre: Vector = place.apply(link.centre)
+    full = numbers((t[0][0], t[1][1], t[2][2], t[0][1], t[0][2], t[1][2]))
+    return f'<inertial pos="{numbers(centre)}" mass="{link.mass!r}" fullinertia="{full}"/>'
+
+
+_CONTACT_MARGIN = -1.0  # m; of MuJoCo's own force, so far inside that it makes none
+_CONTACT_GAP = (
+    1.002  # m; beyond the margin, in which it reports contacts all the same: from 2 mm before two surfaces touch
+)
+_PRISM_SIDES = 96  # of the prism that a sheet is: its radius is wrong by at most 0.03 mm on a link of 50 mm
+_WALL_THICKNESS = 0.02  # m; thickness of a wall
+_SMALLEST_NUMBER = 1e-9  # kg m^2 and the like, where MuJoCo wants a number above 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +136,7 @@ def describe_scene(
         geoms[sheet.link] = geoms.get(sheet.link, "") + f'<geom name="sheet{number}" type="mesh" mesh="mesh{number}"/>'
     names = [f"body{n}.{part}" for n, body in enumerate(bodies) for part, _ in enumerate(body.parts)]
     pairs = "".join(
-        f'<pair geom1="sheet{number}" geom2="{name}" margin="{_MARGIN!r}" gap="{_GAP!r}" condim="1"/>'
+        f'<pair geom1="sheet{number}" geom2="{name}" margin="{_CONTACT_MARGIN!r}" gap="{_CONTACT_GAP!r}" condim="1"/>'
         for number in range(len(sheets))
         for name in names
     )
@@ -93,14 +161,14 @@ def _vertices(model: ArmModel, sheet: SheetOnLink) -> list[float]:
     place = body_link(model, sheet.link)
     cone = sheet.cone.frustum
     if sheet.cone.bends:
-        azimuths = [cone.wrap * side / _SIDES for side in range(_SIDES)]
+        azimuths = [cone.wrap * side / _PRISM_SIDES for side in range(_PRISM_SIDES)]
         corners = [sheet.cone.point(u, phi) for u in (0.0, cone.slant) for phi in azimuths]
         return [value for corner in corners for value in place.apply(corner)]
-    grown = 1.0 / math.cos(math.pi / _SIDES) ** 0.5  # half of the facets' error outside, half inside
+    grown = 1.0 / math.cos(math.pi / _PRISM_SIDES) ** 0.5  # half of the facets' error outside, half inside
     found: list[float] = []
     for height, radius in ((0.0, cone.radius1), (cone.height, cone.radius2)):
-        for side in range(_SIDES):
-            angle = 2.0 * math.pi * side / _SIDES
+        for side in range(_PRISM_SIDES):
+            angle = 2.0 * math.pi * side / _PRISM_SIDES
             corner = (grown * radius * math.cos(angle), grown * radius * math.sin(angle), height)
             found += place.apply(sheet.cone.link_frustum.apply(corner))
     return found
@@ -108,8 +176,8 @@ def _vertices(model: ArmModel, sheet: SheetOnLink) -> list[float]:
 
 def _body(name: str, body: BodyScene, place: Vector) -> str:
     if body.kind == "wall":
-        x, y, z = (p - 0.5 * _WALL * a for p, a in zip(place, body.axis, strict=True))
-        size = numbers((body.radius, body.radius, 0.5 * _WALL))
+        x, y, z = (p - 0.5 * _WALL_THICKNESS * a for p, a in zip(place, body.axis, strict=True))
+        size = numbers((body.radius, body.radius, 0.5 * _WALL_THICKNESS))
         return f'<geom name="{name}" type="box" size="{size}" pos="{numbers((x, y, z))}" zaxis="{numbers(body.axis)}"/>'
     if body.kind == "post":
         size = numbers((body.radius, 0.5 * body.length))
@@ -122,6 +190,6 @@ def _body(name: str, body: BodyScene, place: Vector) -> str:
     )
     return (
         f'<body name="{name}" pos="{numbers(place)}">{slides}'
-        f'<inertial pos="0 0 0" mass="{body.mass!r}" diaginertia="{_STIFF!r} {_STIFF!r} {_STIFF!r}"/>'
+        f'<inertial pos="0 0 0" mass="{body.mass!r}" diaginertia="{f"{_SMALLEST_NUMBER!r} " * 3}"/>'
         f'<geom name="{name}" type="sphere" size="{body.radius!r}"/></body>'
     )

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from coneskin.impact.simulation.joint_program import Waypoints
+from coneskin.impact.simulation.collision_run import Waypoints
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.guard.phase import Phase
