@@ -10,7 +10,6 @@ from coneskin.scene.values.scene import Scene
 def limit_values(scene: Scene, **values: object) -> dict[str, object]:
     """Return the values of a table for a scene, with its digest; ``values`` are added, or taken in place of these."""
     table: dict[str, object] = {
-        "format": 2,
         "fingerprint": limit_fingerprint(scene),
         "date": "2026-11-23T06:00:00Z",
         "coneskin": "0.1.0",

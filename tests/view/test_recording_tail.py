@@ -40,7 +40,7 @@ def test_a_chunk_that_is_not_whole_yet_is_waited_for(tmp_path: Path) -> None:
     with Recorder(whole) as recorder:
         recorder.write(*blocks(30, 1.0), flush=True)
         written = whole.read_bytes()
-    for cut in (28, 40, 28 + 68, len(written) - 1):
+    for cut in (24, 40, 24 + 68, len(written) - 1):
         path.write_bytes(written[:cut])
         with RecordingTail(path, 60.0, ALWAYS) as tail:
             assert tail.read() == []

@@ -131,7 +131,7 @@ def parse_scene(
         commissioning_max_age=_max_age(tables, problems),
         commissioning=commissioning,
         **_physics(tables, problems),
-        **_speed_limit(tables, recorded, problems),
+        **_speed_limit(tables, problems),
     )
     scene = replace(scene, source=_source(scene, tables, problems))
     _check_together(scene, named, tables, problems)
@@ -190,13 +190,13 @@ def _inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: l
     return inline_speed_limit(tables, folder, problems)
 
 
-def _speed_limit(tables: Mapping[str, Any], recorded: bool, problems: list[str]) -> dict[str, Any]:
+def _speed_limit(tables: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
     """Return what only a limit of the speed asks for."""
     if "speed_limit" not in tables:
         return {}
     from .tables.speed_limit_table import read_speed_limit
 
-    return {"speed_limit": read_speed_limit(tables, recorded, problems)}
+    return {"speed_limit": read_speed_limit(tables, problems)}
 
 
 def _max_age(tables: Mapping[str, Any], problems: list[str]) -> float | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.defect import DefectKind
 from coneskin.core.recording.reader import MAX_SIZE, parts_of, read_recording
@@ -45,12 +44,10 @@ def prune_run(path: Path, around: float = AROUND, progress: Callable[[float], No
         bytes before and after.
 
     Raises:
-        RecordingError: it cannot be read, is being recorded now, or is of version 1.
+        RecordingError: it cannot be read, or is being recorded now.
     """
     path = path / "run.rec" if path.is_dir() else path
     recording = read_recording(path, progress)
-    if recording.version == 1:
-        raise RecordingError(f"{path} is of version 1, and only recordings of version 2 are pruned")
     parts = parts_of(path)
     with hold_against_recorder(parts[-1], MAX_SIZE):
         windows = list(_windows(recording.select(kinds=_EVENTS), around))

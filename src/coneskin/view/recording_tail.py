@@ -46,7 +46,7 @@ class RecordingTail:
         damaged: bytes that were passed over, because they are no intact chunk.
 
     Raises:
-        RecordingError: there is no such file, or it is no recording of this version.
+        RecordingError: there is no such file, or it is no recording.
     """
 
     def __init__(self, path: Path, keep: float, always: frozenset[int]) -> None:

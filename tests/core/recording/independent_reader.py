@@ -9,9 +9,9 @@ Item = tuple[int, float, bytes]  # kind, time, payload
 
 def read_file(data: bytes) -> tuple[int | None, list[tuple[int, int, int, list[Item]]], int]:
     """Return the number of the run, the chunks (run, sequence, span, blocks) and the bytes that are in none."""
-    magic, version, _, _, run, crc = struct.unpack("<8sHHIQI", data[:28])
-    whole = magic == b"CONESKIN" and version == 2 and crc == zlib.crc32(data[:24])
-    chunks, stray, at = [], 0 if whole else 28, 28
+    magic, _, run, crc = struct.unpack("<8sIQI", data[:24])
+    whole = magic == b"CONESKIN" and crc == zlib.crc32(data[:20])
+    chunks, stray, at = [], 0 if whole else 24, 24
     while at < len(data):
         head = data[at : at + 68]
         if len(head) == 68 and head[:4] == b"\xa7CSK" and zlib.crc32(head[:64]) == int.from_bytes(head[64:], "little"):

@@ -17,7 +17,6 @@ from coneskin.runs.replay.run import read_run
 from coneskin.session.event_log import EventLog, discard_recording, new_recording
 from coneskin.session.retention import prune_run
 from tests.scene.scenes import record
-from tests.support.paths import ROOT
 
 EVENT = 10
 
@@ -101,11 +100,6 @@ def test_the_command_prunes_and_goes_on_after_a_file_that_it_cannot(
     assert "none.rec: not pruned: cannot read the recording" in printed
     assert f"{tmp_path}: {before / 1e6:.3f} -> " in printed
     assert (tmp_path / "run.rec").stat().st_size < 0.8 * before
-
-
-def test_a_file_of_version_1_is_not_pruned() -> None:
-    with pytest.raises(RecordingError, match="is of version 1, and only recordings of version 2 are pruned"):
-        prune_run(ROOT / "tests" / "data" / "collision-version-1.rec")
 
 
 def test_a_run_that_did_not_start_leaves_no_folder(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ Layout (little endian)::
     block  = u32 length of the payload , u8 kind , f64 host time [s] , payload , u32 CRC-32 of all before in this block
 
 Blocks that follow each other need nothing between them. A file holds them otherwise, in chunks that are found again
-after damage: see ``recording_file``. The writer gives the kinds their meaning: see ``robot.guard.journal``.
+after damage: see ``chunk``. The writer gives the kinds their meaning: see ``robot.guard.journal``.
 """
 
 from __future__ import annotations

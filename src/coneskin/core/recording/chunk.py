@@ -18,7 +18,6 @@ __all__ = [
     "MAGIC",
     "MAX_BODY",
     "SYNC",
-    "VERSION",
     "ChunkHead",
     "FileHead",
     "bits",
@@ -31,9 +30,8 @@ __all__ = [
 ]
 
 MAGIC = b"CONESKIN"  #: of a file
-VERSION = 2  #: of the format
 SYNC = b"\xa7CSK"  #: of a chunk
-_FILE_HEAD = struct.Struct("<8sHHIQI")
+_FILE_HEAD = struct.Struct("<8sIQI")
 _CHUNK_HEAD = struct.Struct("<4sIQQIIQddB3xII")
 _BLOCK = struct.Struct("<IBd")
 FILE_HEAD_SIZE = _FILE_HEAD.size  #: bytes
@@ -100,16 +98,16 @@ def bits(kinds: Sequence[int] | frozenset[int]) -> int:
 
 def encode_file_head(head: FileHead) -> bytes:
     """Return the first bytes of a file."""
-    data = _FILE_HEAD.pack(MAGIC, VERSION, 0, head.part, head.run, 0)[:-4]
+    data = _FILE_HEAD.pack(MAGIC, head.part, head.run, 0)[:-4]
     return data + struct.pack("<I", zlib.crc32(data))
 
 
 def decode_file_head(data: bytes) -> FileHead | None:
-    """Return the head that a file of this version begins with; None where its checksum is wrong, or it is too short."""
+    """Return the head that a file begins with; None where its checksum is wrong, or it is too short."""
     if len(data) < _FILE_HEAD.size:
         return None
-    magic, version, _, part, run, crc = _FILE_HEAD.unpack_from(data)
-    if magic != MAGIC or version != VERSION or zlib.crc32(data[: _FILE_HEAD.size - 4]) != crc:
+    magic, part, run, crc = _FILE_HEAD.unpack_from(data)
+    if magic != MAGIC or zlib.crc32(data[: _FILE_HEAD.size - 4]) != crc:
         return None
     return FileHead(part, run)
 

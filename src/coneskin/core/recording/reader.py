@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +14,11 @@ from coneskin.core.bounded_file import open_file
 from coneskin.core.errors import RecordingError
 
 from .block import Block
-from .chunk import FILE_HEAD_SIZE, MAGIC, VERSION, bits, decode_body, decode_file_head, decode_payloads
+from .chunk import FILE_HEAD_SIZE, MAGIC, bits, decode_body, decode_file_head, decode_payloads
 from .defect import Defect
 from .defects import find_defects
 from .own_block import COPY, DROPPED, FILE_KINDS, decode_copy, decode_drop
 from .scan import Chunk, Damage, Extent, holds_chunk, scan_extents, walk
-from .version_1 import read_version_1
 
 __all__ = ["MAX_SIZE", "RecordedBlocks", "Recording", "parts_of", "read_recording"]
 
@@ -120,8 +119,7 @@ class Recording:
 
     Attributes:
         path: its first file.
-        version: of the format.
-        run: number of the recording; 0 in version 1, which has none.
+        run: number of the recording.
         blocks: the intact blocks, in the order in which they were written; to be iterated over as often as one likes.
         copies: blocks without which nothing can be replayed, from a place where they stand again.
         defects: what is missing or wrong; empty where the recording is whole and was closed.
@@ -131,9 +129,8 @@ class Recording:
     """
 
     path: Path
-    version: int
     run: int
-    blocks: Iterable[Block]
+    blocks: RecordedBlocks
     copies: tuple[Block, ...]
     defects: tuple[Defect, ...]
     size: int
@@ -144,12 +141,7 @@ class Recording:
         self, since: float = -math.inf, until: float = math.inf, kinds: frozenset[int] | None = None
     ) -> Iterator[Block]:
         """Yield some of the blocks; arguments as of ``RecordedBlocks.select``."""
-        if isinstance(self.blocks, RecordedBlocks):
-            yield from self.blocks.select(since, until, kinds)
-            return
-        for block in self.blocks:
-            if since <= block.time <= until and (kinds is None or block.kind in kinds):
-                yield block
+        return self.blocks.select(since, until, kinds)
 
     @property
     def missing(self) -> str:
@@ -172,8 +164,8 @@ def read_recording(path: Path, progress: Callable[[float], None] | None = None) 
         progress: called now and then with the fraction that is scanned.
 
     Raises:
-        RecordingError: there is no such file, it is no recording, it is of a version that is not known, it is too
-            large, or an intact chunk holds what cannot be.
+        RecordingError: there is no such file, it is no recording, it is too large, or an intact chunk
+            holds what cannot be.
     """
     paths = parts_of(path)
     extents: list[Extent] = []
@@ -181,7 +173,7 @@ def read_recording(path: Path, progress: Callable[[float], None] | None = None) 
     run: int | None = None
     sizes = [_size(part) for part in paths]
     total, done = max(sum(sizes), 1), 0
-    for number, (part, size) in enumerate(zip(paths, sizes, strict=True)):
+    for part, size in zip(paths, sizes, strict=True):
         with _open(part) as file:
             head = file.read(FILE_HEAD_SIZE)
             known = decode_file_head(head)
@@ -190,10 +182,6 @@ def read_recording(path: Path, progress: Callable[[float], None] | None = None) 
             tell = None if progress is None else (lambda at, base=done: progress((base + at) / total))
             found, damaged = scan_extents(part, file, size, tell)
         if known is None:
-            if not number and not found and (old := read_version_1(part, size)) is not None:
-                blocks, defects = old
-                times = [block.time for block in blocks] or [math.inf, -math.inf]
-                return Recording(path, 1, 0, blocks, (), defects, size, min(times), max(times))
             if not found:
                 _refuse(part, head)
             damages.append((part, len(extents), Damage(0, FILE_HEAD_SIZE, None)))
@@ -216,7 +204,7 @@ def read_recording(path: Path, progress: Callable[[float], None] | None = None) 
     dropped = tuple(decode_drop(block) for block in notes if block.kind == DROPPED)
     copies = tuple(decode_copy(block) for block in notes if block.kind == COPY)
     every = tuple(sorted((*defects, *dropped), key=lambda defect: defect.since))
-    return Recording(path, VERSION, run, stream, copies, every, sum(sizes), stream.since, stream.until)
+    return Recording(path, run, stream, copies, every, sum(sizes), stream.since, stream.until)
 
 
 def _open(path: Path) -> BinaryIO:
@@ -236,9 +224,6 @@ def _refuse(path: Path, head: bytes) -> None:
     """Raise why a file without a chunk is none that can be read; return for the start of one."""
     if not head.startswith(MAGIC):
         raise RecordingError(f"{path} is no recording of coneskin: it does not begin with {MAGIC.decode()}")
-    version = int.from_bytes(head[len(MAGIC) : len(MAGIC) + 2], "little")
-    if version != VERSION:
-        raise RecordingError(f"{path} is a recording of version {version}; this coneskin reads version 1 and {VERSION}")
     raise RecordingError(f"{path} has no header: not one chunk of it is intact")
 
 

@@ -36,14 +36,14 @@ def prune_file(path: Path, windows: Sequence[tuple[float, float]], kept: frozens
         kept: kinds of block that stay everywhere.
 
     Raises:
-        RecordingError: the file cannot be read or replaced, or is of another version.
+        RecordingError: the file cannot be read or replaced.
     """
     try:
         with draft_of(path, overwrite=True) as draft, open_file(path, MAX_SIZE) as file:
             size, head = os.fstat(file.fileno()).st_size, file.read(FILE_HEAD_SIZE)
             known = decode_file_head(head)
             if known is None:
-                raise RecordingError(f"{path} cannot be pruned: its head is damaged, or it is of another version")
+                raise RecordingError(f"{path} cannot be pruned: its head is damaged")
             with open(draft, "wb", opener=lambda name, flags: os.open(name, flags, 0o600)) as target:
                 target.write(head)
                 yield from _copy(file, size, target, known.run, windows, kept | FILE_KINDS)

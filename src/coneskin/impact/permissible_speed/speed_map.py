@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.core.errors import SceneError
 from coneskin.core.version import __version__
 from coneskin.scene.tables.speed_limit_check import limit_digest
-from coneskin.scene.tables.speed_limit_table import SPEED_LIMIT_FORMAT, limit_fingerprint
+from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
 from coneskin.scene.values.whole_file import write_whole
 from coneskin.skin.padding import Padding
@@ -172,7 +172,6 @@ def map_speeds(
     found = maker.curves
     _check_speeds(scene, found)
     table = SpeedLimitScene(
-        format=SPEED_LIMIT_FORMAT,
         fingerprint=limit_fingerprint(scene),
         date=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
         coneskin=__version__,
@@ -305,7 +304,6 @@ def map_table(found: SpeedMap) -> dict[str, Any]:
     """Return the table of a map, in the units of the file."""
     table = found.table
     values: dict[str, Any] = {
-        "format": table.format,
         "fingerprint": table.fingerprint,
         "date": table.date,
         "coneskin": table.coneskin,

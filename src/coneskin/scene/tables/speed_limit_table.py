@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
 
 __all__ = [
-    "SPEED_LIMIT_FORMAT",
     "SPEED_LIMIT_KEYS",
     "check_speed_limit",
     "inline_speed_limit",
@@ -35,14 +34,12 @@ __all__ = [
     "read_speed_limit",
 ]
 
-#: to be raised where the model changes, so that old files are void
-SPEED_LIMIT_FORMAT = 2
+_MODEL_NUMBER = 1  # part of the fingerprint: raise it where the computation changes, so that computed files are void
 _MAX_BYTES = 1 << 20  # of a file; a map of ten sheets has 100 kB
 _MAX_ROWS = 20_000
 _MAX_LINES = 10  # of mistakes
 HOW_TO = "run `coneskin permissible`, and name what it writes"
 SPEED_LIMIT_KEYS = (
-    Key("format", int, low=1, high=1000),
     Key("digest", str),
     Key("fingerprint", str),
     Key("date", str),
@@ -81,7 +78,7 @@ def limit_fingerprint(scene: Scene) -> str:
 
     reactions = [scene.default_reaction, *(rule.reaction for rule in scene.rules)]
     facts = {
-        "format": SPEED_LIMIT_FORMAT,
+        "model": _MODEL_NUMBER,
         "arm": scene.arm.model if scene.arm else None,
         "sheets": [
             [link.name, link.frame, item.sensor.name, asdict(item.sensor.frustum), *_place(item.placed)]
@@ -138,20 +135,17 @@ def _read(tables: dict[str, Any], path: Path, problems: list[str]) -> None:
     tables["speed_limit"] = found["speed_limit"]
 
 
-def read_speed_limit(tables: Mapping[str, Any], recorded: bool, problems: list[str]) -> SpeedLimitScene | None:
+def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLimitScene | None:
     """Return the permissible speeds of a scene; None where it names none, or they have a mistake.
 
     Args:
         tables: of the whole file.
-        recorded: they come from a recording; it may have an older format, and no digest.
         problems: every mistake is added here.
     """
     if "speed_limit" not in tables:
         return None
     lines: list[str] = []
     table = tables["speed_limit"]
-    if recorded:
-        table = {"digest": limit_digest(table), **table}
     values = check(table, SPEED_LIMIT_KEYS, "speed_limit", lines)
     digest = values.pop("digest", "")
     rows = values.pop("curve", ())[:_MAX_ROWS]
@@ -164,9 +158,7 @@ def read_speed_limit(tables: Mapping[str, Any], recorded: bool, problems: list[s
         limited = tuple(LimitedPatch(*(row[key.plain] for key in _PATCH)) for row in patches)
         found = SpeedLimitScene(curves=speeds, patches=limited, **values)
         lines += unfit(found)
-        if found.format > SPEED_LIMIT_FORMAT or (found.format < SPEED_LIMIT_FORMAT and not recorded):
-            lines.insert(0, f"speed_limit.format must be {SPEED_LIMIT_FORMAT}, got {found.format}")
-        elif digest != limit_digest(table):
+        if digest != limit_digest(table):
             lines.insert(0, "speed_limit.digest is not that of the table: the file was cut, or changed by hand")
     problems += [f"{line}; {HOW_TO}" for line in lines[:_MAX_LINES]]
     return None if lines else found
@@ -197,7 +189,7 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
     if limit.fingerprint != limit_fingerprint(scene):
         problems.append(
             f"arm.speed_limit_from: the permissible speeds of {limit.date[:10]} are of another scene: arm, sheets, "
-            f"padding or reactions are others now; {HOW_TO}"
+            f"padding or reactions are others now, or coneskin computes them otherwise; {HOW_TO}"
         )
         return
     sheets = {item.sensor.name: item.placed for link in scene.links if link_index(link.name) for item in link.sensors}

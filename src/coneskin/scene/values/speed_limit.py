@@ -31,7 +31,6 @@ class SpeedLimitScene:
     """Permissible speeds of the skins of a scene.
 
     Attributes:
-        format: of the table.
         fingerprint: of what they hold for; see ``speed_limit_table.limit_fingerprint``.
         date: when they were computed, UTC.
         coneskin: the version.
@@ -48,7 +47,6 @@ class SpeedLimitScene:
         patches: of the skins.
     """
 
-    format: int
     fingerprint: str
     date: str
     coneskin: str
