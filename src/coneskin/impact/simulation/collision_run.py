@@ -286,16 +286,16 @@ class CollisionRun:
             self._feed(block)
         self._device.press(presses_of(self.plant, self._skins), _STEP_TIME)
         if self._unread:
-            self._feed(BlockKind.SKIN, self._unread)
+            self._feed_new(BlockKind.SKIN, self._unread)
         self._unread = b"".join([next(self._packets)[1] for _ in self._device.sensors])
         assert self._core is not None
         if not first:
             if self._steps % 20 == 0 and self._core.needs.slider:
-                self._feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
-            self._feed(BlockKind.ARM, self.arm.packet(self.plant.q, self.plant.qd, currents_of(self.plant)))
-        self._feed(BlockKind.TICK)
+                self._feed_new(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
+            self._feed_new(BlockKind.ARM, self.arm.packet(self.plant.q, self.plant.qd, currents_of(self.plant)))
+        self._feed_new(BlockKind.TICK)
 
-    def _feed(self, kind: BlockKind, payload: bytes = b"") -> None:
+    def _feed_new(self, kind: BlockKind, payload: bytes = b"") -> None:
         self._feed(Block(kind, self.now, payload))
 
     def _feed(self, block: Block) -> None:
