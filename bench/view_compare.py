@@ -35,7 +35,7 @@ def serve(port: int) -> None:
 
     server = PageServer("compared", port=port)
     live = LiveRun(RUN)
-    page = LivePage(server, live.strand.stage, lambda: live)
+    page = LivePage(server, live.course.stage, lambda: live)
     page.look(0.0)
     page.draw(0.0)
     print(server.url, flush=True)
@@ -45,7 +45,7 @@ def serve(port: int) -> None:
         step += 1
         since, until = MOVING
         with server.together():
-            nodes.show(live.strand.moment(since + (until - since) * abs(math.sin(step / 40))))
+            nodes.show(live.course.moment(since + (until - since) * abs(math.sin(step / 40))))
         time.sleep(PERIOD)
 
 

@@ -55,7 +55,7 @@ def main() -> None:
         first = header_of()
         recorder.write(first, flush=True)
         live = LiveRun(Path(folder) / "run.rec")
-        page = LivePage(server, live.strand.stage, lambda: live)
+        page = LivePage(server, live.course.stage, lambda: live)
         follow(args, recorder, server, live, page)
         page.close()
 
@@ -76,7 +76,7 @@ def follow(args: argparse.Namespace, recorder: Recorder, server: PageServer, liv
             old.unlink(missing_ok=True)
         parcel = [block]
         if steps % round(args.late / STEP) == 0:
-            page.look(due)
+            page.poll(due)
         if steps % max(DRAWN, round(args.late / STEP)) == 0:
             page.draw(due)
         steps, due = steps + 1, due + STEP
@@ -92,7 +92,7 @@ def follow(args: argparse.Namespace, recorder: Recorder, server: PageServer, liv
 def row(server: PageServer, live: LiveRun, collisions: int, at: float, began: float) -> str:
     """One line of the table."""
     gc.collect()
-    history = live.strand.history
+    history = live.course.history
     (levels,) = history.levels.values()
     messages = len(server._server._websock_server._broadcast_buffer.message_from_id)
     return (

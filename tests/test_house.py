@@ -19,7 +19,7 @@ from tests.support.paths import ROOT
 FOLDERS = ("geometry", "skin", "robot")
 #: floors of the house, from the ground up: a folder imports only from the floors below its own
 FLOORS = (
-    "core view.client",
+    "core",
     "core.recording geometry skin.field",
     "geometry.drawing geometry.fit geometry.solid robot.arm robot.sim.urscript skin",
     "geometry.fit.developable robot.driver robot.reaction robot.sim.motion skin.detection.frame skin.diagnosis "

@@ -10,11 +10,9 @@ from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.replay.run import read_run
 from coneskin.view.contact_mark import FADING, ContactLog
-from coneskin.view.history import History
-from coneskin.view.panel_text import event_list, status
-from coneskin.view.phase_words import UNKNOWN, PhaseWords, phase_after
-from coneskin.view.strand import Strand, read_strands
-from coneskin.view.timeline import timeline
+from coneskin.view.history import UNKNOWN, History, PhaseWords, phase_after
+from coneskin.view.panel import event_list, status, timeline
+from coneskin.view.run_course import RunCourse, read_courses
 from coneskin.view.traces import trace_names, traces
 from tests.support.paths import COLLISION
 
@@ -22,42 +20,42 @@ RUN = COLLISION
 
 
 @pytest.fixture(scope="module")
-def strand() -> Strand:
-    return read_strands([RUN])[0]
+def course() -> RunCourse:
+    return read_courses([RUN])[0]
 
 
-def event(strand: Strand, name: str) -> GuardEvent:
-    return next(item for item in strand.history.events if item.name == name)
+def event(course: RunCourse, name: str) -> GuardEvent:
+    return next(item for item in course.history.events if item.name == name)
 
 
-def test_the_arm_stands_where_the_controller_measured_it(strand: Strand) -> None:
+def test_the_arm_stands_where_the_controller_measured_it(course: RunCourse) -> None:
     run = read_run(RUN)
     blocks = list(run.select(kinds=frozenset({BlockKind.ARM})))
     decode = load_driver("ur").decode_state
     for block in blocks[:: len(blocks) // 7]:
-        assert strand.history.q(block.time) == decode(block.time, block.payload).q
+        assert course.history.q(block.time) == decode(block.time, block.payload).q
     between = 0.5 * (blocks[10].time + blocks[11].time)
-    assert strand.history.q(between) == decode(blocks[10].time, blocks[10].payload).q
+    assert course.history.q(between) == decode(blocks[10].time, blocks[10].payload).q
 
 
-def test_the_sheet_is_touched_while_the_touch_lasts(strand: Strand) -> None:
-    (sheet,) = strand.stage.sheets
-    began = event(strand, EventName.CONTACT)
-    assert strand.history.level(sheet.name, began.time - 0.05) < sheet.touch_level
-    assert strand.history.level(sheet.name, began.time + 0.01) > sheet.touch_level
+def test_the_sheet_is_touched_while_the_touch_lasts(course: RunCourse) -> None:
+    (sheet,) = course.stage.sheets
+    began = event(course, EventName.CONTACT)
+    assert course.history.level(sheet.name, began.time - 0.05) < sheet.touch_level
+    assert course.history.level(sheet.name, began.time + 0.01) > sheet.touch_level
 
 
-def test_the_mark_is_where_the_touch_was_read_and_fades_when_it_is_over(strand: Strand) -> None:
-    began, located = event(strand, EventName.CONTACT), event(strand, EventName.CONTACT_LOCATED)
-    assert strand.history.marks(began.time - 0.001) == []
-    (mark,) = strand.history.marks(located.time)
+def test_the_mark_is_where_the_touch_was_read_and_fades_when_it_is_over(course: RunCourse) -> None:
+    began, located = event(course, EventName.CONTACT), event(course, EventName.CONTACT_LOCATED)
+    assert course.history.marks(began.time - 0.001) == []
+    (mark,) = course.history.marks(located.time)
     assert list(mark.point) == located.details["point"]
     assert list(mark.normal) == located.details["normal"]
     assert mark.located
     assert mark.strength == 1.0
-    over = event(strand, EventName.TOUCH_ENDED).time
-    assert strand.history.marks(over + 0.5 * FADING)[0].strength == pytest.approx(0.5)
-    assert strand.history.marks(over + FADING) == []
+    over = event(course, EventName.TOUCH_ENDED).time
+    assert course.history.marks(over + 0.5 * FADING)[0].strength == pytest.approx(0.5)
+    assert course.history.marks(over + FADING) == []
 
 
 def touch(name: EventName, time: float, number: int = 1, **details: object) -> GuardEvent:
@@ -67,9 +65,9 @@ def touch(name: EventName, time: float, number: int = 1, **details: object) -> G
 
 def test_a_touch_that_is_over_fades() -> None:
     ended = GuardEvent(EventName.TOUCH_ENDED, 2.0, {"sensor": "s"})  # as the guard tells it: one touch on a sensor
-    log = ContactLog().take_all([touch(EventName.CONTACT, 1.0), touch(EventName.CONTACT, 1.5, 2, sensor="t"), ended])
+    log = ContactLog().feed_all([touch(EventName.CONTACT, 1.0), touch(EventName.CONTACT, 1.5, 2, sensor="t"), ended])
     assert [(mark.sensor, mark.strength) for mark in log.marks(2.0 + FADING)] == [("t", 1.0)]
-    log = ContactLog().take_all([touch(EventName.CONTACT, 1.0), ended, GuardEvent(ended.name, 3.0, ended.details)])
+    log = ContactLog().feed_all([touch(EventName.CONTACT, 1.0), ended, GuardEvent(ended.name, 3.0, ended.details)])
     assert [mark.strength for mark in log.marks(2.0)] == [1.0]
     assert log.marks(2.0 + 0.5 * FADING)[0].strength == pytest.approx(0.5)
     assert log.marks(2.0 + FADING) == []
@@ -77,23 +75,23 @@ def test_a_touch_that_is_over_fades() -> None:
 
 @pytest.mark.parametrize("point", [None, [1.0, 2.0], [1.0, 2.0, "x"], [1e300, 0.0, 0.0], [math.nan, 0.0, 0.0], "abc"])
 def test_a_place_that_is_nonsense_has_no_mark(point: object) -> None:
-    assert ContactLog().take_all([touch(EventName.CONTACT, 1.0, point=point)]).marks(1.0) == []
+    assert ContactLog().feed_all([touch(EventName.CONTACT, 1.0, point=point)]).marks(1.0) == []
 
 
 def test_a_page_that_stays_open_forgets_touches() -> None:
-    log = ContactLog().take_all(touch(EventName.CONTACT, float(k), number=k) for k in range(2000))
+    log = ContactLog().feed_all(touch(EventName.CONTACT, float(k), number=k) for k in range(2000))
     assert len(log.marks(1e9)) == 400
 
 
-def test_the_phases_are_those_of_the_guard(strand: Strand) -> None:
-    words = [change.phase.text for change in strand.history.phases]
+def test_the_phases_are_those_of_the_guard(course: RunCourse) -> None:
+    words = [change.phase.text for change in course.history.phases]
     assert words[0] == UNKNOWN.text
     assert [words.index(text) for text in ("active", "stopping", "latched: stands until a manual reset")]
     order = [words.index(text) for text in ("active", "stopping", "moving away from the touch")]
     assert order == sorted(order)
-    latched = event(strand, EventName.LATCHED)
-    assert strand.history.phase(latched.time).text.startswith("latched")
-    assert not strand.history.phase(latched.time - 1e-3).text.startswith("latched")
+    latched = event(course, EventName.LATCHED)
+    assert course.history.phase(latched.time).text.startswith("latched")
+    assert not course.history.phase(latched.time - 1e-3).text.startswith("latched")
 
 
 def test_a_latched_arm_that_is_measured_standing_again_stays_latched() -> None:
@@ -103,14 +101,14 @@ def test_a_latched_arm_that_is_measured_standing_again_stays_latched() -> None:
     assert phase_after(latched, EventName.ACTIVATED).text == "active"
 
 
-def test_a_page_that_follows_does_not_grow(strand: Strand) -> None:
+def test_a_page_that_follows_does_not_grow(course: RunCourse) -> None:
     run = read_run(RUN)
     blocks = list(run.select(kinds=frozenset({BlockKind.SKIN, BlockKind.ARM})))
     length = blocks[-1].time - blocks[0].time
     history = History(run.scene(), keep=1.0)
     sizes = []
     for turn in range(12):
-        history.take_all(block._replace(time=block.time + turn * length) for block in blocks)
+        history.feed_all(block._replace(time=block.time + turn * length) for block in blocks)
         sizes.append(len(history.joints.times) + sum(len(series.times) for series in history.levels.values()))
     assert max(sizes[4:]) <= 1.2 * max(sizes[:4])
     assert history.until - history.since <= 1.5 + length
@@ -125,22 +123,22 @@ def test_what_a_recording_says_is_never_taken_for_html() -> None:
         assert "&lt;img" in text
 
 
-def test_traces_keep_the_peak(strand: Strand) -> None:
-    since, until = strand.span
-    names = trace_names([strand])
+def test_traces_keep_the_peak(course: RunCourse) -> None:
+    since, until = course.span
+    names = trace_names([course])
     assert names == ["touch level", "joint speed [rad/s]", "channels of forearm skin"]
-    (series,) = strand.history.levels.values()
-    found = traces([strand], "touch level", since, until)
+    (series,) = course.history.levels.values()
+    found = traces([course], "touch level", since, until)
     assert np.nanmax(found.values) == max(value for (value,) in series.values)
     assert found.times[np.nanargmax(found.values[0])] == pytest.approx(
-        series.times[int(np.argmax([value for (value,) in series.values]))] - strand.zero, abs=(until - since) / 240
+        series.times[int(np.argmax([value for (value,) in series.values]))] - course.zero, abs=(until - since) / 240
     )
-    assert traces([strand], "channels of forearm skin", since, until).values.shape == (6, 480)
+    assert traces([course], "channels of forearm skin", since, until).values.shape == (6, 480)
 
 
-def test_the_timeline_has_a_band_for_each_phase(strand: Strand) -> None:
-    drawn = timeline([strand], *strand.span)
-    phases = strand.history.phases
+def test_the_timeline_has_a_band_for_each_phase(course: RunCourse) -> None:
+    drawn = timeline([course], *course.span)
+    phases = course.history.phases
     lasting = [change for change, after in pairwise(phases[1:]) if after.time > change.time]
     assert len(lasting) >= 4
     for change in lasting:
@@ -148,6 +146,6 @@ def test_the_timeline_has_a_band_for_each_phase(strand: Strand) -> None:
 
 
 def test_two_runs_are_laid_side_by_side_by_their_first_touch() -> None:
-    first, second = read_strands([RUN, RUN])
+    first, second = read_courses([RUN, RUN])
     assert first.offset[1] == -second.offset[1] != 0.0
     assert event(first, EventName.CONTACT).time == first.zero

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from coneskin.view.page_server import PageServer
+from coneskin.view.run_course import read_courses
 from coneskin.view.run_page import show_runs
-from coneskin.view.strand import read_strands
 
 from .socket_viewer import SocketViewer, socket_viewer
 
@@ -38,7 +38,7 @@ def clock_of(message: dict[str, Any]) -> str:
 
 def test_a_viewer_cannot_move_what_another_looks_at() -> None:
     with PageServer("runs", port=18180) as server:
-        show_runs(server, read_strands([RUN]))
+        show_runs(server, read_courses([RUN]))
         with socket_viewer(server) as victim, socket_viewer(server) as attacker:
             slider, own = control(victim, "GuiSliderMessage"), control(attacker, "GuiSliderMessage")
             assert slider != own
@@ -56,7 +56,7 @@ def test_a_viewer_cannot_move_what_another_looks_at() -> None:
 )  # fmt: skip
 def test_nonsense_in_a_control_leaves_the_next_viewer_a_page(kind: str, value: Any) -> None:
     with PageServer("runs", port=18180) as server:
-        show_runs(server, read_strands([RUN]))
+        show_runs(server, read_courses([RUN]))
         with socket_viewer(server) as attacker:
             attacker.send(type="GuiUpdateMessage", uuid=control(attacker, kind), updates={"value": value})
             attacker.socket.ping().wait(20)

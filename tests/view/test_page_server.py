@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from coneskin.core.errors import ConeSkinError
-from coneskin.view.client.unpacked_client import unpacked
 from coneskin.view.page_server import PageServer, page_client
+from coneskin.view.viser_client import unpacked
 
 pytest.importorskip("viser", reason="viser is not installed: no page is served")
 import msgspec

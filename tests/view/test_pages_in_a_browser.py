@@ -14,8 +14,8 @@ from coneskin.view.html_file import write_html
 from coneskin.view.live_page import LivePage
 from coneskin.view.live_run import LiveRun
 from coneskin.view.page_server import PageServer
+from coneskin.view.run_course import RunCourse, read_courses
 from coneskin.view.run_page import show_runs
-from coneskin.view.strand import Strand, read_strands
 from tests.support.paths import COLLISION
 
 from .browser import browser_page, look_closely, look_closely_at_a_file, magenta, pixels, quiet, violet, wait_for_text
@@ -28,21 +28,21 @@ JUMP = """(words) => [...document.querySelectorAll('#coneskin-events div')]
 pytestmark = pytest.mark.long
 
 
-def contact(strand: Strand) -> tuple[float, Any, Any]:
+def contact(course: RunCourse) -> tuple[float, Any, Any]:
     """When the demo's touch was located, and where that was in the base frame, with its normal."""
-    at = next(event for event in strand.history.events if event.name == EventName.CONTACT_LOCATED)
-    moment = strand.moment(at.time - strand.zero)
+    at = next(event for event in course.history.events if event.name == EventName.CONTACT_LOCATED)
+    moment = course.moment(at.time - course.zero)
     (mark,) = moment.marks
-    (sheet,) = strand.stage.sheets
+    (sheet,) = course.stage.sheets
     pose = moment.poses[sheet.link]
-    return at.time - strand.zero, pose.apply(mark.point), pose.rotate(mark.normal)
+    return at.time - course.zero, pose.apply(mark.point), pose.rotate(mark.normal)
 
 
 def test_a_recording_is_scrubbed_to_its_touch() -> None:
-    strands = read_strands([RUN])
-    _, point, normal = contact(strands[0])
+    courses = read_courses([RUN])
+    _, point, normal = contact(courses[0])
     with PageServer("a run", port=18180) as server, browser_page() as page:
-        show_runs(server, strands)
+        show_runs(server, courses)
         page.goto(server.url)
         wait_for_text(page, "#coneskin-notice", NOTICE)
         wait_for_text(page, ".coneskin-phase", "nothing is known of the guard")
@@ -69,7 +69,7 @@ def test_a_recording_is_scrubbed_to_its_touch() -> None:
 
 
 def test_a_file_without_python_jumps_to_the_touch(tmp_path: Path) -> None:
-    write_html(tmp_path / "run.html", read_strands([RUN, RUN]))
+    write_html(tmp_path / "run.html", read_courses([RUN, RUN]))
     with browser_page() as page:
         requests: list[str] = []
         page.on("request", lambda request: requests.append(request.url))
@@ -79,7 +79,7 @@ def test_a_file_without_python_jumps_to_the_touch(tmp_path: Path) -> None:
         page.evaluate(JUMP, "touch located")
         wait_for_text(page, "#coneskin-clock", "0.021 s")
         wait_for_text(page, ".coneskin-phase", "stopping")
-        level = read_strands([RUN, RUN])[0].moment(0.0214).levels["forearm skin"]
+        level = read_courses([RUN, RUN])[0].moment(0.0214).levels["forearm skin"]
         wait_for_text(page, ".coneskin-level", f"level {level:.2f}")
         marks = [float(mark.evaluate("(mark) => mark.style.left.slice(0, -1)"))
                  for mark in page.query_selector_all(".coneskin-level-mark")]  # fmt: skip
@@ -96,9 +96,9 @@ def test_a_file_without_python_jumps_to_the_touch(tmp_path: Path) -> None:
 
 
 def test_a_file_shows_the_contact_where_it_was_when_it_was(tmp_path: Path) -> None:
-    strands = read_strands([RUN])
-    at, point, normal = contact(strands[0])
-    write_html(tmp_path / "run.html", strands)
+    courses = read_courses([RUN])
+    at, point, normal = contact(courses[0])
+    write_html(tmp_path / "run.html", courses)
     with browser_page() as page:
         page.goto(f"file://{tmp_path / 'run.html'}")
         page.wait_for_selector("#root [role=slider]", state="attached")
@@ -117,21 +117,21 @@ def test_a_page_follows_a_recording_that_grows(tmp_path: Path) -> None:
     run = read_run(RUN)
     blocks = list(run.blocks)
     path = tmp_path / "run.rec"
-    located, point, normal = contact(read_strands([RUN])[0])
+    located, point, normal = contact(read_courses([RUN])[0])
     with Recorder(path) as recorder, PageServer("live", port=18180) as server, browser_page() as page:
         recorder.write(Block(BlockKind.HEADER, run.start, json.dumps(run.header).encode()), flush=True)
         before = [block for block in blocks if block.time < run.start + located - 0.1]
         recorder.write(*before, flush=True)
         live = LiveRun(path)
-        shown = LivePage(server, live.strand.stage, lambda: live)
-        shown.look(0.0)
+        shown = LivePage(server, live.course.stage, lambda: live)
+        shown.poll(0.0)
         shown.draw(0.0)
         page.goto(server.url)
         wait_for_text(page, "#coneskin-notice", NOTICE)
         wait_for_text(page, ".coneskin-phase", "active")
         place = look_closely(server, page, point, normal)
         recorder.write(*(b for b in blocks if run.start + located - 0.1 <= b.time <= run.start + located), flush=True)
-        assert shown.look(1.0), "an event has come"
+        assert shown.poll(1.0), "an event has come"
         shown.draw(1.0)
         wait_for_text(page, ".coneskin-phase", "stopping")
         wait_for_text(page, "#coneskin-events", "touch located")
@@ -139,7 +139,7 @@ def test_a_page_follows_a_recording_that_grows(tmp_path: Path) -> None:
         assert quiet(pixels(page, place, 40)) == 0
         assert page.wrong == []
         recorder.close()
-        shown.look(2.0)
+        shown.poll(2.0)
         shown.draw(2.0)
         wait_for_text(page, "#coneskin-stale", "the run is over")
         shown.close()

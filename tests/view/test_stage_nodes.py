@@ -22,8 +22,8 @@ from coneskin.testing.forearm import forearm_scene
 from coneskin.view.history import History
 from coneskin.view.live_page import LivePage
 from coneskin.view.live_run import LiveRun
+from coneskin.view.run_course import read_courses
 from coneskin.view.stage_nodes import StageNodes
-from coneskin.view.strand import read_strands
 
 BODIES = """
 [[body]]
@@ -91,18 +91,18 @@ def near(places: Sequence[Vector]) -> list[Any]:
 
 
 def test_bodies_are_where_the_run_says_and_where_the_scene_puts_them_before(tmp_path: Path) -> None:
-    (strand,) = read_strands([recorded(tmp_path, (101.0, PUSHED), (103.0, STARTS))])
+    (course,) = read_courses([recorded(tmp_path, (101.0, PUSHED), (103.0, STARTS))])
     scene = Scene()
-    nodes = StageNodes(scene, strand.stage, "/run")
+    nodes = StageNodes(scene, course.stage, "/run")
     for time, places in ((0.5, STARTS), (1.0, PUSHED), (2.9, PUSHED), (3.0, STARTS), (1.5, PUSHED)):
-        nodes.show(strand.moment(time))
+        nodes.show(course.moment(time))
         assert scene.middles("/run") == near(places), time
 
 
 def test_places_of_other_bodies_than_the_scenes_move_nothing(tmp_path: Path) -> None:
-    (strand,) = read_strands([recorded(tmp_path, (101.0, PUSHED[:2]))])
+    (course,) = read_courses([recorded(tmp_path, (101.0, PUSHED[:2]))])
     scene = Scene()
-    StageNodes(scene, strand.stage, "/run").show(strand.moment(1.5))
+    StageNodes(scene, course.stage, "/run").show(course.moment(1.5))
     assert scene.middles("/run") == near(STARTS)
 
 
@@ -112,9 +112,9 @@ def test_a_live_page_moves_bodies_with_the_arm(tmp_path: Path) -> None:
         scene=Scene(), gui=MagicMock(), look_from=lambda *_: None, on_viewer=lambda _: None, together=nullcontext
     )
     live = LiveRun(recorded(tmp_path, (101.0, PUSHED), (109.96, STARTS)))
-    page = LivePage(server, live.strand.stage, lambda: live)  # type: ignore[arg-type]
+    page = LivePage(server, live.course.stage, lambda: live)  # type: ignore[arg-type]
     assert server.scene.middles("/run") == near(STARTS)
-    page.look(0.0)
+    page.poll(0.0)
     page.draw(0.0)
     assert server.scene.middles("/run") == near(PUSHED)
     page.draw(0.04)
@@ -125,6 +125,6 @@ def test_a_live_page_moves_bodies_with_the_arm(tmp_path: Path) -> None:
 def test_a_page_that_forgets_still_knows_where_a_body_came_to_rest() -> None:
     blocks = blocks_of((101.0, PUSHED))
     history = History(Run(json.loads(blocks[0].payload), blocks).scene(), 60.0)
-    history.take_all([*blocks, Block(BlockKind.TICK, 300.0, b"")])
+    history.feed_all([*blocks, Block(BlockKind.TICK, 300.0, b"")])
     assert history.since == 240.0
     assert history.places(250.0) == PUSHED

@@ -81,9 +81,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _write(args: argparse.Namespace) -> int:
     from coneskin.view.html_file import write_html
-    from coneskin.view.strand import read_strands
+    from coneskin.view.run_course import read_courses
 
-    rate = write_html(args.html, read_strands(args.what))
+    rate = write_html(args.html, read_courses(args.what))
     if args.json:
         print(json.dumps({"html": str(args.html), "pictures_per_s": rate}))
     else:
@@ -92,12 +92,12 @@ def _write(args: argparse.Namespace) -> int:
 
 
 def _show(args: argparse.Namespace) -> int:
+    from coneskin.view.run_course import read_courses
     from coneskin.view.run_page import show_runs
-    from coneskin.view.strand import read_strands
 
     with _server(args) as server:
-        strands = read_strands(args.what)
-        show_runs(server, strands)
+        courses = read_courses(args.what)
+        show_runs(server, courses)
         over = _announce(args, server)
         over.wait(None if args.duration_s is None else min(args.duration_s, threading.TIMEOUT_MAX))
     return 0
@@ -112,7 +112,7 @@ def _follow_run(args: argparse.Namespace, recording: Path) -> int:
     def find() -> LiveRun | None:
         return runs.pop() if runs else None
 
-    return _follow(args, first.strand.stage, find)
+    return _follow(args, first.course.stage, find)
 
 
 def _follow_scene(args: argparse.Namespace, path: Path) -> int:

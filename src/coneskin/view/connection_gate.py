@@ -21,22 +21,22 @@ __all__ = ["ALLOWED", "UPLOADS", "ConnectionGate", "is_value", "refusal_of"]
 ALLOWED = frozenset({"ViewerCameraMessage", "GuiUpdateMessage"})
 #: and those with which a file is dropped onto it
 UPLOADS = frozenset({"FileTransferStartUpload", "FileTransferPart"})
-_UPDATE = "GuiUpdateMessage"
-_PAGE = frozenset({"/", "/index.html"})
-_LARGEST = 1 << 16  # bytes of a message that is no part of a file
-_VIEWERS = 32  # that are served at once
-_RATE = 200.0  # messages a second of a viewer, who drags a handle or the camera at 60; more have to wait
-_BURST = 400  # messages that may come at once, before they have to wait
-_WORDS = 1000  # letters of a value
-_ITEMS = 8  # of a value that is a list
+_UPDATE_MESSAGE = "GuiUpdateMessage"
+_PAGE_PATHS = frozenset({"/", "/index.html"})
+_MAX_MESSAGE_SIZE = 1 << 16  # bytes of a message that is no part of a file
+_MAX_VIEWERS = 32  # that are served at once
+_MAX_MESSAGE_RATE = 200.0  # messages a second of a viewer, who drags a handle or the camera at 60; more have to wait
+_MAX_BURST = 400  # messages that may come at once, before they have to wait
+_MAX_VALUE_LENGTH = 1000  # letters of a value
+_MAX_LIST_ITEMS = 8  # of a value that is a list
 
 
 def is_value(value: Any, depth: int = 1) -> bool:
     """Tell whether a value may be that of a control: a finite number, a few words, yes or no, or a few of them."""
     if isinstance(value, list | tuple):
-        return depth > 0 and len(value) <= _ITEMS and all(is_value(item, depth - 1) for item in value)
+        return depth > 0 and len(value) <= _MAX_LIST_ITEMS and all(is_value(item, depth - 1) for item in value)
     if isinstance(value, str):
-        return len(value) <= _WORDS
+        return len(value) <= _MAX_VALUE_LENGTH
     return value is None or (isinstance(value, int | float) and math.isfinite(value))
 
 
@@ -84,7 +84,7 @@ class ConnectionGate:
         hosts: frozenset[str] | None,
         page: str | None = None,
         allowed: frozenset[str] = ALLOWED,
-        largest: int = _LARGEST,
+        largest: int = _MAX_MESSAGE_SIZE,
     ) -> None:
         self.refused = self.viewers = 0
         self._decode, self._hosts, self._allowed, self._largest = decode, hosts, allowed, largest
@@ -102,12 +102,12 @@ class ConnectionGate:
         def process_request(connection: Any, request: Any) -> Any:
             headers = request.headers
             why = refusal_of(request.path, headers.get("Host", ""), headers.get("Origin"), self._hosts)
-            if not why and headers.get("Upgrade") and self.viewers >= _VIEWERS:
-                why = f"{_VIEWERS} viewers are served already"
+            if not why and headers.get("Upgrade") and self.viewers >= _MAX_VIEWERS:
+                why = f"{_MAX_VIEWERS} viewers are served already"
             if why:
                 self.refused += 1
                 return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
-            if self._page is not None and not headers.get("Upgrade") and request.path.partition("?")[0] in _PAGE:
+            if self._page is not None and not headers.get("Upgrade") and request.path.partition("?")[0] in _PAGE_PATHS:
                 response = connection.respond(HTTPStatus.OK, self._page)
                 del response.headers["Content-Type"]
                 response.headers["Content-Type"] = "text/html; charset=utf-8"
@@ -130,7 +130,7 @@ class ConnectionGate:
             kind = message.get("type") if isinstance(message, dict) else None
         except ValueError:
             message = kind = None
-        if isinstance(kind, str) and kind in self._allowed and (kind != _UPDATE or _sets_a_value(message)):
+        if isinstance(kind, str) and kind in self._allowed and (kind != _UPDATE_MESSAGE or _sets_a_value(message)):
             return True
         self.refused += 1
         return False
@@ -150,7 +150,7 @@ class _Sieve:
 
     def __init__(self, connection: Any, gate: ConnectionGate) -> None:
         self._connection, self._gate = connection, gate
-        self._spare, self._then = float(_BURST), monotonic()
+        self._spare, self._then = float(_MAX_BURST), monotonic()
 
     async def recv(self) -> bytes:
         while True:
@@ -161,10 +161,10 @@ class _Sieve:
 
     async def _wait_its_turn(self) -> None:
         now = monotonic()
-        self._spare = min(float(_BURST), self._spare + _RATE * (now - self._then)) - 1.0
+        self._spare = min(float(_MAX_BURST), self._spare + _MAX_MESSAGE_RATE * (now - self._then)) - 1.0
         self._then = now
         if self._spare < 0.0:
-            await asyncio.sleep(-self._spare / _RATE)
+            await asyncio.sleep(-self._spare / _MAX_MESSAGE_RATE)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._connection, name)

@@ -12,9 +12,9 @@ from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 __all__ = ["FADING", "ContactLog", "ContactMark"]
 
 FADING = 4.0  #: s that the mark of a touch that is over is still seen
-_KEPT = 400  # touches that are remembered, in a page that stays open
-_PLACES = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})
-_FARTHEST = 100.0  # m; a place farther off is no place
+_MAX_TOUCHES = 400  # touches that are remembered, in a page that stays open
+_PLACE_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})
+_MAX_DISTANCE = 100.0  # m; a place farther off is no place
 
 
 class ContactMark(NamedTuple):
@@ -65,7 +65,7 @@ class ContactLog:
     def __init__(self) -> None:
         self._touches: dict[int, _Touch] = {}
 
-    def take(self, event: GuardEvent) -> None:
+    def feed(self, event: GuardEvent) -> None:
         """Take an event; those that tell of no touch are passed over."""
         if event.name == EventName.TOUCH_ENDED:
             for touch in self._touches.values():
@@ -75,15 +75,15 @@ class ContactLog:
         number = event.details.get("number")
         if not isinstance(number, int):
             return
-        if event.name in _PLACES and (mark := _mark(number, event.details)) is not None:
+        if event.name in _PLACE_EVENTS and (mark := _mark(number, event.details)) is not None:
             self._touches.setdefault(number, _Touch()).places.append(_Place(event.time, mark))
-            while len(self._touches) > _KEPT:
+            while len(self._touches) > _MAX_TOUCHES:
                 del self._touches[next(iter(self._touches))]
 
-    def take_all(self, events: Iterable[GuardEvent]) -> ContactLog:
+    def feed_all(self, events: Iterable[GuardEvent]) -> ContactLog:
         """Take events in their order, and return itself."""
         for event in events:
-            self.take(event)
+            self.feed(event)
         return self
 
     def marks(self, time: float) -> list[ContactMark]:
@@ -124,6 +124,6 @@ def _mark(number: int, details: Mapping[str, Any]) -> ContactMark | None:
 def _vector(value: Any) -> Vector | None:
     if not isinstance(value, list | tuple) or len(value) != 3:
         return None
-    if not all(isinstance(x, int | float) and abs(x) < _FARTHEST for x in value):
+    if not all(isinstance(x, int | float) and abs(x) < _MAX_DISTANCE for x in value):
         return None
     return float(value[0]), float(value[1]), float(value[2])

@@ -8,19 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import FieldError
 
-from .stage.field_patches import SQUARE, FieldPatches, field_patches, linear, potential_colours
 from .stage.level_scale import gradient
-from .stage.sheet_field import PHASES, ContactOnSheet, SheetField
+from .stage.sheet_field import (
+    PHASES,
+    SQUARE,
+    ContactOnSheet,
+    FieldPatches,
+    SheetField,
+    field_patches,
+    linear,
+    potential_colours,
+)
 
 if TYPE_CHECKING:
-    from .moment import Moment
+    from .run_course import Moment
     from .stage.sheet_surface import SheetSurface
     from .stage.stage import Stage
 
 __all__ = ["FieldChoice", "contact_on"]
 
-_OFF = "off"
-_FLAT = 1e-3  # of the supply: what differs by less than this is drawn in one colour
+_FIELD_OFF = "off"
+_FLAT_SPAN = 1e-3  # of the supply: what differs by less than this is drawn in one colour
 
 
 class FieldChoice:
@@ -35,7 +43,7 @@ class FieldChoice:
         self._scene, self._stages = client.scene, stages
         self._fields: dict[str, tuple[SheetField, FieldPatches]] = {}
         self._nodes: dict[str, Any] = {}
-        self._choice = client.gui.add_dropdown("potential", (_OFF, *PHASES), initial_value=_OFF)
+        self._choice = client.gui.add_dropdown("potential", (_FIELD_OFF, *PHASES), initial_value=_FIELD_OFF)
         self._legend = client.gui.add_html("")
 
     def on_update(self, changed: Any) -> None:
@@ -128,7 +136,7 @@ def _range(shown: list[Any]) -> tuple[float, float]:
     """Return from where to where the colours go [V]: as far as anything drawn, the whole supply where it is all one."""
     low, high = min(float(volts.min()) for _, _, volts, _ in shown), max(float(volts.max()) for _, _, volts, _ in shown)
     supply = max(supply for _, _, _, supply in shown)
-    return (low, high) if high - low > _FLAT * supply else (0.0, supply)
+    return (low, high) if high - low > _FLAT_SPAN * supply else (0.0, supply)
 
 
 def _legend(low: float, high: float, said: str) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain
@@ -25,7 +25,6 @@ from coneskin.robot.guard.signals.journal import (
 )
 
 from .contact_mark import ContactLog, ContactMark
-from .phase_words import UNKNOWN, PhaseWords, phase_after
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,15 +36,67 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["CHANNELS", "History", "PhaseChange", "Series", "history_of"]
+__all__ = ["CHANNELS", "UNKNOWN", "History", "PhaseChange", "PhaseWords", "Series", "history_of", "phase_after"]
+
+_GREY, _GREEN, _AMBER, _RED, _VIOLET, _BLUE = "#6b7280", "#15803d", "#b45309", "#b91c1c", "#6d28d9", "#1d4ed8"
+
+
+class PhaseWords(NamedTuple):
+    """Phase of a guard for people.
+
+    Attributes:
+        text: in a few words.
+        colour: of its band, as in a style sheet.
+    """
+
+    text: str
+    colour: str
+
+
+UNKNOWN = PhaseWords("nothing is known of the guard", _GREY)  #: before its first event
+_PHASE_ACTIVE = PhaseWords("active", _GREEN)
+#: event -> the phase that it begins
+_PHASE_OF_EVENT: Mapping[str, PhaseWords] = {
+    EventName.WAITING: PhaseWords("waiting, not active", _GREY),
+    EventName.ACTIVATED: _PHASE_ACTIVE,
+    EventName.SPEED_REDUCED: PhaseWords("touched: slower", _AMBER),
+    EventName.RESUMED: _PHASE_ACTIVE,
+    EventName.STOPPING: PhaseWords("stopping", _RED),
+    EventName.STANDSTILL: PhaseWords("stands", _RED),
+    EventName.STOP_FAILED: PhaseWords("standstill NOT confirmed", _RED),
+    EventName.RETREATING: PhaseWords("moving away from the touch", _AMBER),
+    EventName.RETREATED: PhaseWords("stopping after the motion away", _RED),
+    EventName.LATCHED: PhaseWords("latched: stands until a manual reset", _VIOLET),
+    EventName.RESET: PhaseWords("reset, not active yet", _GREY),
+    EventName.ENDING: PhaseWords("ending", _GREY),
+    EventName.GUARD_EXITED: PhaseWords("no guard: it has ended", _GREY),
+    EventName.GUARD_UNRESPONSIVE: PhaseWords("the guard does not answer", _RED),
+    EventName.GUARD_RESPONSIVE: PhaseWords("the guard answers again", _BLUE),
+    EventName.FALLBACK_STOP: PhaseWords("stopped without the guard", _RED),
+}
+_REPEATING_EVENTS = {EventName.WAITING, EventName.STANDSTILL}  # within the phases below they say nothing new
+_FINAL_PHASES = {"latched: stands until a manual reset", "ending", "no guard: it has ended"}
+
+
+def phase_after(before: PhaseWords, name: str) -> PhaseWords:
+    """Return the phase after an event.
+
+    Args:
+        before: the phase.
+        name: of the event.
+    """
+    if name in _REPEATING_EVENTS and before.text in _FINAL_PHASES:
+        return before
+    return _PHASE_OF_EVENT.get(name, before)
+
 
 #: channels of a frame that are drawn, as fractions of the supply
 CHANNELS = ("touch_c", "touch_d", "radial_c", "radial_d", "angular_a", "angular_b")
 _LONGEST_FRAME = 64  # bytes
-_BATCH = 1 << 21  # bytes of a skin's stream that are looked at together
-_EVENTS = 2000  # that a page keeps
-_SPARE = 1.5  # times what is kept, before the older part is dropped
-_HEALTH = frozenset(
+_BATCH_SIZE = 1 << 21  # bytes of a skin's stream that are looked at together
+_MAX_EVENTS = 2000  # that a page keeps
+_KEEP_FACTOR = 1.5  # times what is kept, before the older part is dropped
+_HEALTH_EVENTS = frozenset(
     {EventName.FAULT, EventName.GUARD_EXITED, EventName.GUARD_UNRESPONSIVE, EventName.STOP_FAILED}
     | {EventName.RECORDING_GAP, EventName.SKIN_LINE, EventName.FALLBACK_STOP}
 )
@@ -117,7 +168,7 @@ class History:
         self._rest = b""
         self._decode = _state_decoder(scene)
 
-    def take(self, block: Block) -> None:
+    def feed(self, block: Block) -> None:
         """Take a block; one that cannot be read, which the guard has reported, is passed over."""
         if block.time > self.until:
             self.until = block.time
@@ -126,7 +177,7 @@ class History:
         if block.kind == BlockKind.SKIN:
             self._pending.append((block.time, block.payload))
             self._pending_size += len(block.payload)
-            if self._pending_size >= _BATCH:
+            if self._pending_size >= _BATCH_SIZE:
                 self.settle()
         elif block.kind == BlockKind.ARM:
             with suppress(RobotConnectionError):
@@ -146,10 +197,10 @@ class History:
                 self.bodies.times.append(block.time)
                 self.bodies.values.append(tuple(chain.from_iterable(places)))
 
-    def take_all(self, blocks: Iterable[Block]) -> None:
+    def feed_all(self, blocks: Iterable[Block]) -> None:
         """Take blocks, and read the skin's bytes among them."""
         for block in blocks:
-            self.take(block)
+            self.feed(block)
         self.settle()
 
     def settle(self) -> None:
@@ -159,7 +210,7 @@ class History:
             parts = [part for _, part in self._pending]
             self._pending, self._pending_size = [], 0
             self._read_skin(times, parts)
-        if math.isfinite(self._keep) and self.until - self.since > _SPARE * self._keep:
+        if math.isfinite(self._keep) and self.until - self.since > _KEEP_FACTOR * self._keep:
             self.since = self.until - self._keep
             for series in (self.joints, self.speeds, self.forces, *self.levels.values(), *self.channels.values()):
                 series.drop_before(self.since)
@@ -202,16 +253,16 @@ class History:
                 continue
             if event.name == EventName.ACTIVATED:
                 return ""
-            if event.name in _HEALTH:
+            if event.name in _HEALTH_EVENTS:
                 return str(event.details.get("what", event.name))
         return ""
 
     def _take_event(self, event: GuardEvent) -> None:
         self.events.append(event)
-        if len(self.events) > _SPARE * _EVENTS and math.isfinite(self._keep):
-            del self.events[:-_EVENTS]
-            del self.phases[:-_EVENTS]
-        self.contacts.take(event)
+        if len(self.events) > _KEEP_FACTOR * _MAX_EVENTS and math.isfinite(self._keep):
+            del self.events[:-_MAX_EVENTS]
+            del self.phases[:-_MAX_EVENTS]
+        self.contacts.feed(event)
         before = self.phases[-1].phase
         if (phase := phase_after(before, event.name)) != before:
             self.phases.append(PhaseChange(event.time, phase))
@@ -229,7 +280,9 @@ class History:
             own = batch.of(sensor.device_id, sensor.sensor_id)
             if own.any():
                 frames = batch.pick(own)
-                self._take_frames(sensor, arrived[own].tolist(), {n: frames.field(n).astype(float) for n in _FIELDS})
+                self._take_frames(
+                    sensor, arrived[own].tolist(), {n: frames.field(n).astype(float) for n in _FRAME_FIELDS}
+                )
         read = int(batch.ends[-1]) if len(batch.ends) else 0
         self._rest = data[max(read, len(data) - _LONGEST_FRAME) :]
 
@@ -249,7 +302,7 @@ class History:
         channels.values += list(zip(*columns, strict=True))
 
 
-_FIELDS = (*CHANNELS, "touch_supply", "radial_supply", "angular_supply")
+_FRAME_FIELDS = (*CHANNELS, "touch_supply", "radial_supply", "angular_supply")
 
 
 def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState]:
@@ -268,5 +321,5 @@ def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState]:
 def history_of(scene: Scene, blocks: Iterable[Block]) -> History:
     """Return the history of a recording that is over."""
     found = History(scene)
-    found.take_all(blocks)
+    found.feed_all(blocks)
     return found

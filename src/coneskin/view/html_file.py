@@ -11,27 +11,60 @@ import json
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
 from coneskin.core.draft_file import draft_of
 from coneskin.core.errors import RecordingError
 
-from .level_changes import LevelChanges
 from .page_server import PageServer, page_client
-from .panel_text import EVENT_STYLE, NOTICE
-from .stage.level_scale import level_bars
+from .panel import EVENT_STYLE, NOTICE
+from .run_course import Moment, RunCourse, event_lines
+from .stage.level_scale import force_words, level_bars, level_words
+from .stage.sheet_surface import SheetSurface
 from .stage_nodes import StageNodes, look_at_stages
-from .strand import Strand, event_lines
-from .trace_drawing import trace_drawings
+from .traces import trace_drawings
 
-__all__ = ["write_html"]
+__all__ = ["LevelChanges", "write_html"]
 
-_RATE = 30.0  # pictures a second ...
-_PICTURES = 6000  # ... but not more than these in a file
-_EVENTS = 3000  # in a file, each with a picture of its own ...
-_AFTER = 1e-6  # ... so long after it [s]
-_FIRST = b"<!doctype html"  # of every page
+_LEVEL_STEPS = 100  # of a level, which a bar can show
 
-_STYLE = """
+
+class LevelChanges:
+    """Changes of one run, taken moment by moment.
+
+    Args:
+        sheets: of its stage.
+    """
+
+    def __init__(self, sheets: Sequence[SheetSurface]) -> None:
+        self._sheets = sheets
+        self._levels: list[list[tuple[float, int]]] = [[] for _ in sheets]
+        self._forces: list[tuple[float, str]] = []
+
+    def feed(self, time: float, moment: Moment) -> None:
+        """Take what is seen at a time [s], later than those before; what has not changed is passed over."""
+        for sheet, changes in zip(self._sheets, self._levels, strict=True):
+            level = round(_LEVEL_STEPS * min(max(moment.levels[sheet.name], 0.0), 1.0))
+            if not changes or changes[-1][1] != level:
+                changes.append((round(time, 4), level))
+        if moment.force is not None and (not self._forces or self._forces[-1][1] != force_words(moment.force)):
+            self._forces.append((round(time, 4), force_words(moment.force)))
+
+    def data(self) -> dict[str, Any]:
+        """Return the changes for JSON: of each sheet level [%] and the words for each level; of the force its words."""
+        words = [
+            [level_words(sheet, level / _LEVEL_STEPS) for level in range(_LEVEL_STEPS + 1)] for sheet in self._sheets
+        ]
+        return {"levels": self._levels, "words": words, "forces": self._forces}
+
+
+_PICTURE_RATE = 30.0  # pictures a second ...
+_MAX_PICTURES = 6000  # ... but not more than these in a file
+_MAX_EVENTS = 3000  # in a file, each with a picture of its own ...
+_EVENT_DELAY = 1e-6  # ... so long after it [s]
+_PAGE_BEGIN = b"<!doctype html"  # of every page
+
+_PAGE_STYLE = """
 body #root{width:calc(100% - 384px);overflow:hidden;transform:translateZ(0)}
 #coneskin{position:fixed;top:12px;right:12px;width:360px;max-height:calc(100% - 24px);overflow:auto;z-index:9;
 background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px 8px rgba(0,0,0,.25);padding:10px}
@@ -47,7 +80,7 @@ background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px
 """  # the client's own field and label count from the first picture, which is not where the run's clock has its zero
 
 #: moves the client's own playback by its field for the time, and follows what its slider shows
-_SCRIPT = """
+_PAGE_SCRIPT = """
 (function () {
   const data = JSON.parse(document.getElementById('coneskin-data').textContent);
   const panel = document.getElementById('coneskin');
@@ -125,12 +158,12 @@ _SCRIPT = """
 """
 
 
-def write_html(path: Path, strands: Sequence[Strand]) -> float:
+def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
     """Write runs into one HTML file.
 
     Args:
         path: of the file; a page that is there is replaced, and nothing else.
-        strands: the runs.
+        courses: the runs.
 
     Returns:
         pictures a second that the file has.
@@ -140,20 +173,20 @@ def write_html(path: Path, strands: Sequence[Strand]) -> float:
         RecordingError: the file cannot be written, or is something else than a page.
     """
     _check_target(path)
-    since, until = min(item.span[0] for item in strands), max(item.span[1] for item in strands)
+    since, until = min(item.span[0] for item in courses), max(item.span[1] for item in courses)
     duration = max(until - since, 1e-3)
-    count = min(max(2, int(duration * _RATE)), _PICTURES)
-    changes = [LevelChanges(strand.stage.sheets) for strand in strands]
-    scene = _serialized(strands, since, _pictures(strands, since, duration, count), changes)
+    count = min(max(2, int(duration * _PICTURE_RATE)), _MAX_PICTURES)
+    changes = [LevelChanges(course.stage.sheets) for course in courses]
+    scene = _serialized(courses, since, _pictures(courses, since, duration, count), changes)
     embedded = base64.b64encode(scene).decode("ascii")
     head = (
-        f"<title>coneskin: {escape(strands[0].stage.title)}</title><style>{_STYLE}</style>"
+        f"<title>coneskin: {escape(courses[0].stage.title)}</title><style>{_PAGE_STYLE}</style>"
         f'<script>window.__VISER_EMBED_DATA__="{embedded}";window.__VISER_EMBED_CONFIG__={{darkMode:false}};</script>'
     )
     page = page_client()
     page = page.replace("</head>", f"{head}</head>", 1)
     at = page.rindex("</body>")
-    page = page[:at] + _panel(strands, since, until, changes) + page[at:]
+    page = page[:at] + _panel(courses, since, until, changes) + page[at:]
     try:
         with draft_of(path, overwrite=True) as draft:
             draft.write_text(page, encoding="utf-8")
@@ -168,71 +201,71 @@ def _check_target(path: Path) -> None:
         return  # the writing says whether that is possible
     try:
         with path.open("rb") as file:
-            start = file.read(len(_FIRST))
+            start = file.read(len(_PAGE_BEGIN))
     except OSError as exc:
         raise RecordingError(f"cannot write {path}: {exc.strerror or exc}") from exc
-    if start and start.lower() != _FIRST:
+    if start and start.lower() != _PAGE_BEGIN:
         raise RecordingError(f"{path} exists already and is no page, so it is not replaced: name another file")
 
 
-def _pictures(strands: Sequence[Strand], since: float, duration: float, count: int) -> list[float]:
+def _pictures(courses: Sequence[RunCourse], since: float, duration: float, count: int) -> list[float]:
     """Return the times of the pictures from the first one on [s]: even steps, and one just after each event."""
     even = {duration * picture / (count - 1) for picture in range(count)}
-    events = {line.time - since + _AFTER for line in event_lines(strands)[:_EVENTS]}
+    events = {line.time - since + _EVENT_DELAY for line in event_lines(courses)[:_MAX_EVENTS]}
     return sorted(even | {at for at in events if 0.0 <= at < duration})
 
 
 def _serialized(
-    strands: Sequence[Strand], since: float, pictures: Sequence[float], changes: Sequence[LevelChanges]
+    courses: Sequence[RunCourse], since: float, pictures: Sequence[float], changes: Sequence[LevelChanges]
 ) -> bytes:
     """Return the scene and its pictures as viser's client reads them, and take the levels of each picture."""
     with PageServer("coneskin", port=0x2F00) as server:
         taken = server.serializer()
-        reach = max(strand.stage.reach for strand in strands)
-        look_at_stages(server, reach, len(strands))
+        reach = max(course.stage.reach for course in courses)
+        look_at_stages(server, reach, len(courses))
         server.scene.set_up_direction("+z")
         nodes = [
-            StageNodes(server.scene, strand.stage, f"/run {number}", strand.offset)
-            for number, strand in enumerate(strands, 1)
+            StageNodes(server.scene, course.stage, f"/run {number}", course.offset)
+            for number, course in enumerate(courses, 1)
         ]
         before = 0.0
         for at in pictures:
             if at > before:
                 taken.insert_sleep(at - before)
             before = at
-            for strand, drawn, levels in zip(strands, nodes, changes, strict=True):
-                moment = strand.moment(since + at)
+            for course, drawn, levels in zip(courses, nodes, changes, strict=True):
+                moment = course.moment(since + at)
                 drawn.show(moment)
-                levels.take(at, moment)
+                levels.feed(at, moment)
         return bytes(taken.serialize())
 
 
-def _panel(strands: Sequence[Strand], since: float, until: float, changes: Sequence[LevelChanges]) -> str:
-    from .timeline import timeline
+def _panel(courses: Sequence[RunCourse], since: float, until: float, changes: Sequence[LevelChanges]) -> str:
+    from .panel import timeline
 
-    several = len(strands) > 1
+    several = len(courses) > 1
     runs, parts, bars = [], [], []
-    for strand, levels in zip(strands, changes, strict=True):
-        phases = [[max(c.time - strand.zero - since, 0.0), c.phase.text, c.phase.colour] for c in strand.history.phases]
+    for course, levels in zip(courses, changes, strict=True):
+        phases = [[max(c.time - course.zero - since, 0.0), c.phase.text, c.phase.colour] for c in course.history.phases]
         health = [[0.0, ""]]
-        for event in strand.history.events:
-            if (wrong := strand.history.health(event.time)) != health[-1][1]:
-                health.append([event.time - strand.zero - since, wrong])
-        runs.append({"title": strand.stage.title, "phases": phases, "health": health, **levels.data()})
-        title = "" if several else f"<b>{escape(strand.stage.title)}</b>"  # of several, each phase says whose it is
+        for event in course.history.events:
+            if (wrong := course.history.health(event.time)) != health[-1][1]:
+                health.append([event.time - course.zero - since, wrong])
+        runs.append({"title": course.stage.title, "phases": phases, "health": health, **levels.data()})
+        title = "" if several else f"<b>{escape(course.stage.title)}</b>"  # of several, each phase says whose it is
         parts.append(f'{title}<div class="coneskin-phase"></div>')
         parts.append('<div class="coneskin-health"></div>')
-        force = strand.history.force(strand.zero + since)
-        none = {sheet.name: 0.0 for sheet in strand.stage.sheets}
-        bars.append(level_bars(strand.stage.sheets, none, force, f"run {len(runs)}" if several else ""))
-    events = [(line.time - since, " ".join(line.text.split())) for line in event_lines(strands)[:_EVENTS]]
+        force = course.history.force(course.zero + since)
+        none = {sheet.name: 0.0 for sheet in course.stage.sheets}
+        bars.append(level_bars(course.stage.sheets, none, force, f"run {len(runs)}" if several else ""))
+    events = [(line.time - since, " ".join(line.text.split())) for line in event_lines(courses)[:_MAX_EVENTS]]
     data = {"since": since, "duration": max(until - since, 1e-3), "several": several, "runs": runs, "events": events}
     text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element
-    drawn = timeline(strands, since, until)
+    drawn = timeline(courses, since, until)
     return (
         f'<div id="coneskin"><div id="coneskin-notice">{escape(NOTICE)}</div>{"".join(parts)}'
         '<div id="coneskin-clock"></div><div style="position:relative;margin:4px 10px 0">'
-        f'{drawn}<div class="coneskin-cursor"></div></div>{"".join(bars)}{trace_drawings(strands, since, until)}'
+        f'{drawn}<div class="coneskin-cursor"></div></div>{"".join(bars)}{trace_drawings(courses, since, until)}'
         f'<style>{EVENT_STYLE}</style><div id="coneskin-events"></div></div>'
-        f'<script type="application/json" id="coneskin-data">{text}</script><script>{_SCRIPT}</script>'
+        f'<script type="application/json" id="coneskin-data">{text}</script><script>{_PAGE_SCRIPT}</script>'
     )

@@ -12,30 +12,28 @@ from coneskin.core.errors import ConeSkinError
 from coneskin.runs.replay.event_text import describe
 
 from .field_choice import FieldChoice
+from .history import UNKNOWN, PhaseWords
 from .live_run import LiveRun
-from .moment import Moment
 from .page_server import PageServer
-from .panel_text import event_list, notice, status
-from .phase_words import UNKNOWN, PhaseWords
-from .playout import Playout
+from .panel import event_list, notice, status, timeline
+from .playback import Playout
+from .run_course import Moment, RunCourse
 from .stage.level_scale import level_bars
 from .stage.stage import Stage
 from .stage_nodes import StageNodes, look_at_stages
-from .strand import Strand
-from .timeline import timeline
-from .trace_plot import TracePlot
+from .traces import TracePlot
 
 __all__ = ["LivePage"]
 
-_PERIOD = 1.0 / 30.0  # s between two pictures
-_POLL = 0.008  # s between two looks at the recording
+_PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
+_POLL_PERIOD = 0.008  # s between two looks at the recording
 _TEXT_PERIOD = 0.2  # s between two changes of the text: a processor that draws the arm draws it too
 _PLOT_PERIOD = 0.5  # s between two changes of timeline, traces and potentials
-_ROOT = "/run"
+_ROOT_NODE = "/run"
 _SEARCH_PERIOD = 0.3  # s between two looks for a guard
-_STALE = 0.7  # s without news after which the page says so
-_WINDOW = 20.0  # s of the timeline
-_LISTED = 60  # events that are put into words
+_STALE_TIME = 0.7  # s without news after which the page says so
+_TIMELINE_SPAN = 20.0  # s of the timeline
+_MAX_LISTED_EVENTS = 60  # events that are put into words
 
 
 class LivePage:
@@ -78,14 +76,14 @@ class LivePage:
         due = 0.0
         while not over.is_set() and not ended():
             now = time.monotonic()
-            news = self.look(now)
+            news = self.poll(now)
             if now >= due or news:
                 self.draw(now)
                 if now >= due:  # the next one on time, unless this one was late by more than that
-                    due = due + _PERIOD if now < due + _PERIOD else now + _PERIOD
-            over.wait(max(0.0, min(_POLL, due - time.monotonic())))
+                    due = due + _PICTURE_PERIOD if now < due + _PICTURE_PERIOD else now + _PICTURE_PERIOD
+            over.wait(max(0.0, min(_POLL_PERIOD, due - time.monotonic())))
 
-    def look(self, now: float) -> bool:
+    def poll(self, now: float) -> bool:
         """Take what is new; return whether an event is among it.
 
         Args:
@@ -100,21 +98,21 @@ class LivePage:
             except ConeSkinError:  # its header is not there yet
                 return False
             if self._run is not None:
-                self._stand(self._run.strand.stage)
+                self._stand(self._run.course.stage)
             return False
-        events = len(self._run.strand.history.events)
+        events = len(self._run.course.history.events)
         try:
-            self._run.follow()
+            self._run.poll()
         except ConeSkinError:
             self._leave()
             return True
-        news = len(self._run.strand.history.events) != events
+        news = len(self._run.course.history.events) != events
         if self._run.ended or self._run.silence > 30.0:
             self._searched = now
             if (following := self._find()) is not None:
                 self._leave()
                 self._run = following
-                self._stand(following.strand.stage)
+                self._stand(following.course.stage)
                 return True
         return news
 
@@ -124,24 +122,24 @@ class LivePage:
         Args:
             now: the clock [s].
         """
-        strand = None if self._run is None else self._run.strand
-        if strand is None:
+        course = None if self._run is None else self._run.course
+        if course is None:
             self._text(now, [(self._stage.title, UNKNOWN, "")], "", "no guard records a run: what is drawn is at rest")
             return
-        at = strand.history.until - strand.zero
+        at = course.history.until - course.zero
         moving = self._playout.time(at, now)
-        moment = replace(strand.moment(at), poses=strand.poses(moving), bodies=strand.bodies(moving))
+        moment = replace(course.moment(at), poses=course.poses(moving), bodies=course.bodies(moving))
         assert self._nodes is not None
         with self._server.together():
             self._nodes.show(moment)
         self._show_levels(now, moment)
-        self._text(now, [(strand.stage.title, moment.phase, moment.health)], f"{at:9.3f} s", self._stale())
-        self._draw_past(now, strand, at)
+        self._text(now, [(course.stage.title, moment.phase, moment.health)], f"{at:9.3f} s", self._stale())
+        self._draw_past(now, course, at)
 
     def _enter(self, client: Any) -> Callable[[], None]:
         """Give a viewer its choice of potentials; return what takes it away."""
         with self._entering:
-            self._choices[client.client_id] = FieldChoice(client, [(self._drawn, _ROOT)])
+            self._choices[client.client_id] = FieldChoice(client, [(self._drawn, _ROOT_NODE)])
 
         def leave() -> None:
             with self._entering:
@@ -164,7 +162,7 @@ class LivePage:
         if self._run.ended:
             return "the run is over: this is its last moment"
         silence = self._run.silence
-        return f"NOTHING NEW for {silence:.1f} s: what is drawn is old" if silence > _STALE else ""
+        return f"NOTHING NEW for {silence:.1f} s: what is drawn is old" if silence > _STALE_TIME else ""
 
     def _text(self, now: float, runs: list[tuple[str, PhaseWords, str]], clock: str, stale: str) -> None:
         content = status(runs, clock if now - self._texted >= _TEXT_PERIOD else self._clock, stale)
@@ -173,20 +171,20 @@ class LivePage:
             self._texted = now
             self._status.content = content
 
-    def _draw_past(self, now: float, strand: Strand, at: float) -> None:
-        events = strand.history.events
+    def _draw_past(self, now: float, course: RunCourse, at: float) -> None:
+        events = course.history.events
         newest = len(events) and id(events[-1])
         if newest != self._lines_of:
             self._lines_of = newest
-            lines = [(event, describe(event, strand.zero)) for event in events[-_LISTED:]]
+            lines = [(event, describe(event, course.zero)) for event in events[-_MAX_LISTED_EVENTS:]]
             self._events.content = event_list(lines, len(lines) - 1)
         if now - self._plotted >= _PLOT_PERIOD and not (self._run is not None and self._run.ended):
             self._plotted = now
-            self._timeline.content = timeline([strand], at - _WINDOW, at)
+            self._timeline.content = timeline([course], at - _TIMELINE_SPAN, at)
             if self._plot is None:
-                self._plot = TracePlot(self._server.gui, [strand], at - _WINDOW, at, fixed=True)
+                self._plot = TracePlot(self._server.gui, [course], at - _TIMELINE_SPAN, at, fixed=True)
             else:
-                self._plot.move(at - _WINDOW, at)
+                self._plot.move(at - _TIMELINE_SPAN, at)
 
     def _stand(self, stage: Stage) -> None:
         """Draw a stage in the place of the one before, unless it looks the same."""
@@ -202,11 +200,11 @@ class LivePage:
         scene, reach = self._server.scene, stage.reach
         with self._entering:
             for choice in self._choices.values():
-                choice.stand([(stage, _ROOT)])
+                choice.stand([(stage, _ROOT_NODE)])
         scene.reset()
         scene.set_up_direction("+z")
         look_at_stages(self._server, reach)
-        self._nodes = StageNodes(scene, stage, _ROOT)
+        self._nodes = StageNodes(scene, stage, _ROOT_NODE)
         levels = {sheet.name: 0.0 for sheet in stage.sheets}
         self._nodes.show(Moment(0.0, stage.poses(None), levels, [], UNKNOWN, "", bodies=stage.moved(())))
 

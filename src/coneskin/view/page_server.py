@@ -15,15 +15,13 @@ from typing import Any
 
 from coneskin.core.errors import ConeSkinError, MissingExtra
 
-from .client.file_drop import with_file_drop
-from .client.software_drawing import with_plain_edges
-from .client.unpacked_client import unpacked
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
+from .viser_client import unpacked, with_file_drop, with_plain_edges
 
 __all__ = ["LOOPBACK", "PageServer", "page_client"]
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
-_UPLOAD = 200_000_000  # bytes of a message, where files may be dropped
+_MAX_UPLOAD_SIZE = 200_000_000  # bytes of a message, where files may be dropped
 _FIELD_OF_VIEW = math.radians(50.0)  # from top to bottom; viser's own 75 deg makes what is far small
 _starting = threading.Lock()
 
@@ -82,7 +80,7 @@ class PageServer:
         allowed = ALLOWED | UPLOADS if uploads else ALLOWED
         page = unpacked(page_client())
         page = with_file_drop(page) if uploads else page
-        self.gate = ConnectionGate(decode, hosts, page, allowed, **({"largest": _UPLOAD} if uploads else {}))
+        self.gate = ConnectionGate(decode, hosts, page, allowed, **({"largest": _MAX_UPLOAD_SIZE} if uploads else {}))
         _check_address(host)
         with _starting, _gated(self.gate), contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host=host, port=port, label=title, verbose=False)

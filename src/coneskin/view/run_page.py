@@ -14,31 +14,30 @@ from coneskin.robot.guard.signals.journal import EventName
 
 from .field_choice import FieldChoice
 from .page_server import PageServer
-from .panel_text import event_list, notice, status
+from .panel import event_list, notice, status, timeline
 from .playback import SPEEDS, Playback
+from .run_course import RunCourse, event_lines
 from .stage.level_scale import level_bars
 from .stage_nodes import StageNodes, look_at_stages
-from .strand import Strand, event_lines
-from .timeline import timeline
-from .trace_plot import TracePlot
+from .traces import TracePlot
 
 __all__ = ["show_runs"]
 
-_PERIOD = 1.0 / 30.0  # s between two pictures
+_PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
 _TEXT_PERIOD = 0.1  # s between two changes of the text
-_SPEEDS = {f"{speed:g}x": speed for speed in SPEEDS}
-_IMPORTANT = frozenset(
+_SPEED_CHOICES = {f"{speed:g}x": speed for speed in SPEEDS}
+_JUMP_EVENTS = frozenset(
     {EventName.CONTACT, EventName.STOPPING, EventName.STANDSTILL, EventName.RETREATING, EventName.RETREATED}
     | {EventName.LATCHED, EventName.FAULT, EventName.ACTIVATED, EventName.SPEED_REDUCED, EventName.STOP_FAILED}
     | {EventName.CONTACT_LOCATED, EventName.TOUCH_ENDED, EventName.GUARD_EXITED, EventName.RESET}
 )
 
 
-def show_runs(server: PageServer, strands: Sequence[Strand]) -> None:
+def show_runs(server: PageServer, courses: Sequence[RunCourse]) -> None:
     """Show recordings on a page, to every viewer that connects from now on."""
-    reach = max(strand.stage.reach for strand in strands)
-    look_at_stages(server, reach, len(strands))
-    server.on_viewer(lambda client: _Player(client, strands).end)
+    reach = max(course.stage.reach for course in courses)
+    look_at_stages(server, reach, len(courses))
+    server.on_viewer(lambda client: _Player(client, courses).end)
 
 
 class _Player:
@@ -46,23 +45,23 @@ class _Player:
 
     Args:
         client: viser's ``ClientHandle``.
-        strands: the runs.
+        courses: the runs.
     """
 
-    def __init__(self, client: Any, strands: Sequence[Strand]) -> None:
-        self._client, self._strands = client, strands
-        spans = [strand.span for strand in strands]
+    def __init__(self, client: Any, courses: Sequence[RunCourse]) -> None:
+        self._client, self._strands = client, courses
+        spans = [course.span for course in courses]
         self._playback = Playback(_down(min(since for since, _ in spans)), -_down(-max(until for _, until in spans)))
         self._changed = threading.Condition()
         self._over = False
         self._nodes = [
-            StageNodes(client.scene, strand.stage, f"/run {number}", strand.offset)
-            for number, strand in enumerate(strands, 1)
+            StageNodes(client.scene, course.stage, f"/run {number}", course.offset)
+            for number, course in enumerate(courses, 1)
         ]
-        lines = event_lines(strands)
+        lines = event_lines(courses)
         self._times = [line.time for line in lines]
         self._lines = [(line.event, line.text) for line in lines]
-        self._jumps = [index for index, line in enumerate(lines) if line.event.name in _IMPORTANT]
+        self._jumps = [index for index, line in enumerate(lines) if line.event.name in _JUMP_EVENTS]
         self._make_panel(client.gui)
         self._shown = -2
         self._texted = -1.0
@@ -77,8 +76,8 @@ class _Player:
     def _make_panel(self, gui: Any) -> None:
         playback = self._playback
         gui.add_html(notice())
-        for strand in self._strands:
-            gui.add_html(_title(strand.stage.title))
+        for course in self._strands:
+            gui.add_html(_title(course.stage.title))
         gui.add_html(timeline(self._strands, playback.since, playback.until))
         self._status = gui.add_html("")
         step = max(1e-3, round((playback.until - playback.since) / 2e5, 3))
@@ -86,11 +85,11 @@ class _Player:
             "time [s]", min=playback.since, max=playback.until, step=step, initial_value=playback.since
         )
         self._buttons = gui.add_button_group("", ("play", "pause", "|<", "<", ">"))
-        self._speed = gui.add_dropdown("speed", list(_SPEEDS), initial_value="1x")
+        self._speed = gui.add_dropdown("speed", list(_SPEED_CHOICES), initial_value="1x")
         choices = ["jump to an event", *(self._choice(index) for index in self._jumps[:500])]
         self._levels = gui.add_html("")
         self._field = FieldChoice(
-            self._client, [(strand.stage, f"/run {number}") for number, strand in enumerate(self._strands, 1)]
+            self._client, [(course.stage, f"/run {number}") for number, course in enumerate(self._strands, 1)]
         )
         self._jump = gui.add_dropdown("event", choices, initial_value=choices[0])
         self._events = gui.add_html("")
@@ -121,7 +120,7 @@ class _Player:
             self._do(actions[what])
 
     def _speeded(self, _event: Any) -> None:
-        speed = _SPEEDS.get(str(self._speed.value))
+        speed = _SPEED_CHOICES.get(str(self._speed.value))
         if speed is not None:  # a browser may send any words
             self._do(lambda playback: setattr(playback, "speed", speed))
 
@@ -146,13 +145,13 @@ class _Player:
         with self._changed:
             while not self._over:
                 began = time.monotonic()
-                at, playing = self._playback.advance(began), self._playback.playing
+                at, playing = self._playback.poll(began), self._playback.playing
                 self._show(at, began, playing)
-                wait = max(0.0, _PERIOD - (time.monotonic() - began)) if self._playback.playing else None
+                wait = max(0.0, _PICTURE_PERIOD - (time.monotonic() - began)) if self._playback.playing else None
                 self._changed.wait(wait)
 
     def _show(self, at: float, now: float, playing: bool) -> None:
-        moments = [strand.moment(at) for strand in self._strands]
+        moments = [course.moment(at) for course in self._strands]
         with self._client.atomic():
             for nodes, moment in zip(self._nodes, moments, strict=True):
                 nodes.show(moment)
@@ -161,14 +160,14 @@ class _Player:
         self._texted = now
         self._field.show(moments)
         self._levels.content = "".join(
-            level_bars(strand.stage.sheets, moment.levels, moment.force, f"run {number}" if len(moments) > 1 else "")
-            for number, (strand, moment) in enumerate(zip(self._strands, moments, strict=True), 1)
+            level_bars(course.stage.sheets, moment.levels, moment.force, f"run {number}" if len(moments) > 1 else "")
+            for number, (course, moment) in enumerate(zip(self._strands, moments, strict=True), 1)
         )
         playback = self._playback
         share = (at - playback.since) / max(playback.until - playback.since, 1e-9)
         runs = [
-            (strand.stage.title, moment.phase, moment.health)
-            for strand, moment in zip(self._strands, moments, strict=True)
+            (course.stage.title, moment.phase, moment.health)
+            for course, moment in zip(self._strands, moments, strict=True)
         ]
         self._status.content = status(runs, f"{at:9.3f} s of {playback.until:.3f} s", share=share)
         if abs(float(self._slider.value) - at) > 1e-9:

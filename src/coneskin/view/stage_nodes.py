@@ -7,30 +7,29 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.geometry.pose import Vector
 
-from .stage.floor import floor_lines
 from .stage.level_scale import level_colour
-from .stage.rotation import along, quaternion
-from .stage.solid import joined, revolve
+from .stage.solids import along, joined, quaternion, revolve
+from .stage.stage import floor_lines
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from .contact_mark import ContactMark
-    from .moment import Moment
     from .page_server import PageServer
-    from .stage.solid import Solid
+    from .run_course import Moment
+    from .stage.solids import Solid
     from .stage.stage import Stage
 
 __all__ = ["StageNodes", "light_plainly", "look_at_stages"]
 
-_MARKS = 6  # nodes for contacts on each link with a sheet, used again and again
+_MARKS_PER_LINK = 6  # nodes for contacts on each link with a sheet, used again and again
 _LOCATED, _UNCERTAIN, _PAST = (192, 38, 211), (249, 115, 22), (120, 113, 108)
 _FLOOR, _RIM = (175, 175, 180), (30, 33, 36)
-_NORMAL = 0.14  # m; length of the arrow along the normal
-_LEAST = 0.004  # m; half axes of an ellipse that can still be seen
-_FADES = 8  # steps in which a mark fades
-_SEGMENTS = 32
+_ARROW_LENGTH = 0.14  # m; length of the arrow along the normal
+_MIN_HALF_AXIS = 0.004  # m; half axes of an ellipse that can still be seen
+_FADE_STEPS = 8  # steps in which a mark fades
+_SEGMENT_COUNT = 32
 
 
 def light_plainly(scene: Any) -> None:
@@ -111,7 +110,8 @@ class StageNodes:
             )
         links = sorted({sheet.link for sheet in stage.sheets})
         self._marks = {
-            link: [_MarkNodes(scene, f"{root}/link {link}/contact {k}") for k in range(_MARKS)] for link in links
+            link: [_MarkNodes(scene, f"{root}/link {link}/contact {k}") for k in range(_MARKS_PER_LINK)]
+            for link in links
         }
         self._link_of = {sheet.name: sheet.link for sheet in stage.sheets}
 
@@ -146,11 +146,11 @@ class _MarkNodes:
         self._parts: list[Any] = []
 
     def show(self, mark: ContactMark) -> None:
-        fading = math.ceil(mark.strength * _FADES)
+        fading = math.ceil(mark.strength * _FADE_STEPS)
         drawn = (mark._replace(strength=fading, level=0.0),)
         if drawn != self._drawn:
             self._drawn = drawn
-            self._draw(mark, fading / _FADES)
+            self._draw(mark, fading / _FADE_STEPS)
         self._frame.visible = True
 
     def hide(self) -> None:
@@ -183,7 +183,13 @@ def _add_solid(scene: Any, name: str, solid: Solid) -> None:
 
 def _arrow() -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     head, shaft, width = 0.035, 0.0035, 0.010
-    profile = [(0.0, 0.0), (shaft, 0.0), (shaft, _NORMAL - head), (width, _NORMAL - head), (0.0, _NORMAL)]
+    profile = [
+        (0.0, 0.0),
+        (shaft, 0.0),
+        (shaft, _ARROW_LENGTH - head),
+        (width, _ARROW_LENGTH - head),
+        (0.0, _ARROW_LENGTH),
+    ]
     vertices, faces = revolve(profile, 16)
     return _single(vertices), faces
 
@@ -193,14 +199,14 @@ def _ellipse(mark: ContactMark) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     import numpy as np
 
     back = along(mark.normal).inverse()
-    axes = mark.ellipse or ((_LEAST, 0.0, 0.0), (0.0, _LEAST, 0.0))
+    axes = mark.ellipse or ((_MIN_HALF_AXIS, 0.0, 0.0), (0.0, _MIN_HALF_AXIS, 0.0))
     first, second = (np.array(back.rotate(axis) if mark.ellipse else axis) for axis in axes)
     first, second = _visible(first), _visible(second)
-    turn = np.linspace(0.0, 2.0 * math.pi, _SEGMENTS, endpoint=False)[:, None]
+    turn = np.linspace(0.0, 2.0 * math.pi, _SEGMENT_COUNT, endpoint=False)[:, None]
     rim = np.cos(turn) * first + np.sin(turn) * second + (0.0, 0.0, 0.004)
     vertices = np.concatenate([[[0.0, 0.0, 0.004]], rim])
-    k = np.arange(_SEGMENTS)
-    return vertices, np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % _SEGMENTS])
+    k = np.arange(_SEGMENT_COUNT)
+    return vertices, np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % _SEGMENT_COUNT])
 
 
 def _both_sides(
@@ -219,7 +225,7 @@ def _visible(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     import numpy as np
 
     length = float(np.linalg.norm(axis))
-    return axis * max(1.0, _LEAST / length) if length > 0.0 else np.array((_LEAST, 0.0, 0.0))
+    return axis * max(1.0, _MIN_HALF_AXIS / length) if length > 0.0 else np.array((_MIN_HALF_AXIS, 0.0, 0.0))
 
 
 def _single(values: NDArray[np.float64]) -> NDArray[np.float32]:

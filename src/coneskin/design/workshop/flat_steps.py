@@ -75,14 +75,14 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     )
     yield (
         f"Wires to the tabs, in the colours and lengths of the table below: strip {in_mm(STRIPPED)} of each wire, lay "
-        f"the strands along the outer half of the tab, fold that half ({in_mm(0.5 * plan.tab)}) over them, wrap copper "
+        f"the courses along the outer half of the tab, fold that half ({in_mm(0.5 * plan.tab)}) over them, wrap copper "
         "tape with conductive adhesive around it, press it flat with pliers, and shrink a tube over it (heat gun at "
         "its lowest setting, a metal ruler under "
         "the tab). *Check:* below 1 ohm from the free end of the wire to the foil, also while you pull the wire "
         "as hard as a full cup hangs on it (3 N). "
         "Until the cable tie is there, masking tape holds the wires to the part, so that nothing pulls at a tab."
         if plan.tab
-        else "This sheet has no tabs: lay the strands of each wire (table below) flat on its foil at the rim, and "
+        else "This sheet has no tabs: lay the courses of each wire (table below) flat on its foil at the rim, and "
         "copper tape with conductive adhesive over them. *Check:* below 1 ohm from the free end of the wire to the "
         "foil."
     )

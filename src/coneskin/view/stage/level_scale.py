@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 __all__ = ["force_words", "gradient", "level_bars", "level_colour", "level_words"]
 
-_STEPS = 24  # colours of a sheet: a change below one is not worth a message
+_COLOUR_STEPS = 24  # colours of a sheet: a change below one is not worth a message
 _QUIET, _TOUCHED, _FIRM = (46, 125, 107), (245, 158, 11), (220, 38, 38)
 _FIRM_LEVEL = 0.6
-_STOPS = 16  # of a bar's gradient
-_FORCES = 4  # of a force table that have a tick
+_GRADIENT_STOPS = 16  # of a bar's gradient
+_MAX_FORCE_TICKS = 4  # of a force table that have a tick
 
 
 def level_colour(level: float, touch_level: float) -> tuple[int, int, int]:
@@ -25,7 +25,7 @@ def level_colour(level: float, touch_level: float) -> tuple[int, int, int]:
     else:
         low, high = _TOUCHED, _FIRM
         share = min(1.0, (level - touch_level) / max(_FIRM_LEVEL - touch_level, 1e-3))
-    share = round(share * _STEPS) / _STEPS
+    share = round(share * _COLOUR_STEPS) / _COLOUR_STEPS
     red, green, blue = (round(a + share * (b - a)) for a, b in zip(low, high, strict=True))
     return red, green, blue
 
@@ -72,11 +72,11 @@ def force_words(force: float) -> str:
 
 
 def _bar(sheet: SheetSurface, level: float) -> str:
-    colours = [level_colour(k / _STOPS, sheet.touch_level) for k in range(_STOPS + 1)]
+    colours = [level_colour(k / _GRADIENT_STOPS, sheet.touch_level) for k in range(_GRADIENT_STOPS + 1)]
     shown = 100.0 * min(max(level, 0.0), 1.0)
     ticks = [(sheet.touch_level, f"{sheet.touch_level:g}")]
     if (table := sheet.sensor.force_table) is not None:
-        every = max(1, -(-len(table.forces) // _FORCES))
+        every = max(1, -(-len(table.forces) // _MAX_FORCE_TICKS))
         ticks += [(at, f"{force:.3g} N") for at, force in list(zip(table.levels, table.forces, strict=True))[::every]]
     else:
         ticks += [(0.5, "0.5"), (1.0, "1")]

@@ -15,10 +15,12 @@ if TYPE_CHECKING:
 
 __all__ = ["SheetSurface", "sheet_surfaces"]
 
-_ABOVE = 0.0015  # m above the surface that is sensed: the sheets are that thick, and their link is not to shine through
-_SAGITTA = 0.0005  # m by which a flat piece may lie below the round side, so that the link does not shine through
-_STEP = 0.008  # m between two vertices along a side that is not straight, about
-_MOST = 96  # vertices along or around
+_SHEET_HEIGHT = (
+    0.0015  # m above the surface that is sensed: the sheets are that thick, and their link is not to shine through
+)
+_MAX_SAGITTA = 0.0005  # m by which a flat piece may lie below the round side, so that the link does not shine through
+_VERTEX_DISTANCE = 0.008  # m between two vertices along a side that is not straight, about
+_MAX_VERTICES = 96  # vertices along or around
 _RIM_WIDTH, _RIM_ABOVE = 0.0025, 0.0006  # m; of the band that shows where the active area ends, above the sheet
 
 
@@ -66,16 +68,16 @@ def _surface(item: SensorOnArm, sensor: Sensor) -> SheetSurface:
     cone = item.frustum.frustum
     largest = max(cone.radius1, cone.radius2)
     straight = item.surface is None  # a mesh lies below another sheet, and is not quite a cone
-    u = np.linspace(0.0, cone.slant, 2 if straight else _count(cone.slant / _STEP, 8))
-    step = 2.0 * math.acos(1.0 - min(_SAGITTA / largest, 1.0)) if straight else _STEP / largest
+    u = np.linspace(0.0, cone.slant, 2 if straight else _count(cone.slant / _VERTEX_DISTANCE, 8))
+    step = 2.0 * math.acos(1.0 - min(_MAX_SAGITTA / largest, 1.0)) if straight else _VERTEX_DISTANCE / largest
     phi = np.linspace(0.0, cone.wrap, _count(cone.wrap / step, 24))
-    vertices, faces = _strip(item, u, phi, _ABOVE)
+    vertices, faces = _strip(item, u, phi, _SHEET_HEIGHT)
     width, turn = min(_RIM_WIDTH, cone.slant), min(_RIM_WIDTH / largest, cone.wrap)
     bands = [(u[[0]] + (0.0, width), phi), (u[[-1]] - (width, 0.0), phi)]
     bands += [(u, phi[[0]] + (0.0, turn)), (u, phi[[-1]] - (turn, 0.0))]
     rim_vertices, rim_faces, before = [], [], 0
     for along, around in bands:
-        points, triangles = _strip(item, along, around, _ABOVE + _RIM_ABOVE)
+        points, triangles = _strip(item, along, around, _SHEET_HEIGHT + _RIM_ABOVE)
         rim_vertices.append(points)
         rim_faces.append(before + triangles)
         before += len(points)
@@ -111,4 +113,4 @@ def _strip(
 
 
 def _count(pieces: float, least: int) -> int:
-    return min(max(math.ceil(pieces) + 1, least), _MOST)
+    return min(max(math.ceil(pieces) + 1, least), _MAX_VERTICES)

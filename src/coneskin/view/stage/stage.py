@@ -1,28 +1,103 @@
-"""Stage: what is drawn once and then only moved: the arm's solids and the sheets on them."""
+"""Stage: what is drawn once and then only moved: the arm's solids and the sheets on them.
+
+The solids of an arm are made from its tables (``solids``): their axes are exact, how thick they are is not. Where a
+sheet truly lies, its scene says. So a solid that hides one is at fault: that part is drawn so that you see through it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from coneskin.geometry.pose import Pose, Vector
 
-from .body_solids import body_solids
-from .buried_sheets import clear_where_buried
 from .sheet_surface import SheetSurface, sheet_surfaces
-from .solid import Solid
+from .solids import Solid, body_solids
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["Stage", "set_stage"]
+__all__ = ["CLEAR", "SPACING", "Stage", "clear_where_buried", "floor_lines", "set_stage"]
+
+CLEAR = 0.3  #: opacity of a solid in which part of a sheet is buried
+_MIN_HIDDEN_SHARE = 0.005  # share of a sheet from which on it counts
+_ROWS, _COLUMNS = 16, 48  # places of a sheet that are looked at
+
+
+def clear_where_buried(
+    solids: Sequence[Solid], sheets: Sequence[SheetSurface], poses: Mapping[int, Pose]
+) -> tuple[Solid, ...]:
+    """Return solids, those clear in which a sheet on their link or a neighbour is buried.
+
+    Neighbours turn about the axis of their joint, and so does each solid about it: one pose of the arm stands for all.
+
+    Args:
+        solids: of the arm; one that is not closed, a mesh of a link, is what it is.
+        sheets: on the arm.
+        poses: of the links' frames, at any joint positions.
+    """
+    found = []
+    for solid in solids:
+        near = [sheet for sheet in sheets if solid.closed and abs(sheet.link - solid.link) <= 1]
+        hides = any(_share_inside(solid, _places(sheet, poses, solid.link)) > _MIN_HIDDEN_SHARE for sheet in near)
+        found.append(solid._replace(opacity=CLEAR) if hides else solid)
+    return tuple(found)
+
+
+def _places(sheet: SheetSurface, poses: Mapping[int, Pose], link: int) -> NDArray[np.float64]:
+    """Return places all over a sheet, in the frame of a link [m], shape (n, 3)."""
+    import numpy as np
+
+    cone = sheet.item.frustum.frustum
+    u, phi = np.meshgrid(np.linspace(0.0, cone.slant, _ROWS), np.linspace(0.0, cone.wrap, _COLUMNS), indexing="ij")
+    points, _ = sheet.item.frustum.place(u, phi)
+    here = poses[sheet.link].apply_all(points.reshape(-1, 3))
+    return np.asarray(poses[link].inverse().apply_all(here))
+
+
+def _share_inside(solid: Solid, points: NDArray[np.float64]) -> float:
+    """Return which share of points is inside of a solid, which is convex as all that is closed here."""
+    import numpy as np
+
+    a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    behind = points @ normals.T < np.einsum("ij,ij->i", a, normals)
+    return float(behind.all(axis=1).mean())
+
+
+SPACING = 0.25  #: m between two lines
+_LINE_WIDTH = 0.006  # m; from 2 m off still more than a pixel
+
+
+def floor_lines(reach: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices [m] and faces, seen from above, of lines that go as far as twice the reach each way.
+
+    Args:
+        reach: how far an arm on the floor can be from its base [m].
+    """
+    import numpy as np
+
+    count = max(1, math.ceil(2.0 * reach / SPACING))
+    at, end, half = SPACING * np.arange(-count, count + 1), SPACING * count, 0.5 * _LINE_WIDTH
+    corners = [np.stack([at + side, np.full_like(at, far)], axis=1) for far in (-end, end) for side in (-half, half)]
+    across = np.stack(corners, axis=1)  # lines along y: near left, near right, far left, far right
+    along = across[..., ::-1][:, [0, 2, 1, 3]]  # the same along x
+    flat = np.concatenate([across, along]).reshape(-1, 2)
+    first = 4 * np.arange(2 * len(at))[:, None, None]
+    faces = (first + np.array([(0, 1, 3), (0, 3, 2)])).reshape(-1, 3)
+    return np.column_stack([flat, np.zeros(len(flat))]), faces
+
 
 #: joint positions of an arm of which nothing has been measured [rad]: it stands upright, its elbow bent
 REST = (0.0, -1.5708, 1.2, -1.2, -1.5708, 0.0)
-_SHELL = (201, 205, 210)
+_SHELL_COLOUR = (201, 205, 210)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +179,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
         return Stage(title, None, (), sheets, bodies, starts)
     from coneskin.robot.arm.ur_models import arm_model
 
-    from .arm_solids import arm_solids
+    from .solids import arm_solids
 
     model = arm_model(scene.arm.model)
     slimmest: dict[int, float] = {}
@@ -130,5 +205,7 @@ def _link_meshes(scene: Scene, model: ArmModel) -> list[Solid]:
 
             mesh = load_mesh(link.mesh).moved(dh_mesh(model, link.name))
             faces = np.asarray(mesh.faces)
-            found.append(Solid(f"{link.name}, mesh", link_index(link.name), np.asarray(mesh.vertices), faces, _SHELL))
+            found.append(
+                Solid(f"{link.name}, mesh", link_index(link.name), np.asarray(mesh.vertices), faces, _SHELL_COLOUR)
+            )
     return found

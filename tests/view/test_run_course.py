@@ -4,16 +4,16 @@ import pytest
 
 from coneskin.robot.guard.signals.journal import EventName
 from coneskin.runs.replay.run import read_run
-from coneskin.view.strand import event_lines, read_strands
+from coneskin.view.run_course import event_lines, read_courses
 from tests.support.paths import COLLISION
 
 RUN = COLLISION
 
 
 def test_the_events_of_one_run_count_from_its_start() -> None:
-    (strand,) = read_strands([RUN])
-    lines = event_lines([strand])
-    assert [line.event for line in lines] == strand.history.events
+    (course,) = read_courses([RUN])
+    lines = event_lines([course])
+    assert [line.event for line in lines] == course.history.events
     for line in lines:
         assert line.time == pytest.approx(line.event.time - read_run(RUN).start)
         assert line.text.startswith(f"{line.time:.4f} s  ")
@@ -21,9 +21,9 @@ def test_the_events_of_one_run_count_from_its_start() -> None:
 
 
 def test_the_events_of_two_runs_count_from_the_first_touch_and_say_whose_they_are() -> None:
-    strands = read_strands([RUN, RUN])
-    lines = event_lines(strands)
-    assert len(lines) == 2 * len(strands[0].history.events)
+    courses = read_courses([RUN, RUN])
+    lines = event_lines(courses)
+    assert len(lines) == 2 * len(courses[0].history.events)
     assert [line.time for line in lines] == sorted(line.time for line in lines)
     touches = [line for line in lines if line.event.name == EventName.CONTACT]
     assert [line.text[:26] for line in touches] == ["0.0000 s  run 1: touch on ", "0.0000 s  run 2: touch on "]

@@ -1,26 +1,27 @@
-"""Text of a page's panel as HTML. What a recording says is foreign: every word of it is escaped."""
+"""Text and timeline of a page's panel, as HTML and SVG. A recording is foreign: every word of it is escaped."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
 
-from coneskin.robot.guard.signals.journal import GuardEvent
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
-from .phase_words import PhaseWords
+from .history import PhaseWords
+from .run_course import RunCourse
 
-__all__ = ["EVENT_STYLE", "NOTICE", "event_list", "notice", "status"]
+__all__ = ["EVENT_STYLE", "NOTICE", "event_list", "notice", "status", "timeline"]
 
 NOTICE = "No safety display. What is drawn may be late, old or wrong; nobody may rely on it near an arm."
-_SHOWN = 9  # events of the list
-_LONGEST = 1200  # letters of a line
+_MAX_SHOWN_EVENTS = 9  # events of the list
+_MAX_LINE_LENGTH = 1200  # letters of a line
 #: of the lines of events: three lines of the panel each, and all of it under the pointer or where it was clicked
 EVENT_STYLE = """
 #coneskin-events>div{padding-left:9ch;text-indent:-9ch;overflow:hidden;overflow-wrap:anywhere;cursor:pointer;
 display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
 #coneskin-events>div:hover,#coneskin-events>div:focus,#coneskin-events>div.now{display:block}
 """
-_HOT = {"contact", "contact_located", "contact_extended", "stopping", "stop_failed", "fault", "guard_exited"}
+_ALARM_EVENTS = {"contact", "contact_located", "contact_extended", "stopping", "stop_failed", "fault", "guard_exited"}
 
 
 def notice() -> str:
@@ -74,12 +75,12 @@ def event_list(lines: Sequence[tuple[GuardEvent, str]], now: int) -> str:
         lines: events and their lines for people.
         now: index of the newest that has happened; -1 for none.
     """
-    begin = max(0, min(now - _SHOWN + 3, len(lines) - _SHOWN))
+    begin = max(0, min(now - _MAX_SHOWN_EVENTS + 3, len(lines) - _MAX_SHOWN_EVENTS))
     rows = []
-    for index in range(begin, min(begin + _SHOWN, len(lines))):
+    for index in range(begin, min(begin + _MAX_SHOWN_EVENTS, len(lines))):
         event, line = lines[index]
         style = "font-weight:700;" if index == now else "opacity:.45;" if index > now else ""
-        colour = "#b91c1c" if event.name in _HOT else "inherit"
+        colour = "#b91c1c" if event.name in _ALARM_EVENTS else "inherit"
         kind = ' class="now"' if index == now else ""
         rows.append(f'<div tabindex="0"{kind} style="{style}color:{colour}">{escape(_line(line))}</div>')
     return (
@@ -91,4 +92,45 @@ def event_list(lines: Sequence[tuple[GuardEvent, str]], now: int) -> str:
 
 def _line(text: str) -> str:
     text = " ".join(text.split())
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+    return text if len(text) <= _MAX_LINE_LENGTH else f"{text[:_MAX_LINE_LENGTH]} ..."
+
+
+_WIDTH, _BAND, _TICK, _GAP = 1000.0, 16.0, 8.0, 6.0
+_CONTACT_EVENTS = {EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED}
+_FAULT_EVENTS = {EventName.FAULT, EventName.GUARD_EXITED, EventName.GUARD_UNRESPONSIVE, EventName.STOP_FAILED}
+_MAX_TICKS = 400  # ticks; a run with more faults than pixels has one wherever one looks
+
+
+def timeline(courses: Sequence[RunCourse], since: float, until: float) -> str:
+    """Return the timeline of runs.
+
+    Args:
+        courses: the runs.
+        since: where it begins, on the page's clock [s].
+        until: where it ends.
+    """
+    scale = _WIDTH / max(until - since, 1e-9)
+    row = _BAND + _TICK + _GAP
+    height = row * len(courses)
+    parts = [
+        f'<svg id="coneskin-timeline" viewBox="0 0 {_WIDTH:.0f} {height:.0f}" preserveAspectRatio="none" '
+        f'style="width:calc(100% - 20px);height:{height:.0f}px;margin:4px 10px 0">'
+    ]
+    for number, course in enumerate(courses):
+        top = number * row
+        phases = course.history.phases
+        ends = [*(change.time for change in phases[1:]), course.zero + until]
+        for change, end in zip(phases, ends, strict=True):
+            x0 = (max(change.time - course.zero, since) - since) * scale
+            x1 = (min(end - course.zero, until) - since) * scale
+            if x1 > x0:
+                parts.append(
+                    f'<rect x="{x0:.2f}" y="{top + _TICK:.1f}" width="{max(x1 - x0, 1.0):.2f}" height="{_BAND}" '
+                    f'fill="{change.phase.colour}"><title>{escape(change.phase.text)}</title></rect>'
+                )
+        shown = [event for event in course.history.events if since <= event.time - course.zero <= until]
+        for event in [event for event in shown if event.name in _CONTACT_EVENTS | _FAULT_EVENTS][-_MAX_TICKS:]:
+            x = (event.time - course.zero - since) * scale
+            colour = "#e11d48" if event.name in _CONTACT_EVENTS else "#111827"
+            parts.append(f'<rect x="{x - 1.5:.2f}" y="{top:.1f}" width="3" height="{_TICK}" fill="{colour}"/>')
+    return "".join([*parts, "</svg>"])

@@ -8,8 +8,8 @@ import re
 
 import pytest
 
-from coneskin.view.client.unpacked_client import letters_to_bytes, unpacked
 from coneskin.view.page_server import page_client
+from coneskin.view.viser_client import letters_to_bytes, unpacked
 
 LETTERS = [letter for letter in map(chr, range(33, 127)) if letter not in "\"&<>'`"]
 

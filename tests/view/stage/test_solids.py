@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coneskin.scene.values.body import BodyScene
-from coneskin.view.stage.body_solids import body_solids
+from coneskin.view.stage.solids import body_solids
 
 
 def enclosed(vertices: np.ndarray, faces: np.ndarray) -> float:

@@ -1,11 +1,11 @@
-"""Strand: one run on a page, with its own place on the floor and its own zero of time."""
+"""Course of a run on a page: each moment of it, its place on the floor, and its own zero of time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.core.errors import RecordingError
 from coneskin.geometry.pose import Pose, Vector
@@ -14,17 +14,54 @@ from coneskin.runs.replay.event_text import describe
 from coneskin.runs.replay.run import Run, read_run
 
 from .history import History, history_of
-from .moment import Moment, moment_at
 from .stage.stage import Stage, set_stage
 
-__all__ = ["EventLine", "Strand", "event_lines", "read_strands"]
+if TYPE_CHECKING:
+    from .contact_mark import ContactMark
+    from .history import PhaseWords
 
-_APART = 0.75  # of the arms' reach, between two bases
-_ZEROS = (EventName.CONTACT, EventName.STOPPING)  # by which two runs are laid side by side
+__all__ = ["EventLine", "Moment", "RunCourse", "event_lines", "moment_at", "read_courses"]
 
 
 @dataclass(frozen=True, slots=True)
-class Strand:
+class Moment:
+    """What is seen at one time.
+
+    Attributes:
+        time: [s, host clock].
+        poses: of the links' frames in the base frame, by their indices.
+        levels: of the sensors, by their names.
+        marks: of contacts.
+        phase: of the guard.
+        health: what is wrong; empty where nothing is.
+        force: between the arm and what it meets [N]; None where nothing tells.
+        bodies: how far each part of a body is from where the scene puts it [m].
+    """
+
+    time: float
+    poses: dict[int, Pose]
+    levels: dict[str, float]
+    marks: list[ContactMark]
+    phase: PhaseWords
+    health: str
+    force: float | None = None
+    bodies: tuple[Vector, ...] = ()
+
+
+def moment_at(stage: Stage, history: History, time: float) -> Moment:
+    """Return what is seen at a time [s, host clock]."""
+    levels = {sheet.name: history.level(sheet.name, time) for sheet in stage.sheets}
+    poses = stage.poses(history.q(time))
+    seen = history.marks(time), history.phase(time), history.health(time), history.force(time)
+    return Moment(time, poses, levels, *seen, stage.moved(history.places(time)))
+
+
+_BASE_DISTANCE = 0.75  # of the arms' reach, between two bases
+_ZERO_EVENTS = (EventName.CONTACT, EventName.STOPPING)  # by which two runs are laid side by side
+
+
+@dataclass(frozen=True, slots=True)
+class RunCourse:
     """One run on a page.
 
     Attributes:
@@ -71,18 +108,18 @@ class EventLine(NamedTuple):
     text: str
 
 
-def event_lines(strands: Sequence[Strand]) -> list[EventLine]:
+def event_lines(courses: Sequence[RunCourse]) -> list[EventLine]:
     """Return the events of runs in the order of the page's clock, by which they count."""
     found = []
-    for number, strand in enumerate(strands, 1):
-        whose = f"run {number}: " if len(strands) > 1 else ""
-        for event in strand.history.events:
-            time, _, words = describe(event, strand.zero).strip().partition("  ")
-            found.append(EventLine(event.time - strand.zero, event, f"{time}  {whose}{words}"))
+    for number, course in enumerate(courses, 1):
+        whose = f"run {number}: " if len(courses) > 1 else ""
+        for event in course.history.events:
+            time, _, words = describe(event, course.zero).strip().partition("  ")
+            found.append(EventLine(event.time - course.zero, event, f"{time}  {whose}{words}"))
     return sorted(found, key=lambda line: line.time)
 
 
-def read_strands(paths: Sequence[Path]) -> list[Strand]:
+def read_courses(paths: Sequence[Path]) -> list[RunCourse]:
     """Read runs: one as it is, several side by side, each with its first touch at the time 0.
 
     Raises:
@@ -90,20 +127,24 @@ def read_strands(paths: Sequence[Path]) -> list[Strand]:
         SceneError: this version of coneskin cannot read its scene.
     """
     runs = [read_run(path) for path in paths]
-    found = [_strand(run, str(path), len(runs) > 1) for run, path in zip(runs, paths, strict=True)]
-    apart = _APART * max(strand.stage.reach for strand in found)
+    found = [_read_course(run, str(path), len(runs) > 1) for run, path in zip(runs, paths, strict=True)]
+    apart = _BASE_DISTANCE * max(course.stage.reach for course in found)
     middle = 0.5 * (len(found) - 1)
     return [
-        Strand(item.stage, item.history, item.zero, (0.0, apart * (middle - number), 0.0))
+        RunCourse(item.stage, item.history, item.zero, (0.0, apart * (middle - number), 0.0))
         for number, item in enumerate(found)
     ]
 
 
-def _strand(run: Run, title: str, aligned: bool) -> Strand:
+def _read_course(run: Run, title: str, aligned: bool) -> RunCourse:
     scene = run.scene()
     history = history_of(scene, run.blocks)
     if not history.since <= history.until:
         raise RecordingError(f"nothing was recorded in {title}: there is nothing to be shown")
     stage = set_stage(scene, run.place_sensors(), title)
-    first = next((event.time for event in history.events if event.name in _ZEROS), run.start) if aligned else run.start
-    return Strand(stage, history, first)
+    first = (
+        next((event.time for event in history.events if event.name in _ZERO_EVENTS), run.start)
+        if aligned
+        else run.start
+    )
+    return RunCourse(stage, history, first)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coneskin.view.strand import Strand, read_strands
-from coneskin.view.trace_plot import TracePlot
+from coneskin.view.run_course import RunCourse, read_courses
+from coneskin.view.traces import TracePlot
 from tests.support.paths import COLLISION
 
 RUN = COLLISION
@@ -25,14 +25,14 @@ class Gui:
 
 
 @pytest.fixture(scope="module")
-def strand() -> Strand:
-    return read_strands([RUN])[0]
+def course() -> RunCourse:
+    return read_courses([RUN])[0]
 
 
-def test_a_plot_has_a_range_where_frames_are_missing(strand: Strand) -> None:
-    since, until = strand.span
-    plot = TracePlot(Gui(), [strand], since, until, fixed=True)
-    levels = strand.history.levels["forearm skin"].values
+def test_a_plot_has_a_range_where_frames_are_missing(course: RunCourse) -> None:
+    since, until = course.span
+    plot = TracePlot(Gui(), [course], since, until, fixed=True)
+    levels = course.history.levels["forearm skin"].values
     shown = plot._plot
     low, high = shown.scales["y"]["range"]
     assert np.isfinite([low, high]).all()

@@ -7,7 +7,7 @@ import pytest
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
-from coneskin.view.recording_tail import RecordingTail
+from coneskin.view.live_run import RecordingTail
 
 HEADER, SKIN, EVENT = 20, 1, 10
 ALWAYS = frozenset({HEADER, EVENT})
