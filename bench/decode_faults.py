@@ -5,7 +5,7 @@
 
 A case is a sensor with its electronics, a fault, the frame at which it begins, and a touch that begins before, with or
 after it, or none. The last name counts: the first frame that shows something stops the arm, the name may follow. Right
-is a name that docs/wire-format.md has for the fault, or, where that page says so, a touch.
+is a name that docs/look-up/wire-format.md has for the fault, or, where that page says so, a touch.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Force on a hand by how hard the stop brakes: `coneskin impact` with the scene of docs/physics.md.
+"""Force on a hand by how hard the stop brakes: `coneskin impact` with the scene of docs/do/impact.md.
 
     python bench/impact_braking.py [--scene SCENE] [--rad-s2 10 20 40]
 
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from report import head
 
-_PAGE = Path(__file__).parents[1] / "docs" / "physics.md"
+_PAGE = Path(__file__).parents[1] / "docs" / "do" / "impact.md"
 _SCENE = re.compile(r'```toml title="scene\.toml"\n(.*?)```', re.DOTALL)
 _DECELERATION = re.compile(r"^deceleration_rad_s2 = .*$", re.MULTILINE)
 _COLUMNS = {"approach": 1.0, "peak": 1.0, "clamp": 1.0, "impulse": 1.0, "depth": 1e3, "noticed": 1e3, "standstill": 1e3}
@@ -49,7 +49,7 @@ def strike(scene: str, deceleration: float) -> dict[str, float]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scene", type=Path, help="a file (the scene of docs/physics.md)")
+    parser.add_argument("--scene", type=Path, help="a file (the scene of docs/do/impact.md)")
     parser.add_argument("--rad-s2", type=float, nargs="+", default=[10.0, 20.0, 40.0])
     args = parser.parse_args()
     scene = args.scene.read_text(encoding="utf-8") if args.scene else page_scene()

@@ -1,6 +1,6 @@
 """Truncated cone and the surface coordinates (u, phi) on its side.
 
-Symbols (docs/conventions.md): rho1, rho2 radii, h height, s slant, a half angle;
+Symbols (docs/understand/conventions.md): rho1, rho2 radii, h height, s slant, a half angle;
 d = rho2 - rho1 = s sin a, h = s cos a.
 A method in the singular takes numbers, one place, and loads no numpy: the live loop calls it. ``points``, ``normals``
 and ``flat_points`` take arrays; ``PlacedFrustum.locate_all`` is the inverse for arrays.

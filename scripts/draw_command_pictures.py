@@ -16,8 +16,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 #: name of the picture -> page, and the file that its command draws
 PICTURES = {
-    "calibration": ("docs/calibration.md", "residuals.png"),
-    "commissioning": ("docs/guard/commissioning.md", "marks.png"),
+    "calibration": ("docs/do/calibrate.md", "residuals.png"),
+    "commissioning": ("docs/do/commission.md", "marks.png"),
 }
 _SCENE = re.compile(r'^```toml title="([\w.-]+)"\n(.*?)^```', re.DOTALL | re.MULTILINE)
 

@@ -1,4 +1,4 @@
-"""Drawing of docs/touch-flow.md: the processes, the folders that a touch goes through, and the stop paths.
+"""Drawing of docs/understand/touch-flow.md: the processes, the folders that a touch goes through, and the stop paths.
 
     python scripts/draw_touch_flow.py        writes docs/images/touch-flow.svg
 

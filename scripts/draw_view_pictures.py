@@ -2,7 +2,7 @@
 
 python scripts/draw_view_pictures.py [--output docs/images] [--only view,view-two-runs,view-potential,studio,view.gif]
 
-The recording of the tests, and one of the collision in docs/physics.md, which MuJoCo makes anew (extra `physics`).
+The recording of the tests, and one of the collision in docs/do/impact.md, which MuJoCo makes anew (extra `physics`).
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ _COLOURS = 96  # of the film's palette
 
 
 def collision(folder: Path) -> Path:
-    """Make the collision of docs/physics.md, and return its recording."""
+    """Make the collision of docs/do/impact.md, and return its recording."""
     from coneskin.core.recording.block import Block
     from coneskin.core.recording.recorder import Recorder
     from coneskin.impact.simulation.collision_run import CollisionRun, Waypoints
     from coneskin.robot.guard.signals.journal import BlockKind
     from coneskin.scene.reader import parse_scene
 
-    page = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "do" / "impact.md").read_text(encoding="utf-8")
     found = re.search(r'```toml title="scene.toml"\n(.*?)```', page, re.DOTALL)
     assert found is not None
     scene = parse_scene(found.group(1), "scene.toml")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write the table of ur_rtde's methods into docs/ur-rtde.md, from the wheel that is installed.
+"""Write the table of ur_rtde's methods into docs/do/ur-rtde.md, from the wheel that is installed.
 
 python scripts/ur_rtde_table.py
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-PAGE = Path(__file__).parents[1] / "docs" / "ur-rtde.md"
+PAGE = Path(__file__).parents[1] / "docs" / "do" / "ur-rtde.md"
 BEGIN, END = "<!-- methods -->\n", "<!-- end of methods -->\n"
 
 

@@ -1,6 +1,6 @@
 """Electronics of a sensor: supply, converter, resistors, and the levels at which a value counts.
 
-The circuit (docs/wire-format.md): each of the electrodes A, B, C, D has one wire, which drives it in one phase and
+The circuit (docs/look-up/wire-format.md): each electrode A, B, C, D has one wire, which drives it in one phase and
 reads it in another. The drive current is measured in the supply line; the supply is measured behind that.
 """
 

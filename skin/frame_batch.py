@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FrameBatch", "find_frames"]
 
-_LENGTHS = ((1, FRAME_LENGTH), (2, 40), (2, 52))  # version and bytes of a frame; docs/wire-format.md
+_LENGTHS = ((1, FRAME_LENGTH), (2, 40), (2, 52))  # version and bytes of a frame; docs/look-up/wire-format.md
 #: offset of each 16-bit field in a frame [bytes]; version 1 has one supply for all phases
 _OFFSETS = {
     **{"device": 4, "sequence": 8, "touch_c": 14, "touch_d": 16, "touch_current": 18},

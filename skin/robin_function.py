@@ -1,6 +1,6 @@
 """Robin function of a sheet at one place, in plain floats for the live path.
 
-What a point of contact feels of the sheet's edges (docs/field.md): its value changes the spreading resistance, its
+What a contact feels of the sheet's edges (docs/understand/field.md): its value changes the spreading resistance, its
 gradient displaces the electrical centre of an extended contact. `skin/field/robin` has the gradient for arrays, from
 the same series.
 """

@@ -1,6 +1,6 @@
 """Wire format, versions 1 and 2: frames with a checksum, and a decoder that finds them in any stream.
 
-The layout, the meaning of each field and the reasons are in docs/wire-format.md. In short: sync, version, length,
+Layout, meaning of each field and reasons are in docs/look-up/wire-format.md. In short: sync, version, length,
 device, sensor, status, sequence, device clock, three phases of (guide, guide, drive current), supply, CRC. Version 1
 measures the supply once in a frame; version 2 once in each phase and, in its longer form, the driven electrodes' own
 potentials as well.

@@ -1,4 +1,4 @@
-"""docs/conventions.md against the code: what it names exists, and what it claims about handedness and signs holds."""
+"""docs/understand/conventions.md against the code: what it names exists, and its handedness and signs hold."""
 
 import importlib
 import math
@@ -11,7 +11,7 @@ from coneskin.geometry.sector import unroll
 from coneskin.skin.sensor import Sensor
 from tests.support.paths import ROOT
 
-DOCUMENT = (ROOT / "docs" / "conventions.md").read_text(encoding="utf-8")
+DOCUMENT = (ROOT / "docs" / "understand" / "conventions.md").read_text(encoding="utf-8")
 HOMES = {
     "Frustum": "coneskin.geometry.frustum",
     "Sector": "coneskin.geometry.sector",

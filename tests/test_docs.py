@@ -38,9 +38,21 @@ PAGES = {
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 }
 #: pages whose blocks start processes, or compute for seconds
-LONG = {"README.md", "docs/design.md", "docs/field.md", "docs/guard/external.md", "docs/guard/internal.md"}
-LONG |= {"docs/calibration.md", "docs/guard/commissioning.md", "docs/permissible-speed.md"}
-LONG |= {"docs/index.md", "docs/replay.md", "docs/runs.md", "docs/sim-ur.md", "docs/physics.md"}
+LONG = {"README.md", "docs/index.md", "docs/look-up/sim-ur.md", "docs/understand/field.md"}
+LONG |= {
+    f"docs/do/{name}.md"
+    for name in (
+        "calibrate",
+        "commission",
+        "design",
+        "guard-external",
+        "guard-internal",
+        "impact",
+        "permissible-speed",
+        "replay",
+        "runs",
+    )
+}
 #: blocks that no test runs, each with its reason in the page
 NOT_RUN = 3
 LANGUAGES = ("python", "sh", "toml", "text")
@@ -250,7 +262,7 @@ def test_the_files_that_a_page_names_exist(page: str) -> None:
     text = re.sub(r"^```.*?^```$", "", PAGES[page].read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     folders = ("geometry", "skin", "robot", "src", "tests", "demos", "bench", "docs", "scripts")
     named = set(re.findall(rf"`((?:{'|'.join(folders)})/[\w./-]+\.\w+)`", text))
-    planned = {"skin/sources/i2c_bus.py"}  # the example of docs/how-to-add/sensor-bus.md
+    planned = {"skin/sources/i2c_bus.py"}  # the example of docs/extend/sensor-bus.md
     assert sorted(name for name in named - planned if not (ROOT / name).is_file()) == []
     modules = {path.name for folder in folders for path in (ROOT / folder).rglob("*.py")}
     assert set(re.findall(r"`(\w+\.py)`", text)) - modules == set()

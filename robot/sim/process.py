@@ -64,7 +64,7 @@ class SimulatedController:
         start_q: joint positions at the start [rad]; clear of every singular position if not given.
         log: file for a JSON line for each command and event.
         version: PolyScope version to report.
-        quirks: "real" runs the program of ur_rtde as it is, "fixed" with the corrections of docs/sim-ur.md.
+        quirks: "real" runs the program of ur_rtde as it is, "fixed" with the corrections of docs/look-up/sim-ur.md.
         start_delay: from a program's last byte to its first cycle [s].
         unlock_after: time before a protective stop can be unlocked [s].
         protective_stop: "pause" or "stop", the effect of a protective stop on the running program.
@@ -177,7 +177,7 @@ class SimulatedController:
         process.wait()
 
     def call(self, line: str, timeout: float = 5.0) -> Any:
-        """Inject a fault, or ask for the state; docs/sim-ur.md lists the lines.
+        """Inject a fault, or ask for the state; docs/look-up/sim-ur.md lists the lines.
 
         Raises:
             RobotConnectionError: the process has ended, or does not know the line.

@@ -47,7 +47,7 @@ def test_a_program_with_the_lines_ends_when_the_network_is_cut(controller):
 
 @pytest.mark.long
 def test_a_motion_that_ur_rtde_sends_with_the_lines_ends_when_the_network_is_cut(controller):
-    """The way of docs/guard/external.md: it needs no file of the control script, which the wheel does not hold."""
+    """The way of docs/do/guard-external.md: it needs no file of the control script, which the wheel does not hold."""
     pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
     code = (
         "import sys, rtde_control\n"

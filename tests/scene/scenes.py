@@ -19,7 +19,7 @@ from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from tests.support.paths import ROOT
 
-DOCUMENT = ROOT / "docs" / "scene.md"
+DOCUMENT = ROOT / "docs" / "look-up" / "scene.md"
 SKIN_ONLY, SERIAL_RETREAT, DOUBLE_CONE, TWO_PORTS = re.findall(
     r"```toml.*?\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL
 )

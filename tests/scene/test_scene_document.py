@@ -1,4 +1,4 @@
-"""docs/scene.md against the code: every key with its unit, range and default, no other key, and examples that load."""
+"""docs/look-up/scene.md against the code: each key with its unit, range and default, and examples that load."""
 
 import math
 import re
@@ -30,7 +30,7 @@ from coneskin.skin.matched_electronics import match_electronics
 from coneskin.skin.sensor import Sensor
 from tests.support.paths import ROOT
 
-DOCUMENT = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
+DOCUMENT = (ROOT / "docs" / "look-up" / "scene.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml.*?\n(.*?)```", DOCUMENT, re.DOTALL)
 SECTIONS: dict[str, tuple[Key, ...]] = {
     "[arm]": arm_table.ARM_KEYS,

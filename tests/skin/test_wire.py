@@ -80,7 +80,7 @@ DOCUMENTED = (
 
 
 def test_layout_byte_by_byte():
-    # docs/wire-format.md shows these bytes
+    # docs/look-up/wire-format.md shows these bytes
     head, nine = "3412 05 40 0b0a 04030201", "0001 0101 0201 0301 0401 0501 0601 0701 0801"
     for frame, sync, rest in (
         (DOCUMENTED[0], "c53a 01 24", "0901"),
@@ -93,13 +93,13 @@ def test_layout_byte_by_byte():
 
 
 def test_the_documented_bytes_are_the_encoded_ones():
-    text = (ROOT / "docs" / "wire-format.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "look-up" / "wire-format.md").read_text(encoding="utf-8")
     shown = bytes.fromhex("".join(re.findall(r"^    ((?:[0-9A-F]{2}[ ]*)+)$", text, re.MULTILINE)))
     assert shown == b"".join(encode(frame) for frame in DOCUMENTED)
 
 
 def test_the_worked_example_is_what_the_circuit_gives():
-    text = (ROOT / "docs" / "wire-format.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "look-up" / "wire-format.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (?:untouched|touched at [^|]*) \| (.*) \|$", text, re.MULTILINE)
     shown = [[int(count) for count in re.findall(r"\d+", row)] for row in rows]
     sensor = Sensor(UR10)

@@ -25,7 +25,7 @@ class Options:
         model: name of the arm.
         version: of PolyScope, major and minor.
         start_q: joint positions at the start [rad].
-        quirks: "real": the program of ur_rtde runs as it is; "fixed": with the corrections listed in docs/sim-ur.md.
+        quirks: "real": the program of ur_rtde runs as it is; "fixed": with the corrections of docs/look-up/sim-ur.md.
         wrong_size: treatment of a data packet longer than its recipe; that of the real controller is not known.
         start_delay: from a program's last byte to its first cycle [s].
         unlock_after: time that must pass before a protective stop can be unlocked [s].

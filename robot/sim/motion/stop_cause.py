@@ -1,7 +1,7 @@
 """Cause of a protective stop of the simulated arm, under the number that a controller gives it in its log.
 
 Source: Universal Robots, "Error Codes", PolyScope 5: numbers, arguments and titles. What exactly makes a real
-controller give each is not published; docs/sim-ur.md has what makes this one give it.
+controller give each is not published; docs/look-up/sim-ur.md has what makes this one give it.
 """
 
 from __future__ import annotations

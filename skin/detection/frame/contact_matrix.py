@@ -1,7 +1,7 @@
 """Contact matrix: the six numbers that all contacts together are to the four electrodes, out of one frame.
 
 The electrodes impose a difference of the two sheets h0 + hx x/L + hy y/T, with h0 = V_B - V_D, hx = V_A - V_B and
-hy = V_D - V_C (docs/field.md). The contacts answer with a conductance G, an electrical centre (X, Y) and a
+hy = V_D - V_C (docs/understand/field.md). The contacts answer with a conductance G, an electrical centre (X, Y) and a
 polarisability P. In each phase, with Ic the current from the upper to the lower sheet and K = (sheets) + P,
 
     h0 + X hx + Y hy = Ic / G,        K (hx, hy) = (I_A - X Ic, -I_C - Y Ic)

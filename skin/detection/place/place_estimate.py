@@ -1,7 +1,7 @@
 """Place of a contact out of its contact matrix, without the area error, and how certain it is.
 
 The electrical centre of an extended contact is displaced by the images of its own dipole in the sheet's edges
-(docs/field.md):
+(docs/understand/field.md):
 
     displacement = -1/2 A grad gamma - (Ru+Rl) kappa/(4 pi) (2 A_xx - A_yy, 3 A_xy)
 

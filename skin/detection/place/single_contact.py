@@ -1,6 +1,6 @@
 """Test whether the contact on a sensor can be two: what the drive currents and the guides' split say of its shape.
 
-All contacts together add a symmetric tensor P to the conductances along and around the sheets (docs/field.md): P_xx to
+Together the contacts add a tensor P to the conductances along and around the sheets (docs/understand/field.md): P_xx to
 the radial drive current, P_yy to the angular one, P_xy splits the guides. One disc adds equally in all directions, at
 most as much as a perfect bond. Two contacts of conductance G1 and G2 at a distance s add G1 G2 s^2/(G1 + G2) along
 the line between them and nothing across. So the inequality of P, over the square of a distance, is the conductance of

@@ -1,10 +1,10 @@
 // Firmware of a coneskin board: drives the two sheets of one sensor in turn, reads them, sends frames.
 //
-// A frame is three phases (docs/wire-format.md has their reasons):
+// A frame is three phases (docs/look-up/wire-format.md has their reasons):
 //   touch    A and B at the rail, C and D over their pull-downs: is there a contact between the sheets?
 //   radial   a current from B to A; C and D float and read the potential at the contact: how far along?
 //   angular  a current from C to D; A and B float: how far around?
-// and, while the frame is on its way, half of a self-test. Wiring, parts and flashing: docs/firmware.md.
+// and, while the frame is on its way, half of a self-test. Wiring, parts and flashing: docs/do/firmware.md.
 //
 // Over the same port it takes lines of text: "?" tells what it is, "rate_hz=150" changes a setting until the next
 // start, "save" keeps the settings. A guard never sends any, and answers are no frames: not while an arm is guarded.

@@ -1,6 +1,6 @@
 /* Frames of the coneskin wire format, versions 1 and 2, for any firmware: C99, no library, no memory of its own.
 
-   The layout and its reasons are in docs/wire-format.md; the 50 frames of frame_vectors.csv, beside this folder, tell
+   The layout and its reasons are in docs/look-up/wire-format.md; the 50 frames of frame_vectors.csv, beside this folder, tell
    whether a copy or a translation of this file is right. A frame is 36 bytes (version 1), 40 (version 2), or 52
    (version 2 with the driven electrodes' own potentials). Everything is little endian but for the CRC. */
 #ifndef CONESKIN_FRAME_H

@@ -41,7 +41,7 @@ example:
   coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm;
                                          where the scene has bodies, the arm runs into them (extra physics)
 
-The scene's keys: docs/scene.md. Exit code: 0 nothing has happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
+Keys of a scene: docs/look-up/scene.md. Exit code: 0 nothing happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
 SIGTERM do not change it. With --check: 0 a guard can start with this scene, 1 it has mistakes or lacks something.
 Without a valid commissioning record a guard can start, so that is 0 as well; the arm then only stops, and the last line
 says so.

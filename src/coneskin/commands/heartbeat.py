@@ -15,7 +15,7 @@ example:
   coneskin heartbeat scene.toml          put what it prints at the beginning of the program on the controller
 
 The lines are URScript. In PolyScope they go into a script node before the first move; how a program with ur_rtde gets
-them: docs/guard/external.md. The scene's arm.controller_heartbeat = "required" stops a program without them.
+them: docs/do/guard-external.md. The scene's arm.controller_heartbeat = "required" stops a program without them.
 Exit code: 0; 1 the scene has mistakes, or control = internal.
 """
 

@@ -27,7 +27,7 @@ example:
   coneskin impact scene.toml
   coneskin impact scene.toml --ways "guard,stop,nothing" --json
 
-The scene needs an [arm], a [motion], skins and at least one [[body]] in the way of a skin (docs/physics.md).
+The scene needs an [arm], a [motion], skins and at least one [[body]] in the way of a skin (docs/do/impact.md).
 
 exit code: 0 if the arm met a body and the guard noticed it; 1 otherwise."""
 _REACTIONS = ("stop", "retreat", "comply", "slow")
@@ -85,7 +85,7 @@ def _check(scene: Scene, ways: list[str]) -> None:
         "a [[link]] with a [[link.sensor]]": scene.sensors,
         "a [[body]] to run into": scene.bodies,
     }
-    problems += [f"an impact needs {name}: see docs/physics.md" for name, part in needed.items() if not part]
+    problems += [f"an impact needs {name}: see docs/do/impact.md" for name, part in needed.items() if not part]
     if problems:
         raise SceneError(problems, scene.name)
 

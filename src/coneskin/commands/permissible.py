@@ -25,7 +25,7 @@ example:
   coneskin permissible scene.toml --limits limits.toml -o impact.toml --picture impact.png
 
 The scene needs an [arm], skins and their [padding]; with a [motion] the speeds are those of its joint positions. The
-limits are yours: docs/permissible-speed.md lists the keys. A scene whose [arm] has speed_limit_from = "impact.toml"
+limits are yours: docs/do/permissible-speed.md lists the keys. A scene whose [arm] has speed_limit_from = "impact.toml"
 lets the guard keep the speeds. A model with assumed servos; no safety assessment.
 
 exit code: 0; 1 where no speed keeps the limits, or a file has a mistake."""

@@ -28,7 +28,7 @@ what if:
   coneskin replay runs/a --scene other.toml           another scene
   coneskin replay runs/* --vary detection.touch_level=0.06,0.08,0.12 --picture delay.png --table all.parquet
 
-Times count from the start of the run. Names of settings: docs/runs.md. Exit code:
+Times count from the start of the run. Names of settings: docs/do/runs.md. Exit code:
   0  the events are the same, bit by bit; with --scene, --set, --vary: it ran
   1  an event differs, or a run cannot be read
   2  wrong usage, or a folder that is no run

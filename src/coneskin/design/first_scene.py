@@ -32,7 +32,7 @@ __all__ = ["ArmAddress", "DesignFolder", "arm_link", "first_scene", "read_design
 _MAX_BYTES = 4 << 20  # of design.json
 _TUBES = {"upper_arm": 1, "forearm": 2}  # link -> index of the DH length along which its mesh's z axis runs
 _HEAD = """\
-# Written by `coneskin init`; every key is described in docs/scene.md.
+# Written by `coneskin init`; every key is described in docs/look-up/scene.md.
 """
 _MOTION = """\
 # What a simulation needs from here on; take it out for real hardware.

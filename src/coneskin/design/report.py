@@ -199,7 +199,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     yield "### Electronics"
     yield ""
     upper, lower = design.conductive
-    yield "What was not given was chosen for the shape of this sheet (docs/electronics.md); options change it."
+    yield "What was not given was chosen for the shape of this sheet (docs/do/electronics.md); options change it."
     yield ""
     yield from _table(
         ("quantity", "value"),

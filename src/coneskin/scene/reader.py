@@ -1,4 +1,4 @@
-"""Reader of scene files, which reports every mistake at once. The keys are described in docs/scene.md."""
+"""Reader of scene files, which reports every mistake at once. The keys are described in docs/look-up/scene.md."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _PIECES = re.compile(r"[=,{\n]")
 
 
 def load_scene(path: Path | str, *, calibrated: bool = True) -> s.Scene:
-    """Read a scene from a TOML file (docs/scene.md).
+    """Read a scene from a TOML file (docs/look-up/scene.md).
 
     Args:
         path: of the file.

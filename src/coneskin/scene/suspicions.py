@@ -32,7 +32,7 @@ _OVERLAP = 1e-3  # m
 _ON_TOP = 3e-3  # m; a sensor that is wider by that is meant to lie on the other one
 _ROOM = 0.5  # part of the distance between two tubes that one of them may fill
 _FRAME_BITS = 360  # of a frame of 36 bytes on a serial line
-_SLOW = 100.0  # Hz, docs/wire-format.md
+_SLOW = 100.0  # Hz, docs/look-up/wire-format.md
 _BUILT_IN = 921600  # baud
 _SCHEMES = ("socket", "rfc2217", "loop", "hwgrep", "spy", "alt", "cp2110")  # of pyserial
 

@@ -218,7 +218,7 @@ class ArmClient:
         """Return the controller's answer to a question that moves nothing, such as its inverse kinematics.
 
         Args:
-            name: of the question, as ur_rtde names it; docs/ur-rtde.md lists them.
+            name: of the question, as ur_rtde names it; docs/do/ur-rtde.md lists them.
             values: its arguments there.
 
         Raises:

@@ -32,7 +32,7 @@ from coneskin.skin.sensor import Sensor
 
 FOREARM = Sensor(Frustum(0.0376, 0.0372, 0.24), name="forearm skin")
 radii = st.floats(0.02, 0.15)
-#: forearm of the demo; docs/scene.md's examples; a conical one; a patch [m, deg]
+#: forearm of the demo; docs/look-up/scene.md's examples; a conical one; a patch [m, deg]
 KNOWN = [(0.0376, 0.0373, 0.24, 360), (0.0605, 0.0605, 0.4, 300), (0.038, 0.046, 0.12, 360), (0.05, 0.09, 0.1, 120)]
 sensors = st.builds(
     lambda r1, r2, h, wrap, radial, angular: Sensor(

@@ -1,4 +1,4 @@
-"""A reader of recordings made from docs/recording.md alone: it imports nothing of coneskin, and shares no code."""
+"""A reader of recordings made from docs/look-up/recording.md alone, which imports nothing of coneskin."""
 
 import struct
 import zlib

@@ -1,4 +1,4 @@
-"""A reader made from docs/recording.md alone finds the same blocks, and calls the same recordings whole."""
+"""A reader made from docs/look-up/recording.md alone finds the same blocks, and calls the same recordings whole."""
 
 from pathlib import Path
 from random import Random

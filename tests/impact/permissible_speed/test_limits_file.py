@@ -79,7 +79,7 @@ def test_a_mistake_is_named(old: str, new: str, message: str) -> None:
 
 
 def test_a_file_that_is_not_there_and_one_that_is_no_text(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r"cannot be read: No such file.*docs/permissible-speed.md has one"):
+    with pytest.raises(SceneError, match=r"cannot be read: No such file.*docs/do/permissible-speed.md has one"):
         read_limits(tmp_path / "limits.toml")
     (tmp_path / "limits.toml").write_bytes(b"\xff")
     with pytest.raises(SceneError, match="UTF-8"):

@@ -24,7 +24,7 @@ touches = st.lists(st.tuples(st.integers(0, 6), levels), max_size=5)
 
 
 def fits_as_documented(rule, link, level, speed):
-    """Written from docs/scene.md, not from the code: a list of what fails."""
+    """Written from docs/look-up/scene.md, not from the code: a list of what fails."""
     failed = []
     if rule.link is not None and link != rule.link:
         failed.append("link")

@@ -1,4 +1,4 @@
-"""One example of each URScript function of the simulated controller; docs/sim-ur.md lists them by this table.
+"""One example of each URScript function of the simulated controller; docs/look-up/sim-ur.md lists them by this table.
 
 An example is a program whose last line must be True. Many are those of "The URScript Programming Language".
 """

@@ -22,7 +22,7 @@ from tests.support.pinocchio_arm import pin_mass_matrix, pin_torques
 
 from .function_examples import EXAMPLES, NO_EFFECT
 
-PAGE = ROOT / "docs" / "sim-ur.md"
+PAGE = ROOT / "docs" / "look-up" / "sim-ur.md"
 HOME = (0.1, -1.4, 1.5, -1.7, -1.4, 0.2)
 _ALL = {name: example for examples in EXAMPLES.values() for name, example in examples.items()}
 

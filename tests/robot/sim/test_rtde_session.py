@@ -173,7 +173,7 @@ def page_table() -> str:
 
 
 def test_the_page_lists_every_variable() -> None:
-    text = (ROOT / "docs" / "sim-ur.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "look-up" / "sim-ur.md").read_text(encoding="utf-8")
     shown = text.split("<!-- variables -->")[1].split("<!-- end of variables -->")[0]
     assert shown.strip() == page_table(), "python -m tests.robot.sim.test_rtde_session prints the table anew"
 

@@ -94,7 +94,7 @@ def test_two_touches_are_a_touch_with_an_ambiguous_place_not_a_fault():
     ids=["equal u", "equal phi"],
 )
 def test_two_contacts_at_equal_u_or_phi_read_as_one_valid_place_between_them(first, second, expected):
-    """The limit that docs/wire-format.md states: a valid place does not prove a single contact."""
+    """The limit that docs/look-up/wire-format.md states: a valid place does not prove a single contact."""
     # firm, but too weak to load the sheets, so the place is the plain mean
     reading = read(SENSOR, measured(SENSOR, [LayerContact(*first, 3e-5), LayerContact(*second, 3e-5)]))
     assert reading.location_valid
@@ -192,7 +192,7 @@ def test_what_is_broken_is_named_touched_or_not(wiring, polarity):
 @pytest.mark.parametrize("rail", ["ground", "supply", "rail"])
 @pytest.mark.parametrize("electrode", "ABCD")
 def test_no_short_hides_a_touch(electrode, rail, place):
-    # D at ground cannot be seen before the touch (docs/wire-format.md); the touch must then be seen, or be a fault
+    # D at ground cannot be seen before the touch (docs/look-up/wire-format.md); then the touch is seen, or is a fault
     reading = read(SENSOR, measured(SENSOR, [place], WiringFaults(shorts=((electrode, rail),))))
     assert reading.fault is not None or reading.level >= SENSOR.thresholds.touch_level
 

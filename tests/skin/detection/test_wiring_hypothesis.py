@@ -62,7 +62,7 @@ def test_a_dead_input_reads_nothing_and_what_exceeds_the_converter_reads_its_end
     assert shorted[5] == 0.01
 
 
-#: without a touch the readings of each of these are the same: the names that docs/wire-format.md has for them say both
+#: untouched, the readings of each of these are the same: names that docs/look-up/wire-format.md has for them say both
 ALIKE = [
     ("A open", "B open"),
     ("C open", "D open"),

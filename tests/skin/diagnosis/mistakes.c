@@ -1,4 +1,4 @@
-/* Firmware mistakes, each a small deviation from a right writer of frames (docs/wire-format.md, version 1).
+/* Firmware mistakes, each a small deviation from a right writer of frames (docs/look-up/wire-format.md, version 1).
  *
  *   mistakes MISTAKE SECONDS          records on standard output: double time [s], uint16 length, bytes
  *   mistakes MISTAKE SECONDS --port   the same bytes in real time on a pseudo-terminal, whose path is the first line

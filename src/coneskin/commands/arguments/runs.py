@@ -79,7 +79,7 @@ examples:
 What is dropped is gone for good; the run says so, and is no longer replayed as a whole.
 Exit code: 0 all are pruned; 1 one is not.
 """
-_SETTING = "another value in B's scene, such as reaction.kind=stop or sensor.0.touch_level=0.08; docs/runs.md"
+_SETTING = "another value in B's scene, such as reaction.kind=stop or sensor.0.touch_level=0.08; docs/do/runs.md"
 _TOLERANCE = "place_mm, angle_deg, level, speed_rad_s, time_ms or relative: what does not count"
 
 

@@ -19,7 +19,7 @@ __all__ = ["examine_line", "examine_sensor"]
 
 _BITS_PER_BYTE = 10  # on a serial line: start, eight, stop
 _LINE_LOAD = 0.95  # part of a line's bytes that frames may take
-_GOOD_RATE, _LOW_RATE = 200.0, 100.0  # Hz, docs/wire-format.md
+_GOOD_RATE, _LOW_RATE = 200.0, 100.0  # Hz, docs/look-up/wire-format.md
 _PATIENT = 4.0  # frames in the time after which the skin is silent: a scene that is made for so low a rate
 _CLOCK = 0.01  # part by which the device's clock may be off as far as a few seconds show it
 _LOST = 0.02  # part of the frames, as the detector allows
@@ -140,7 +140,9 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     status = seen.status & _STATUS
     if status:
         names = ", ".join(bit.name or str(bit.value) for bit in Status if bit & status)
-        found.append(Finding(f"{name}, status", "bad", f"the device reports {names}", "none", "docs/wire-format.md"))
+        found.append(
+            Finding(f"{name}, status", "bad", f"the device reports {names}", "none", "docs/look-up/wire-format.md")
+        )
     return found
 
 

@@ -1,4 +1,4 @@
-"""Chunk of a recording: some blocks behind a head that says how many, of which kinds and times; docs/recording.md."""
+"""Chunk of a recording: blocks behind a head with their number, kinds and times; docs/look-up/recording.md."""
 
 from __future__ import annotations
 

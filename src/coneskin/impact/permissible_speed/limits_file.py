@@ -2,7 +2,7 @@
 
 None of these values comes with this package. Copies of the tables of ISO/TS 15066 that circulate contradict each other:
 whoever uses them buys the edition that applies, transcribes it and lets somebody else compare. The keys are described
-in docs/permissible-speed.md.
+in docs/do/permissible-speed.md.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def read_limits(path: Path | str) -> LimitsFile:
     try:
         text = read_file(path, MAX_SIZE).decode("utf-8-sig")
     except OSError as exc:
-        hint = "; docs/permissible-speed.md has one to begin with" if isinstance(exc, FileNotFoundError) else ""
+        hint = "; docs/do/permissible-speed.md has one to begin with" if isinstance(exc, FileNotFoundError) else ""
         raise SceneError([f"the file cannot be read: {exc.strerror or exc}{hint}"], str(path)) from exc
     except UnicodeDecodeError as exc:
         raise SceneError([f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8"], str(path)) from exc

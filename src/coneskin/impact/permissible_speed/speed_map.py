@@ -261,7 +261,9 @@ class _CurveMaker:
 def _check(scene: Scene, limits: LimitsFile) -> None:
     problems = []
     if scene.padding is None:
-        problems.append("permissible speeds need the [padding] of the skins; press yours on a scale (docs/physics.md)")
+        problems.append(
+            "permissible speeds need the [padding] of the skins; press yours on a scale (docs/do/impact.md)"
+        )
     for reaction in (scene.default_reaction, *(rule.reaction for rule in scene.rules)):
         braking = reaction.deceleration
         if reaction.kind == "slow":

@@ -162,7 +162,7 @@ def test_windows_and_versions_are_answered(console: Console) -> None:
     assert console.say("loading") == "could not understand: 'loading'"
 
 
-PAGE = ROOT / "docs" / "sim-ur.md"
+PAGE = ROOT / "docs" / "look-up" / "sim-ur.md"
 
 
 def first_version(command: str, major: int) -> str:
