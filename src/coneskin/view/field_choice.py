@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from .stage.sheet_surface import SheetSurface
     from .stage.stage import Stage
 
-__all__ = ["FieldChoice", "contact_on"]
+__all__ = [
+    "FieldChoice",
+]
 
 _FIELD_OFF = "off"
 _FLAT_SPAN = 1e-3  # of the supply: what differs by less than this is drawn in one colour
@@ -74,7 +76,7 @@ class FieldChoice:
                     patches = field_patches(sheet)
                     self._fields[name] = SheetField(sheet.sensor, patches.u, patches.phi), patches
                 field, patches = self._fields[name]
-                contact = contact_on(sheet, moment)
+                contact = _contact_on(sheet, moment)
                 try:
                     volts = field.potentials(what, contact)
                 except FieldError as exc:
@@ -119,7 +121,7 @@ class FieldChoice:
             self._legend.content = ""
 
 
-def contact_on(sheet: SheetSurface, moment: Moment) -> ContactOnSheet | None:
+def _contact_on(sheet: SheetSurface, moment: Moment) -> ContactOnSheet | None:
     """Return the contact that touches a sheet at a moment; None for none."""
     level = moment.levels[sheet.name]
     for mark in moment.marks:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["CHANNELS", "UNKNOWN", "History", "PhaseChange", "PhaseWords", "Series", "history_of", "phase_after"]
+__all__ = ["CHANNELS", "UNKNOWN", "History", "PhaseWords", "Series", "history_of", "phase_after"]
 
 _GREY, _GREEN, _AMBER, _RED, _VIOLET, _BLUE = "#6b7280", "#15803d", "#b45309", "#b91c1c", "#6d28d9", "#1d4ed8"
 
@@ -102,7 +102,7 @@ _HEALTH_EVENTS = frozenset(
 )
 
 
-class PhaseChange(NamedTuple):
+class _PhaseChange(NamedTuple):
     """Time [s, host clock] from which on a guard is in a phase."""
 
     time: float
@@ -159,7 +159,7 @@ class History:
         self.levels = {sensor.name: Series() for sensor in self.sensors}
         self.channels = {sensor.name: Series() for sensor in self.sensors}
         self.events: list[GuardEvent] = []
-        self.phases = [PhaseChange(-math.inf, UNKNOWN)]
+        self.phases = [_PhaseChange(-math.inf, UNKNOWN)]
         self.since, self.until = math.inf, -math.inf
         self.contacts = ContactLog()
         self._keep = keep
@@ -265,7 +265,7 @@ class History:
         self.contacts.feed(event)
         before = self.phases[-1].phase
         if (phase := phase_after(before, event.name)) != before:
-            self.phases.append(PhaseChange(event.time, phase))
+            self.phases.append(_PhaseChange(event.time, phase))
 
     def _read_skin(self, times: list[float], parts: list[bytes]) -> None:
         import numpy as np

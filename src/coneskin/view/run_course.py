@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .contact_mark import ContactMark
     from .history import PhaseWords
 
-__all__ = ["EventLine", "Moment", "RunCourse", "event_lines", "moment_at", "read_courses"]
+__all__ = ["Moment", "RunCourse", "event_lines", "read_courses"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Moment:
     bodies: tuple[Vector, ...] = ()
 
 
-def moment_at(stage: Stage, history: History, time: float) -> Moment:
+def _moment_at(stage: Stage, history: History, time: float) -> Moment:
     """Return what is seen at a time [s, host clock]."""
     levels = {sheet.name: history.level(sheet.name, time) for sheet in stage.sheets}
     poses = stage.poses(history.q(time))
@@ -83,7 +83,7 @@ class RunCourse:
 
     def moment(self, time: float) -> Moment:
         """Return what is seen at a time on the page's clock [s]."""
-        return moment_at(self.stage, self.history, self.zero + time)
+        return _moment_at(self.stage, self.history, self.zero + time)
 
     def poses(self, time: float) -> dict[int, Pose]:
         """Return the poses of the links' frames at a time on the page's clock [s]."""
@@ -94,7 +94,7 @@ class RunCourse:
         return self.stage.moved(self.history.places(self.zero + time))
 
 
-class EventLine(NamedTuple):
+class _EventLine(NamedTuple):
     """Event in words.
 
     Attributes:
@@ -108,14 +108,14 @@ class EventLine(NamedTuple):
     text: str
 
 
-def event_lines(courses: Sequence[RunCourse]) -> list[EventLine]:
+def event_lines(courses: Sequence[RunCourse]) -> list[_EventLine]:
     """Return the events of runs in the order of the page's clock, by which they count."""
     found = []
     for number, course in enumerate(courses, 1):
         whose = f"run {number}: " if len(courses) > 1 else ""
         for event in course.history.events:
             time, _, words = describe(event, course.zero).strip().partition("  ")
-            found.append(EventLine(event.time - course.zero, event, f"{time}  {whose}{words}"))
+            found.append(_EventLine(event.time - course.zero, event, f"{time}  {whose}{words}"))
     return sorted(found, key=lambda line: line.time)
 
 

@@ -17,13 +17,20 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["COLOURS", "MOST_LINES", "TracePlot", "Traces", "trace_drawings", "trace_names", "traces", "value_range"]
+__all__ = [
+    "COLOURS",
+    "MOST_LINES",
+    "TracePlot",
+    "trace_drawings",
+    "trace_names",
+    "traces",
+]
 
 _BIN_COUNT = 240  # each with its least and its largest value
 _LEVELS, _SPEEDS, _FORCE = "touch level", "joint speed [rad/s]", "contact force [N]"
 
 
-class Traces(NamedTuple):
+class _Traces(NamedTuple):
     """Values over time.
 
     Attributes:
@@ -45,7 +52,7 @@ def trace_names(courses: Sequence[RunCourse]) -> list[str]:
     return [_LEVELS, *force, *arm, *(f"channels of {name}" for name in sensors)]
 
 
-def traces(courses: Sequence[RunCourse], what: str, since: float, until: float) -> Traces:
+def traces(courses: Sequence[RunCourse], what: str, since: float, until: float) -> _Traces:
     """Return traces of runs.
 
     Args:
@@ -65,7 +72,7 @@ def traces(courses: Sequence[RunCourse], what: str, since: float, until: float) 
         for name, series, column in _columns(course, what):
             names.append(before + name)
             rows.append(_envelope(series, column, course.zero, edges))
-    return Traces(tuple(names), times, np.array(rows).reshape(len(rows), len(times)))
+    return _Traces(tuple(names), times, np.array(rows).reshape(len(rows), len(times)))
 
 
 def _columns(course: RunCourse, what: str) -> list[tuple[str, Series, int]]:
@@ -143,9 +150,9 @@ class TracePlot:
             self._plot = self._make()
         old.remove()
 
-    def _traces(self) -> Traces:
+    def _traces(self) -> _Traces:
         found = traces(self._strands, self._shown, self._since, self._until)
-        return Traces(found.names[:MOST_LINES], found.times, found.values[:MOST_LINES])
+        return _Traces(found.names[:MOST_LINES], found.times, found.values[:MOST_LINES])
 
     def _make(self) -> Any:
         found = self._traces()
@@ -161,7 +168,7 @@ class TracePlot:
         )
 
 
-def value_range(found: Traces) -> tuple[float, float]:
+def _value_range(found: _Traces) -> tuple[float, float]:
     """Return from where to where the values of traces are drawn, with a margin; 0 to 1 where there are none."""
     import numpy as np
 
@@ -171,9 +178,9 @@ def value_range(found: Traces) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _scales(found: Traces) -> dict[str, Any]:
+def _scales(found: _Traces) -> dict[str, Any]:
     """Return the axes of a plot; one that looks for its own range finds none where a value is missing (NaN)."""
-    return {"x": {"time": False, "auto": True}, "y": {"auto": False, "range": value_range(found)}}
+    return {"x": {"time": False, "auto": True}, "y": {"auto": False, "range": _value_range(found)}}
 
 
 _WIDTH, _HEIGHT = 480.0, 120.0  # units of the drawing, which fills the panel
@@ -195,8 +202,8 @@ def trace_drawings(courses: Sequence[RunCourse], since: float, until: float) -> 
     return f'<div id="coneskin-traces"><label>traces <select>{options}</select></label>{drawn}</div>'
 
 
-def _drawing(found: Traces) -> str:
-    low, high = value_range(found)
+def _drawing(found: _Traces) -> str:
+    low, high = _value_range(found)
     span = float(found.times[-1] - found.times[0])
     x = (found.times - found.times[0]) / max(span, 1e-9) * _WIDTH
     lines, words = [], []

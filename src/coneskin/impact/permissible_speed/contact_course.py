@@ -51,7 +51,7 @@ def evaluate(series: Sequence[float], t: float) -> float:
     return value
 
 
-def slope_of(series: Sequence[float]) -> list[float]:
+def _slope_of(series: Sequence[float]) -> list[float]:
     """Return the coefficients of the derivative."""
     return [n * coefficient for n, coefficient in enumerate(series)][1:]
 
@@ -63,7 +63,7 @@ def first_fall(series: Sequence[float], end: float) -> float | None:
     """
     if _stays_above(series, end):
         return None
-    slope = slope_of(series)
+    slope = _slope_of(series)
     if series[0] <= 0.0 and next((c for c in slope if c), 0.0) < 0.0:
         return 0.0
     before, steep = 0.0, slope[0]
@@ -73,7 +73,7 @@ def first_fall(series: Sequence[float], end: float) -> float | None:
         if value < 0.0:
             return _root(series, slope, before, t)
         if steep < 0.0 < rate:  # it has turned on the way
-            lowest = _root([-c for c in slope], slope_of([-c for c in slope]), before, t)
+            lowest = _root([-c for c in slope], _slope_of([-c for c in slope]), before, t)
             if evaluate(series, lowest) < 0.0:
                 return _root(series, slope, before, lowest)
         before, steep = t, rate
@@ -82,7 +82,7 @@ def first_fall(series: Sequence[float], end: float) -> float | None:
 
 def greatest(series: Sequence[float], end: float) -> tuple[float, float]:
     """Return where in [0, end] a polynomial is greatest, and its value there."""
-    slope = slope_of(series)
+    slope = _slope_of(series)
     best = max((evaluate(series, t), t) for t in (0.0, end))
     if not slope:
         return best[1], best[0]
@@ -91,7 +91,7 @@ def greatest(series: Sequence[float], end: float) -> tuple[float, float]:
         t = end * look / _STEP_PARTS
         rate = evaluate(slope, t)
         if steep > 0.0 > rate:
-            top = _root(slope, slope_of(slope), before, t)
+            top = _root(slope, _slope_of(slope), before, t)
             best = max(best, (evaluate(series, top), top))
         before, steep = t, rate
     return best[1], best[0]

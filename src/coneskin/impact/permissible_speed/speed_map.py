@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from .arm_patches import ArmPatch
 
-__all__ = ["LEVERS", "SpeedCurve", "SpeedMap", "contact_at", "map_speeds", "map_table", "write_map"]
+__all__ = ["LEVERS", "SpeedMap", "contact_at", "map_speeds", "map_table", "write_map"]
 
 #: m/rad; a UR20 reaches 1.75 m
 LEVERS = (0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28, 1.8)
@@ -52,7 +52,7 @@ _MOTION_MARGIN = 0.05  # rad around a motion, within which its curves hold
 
 
 @dataclass(frozen=True, slots=True)
-class SpeedCurve:
+class _SpeedCurve:
     """Permissible speeds for a range of masses.
 
     Attributes:
@@ -80,7 +80,7 @@ class SpeedMap:
     """
 
     table: SpeedLimitScene
-    curves: tuple[SpeedCurve, ...]
+    curves: tuple[_SpeedCurve, ...]
     patches: tuple[ArmPatch, ...]
     masses: tuple[float, ...]
 
@@ -210,7 +210,7 @@ class _CurveMaker:
     """Maker of curves, each of them once."""
 
     def __init__(self, limits: LimitsFile, padding: Padding, note: Callable[[str], None]) -> None:
-        self.curves: list[SpeedCurve] = []
+        self.curves: list[_SpeedCurve] = []
         self._limits, self._padding, self._note = limits, padding, note
         self._numbers: dict[tuple[tuple[BodyRegion, ...], tuple[float, ...], ExtraWay], int] = {}
         # two regions may have one name
@@ -226,7 +226,7 @@ class _CurveMaker:
         if key not in self._numbers:
             least = min((self._search(r, mass, extra)[-1], r.name) for r in regions for mass in masses)[1]
             speeds = zip(*(self._search(region, mass, extra) for region in regions for mass in masses), strict=True)
-            curve = SpeedCurve(least, masses[-1], extra, tuple(map(min, speeds)))
+            curve = _SpeedCurve(least, masses[-1], extra, tuple(map(min, speeds)))
             if curve not in self.curves:
                 self.curves.append(curve)
             self._numbers[key] = self.curves.index(curve)
@@ -284,7 +284,7 @@ def _check(scene: Scene, limits: LimitsFile) -> None:
         raise SceneError(problems, scene.name)
 
 
-def _check_speeds(scene: Scene, curves: list[SpeedCurve]) -> None:
+def _check_speeds(scene: Scene, curves: list[_SpeedCurve]) -> None:
     for curve in curves:
         if curve.speeds[-1] <= 0.0:
             raise SceneError(

@@ -30,7 +30,7 @@ from .two_mass_contact import TwoMassContact
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["HORIZON", "POINTS", "Collocation", "collocate", "expand", "integrate", "reach"]
+__all__ = ["HORIZON", "POINTS", "collocate", "expand", "integrate", "reach"]
 
 _SERIES_ORDER = 18
 _SERIES_TOLERANCE = 1e-14  # of the last coefficients of a step, relative to the largest
@@ -91,7 +91,7 @@ _NEWTON_TOLERANCE = 1e-10  # a change of this share of compression or place leav
 
 
 @dataclass(frozen=True, slots=True)
-class Collocation:
+class _Collocation:
     """Step that was found.
 
     Attributes:
@@ -106,7 +106,7 @@ class Collocation:
     tail: float
 
 
-def collocate(model: TwoMassContact, start: ContactState, length: float) -> Collocation | None:
+def collocate(model: TwoMassContact, start: ContactState, length: float) -> _Collocation | None:
     """Return the step of a length [s], in contact throughout; None where Newton's method finds none.
 
     Args:
@@ -161,7 +161,7 @@ def collocate(model: TwoMassContact, start: ContactState, length: float) -> Coll
     tail = float(np.max(np.abs(gains @ legendre) / sizes))
     terms = gains @ powers / length ** np.arange(1.0, POINTS + 1.0)
     series = tuple([float(first), *row] for first, row in zip(begins, terms.tolist(), strict=True))
-    return Collocation(series, (start.s + float(ds[-1]), float(w[-1]), start.x + float(dx[-1]), float(v[-1])), tail)
+    return _Collocation(series, (start.s + float(ds[-1]), float(w[-1]), start.x + float(dx[-1]), float(v[-1])), tail)
 
 
 @cache

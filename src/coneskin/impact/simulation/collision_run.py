@@ -42,14 +42,14 @@ from .impact_outcome import ImpactMeter, ImpactOutcome, TouchRecorder, TruthReco
 from .mujoco_plant import MujocoPlant
 from .scene_plant import currents_of, presses_of, sheets_of
 
-__all__ = ["PROTECTIONS", "CollisionRun", "ConstantSpeed", "ForceLimit", "JointProgram", "Waypoints"]
+__all__ = ["PROTECTIONS", "CollisionRun", "ConstantSpeed", "Waypoints"]
 
 _FILTER_TIME = 0.01  # s
 _ELBOW_LINK = 2  # index of the link at whose far end it is
 _MIN_LEVER = 0.1  # of the longest; shorter ones say nothing of a force
 
 
-class ForceLimit:
+class _ForceLimit:
     """Force limit of one arm.
 
     Args:
@@ -79,7 +79,7 @@ class ForceLimit:
 _ARRIVAL_TOLERANCE = 1e-4  # rad from a waypoint
 
 
-class JointProgram(Protocol):
+class _JointProgram(Protocol):
     """Program that moves the arm."""
 
     def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:
@@ -103,7 +103,7 @@ class ConstantSpeed:
         self._qd, self._acceleration = list(qd), acceleration
 
     def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:  # noqa: ARG002
-        """Return the speeds; see `JointProgram`."""
+        """Return the speeds; see `_JointProgram`."""
         return self._qd, self._acceleration
 
 
@@ -121,7 +121,7 @@ class Waypoints:
         self._speed, self._acceleration = speed, acceleration
 
     def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:  # noqa: ARG002
-        """Return the speeds towards the next waypoint; see `JointProgram`."""
+        """Return the speeds towards the next waypoint; see `_JointProgram`."""
         while self._points:
             way = [goal - at for goal, at in zip(self._points[0], q, strict=True)]
             left = max(map(abs, way))
@@ -187,7 +187,7 @@ class CollisionRun:
         self.events: list[GuardEvent] = []
         self.now = 100.0
         self._protection = protection
-        self._limit = ForceLimit(model)
+        self._limit = _ForceLimit(model)
         self._core = build_core(scene) if protection == "guard" else None
         sensors = [item.sensor for item in scene.sensors]
         self._device = PressedSkin(sensors, seed=seed, model=sheets)
@@ -195,7 +195,7 @@ class CollisionRun:
         self._companions = CompanionProcesses()
         self._commands: deque[tuple[int, object]] = deque()
         self._unread = b""
-        self._program: JointProgram | None = None
+        self._program: _JointProgram | None = None
         self._began = math.nan
         self._steps = 0
         self._note = note
@@ -206,7 +206,7 @@ class CollisionRun:
         """Outcome so far."""
         return self.meter.outcome
 
-    def run(self, program: JointProgram, longest: float = 3.0, after: float = _SETTLE_TIME) -> ImpactOutcome:
+    def run(self, program: _JointProgram, longest: float = 3.0, after: float = _SETTLE_TIME) -> ImpactOutcome:
         """Wait until the guard is active, let the program move the arm, and see what comes of it.
 
         Args:

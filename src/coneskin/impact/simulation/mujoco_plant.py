@@ -24,7 +24,7 @@ from coneskin.skin.padding import Padding
 
 from .scene_description import SheetOnLink, body_link, describe_scene
 
-__all__ = ["STEP", "BodyContact", "HeldPart", "MujocoPlant", "Touch"]
+__all__ = ["STEP", "MujocoPlant", "Touch"]
 
 _FORCE_BAND = (
     100.0  # N between the force wanted and felt at which a person moves at full speed; faster, hands would hammer
@@ -32,7 +32,7 @@ _FORCE_BAND = (
 
 
 @dataclass
-class HeldPart:
+class _HeldPart:
     """Part of a body on a spring, and where that spring rests.
 
     Attributes:
@@ -79,7 +79,7 @@ STEP = 2e-4  #: s of the integration; the stiffest contact, 1e6 N/m against 0.3 
 _ARM_DOF = 6  # degrees of freedom of the arm, the first ones
 
 
-class BodyContact(NamedTuple):
+class _BodyContact(NamedTuple):
     """Contact of a skin with a part of a body, at one instant."""
 
     sheet: int  #: number of the skin
@@ -94,7 +94,7 @@ class BodyContact(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """Contact as one step of the integration needs it; fields as of `BodyContact`."""
+    """Contact as one step of the integration needs it; fields as of `_BodyContact`."""
 
     sheet: int
     part: int
@@ -156,7 +156,7 @@ class MujocoPlant:
         self._back = [body_link(model, sheet.link).inverse() for sheet in sheets]
         self._links = [self._m.body(f"link{sheet.link}").id for sheet in sheets]
         self._sheet_of = {self._m.geom(f"sheet{n}").id: n for n in range(len(sheets))}
-        self.parts: list[HeldPart] = []
+        self.parts: list[_HeldPart] = []
         self._part_of: dict[int, int] = {}
         self._address: list[int | None] = []  # of a part's first coordinate; None where it does not move
         for number, body in enumerate(bodies):
@@ -164,7 +164,7 @@ class MujocoPlant:
                 name = f"body{number}.{part}"
                 self._part_of[self._m.geom(name).id] = len(self.parts)
                 self._address.append(int(self._m.joint(f"{name}.x").dofadr[0]) if body.gives_way else None)
-                self.parts.append(HeldPart(body, part))
+                self.parts.append(_HeldPart(body, part))
         self._lead = self._m.actuator_biasprm[:, 2] / self._m.actuator_biasprm[:, 1]  # kv / kp [s]
         for joint, on in enumerate(held):
             if not on:
@@ -178,7 +178,7 @@ class MujocoPlant:
         self._touched: dict[int, float] = {}  # body -> when it was first touched
         self._body_numbers = [n for n, body in enumerate(bodies) for _ in body.parts]
         self.time = 0.0
-        self.contacts: tuple[BodyContact, ...] = ()
+        self.contacts: tuple[_BodyContact, ...] = ()
         self.impulse = self.deepest = self.peak = self.lost = 0.0
         mujoco.mj_forward(self._m, self._d)
 
@@ -369,7 +369,7 @@ class MujocoPlant:
         rate = float(speed @ normal)
         return Touch(sheet, part, depth, rate, self._padding.force(depth, rate), normal, point, jacobian)
 
-    def _contact(self, touch: Touch) -> BodyContact:
+    def _contact(self, touch: Touch) -> _BodyContact:
         link = self._links[touch.sheet]
         axes = self._d.xmat[link].reshape(3, 3)
         x, y, z = (axes.T @ (touch.point - self._d.xpos[link])).tolist()
@@ -377,6 +377,6 @@ class MujocoPlant:
         u, phi, _ = self._sheets[touch.sheet].cone.locate(at)
         px, py, pz = touch.point.tolist()
         nx, ny, nz = touch.normal.tolist()
-        return BodyContact(
+        return _BodyContact(
             touch.sheet, touch.part, u, phi, touch.depth, touch.rate, touch.force, (nx, ny, nz), (px, py, pz)
         )

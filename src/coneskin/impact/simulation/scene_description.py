@@ -21,7 +21,7 @@ from coneskin.robot.arm.kinematics import JOINTS, cos_sin
 from coneskin.robot.arm.model import ArmModel
 from coneskin.scene.values.body import BodyScene
 
-__all__ = ["SheetOnLink", "body_link", "describe_arm", "describe_scene", "describe_servos", "numbers"]
+__all__ = ["SheetOnLink", "body_link", "describe_scene", "numbers"]
 
 SERVO_FREQUENCY = 15.0  #: Hz; of the position loop of a joint, critically damped; assumed, UR publishes none
 
@@ -33,7 +33,7 @@ def body_link(model: ArmModel, link: int) -> Pose:
     return Pose(turned, (model.a[link - 1], 0.0, model.d[link - 1]))
 
 
-def describe_arm(model: ArmModel, inertia: ArmInertia, geoms: Mapping[int, str]) -> str:
+def _describe_arm(model: ArmModel, inertia: ArmInertia, geoms: Mapping[int, str]) -> str:
     """Return the bodies of an arm, nested; ``link1`` is the shoulder, ``joint1`` turns it.
 
     Args:
@@ -57,7 +57,7 @@ def describe_arm(model: ArmModel, inertia: ArmInertia, geoms: Mapping[int, str])
     return "\n".join(opened) + "</body>" * JOINTS
 
 
-def describe_servos(inertia: ArmInertia, masses: Sequence[float]) -> str:
+def _describe_servos(inertia: ArmInertia, masses: Sequence[float]) -> str:
     """Return the servos of the joints: stiff position loops that saturate at the joint's highest torque.
 
     Args:
@@ -148,8 +148,8 @@ def describe_scene(
         f'<mujoco><compiler angle="radian" autolimits="true"/>'
         f'<option timestep="{step!r}" integrator="implicitfast" gravity="0 0 0"/>'
         f'<default><geom contype="0" conaffinity="0" mass="0"/></default>'
-        f"<asset>{meshes}</asset><worldbody>{describe_arm(model, inertia, geoms)}{placed}</worldbody>"
-        f"<contact>{pairs}</contact><actuator>{describe_servos(inertia, masses)}</actuator></mujoco>"
+        f"<asset>{meshes}</asset><worldbody>{_describe_arm(model, inertia, geoms)}{placed}</worldbody>"
+        f"<contact>{pairs}</contact><actuator>{_describe_servos(inertia, masses)}</actuator></mujoco>"
     )
 
 
