@@ -27,8 +27,7 @@ from scipy.spatial import KDTree
 import coneskin as cs
 from coneskin.design.sheets.seam_strip import blind_angle, cover_seams
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
-from coneskin.design.workshop.jig import Collar, jig_collars
-from coneskin.design.workshop.jig_surroundings import with_sheets
+from coneskin.design.workshop.jig import Collar, jig_collars, with_sheets
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.frustum import Frustum
@@ -36,8 +35,7 @@ from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
-from coneskin.geometry.solid.closed_surface import ClosedSurface
-from coneskin.geometry.solid.step import WrappedLayer, write_step
+from coneskin.geometry.solid import ClosedSurface, WrappedLayer, write_step
 
 SAMPLES = 40_000  # on the faces of a link beside a part, and on the part
 NEAREST = 800  # of them whose distance is computed

@@ -16,10 +16,9 @@ import time
 import numpy as np
 from report import head
 
-from coneskin.geometry.fit.cones import fit_cones
+from coneskin.geometry.fit.cones import fit_cones, sample_link
 from coneskin.geometry.fit.developable.packing import with_developables
 from coneskin.geometry.fit.fit_options import FitOptions
-from coneskin.geometry.fit.sampled_link import sample_link
 from coneskin.geometry.pose import Pose
 from tests.support.ruled_tube import RuledTube, ellipse_section, rounded_box_section, stadium_section
 

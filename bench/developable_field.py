@@ -26,10 +26,9 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
-from coneskin.geometry.fit.cones import fit_cones
+from coneskin.geometry.fit.cones import fit_cones, sample_link
 from coneskin.geometry.fit.developable.packing import with_developables
 from coneskin.geometry.fit.fit_options import FitOptions
-from coneskin.geometry.fit.sampled_link import sample_link
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 

@@ -1,14 +1,31 @@
-"""Bend: a strip of a side between two rulings, by its share of the wrap and the turn of its normal."""
+"""Bends of a developable side: how a strip between two rulings turns, and where its points lie.
+
+A strip is bent evenly: it is a part of a circular cone, a cylinder or a plane. With the unit vectors T along the arc of
+end 1, U along the ruling and N outwards, with g the geodesic curvature of that arc and k its normal curvature, along
+the arc
+
+    T' = -g U - k N        U' = g T        N' = k T
+
+so that T, U, N turn about the fixed vector k U - g N, and all points have closed forms that hold for planes, cylinders
+and cones alike.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.core.errors import GeometryError
 
-__all__ = ["Bend", "bends_between", "check_bends"]
+from .pose import Vector
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["Bend", "BentStrip", "RulingFrame", "bends_between", "check_bends", "frames_along"]
 
 _TURN = 2.0 * math.pi
 _SLACK = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
@@ -69,3 +86,109 @@ def bends_between(bends: Sequence[Bend], phi1: float, phi2: float, around: bool 
             parts.append(Bend(high - low, bend.turn * (high - low) / bend.width))
         begin += bend.width
     return tuple(parts)
+
+
+_STRAIGHT = 1e-9  # rad; a strip that turns by less has its nearest foot by the formula of a plane
+
+
+class RulingFrame(NamedTuple):
+    """A ruling: its point at end 1 [m], and the unit vectors T, U and N there."""
+
+    at: Vector
+    t: Vector
+    u: Vector
+    n: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class BentStrip:
+    """A strip and the frame at its first ruling.
+
+    Attributes:
+        arc: length along end 1 [m].
+        g: geodesic curvature of end 1 [1/m], sin a / radius of a cone.
+        k: normal curvature there [1/m]; 0 of a plane.
+        first: frame at the first ruling.
+    """
+
+    arc: float
+    g: float
+    k: float
+    first: RulingFrame
+
+    def frame(self, along: float) -> RulingFrame:
+        """Return the frame at a distance [m] from the first ruling."""
+        g, k = self.g, self.k
+        (x, y, z), (tx, ty, tz), (ux, uy, uz), (nx, ny, nz) = self.first
+        vx, vy, vz = -k * nx - g * ux, -k * ny - g * uy, -k * nz - g * uz  # T'
+        angle = math.hypot(g, k) * along
+        first = along * _sinc(angle)
+        second = 0.5 * (along * _sinc(0.5 * angle)) ** 2
+        dx, dy, dz = first * tx + second * vx, first * ty + second * vy, first * tz + second * vz
+        cosine = math.cos(angle)
+        return RulingFrame(
+            (x + dx, y + dy, z + dz),
+            (cosine * tx + first * vx, cosine * ty + first * vy, cosine * tz + first * vz),
+            (ux + g * dx, uy + g * dy, uz + g * dz),
+            (nx + k * dx, ny + k * dy, nz + k * dz),
+        )
+
+    def feet(
+        self, points: NDArray[np.float64], low: float, high: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where the nearest feet of points lie along end 1 [m], and how far points are from the rulings there.
+
+        Args:
+            points: shape (n, 3) [m].
+            low: least distance from the first ruling of a foot [m].
+            high: largest distance [m].
+        """
+        import numpy as np
+
+        g, k = self.g, self.k
+        at, *axes = self.first
+        qt, qu, qn = ((points - at) @ np.array(axes).T).T
+        # the foot is where the arc's tangent is square to the way to the point: tan(angle) = omega qT / (1 - qV)
+        rest = 1.0 + k * qn + g * qu
+        omega = math.hypot(g, k)
+        if omega * self.arc > _STRAIGHT:
+            angle = np.arctan2(omega * qt, rest)
+            middle = 0.5 * omega * self.arc
+            along = (angle - _TURN * np.round((angle - middle) / _TURN)) / omega
+        else:
+            along = qt / np.where(np.abs(rest) > 1e-12, rest, 1e-12)
+        along = np.clip(along, low, high)
+        angle = omega * along
+        first = along * np.sinc(angle / np.pi)
+        second = 0.5 * (along * np.sinc(0.5 * angle / np.pi)) ** 2
+        to_t, to_u, to_n = qt - first, qu + second * g, qn + second * k
+        out = k * first * to_t - k * g * second * to_u + (1.0 - k * k * second) * to_n
+        across = np.cos(angle) * to_t - first * (g * to_u + k * to_n)
+        return along, np.hypot(out, across)
+
+
+def frames_along(
+    strips: Sequence[BentStrip], number: NDArray[np.int64], along: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return points of end 1 [m], rulings and normals for many places: shapes (..., 3).
+
+    Args:
+        strips: of a side.
+        number: of the strip of each place, shape (...).
+        along: distance of each place from the first ruling of its strip [m], shape (...).
+    """
+    import numpy as np
+
+    at, t, u, n = (np.array([getattr(strip.first, name) for strip in strips])[number] for name in ("at", "t", "u", "n"))
+    g = np.array([strip.g for strip in strips])[number][..., None]
+    k = np.array([strip.k for strip in strips])[number][..., None]
+    along = along[..., None]
+    angle = np.hypot(g, k) * along
+    first = along * np.sinc(angle / np.pi)
+    second = 0.5 * (along * np.sinc(0.5 * angle / np.pi)) ** 2
+    step = first * t - second * (k * n + g * u)
+    return at + step, u + g * step, n + k * step
+
+
+def _sinc(x: float) -> float:
+    return math.sin(x) / x if x else 1.0

@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.errors import GeometryError
 
-from .bend import Bend, bends_between, check_bends
-from .bent_strip import BentStrip, RulingFrame, frames_along
+from .bend import Bend, BentStrip, RulingFrame, bends_between, check_bends, frames_along
 from .frustum import Frustum
 from .pose import Pose, Vector
 

@@ -21,7 +21,7 @@ FOLDERS = ("geometry", "skin", "robot")
 FLOORS = (
     "core",
     "core.recording geometry skin.field",
-    "geometry.drawing geometry.fit geometry.solid robot.arm robot.sim.urscript skin",
+    "geometry.drawing geometry.fit robot.arm robot.sim.urscript skin",
     "geometry.fit.developable robot.driver robot.reaction robot.sim.motion skin.detection.frame skin.diagnosis "
     "skin.firmware skin.sources",
     "robot.guard.heartbeats robot.stop robot.ur skin.detection.untouched skin.virtual",
@@ -48,8 +48,8 @@ HOMES = {
     "trimesh": ("geometry/mesh.py",),
     "embreex": ("geometry/mesh.py",),
     "collada": ("geometry/mesh.py",),
-    "OCP": ("geometry/solid/step.py",),
-    "xacrodoc": ("geometry/xacro.py",),
+    "OCP": ("geometry/solid.py",),
+    "xacrodoc": ("geometry/urdf.py",),
     "ezdxf": ("geometry/drawing/dxf.py",),
     "rpack": ("geometry/drawing/nesting.py",),
     "pyarrow": ("src/coneskin/runs/export/parquet_file.py",),
@@ -69,12 +69,12 @@ HOMES = {
         "geometry/fit/*.py",
         "geometry/fit/developable/*.py",
         "geometry/hole_bridging.py",
-        "geometry/outermost_points.py",
+        "geometry/mesh.py",
         "skin/field/*.py",
         "skin/virtual/field_contacts.py",
         "tests/support/field/*.py",
         "src/coneskin/design/link_picture.py",
-        "src/coneskin/design/workshop/datum_faces.py",
+        "src/coneskin/design/workshop/placement.py",
     ),
 }
 #: the live path: no numpy in any of it

@@ -9,6 +9,7 @@ face alone.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -17,16 +18,17 @@ from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-from .electrode_layout import SheetLayout, edge_room
-from .layer_layout import layout_above
+from .electrode_layout import SheetLayout, SurfaceRectangle, edge_room
 from .layer_stack import LayerStack, snap_to_cylinder
-from .outline import Outline
+from .outline import Outline, PathSegment
 from .part_labels import PartLabel, ascii_text, part_labels, strip_label
 from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
 from .touch_marks import CoverMarks
 
 __all__ = [
     "LINE_COLOURS",
+    "TEST_HOLE",
+    "TEST_SQUARE",
     "CutPart",
     "CutSheet",
     "FaceUp",
@@ -34,8 +36,43 @@ __all__ = [
     "Stroke",
     "StrokeKind",
     "cut_sheets",
+    "layout_above",
+    "make_test_piece",
     "nest_sheets",
 ]
+
+
+def layout_above(layout: SheetLayout, place: PlacedFrustum, height: float) -> SheetLayout:
+    """Return a layout for a layer at a height [m] above the link, so that its features lie on the same normals.
+
+    The layers of a cone grow evenly and share their azimuths. Around a link of another section a layer grows at the
+    bends only, and each feature moves in the flat pattern by what the bends before it have grown.
+    """
+    if not place.bends:
+        return layout
+
+    def above(phi: float) -> float:
+        return place.azimuth_above(height, phi)
+
+    def shape(outline: SurfaceShape) -> SurfaceShape:
+        return tuple(replace(element, phi=above(element.phi)) for element in outline)
+
+    def box(area: SurfaceRectangle) -> SurfaceRectangle:
+        return replace(area, phi1=above(area.phi1), phi2=above(area.phi2))
+
+    return replace(
+        layout,
+        field=box(layout.field),
+        active=box(layout.active),
+        rim=shape(layout.rim),
+        upper=shape(layout.upper),
+        lower=shape(layout.lower),
+        foils={name: shape(outline) for name, outline in layout.foils.items()},
+        marks={name: tuple(shape(outline) for outline in outlines) for name, outlines in layout.marks.items()},
+        folds={name: shape(outline) for name, outline in layout.folds.items()},
+        holes=tuple((u, above(phi)) for u, phi in layout.holes),
+    )
+
 
 StrokeKind = Literal["cut", "hole", "score", "fold"]
 SheetFace = Literal["outside", "inside"]
@@ -269,3 +306,26 @@ def _finish(part: CutPart, kerf: float, mirror: bool) -> CutPart:
         strokes.append(Stroke(stroke.kind, outline.mirrored() if mirror else outline))
     labels = tuple(label.mirrored() for label in part.labels) if mirror else part.labels
     return CutPart(part.name, tuple(strokes), labels)
+
+
+TEST_SQUARE = 40e-3  #: side of the square [m], drawn without a kerf
+TEST_HOLE = 20e-3  #: side of its hole [m]
+_TICK = 2e-3  # m; from the border to the marked square
+_LETTERS = 3e-3  # m
+
+
+def make_test_piece(material: str) -> CutSheet:
+    """Draw the test piece of a material; its lines have no kerf, so that the kerf can be measured on it."""
+    half, inner = 0.5 * TEST_SQUARE, 0.5 * TEST_HOLE
+    strokes = (_square("score", half - _TICK), _square("hole", inner), _square("cut", half))
+    side, hole = f"{TEST_SQUARE * 1e3:g} mm", f"hole {TEST_HOLE * 1e3:g} mm"
+    middle = 0.5 * (half - _TICK + inner)
+    labels = (PartLabel(f"TEST {side}", 0.0, middle, _LETTERS), PartLabel(hole, 0.0, -middle, _LETTERS))
+    flat = Frustum(half, half, TEST_SQUARE)
+    return CutSheet(0, "test piece", material, "outside", flat, (CutPart("test piece", strokes, labels),))
+
+
+def _square(kind: StrokeKind, half: float) -> Stroke:
+    corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
+    sides = [PathSegment(a, b) for a, b in itertools.pairwise([*corners, corners[0]])]
+    return Stroke(kind, Outline.from_segments(sides, True))

@@ -9,17 +9,133 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
 
 from coneskin.core.errors import GeometryError
 
 from .cut_sheet import LINE_COLOURS, CutSheet
 from .outline import Outline
 from .part_labels import CAP_HEIGHT, PartLabel
-from .pdf_writer import PdfWriter, pdf_number
-from .tiling import PageTiling, tile_pages
 
-__all__ = ["PageSize", "to_pdf"]
+__all__ = ["PageSize", "PageTiling", "PdfWriter", "pdf_number", "tile_pages", "to_pdf"]
+
+
+def pdf_number(value: float) -> str:
+    """Return a number to five decimals without an exponent, which PDF does not allow."""
+    text = f"{value:.5f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+class PdfWriter:
+    """Collection of the objects of a file, written at the end (PDF 1.5, ISO 32000-1 section 7.5)."""
+
+    def __init__(self) -> None:
+        self._objects: list[str] = ["", ""]  # 1: catalogue, 2: page tree
+        self._pages: list[int] = []
+
+    def add(self, body: str) -> int:
+        """Add an object and return its number."""
+        self._objects.append(body)
+        return len(self._objects)
+
+    def add_stream(self, data: str, entries: str = "") -> int:
+        """Add a stream of ASCII text with further entries for its dictionary and return its number."""
+        return self.add(f"<< {entries} /Length {len(data)} >>\nstream\n{data}\nendstream")
+
+    def add_page(self, entries: str) -> None:
+        """Add a page with the entries of its dictionary."""
+        self._pages.append(self.add(f"<< /Type /Page /Parent 2 0 R {entries} >>"))
+
+    def finish(self, entries: str, title: str) -> bytes:
+        """Return the bytes of the file, with further entries for the catalogue and a title."""
+        escaped = title.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
+        info = self.add(f"<< /Title ({escaped}) /Producer (coneskin) >>")
+        kids = " ".join(f"{page} 0 R" for page in self._pages)
+        self._objects[0] = f"<< /Type /Catalog /Pages 2 0 R {entries} >>"
+        self._objects[1] = f"<< /Type /Pages /Kids [{kids}] /Count {len(self._pages)} >>"
+        # four bytes above 127 tell transfer programs that the file is binary
+        data, starts = bytearray(b"%PDF-1.5\n%\xe2\xe3\xcf\xd3\n"), []
+        for index, body in enumerate(self._objects, start=1):
+            starts.append(len(data))
+            data += f"{index} 0 obj\n{body}\nendobj\n".encode("ascii", "replace")
+        table = len(data)
+        data += f"xref\n0 {len(starts) + 1}\n0000000000 65535 f \n".encode()
+        data += b"".join(b"%010d 00000 n \n" % start for start in starts)
+        data += f"trailer\n<< /Size {len(starts) + 1} /Root 1 0 R /Info {info} 0 R >>\n".encode()
+        return bytes(data + f"startxref\n{table}\n%%EOF\n".encode())
+
+
+_SIDE = 14.0  # mm; left and right margin of a page, for crop marks
+_TOP = 14.0  # mm; top margin of a page, for crop marks
+_BOTTOM = 24.0  # mm; bottom margin of a page, for crop marks and the scale bar
+_SAMPLE_STEP = 0.5e-3  # m; distance of points along strokes by which used pages are found
+
+
+@dataclass(frozen=True, slots=True)
+class PageTiling:
+    """Pages of a drawing, each with a window on it; all lengths in mm.
+
+    Attributes:
+        width: of a page.
+        height: of a page.
+        counts: columns and rows of windows.
+        origin: lower left corner of the first window in the drawing.
+        extent: smallest x, smallest y, largest x and largest y of the drawing.
+        cells: (column, row) of the windows that are not empty, in reading order from the top left.
+    """
+
+    width: float
+    height: float
+    counts: tuple[int, int]
+    origin: tuple[float, float]
+    extent: tuple[float, float, float, float]
+    cells: tuple[tuple[int, int], ...]
+
+    @property
+    def corner(self) -> tuple[float, float]:
+        """Lower left corner of the window on its page."""
+        return _SIDE, _BOTTOM
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Width and height of a window."""
+        return self.width - 2.0 * _SIDE, self.height - _TOP - _BOTTOM
+
+
+def tile_pages(sheets: Sequence[CutSheet], width: float, height: float) -> PageTiling:
+    """Spread sheets over pages of a size [mm], in portrait or landscape, whichever needs fewer pages."""
+    boxes = [sheet.bounds for sheet in sheets]
+    extent = (
+        min(box[0] for box in boxes) * 1e3,
+        min(box[1] for box in boxes) * 1e3,
+        max(box[2] for box in boxes) * 1e3,
+        max(box[3] for box in boxes) * 1e3,
+    )
+    strokes = (stroke for sheet in sheets for part in sheet.parts for stroke in part.strokes)
+    segments = (segment for stroke in strokes for segment in stroke.outline.segments())
+    points = 1e3 * np.concatenate([one.along(math.ceil(one.length / _SAMPLE_STEP)) for one in segments])
+    options = [_spread(points, extent, *size) for size in ((width, height), (height, width))]
+    return min(options, key=lambda option: len(option.cells))
+
+
+def _spread(
+    points: NDArray[np.float64], extent: tuple[float, float, float, float], width: float, height: float
+) -> PageTiling:
+    x0, y0, x1, y1 = extent
+    window_x, window_y = width - 2.0 * _SIDE, height - _TOP - _BOTTOM
+    columns, rows = max(1, math.ceil((x1 - x0) / window_x)), max(1, math.ceil((y1 - y0) / window_y))
+    left = 0.5 * (x0 + x1 - columns * window_x)
+    bottom = 0.5 * (y0 + y1 - rows * window_y)
+    places = (points - (left, bottom)) / (window_x, window_y)
+    column, row = np.minimum(places.astype(int), (columns - 1, rows - 1)).T
+    seen = {divmod(int(cell), rows) for cell in np.unique(column * rows + row)}
+    cells = tuple(sorted(seen, key=lambda cell: (-cell[1], cell[0])))
+    return PageTiling(width, height, (columns, rows), (left, bottom), extent, cells)
+
 
 PageSize = Literal["A4", "A3", "Letter"]
 _PAGE_SIZES = {"A4": (210.0, 297.0), "A3": (297.0, 420.0), "Letter": (215.9, 279.4)}  # mm, ISO 216 and ANSI Y14.1

@@ -1,8 +1,13 @@
-"""Sheets about one axis: full wraps, partial wraps, and both together, that cover most with a number of sheets."""
+"""Sheets about one axis: full wraps, partial wraps, and both together, that cover most with a number of sheets.
+
+A partial wrap is the largest region in length and angle, on shoulders and wrists that no full wrap fits. Sheets about
+other axes take cells of the profile away: those on which a sheet would run into theirs.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +15,124 @@ from numpy.typing import NDArray
 
 from .cone_fit import InfiniteCone
 from .intervals import balance_borders, choose_intervals, longest_intervals
-from .partial_wrap import largest_region
 from .profile import RadialProfile
 from .side import StraightSide, azimuth_columns, fit_side
 from .touch_weights import TouchWeights
 
-__all__ = ["AxisPlan", "SheetRequirements", "SideLine", "largest_partial_wrap", "plan_sheets", "side_lines"]
+__all__ = [
+    "AxisPlan",
+    "SheetRequirements",
+    "SideLine",
+    "clashing_cells",
+    "kept_clear",
+    "largest_partial_wrap",
+    "largest_region",
+    "plan_sheets",
+    "side_lines",
+]
+
+Region = tuple[int, int, int, int]  #: first row, end row, first column, columns
+
+
+def largest_region(
+    good: NDArray[np.bool_],
+    rows: int = 1,
+    columns: int = 1,
+    exact: bool = False,
+    worth: NDArray[np.float64] | None = None,
+) -> Region | None:
+    """Return the largest rectangle of good cells on a grid whose columns go round.
+
+    Args:
+        good: True for the cells of the (z, phi) grid that are within the tolerance, shape (k, p).
+        rows: smallest number of rows.
+        columns: smallest number of columns.
+        exact: True to take exactly that many columns.
+        worth: what each cell counts, not negative, shape (k, p); 1 by default.
+
+    Returns:
+        first row, row after the last, first column (in [0, p)) and number of columns (p for a full turn); None
+        where no rectangle is large enough.
+    """
+    count, around = good.shape
+    if columns > around or rows > count:
+        return None
+    filled = good.sum(axis=1)
+    wide_enough = np.flatnonzero(filled >= columns)
+    if len(wide_enough) < rows:
+        return None
+    lowest, end = int(wide_enough[0]), int(wide_enough[-1]) + 1
+    good, count = good[lowest:end], end - lowest
+    whole = np.cumsum(np.concatenate([good, good], axis=1), axis=1, dtype=np.int32)
+    whole = np.concatenate([np.zeros((count, 1), np.int32), whole], axis=1)
+    row = np.arange(1, count + 1, dtype=np.int32)[:, None]
+
+    def runs(wide: int) -> NDArray[np.int32]:
+        """Return how many rows of a block of so many columns end in each row, by its first column, shape (k, p)."""
+        block = whole[:, wide : wide + around] - whole[:, :around] == wide
+        return np.asarray(row - np.maximum.accumulate(np.where(block, 0, row), axis=0))
+
+    most = columns if exact else int(filled.max())
+    if worth is None:
+        found = _largest(runs, rows, columns, most)
+    else:
+        found = _worthiest(runs, rows, columns, most, worth[lowest:end])
+    return found and (found[0] + lowest, found[1] + lowest, *found[2:])
+
+
+def _largest(runs: Callable[[int], NDArray[np.int32]], rows: int, columns: int, most: int) -> Region | None:
+    """Return the region of most cells. A wider block is not taller, so only the widest of each height is looked for."""
+    tallest: dict[int, tuple[int, int, int]] = {}
+
+    def look(wide: int) -> int:
+        if wide not in tallest:
+            run = runs(wide)
+            at = int(run.argmax())
+            tallest[wide] = (int(run.flat[at]), *divmod(at, run.shape[1]))
+        return tallest[wide][0]
+
+    best: Region | None = None
+    area, wide = 0, columns
+    while wide <= most:
+        tall = look(wide)
+        if tall < rows or tall * most <= area:
+            break
+        beyond, step = most + 1, 1
+        while beyond - wide > 1:
+            middle = min(wide + step, (wide + beyond) // 2)
+            if look(middle) == tall:
+                wide, step = middle, 2 * step
+            else:
+                beyond, step = middle, most
+        if tall * wide > area:
+            _, end, first = tallest[wide]
+            area, best = tall * wide, (end + 1 - tall, end + 1, first, wide)
+        wide = max(wide, area // max(tall - 1, 1)) + 1
+    return best
+
+
+def _worthiest(
+    runs: Callable[[int], NDArray[np.int32]], rows: int, columns: int, most: int, worth: NDArray[np.float64]
+) -> Region | None:
+    """Return the region of the cells that count most, each of them as much as ``worth`` says."""
+    count, around = worth.shape
+    row = np.arange(1, count + 1, dtype=np.int32)[:, None]
+    sums = np.zeros((count + 1, 2 * around + 1))
+    sums[1:, 1:] = np.concatenate([worth, worth], axis=1).cumsum(axis=0).cumsum(axis=1)
+    best: Region | None = None
+    area = 0.0
+    for wide in range(columns, most + 1):
+        run = runs(wide)
+        if int(run.max()) < rows:
+            break
+        across = sums[:, wide : wide + around] - sums[:, :around]
+        values = np.where(run >= rows, across[1:] - np.take_along_axis(across, row - run, axis=0), 0.0)
+        at = int(values.argmax())
+        if values.flat[at] > area:
+            end, first = divmod(at, around)
+            area, best = float(values.flat[at]), (end + 1 - int(run.flat[at]), end + 1, first, wide)
+    return best
+
 
 Floats = NDArray[np.float64]
 SideLine = tuple[float, float]  #: radius at z = 0 of the profile's frame [m], and dr/dz
@@ -217,3 +334,69 @@ def _neighbourhood(profile: RadialProfile, side: StraightSide, gap: float) -> ND
     columns = azimuth_columns(profile, side.column - wide, min(side.columns + 2 * wide, around))
     cells[np.ix_(np.arange(max(0, side.first - rows), min(len(profile.z), side.end + rows)), columns)] = True
     return cells
+
+
+_LAYERS = 4  # heights at which the space above a cell is tested
+
+
+def clashing_cells(
+    profile: RadialProfile, other: RadialProfile, side: StraightSide, thickness: float, gap: float
+) -> NDArray[np.bool_]:
+    """Return the cells above which the space of a sheet meets that of another sheet, shape (k, p).
+
+    Args:
+        profile: the hull about the axis of the sheet to come.
+        other: the profile of the sheet that is there.
+        side: of the sheet that is there.
+        thickness: of both sheets, from the link outwards [m].
+        gap: smallest distance between two sheets [m].
+    """
+    turned = profile.frame.columns.T @ other.frame.columns
+    out = np.stack([np.cos(profile.phi), np.sin(profile.phi)], axis=1) @ turned[:2]
+    foot = (profile.frame.origin - other.frame.origin) @ other.frame.columns
+    # a coordinate at a time: numpy is slow with arrays of three columns
+    x, y, z = (foot[i] + profile.z[:, None] * turned[2, i] + profile.radius * out[:, i] for i in range(3))
+    ca = 1.0 / math.hypot(1.0, side.slope)
+    sa = side.slope * ca
+    low = float(other.z[side.first]) - 0.5 * other.step
+    high = float(other.z[side.end - 1]) + 0.5 * other.step
+    width = 2.0 * math.pi / len(other.phi)
+    full = side.columns == len(other.phi)
+    # cells lie up to a step apart: a sheet that slips between two of them is caught by the wider border
+    slack = gap + 0.5 * max(profile.step, other.step)
+    reach = 2.0 * (thickness + slack)  # beyond which no layer above a cell comes near
+    above = np.abs((np.sqrt(x * x + y * y) - side.radius - side.slope * z) * ca)
+    near = np.flatnonzero((above < reach) & (z > low - reach) & (z < high + reach))
+    base = np.stack([x.flat[near], y.flat[near], z.flat[near]], axis=1)
+    way = out[near % len(profile.phi)]
+    met = np.zeros(len(near), bool)
+    for layer in np.linspace(0.0, thickness, _LAYERS):
+        x, y, z = (base + layer * way).T
+        rho = np.sqrt(x * x + y * y)
+        height = (rho - side.radius - side.slope * z) * ca
+        foot = z + height * sa  # along the normal of the side
+        inside = (height > -slack) & (height < thickness + slack) & (foot > low - slack) & (foot < high + slack)
+        if not full:
+            margin = slack / np.maximum(rho, 1e-3)
+            azimuth = (np.arctan2(y, x) - side.column * width + margin) % (2.0 * math.pi)
+            inside &= azimuth < (side.columns - 1) * width + 2.0 * margin
+        met |= inside
+    clash = np.zeros(profile.radius.shape, bool)
+    clash.flat[near[met]] = True
+    return clash
+
+
+def kept_clear(profile: RadialProfile, plans: list[AxisPlan], requirements: SheetRequirements) -> RadialProfile:
+    """Return a profile on which no sheet may lie where it would run into those of plans about other axes.
+
+    Args:
+        profile: the hull about an axis.
+        plans: about other axes.
+        requirements: on the sheets.
+    """
+    for plan in plans:
+        for side in plan.sides:
+            cells = clashing_cells(profile, plan.profile, side, requirements.thickness, requirements.gap)
+            if cells.any():
+                profile = profile.blocked(cells)
+    return profile

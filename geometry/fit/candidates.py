@@ -1,4 +1,9 @@
-"""Candidate axes of a link: the axes of fitted cones, and the axes of revolution.
+"""Candidate axes of a link: the axes of cones, and the axes of revolution.
+
+Cones come from two or three points with normals, chosen by how much of the hull they explain. An axis of revolution is
+the line that all normals of a surface of any profile meet. A line is given by its direction a and moment m = o x a
+(Pluecker coordinates). The normal line through p along n meets it if n . m + (p x n) . a = 0, linear in (a, m): the
+axis is the smallest eigenvector of a 6 x 6 form. Flat ends agree with it, so they need not be separated from the side.
 
 The search knows no tolerance: it has gates of its own, so that the axes of a link are the same whatever is asked of the
 sheets about them.
@@ -6,19 +11,191 @@ sheets about them.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .cone_fit import InfiniteCone, fit_cone
-from .hypotheses import cone_hypotheses
-from .revolution_axis import find_revolution_axis
 from .surface_samples import SurfaceSamples
 
-__all__ = ["AxisCandidate", "find_axis_candidates"]
+__all__ = ["AxisCandidate", "cone_hypotheses", "find_axis_candidates", "find_revolution_axis"]
 
 Floats = NDArray[np.float64]
+
+_ROUNDS = 30  # reweighted solutions
+
+
+def find_revolution_axis(
+    samples: SurfaceSamples, start: tuple[Floats, Floats] | None = None, spread: float = 0.0005
+) -> tuple[Floats, Floats] | None:
+    """Find the axis that most normals meet.
+
+    Args:
+        samples: points and normals of the hull.
+        start: origin [m] and direction near the axis; None to begin with equal weights of all normals.
+        spread: distance of a normal line from the axis at which its final weight is a quarter [m]. The first round uses
+            a hundred times that.
+
+    Returns:
+        origin [m], in the middle of the points, and unit direction; None where the normals have no common line (a
+        plane, a box).
+    """
+    middle = samples.points.mean(axis=0)
+    size = float(np.ptp(samples.points, axis=0).max())
+    if size == 0.0:  # one point is all that is seen of it
+        return None
+    p, n = (samples.points - middle) / size, samples.normals
+    rows = np.concatenate([np.cross(p, n), n], axis=1)
+    if start is None:
+        axis, moment = _smallest(rows, np.ones(len(rows)))
+    else:
+        axis, moment = start[1], np.cross((start[0] - middle) / size, start[1])
+    for turn in range(_ROUNDS):
+        lever = np.maximum(np.linalg.norm(np.cross(n, axis), axis=1), 0.05)
+        miss = (rows @ np.concatenate([axis, moment])) / lever
+        scale = max(spread, 100.0 * spread * 0.7**turn) / size
+        axis, moment = _smallest(rows, 1.0 / (1.0 + (miss / scale) ** 2) ** 2 / lever**2)
+    if not (np.isfinite(axis).all() and np.isfinite(moment).all()):
+        return None
+    origin = np.cross(axis, moment)
+    if np.linalg.norm(origin) > 1.0:  # a line this far away is not an axis of this link
+        return None
+    return middle + size * origin, axis
+
+
+def _smallest(rows: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """Return the unit direction and moment of the line with the least weighted distance from the normals."""
+    form = (rows * weights[:, None]).T @ rows
+    aa, am, mm = form[:3, :3], form[:3, 3:], form[3:, 3:]
+    solved = np.linalg.solve(mm + 1e-9 * np.trace(mm) * np.eye(3), am.T)
+    axis = np.linalg.eigh(aa - am @ solved)[1][:, 0]
+    moment = -solved @ axis
+    return np.asarray(axis), np.asarray(moment - (moment @ axis) * axis)
+
+
+_PAIR_COUNT = 2400  # pairs drawn, a cylinder from each
+_TRIPLE_COUNT = 1500  # triples drawn, a cone from each
+_POOLS = (12, 60, 1)  # points of which the nearest is the partner: near by, nearer by, anywhere
+_LEAST_SHARE = 0.015  # of the hull that a hypothesis must explain: a sheet of 25 mm on a link of 300 mm has more
+_VOTER_COUNT = 1200  # points that vote
+_MIN_HALF_ANGLE = math.radians(8.0)  # rad; a slighter cone is found as a cylinder
+_MAX_HALF_ANGLE = math.radians(75.0)  # rad; a flatter ring is a flange
+
+
+def cone_hypotheses(samples: SurfaceSamples, distance: float, max_count: int = 14, seed: int = 2) -> list[InfiniteCone]:
+    """Return rough cones, each of which explains a part of the hull that those before it do not.
+
+    Two points with normals give a cylinder, three a cone. A slight cone is close enough to a cylinder as a first guess,
+    while its apex, the intersection of the three tangent planes, is far away and uncertain.
+
+    Args:
+        samples: points and normals of the hull.
+        distance: distance from the side up to which a point counts as explained [m].
+        max_count: number of cones at most.
+        seed: seed of the random numbers.
+
+    Returns:
+        the cones, the one that explains most first; empty where none explains 1.5 % of the hull.
+    """
+    rng = np.random.default_rng(seed)
+    if len(samples) < 24:
+        return []
+    origins, axes, radii, angles = (
+        np.concatenate(both) for both in zip(_cylinders(samples, rng), _cones(samples, rng), strict=True)
+    )
+    if len(origins) == 0:
+        return []
+    voters = rng.permutation(len(samples))[:_VOTER_COUNT]
+    explained = _explains(samples.points[voters], samples.normals[voters], origins, axes, radii, angles, distance)
+    votes = explained.astype(np.float32)
+    left = np.ones(len(voters), np.float32)
+    starts: list[InfiniteCone] = []
+    while len(starts) < max_count:
+        score = left @ votes
+        best = int(score.argmax())
+        if score[best] < _LEAST_SHARE * len(voters):
+            break
+        starts.append(InfiniteCone(origins[best], axes[best], float(radii[best]), float(angles[best])))
+        left[explained[:, best]] = 0.0
+    return starts
+
+
+def _partners(samples: SurfaceSamples, rng: np.random.Generator, count: int, others: int) -> list[NDArray[np.int64]]:
+    """Draw index lists of points that belong together: of each three, one has near partners, one nearer, one any."""
+    first = rng.integers(0, len(samples), count)
+    chosen = [first]
+    for _ in range(others):
+        partner = np.empty(count, np.int64)
+        for kind, size in enumerate(_POOLS):
+            mine = np.arange(kind, count, len(_POOLS))
+            pool = rng.integers(0, len(samples), (len(mine), size))
+            gaps = np.linalg.norm(samples.points[pool] - samples.points[first[mine]][:, None], axis=2)
+            partner[mine] = pool[np.arange(len(mine)), gaps.argmin(axis=1)]
+        chosen.append(partner)
+    return chosen
+
+
+def _cylinders(samples: SurfaceSamples, rng: np.random.Generator) -> tuple[Floats, Floats, Floats, Floats]:
+    i, j = _partners(samples, rng, _PAIR_COUNT, 1)
+    p, q, n, m = samples.points[i], samples.points[j], samples.normals[i], samples.normals[j]
+    axis = np.cross(n, m)
+    sine = np.linalg.norm(axis, axis=1)
+    sound = sine > math.sin(math.radians(15.0))
+    p, q, n, m, axis, sine = p[sound], q[sound], n[sound], m[sound], axis[sound], sine[sound]
+    axis /= sine[:, None]
+    # seen along the axis, p - r n and q - s m meet
+    gap, cosine = p - q, np.einsum("ij,ij->i", n, m)
+    gap_n, gap_m = np.einsum("ij,ij->i", gap, n), np.einsum("ij,ij->i", gap, m)
+    r = (gap_n - cosine * gap_m) / sine**2
+    s = (cosine * gap_n - gap_m) / sine**2
+    size = float(np.ptp(samples.points, axis=0).max())
+    good = (np.minimum(r, s) > 0.003 * size) & (np.abs(r - s) < 0.15 * (r + s)) & (r + s < 1.2 * size)
+    radius = 0.5 * (r + s)[good]
+    foot = p[good] - radius[:, None] * n[good]
+    return foot, axis[good], radius, np.zeros(len(radius))
+
+
+def _cones(samples: SurfaceSamples, rng: np.random.Generator) -> tuple[Floats, Floats, Floats, Floats]:
+    index = np.stack(_partners(samples, rng, _TRIPLE_COUNT, 2), axis=1)
+    p, n = samples.points[index], samples.normals[index]
+    sound = np.abs(np.linalg.det(n)) > 0.01
+    p, n = p[sound], n[sound]
+    apex = np.linalg.solve(n, np.einsum("hij,hij->hi", n, p)[..., None])[..., 0]
+    rays = p - apex[:, None]
+    lengths = np.linalg.norm(rays, axis=2)
+    ways = rays / np.maximum(lengths, 1e-12)[..., None]
+    axis = np.cross(ways[:, 1] - ways[:, 0], ways[:, 2] - ways[:, 0])
+    norm = np.linalg.norm(axis, axis=1)
+    axis /= np.maximum(norm, 1e-12)[:, None]
+    cosine = np.einsum("ij,ij->i", axis, ways[:, 0])
+    axis, cosine = axis * np.sign(cosine)[:, None], np.abs(cosine)
+    angle = np.arccos(np.clip(cosine, 0.0, 1.0))
+    # the outward normals of a cone that widens along its axis have the axial component -sin(angle)
+    back = np.einsum("hij,hj->hi", n, axis)
+    fits = (np.abs(back + np.sin(angle)[:, None]) < 0.2).all(axis=1)
+    good = fits & (norm > 1e-3) & (angle > _MIN_HALF_ANGLE) & (angle < _MAX_HALF_ANGLE) & (lengths.min(axis=1) > 1e-4)
+    reach = (lengths[good] * np.cos(angle[good])[:, None]).mean(axis=1)
+    return apex[good] + reach[:, None] * axis[good], axis[good], reach * np.tan(angle[good]), angle[good]
+
+
+def _explains(
+    points: Floats, normals: Floats, origins: Floats, axes: Floats, radii: Floats, angles: Floats, distance: float
+) -> NDArray[np.bool_]:
+    """Return whether each point lies on each cone, shape (points, cones)."""
+    middle = points.mean(axis=0)  # float32 suffices relative to the middle
+    p, o = (points - middle).astype(np.float32), (origins - middle).astype(np.float32)
+    n, a = normals.astype(np.float32), axes.astype(np.float32)
+    ca, sa = np.cos(angles).astype(np.float32), np.sin(angles).astype(np.float32)
+    z = p @ a.T - np.einsum("ij,ij->i", o, a)
+    square = (p**2).sum(axis=1)[:, None] - 2.0 * (p @ o.T) + (o**2).sum(axis=1) - z**2
+    rho = np.sqrt(np.maximum(square, np.float32(1e-12)))
+    along = n @ a.T
+    out = ((n * p).sum(axis=1)[:, None] - n @ o.T - z * along) / rho
+    near = np.abs((rho - radii.astype(np.float32)) * ca - z * sa) < distance
+    return np.asarray(near & (out * ca - along * sa > 0.965))
+
 
 _MAX_DUPLICATE_TILT = 0.002  # rad; angle below which two axes are one
 _MAX_DUPLICATE_SHIFT = 0.0002  # m; distance in the middle of the link below which two axes are one

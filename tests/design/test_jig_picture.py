@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from coneskin.design.jig_picture import _view
+from coneskin.design.link_picture import _view
 
 
 @pytest.mark.parametrize("cuts", [(0.0, math.pi), (0.4, 2.0, 2.1, 3.6), (0.01, 1.8, 3.2), (0.0, 1.571, 3.141, 4.712)])

@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from coneskin.design.layout_picture import draw_layout
+from coneskin.design.sheet_pictures import draw_layout
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
-from coneskin.design.workshop.wiring import cable_exit
+from coneskin.design.workshop.build_figures import cable_exit
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.design.link_picture import _covered
+from coneskin.design.link_picture import _covered, draw_weights
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
-from coneskin.design.weights_picture import draw_weights
 from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum

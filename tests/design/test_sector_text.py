@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from coneskin.design.sheets.sector_text import sector_text
+from coneskin.design.sheets.summary import sector_text
 from coneskin.geometry.frustum import Frustum
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
-from coneskin.design.sheets.small_active_area import LEAST_ACTIVE_SHARE, small_active_area
+from coneskin.design.sheets.summary import LEAST_ACTIVE_SHARE, small_active_area
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum

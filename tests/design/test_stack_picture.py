@@ -2,8 +2,8 @@
 
 import pytest
 
+from coneskin.design.sheet_pictures import draw_seam, draw_stack
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
-from coneskin.design.stack_picture import draw_seam, draw_stack
 from coneskin.design.workshop.build_figures import measure_build
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import MeshError, MissingExtra
-from coneskin.geometry.collada_asset import TO_Z_UP, ColladaAsset, read_collada_asset
-from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
+from coneskin.geometry.mesh import TO_Z_UP, ColladaAsset, Mesh, load_mesh, make_mesh, read_collada_asset
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.urdf import urdf_links
 

@@ -3,8 +3,7 @@
 import numpy as np
 import trimesh
 
-from coneskin.geometry.mesh import make_mesh
-from coneskin.geometry.outermost_points import outermost_points
+from coneskin.geometry.mesh import make_mesh, outermost_points
 
 
 def test_they_reach_as_far_as_all_and_none_is_inside() -> None:

@@ -3,36 +3,71 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit
-from coneskin.geometry.fit.coverage_notes import hull_note
+from coneskin.geometry.fit.bare_areas import BareArea, BareTally, flat_samples, hull_note, sheet_more
+from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, SampledLink, fit_cones, sample_link
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.profile import RadialProfile
-from coneskin.geometry.fit.sampled_link import SampledLink
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
 
-from .bare_beside import bare_beside
 from .found_sheet import (
     FoundSheet,
+    RuledRegion,
+    columns_of,
     covered_by,
     fit_sheet,
     hull_points,
     ruled_profile,
     widest_region,
 )
-from .ruled_region import RuledRegion, columns_of
 from .ruling_candidates import RulingCandidate, find_ruling_candidates
 
-__all__ = ["with_developables"]
+__all__ = ["bare_beside", "find_sheets", "with_developables"]
+
+
+def bare_beside(
+    sheets: Sequence[FittedSheet],
+    more: Sequence[FittedSheet],
+    earlier: Sequence[BareArea],
+    hull: SurfaceSamples,
+    options: FitOptions,
+) -> tuple[BareArea, ...]:
+    """Return what sheets leave bare, by reason, the largest area first.
+
+    Args:
+        sheets: the sheets.
+        more: what could be added if one more were allowed.
+        earlier: bare areas of the same samples before the last of the sheets were found; their reasons still hold.
+        hull: samples of the link.
+        options: of the search.
+    """
+    tally = BareTally(hull, covered_by(sheets, hull, options.tolerance))
+    take = tally.take
+    if more:
+        take(sheet_more(len(sheets)), covered_by(more, hull, options.tolerance))
+    for area in earlier:
+        take(area.reason, _among(hull, area))
+    take("flat", flat_samples(hull))
+    least = f"{options.min_length * 1e3:g} mm long and {math.degrees(options.min_wrap):g} deg wide"
+    take(f"curved in two ways, in a corner, or without room for a sheet {least}", np.ones(len(hull), bool))
+    return tuple(tally.areas)
+
+
+def _among(hull: SurfaceSamples, area: BareArea) -> NDArray[np.bool_]:
+    """Return whether each sample is one of an area, shape (n,)."""
+    inside = set(map(tuple, area.points.tolist()))
+    return np.fromiter((tuple(point) in inside for point in hull.points.tolist()), bool, len(hull))
+
 
 Floats = NDArray[np.float64]
 
@@ -191,3 +226,31 @@ def _kept_clear(profile: RadialProfile, sheets: list[FittedSheet], options: FitO
         inside &= (u < side.slant + clear + half) & (phi > -margin) & (phi < side.wrap + margin)
         profile = profile.blocked(inside.reshape(profile.radius.shape) & (profile.radius > 0.0))
     return profile
+
+
+def find_sheets(
+    mesh: Mesh,
+    options: FitOptions | None = None,
+    *,
+    round_only: bool = False,
+    progress: Callable[[str], None] | None = None,
+    **named: Any,
+) -> LinkFit:
+    """Find the sheets that cover most of a link: cones, or developables of another section where they cover more.
+
+    Args:
+        mesh: the link.
+        options: what is asked of the sheets; None for the values that ``FitOptions`` has by itself.
+        round_only: True for cones only.
+        progress: called with the name of each step.
+        named: options by their names, instead of those in ``options``.
+
+    Raises:
+        GeometryError: an option is out of range.
+        MeshError: no face of the mesh is visible from outside.
+    """
+    options = replace(options or FitOptions(), **named)
+    say = progress or (lambda _: None)
+    link = sample_link(mesh, options, say)
+    cones = fit_cones(link, options, say)
+    return cones if round_only else with_developables(link, cones, options, say)

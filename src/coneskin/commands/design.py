@@ -19,15 +19,16 @@ from coneskin.design.folder import write_design
 from coneskin.design.link import LinkMesh, fit_link
 from coneskin.design.sheets.seam_strip import cover_seams
 from coneskin.design.sheets.sheet_design import SheetDesign, design_sheets
-from coneskin.design.sheets.small_active_area import small_active_area
+from coneskin.design.sheets.summary import small_active_area
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
-from coneskin.geometry.solid.step import require_step_writer
+from coneskin.geometry.solid import require_step_writer
 from coneskin.robot.arm.link_frames import LINK_INDEX
 from coneskin.robot.sim.machine.options import DEFAULT_MODEL
 from coneskin.skin.matched_electronics import shunt_ohms
 
-from .arguments.design import add_arguments, design_options
-from .arguments.link import (
+from .arguments.design import (
+    add_arguments,
+    design_options,
     links_from_dimensions,
     package_folders,
     refuse_dimensions,

@@ -18,12 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import GeometryError
-from coneskin.geometry.drawing.cut_sheet import CutSheet, nest_sheets
+from coneskin.geometry.drawing.cut_sheet import CutSheet, make_test_piece, nest_sheets
 from coneskin.geometry.drawing.dxf import ArcStyle, to_dxf
 from coneskin.geometry.drawing.nesting import MaterialBed
 from coneskin.geometry.drawing.pdf import PageSize, to_pdf
 from coneskin.geometry.drawing.svg import to_svg
-from coneskin.geometry.drawing.test_piece import make_test_piece
 
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import material_rows, sensor_toml

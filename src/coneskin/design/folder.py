@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError
 from coneskin.core.terminal_text import printable
+from coneskin.geometry.drawing.cut_sheet import make_test_piece
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.nesting import nest_on_beds
-from coneskin.geometry.drawing.test_piece import make_test_piece
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.solid.closed_surface import to_stl
-from coneskin.geometry.solid.step import WrappedLayer, require_step_writer, write_step
+from coneskin.geometry.solid import WrappedLayer, require_step_writer, to_stl, write_step
 
 from .files import FileOptions, new_folder, sheet_folder, write_sheets
 from .report import report_text
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import design_summary
 from .workshop.build_figures import measure_build
-from .workshop.datum_faces import find_datum_faces
+from .workshop.placement import find_datum_faces
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit

@@ -153,8 +153,8 @@ def find_link_sheets(source: LinkMesh, progress: Callable[[str], None], **search
     Raises:
         GeometryError: an argument of the search is out of range.
     """
-    from coneskin.geometry.fit.coverage_notes import hull_note
-    from coneskin.geometry.fit.developable.sheets import find_sheets
+    from coneskin.geometry.fit.bare_areas import hull_note
+    from coneskin.geometry.fit.developable.packing import find_sheets
     from coneskin.geometry.fit.surface_samples import sample_surface
     from coneskin.geometry.ray_casting import RayCaster
 

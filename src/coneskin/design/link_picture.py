@@ -1,23 +1,30 @@
-"""Picture of a link with its sheets, from two sides: where they are, their ends, and the faces to measure from."""
+"""Pictures in space: a link with its sheets from two sides, what counts on it, and the printed parts of a jig.
+
+The link shows where the sheets are, their ends, and the faces to measure from.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from coneskin.geometry.ray_casting import RayCaster
 
-from .layout_picture import FOIL_COLOUR, INK_COLOUR
+from .sheet_pictures import FOIL_COLOUR, INK_COLOUR
 from .sheets.sheet_design import SheetDesign
+from .workshop.jig import Collar
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea
+    from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
 
-    from .workshop.datum_faces import DatumFace
+    from .workshop.placement import DatumFace
 
-__all__ = ["draw_link", "drawn_triangles"]
+__all__ = ["draw_jig", "draw_link", "draw_weights", "drawn_triangles"]
 
 _SHEET_COLOURS = ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
 _BARE_COLOURS = ("#c4c8ce", "#d8c9a3", "#b3c7b0", "#cdb4c9", "#a9b8c9", "#e0b9a8")
@@ -251,3 +258,115 @@ def _covered(design: SheetDesign, triangles: Any) -> Any:
     covered = (u >= 0.0) & (u <= side.slant) & (np.abs(height) < design.options.stack.thickness)
     covered &= phi % (2.0 * math.pi) <= side.wrap
     return covered.all(axis=1)
+
+
+_OUTLINE = "#d1495b"
+_LIFT = 1e-3  # m; by which outlines stand off the outer face, so that they are not hidden
+
+
+def draw_weights(figure: Any, triangles: Any, designs: Sequence[SheetDesign], weights: TouchWeights) -> None:
+    """Draw the link from two sides, each area in the colour of its weight as a share of the largest.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        triangles: of the link [m], shape (n, 3, 3).
+        designs: the sheets, of which the outlines are drawn.
+        weights: what an area counts.
+    """
+    import numpy as np
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+    colours, scale = colormaps["viridis"], Normalize(0.0, 1.0)
+    paint = colours(weights.at(triangles.mean(axis=1)))
+    first = designs[0].place.link_frustum
+    low, high = 1e3 * triangles.min(axis=(0, 1)), 1e3 * triangles.max(axis=(0, 1))
+    panels = []
+    for number, way in enumerate(((0.80, 0.45, 0.35), (-0.80, -0.45, 0.35)), 1):
+        axes = figure.add_subplot(1, 2, number, projection="3d", computed_zorder=False, proj_type="ortho")
+        view = np.array(first.rotate(way))
+        view /= np.linalg.norm(view)
+        order = np.argsort(triangles.mean(axis=1) @ view)
+        axes.add_collection3d(
+            Poly3DCollection(1e3 * triangles[order], facecolors=paint[order], edgecolors=paint[order], linewidths=0.3)
+        )
+        for design in designs:
+            for line, normals in _outlines(design):
+                line[normals @ view < 0.0] = np.nan
+                axes.plot(*line.T, color=_OUTLINE, lw=1.5)
+        axes.set(
+            xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x [mm]", ylabel="y [mm]"
+        )
+        axes.set_zlabel("z [mm]")
+        axes.set_box_aspect(np.maximum(high - low, 0.1 * float((high - low).max())), zoom=0.9)
+        axes.view_init(math.degrees(math.asin(view[2])), math.degrees(math.atan2(view[1], view[0])))
+        axes.tick_params(labelsize=7)
+        panels.append(axes)
+    bar = figure.colorbar(ScalarMappable(scale, colours), ax=panels, location="bottom", shrink=0.6)
+    bar.set_label(f"what an area counts by {weights.name}, as a share of the largest; red: the sheets")
+
+
+def _outlines(design: SheetDesign) -> list[tuple[Any, Any]]:
+    """Return points [mm] and normals of the ends and edges of a sheet's outer face."""
+    import numpy as np
+
+    side, height = design.place.frustum, design.options.stack.thickness + _LIFT
+    along, around = np.linspace(0.0, side.slant, 40), np.linspace(0.0, side.wrap, 180)
+    found = []
+    for u, phi in ((0.0, around), (side.slant, around), (along, 0.0), (along, side.wrap)):
+        points, normals = design.place.place(u, phi)
+        found.append((1e3 * (points + height * normals), normals))
+    return found
+
+
+_LIGHT = np.array([0.35, -0.55, 0.76])
+_APART = 0.25  # of the radius of a part: how far the parts are drawn from each other
+_COLOURS = ((0.42, 0.62, 0.78), (0.85, 0.62, 0.40), (0.55, 0.72, 0.50), (0.72, 0.58, 0.76))
+
+
+def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
+    """Draw the collars of a sheet.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        collars: at least one.
+    """
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+    grid = figure.subplots(1, len(collars), subplot_kw={"projection": "3d", "proj_type": "ortho"}, squeeze=False)
+    for axes, collar in zip(grid.flat, collars, strict=True):
+        shown, paint = [], []
+        turned = -1.0 if collar.end == 1 else 1.0  # as it stands, end 1 is upside down
+        for part in collar.parts:
+            middle = 0.5 * (part.start + part.end)
+            aside = 0.5 * _APART * max(part.surface.size[:2])
+            off = np.array([aside * math.cos(middle), turned * aside * math.sin(middle), 0.0])
+            triangles = 1e3 * (part.surface.vertices[part.surface.faces] + off)
+            a, b, c = triangles.transpose(1, 0, 2)
+            normal = np.cross(b - a, c - a)
+            size = np.linalg.norm(normal, axis=1)
+            bright = 0.55 + 0.45 * (normal @ _LIGHT) / np.where(size > 0.0, size, 1.0)
+            shown.append(triangles)
+            paint.append(np.clip(np.outer(bright, _COLOURS[(part.number - 1) % len(_COLOURS)]), 0.0, 1.0))
+            at = 1e3 * (part.surface.vertices.mean(axis=0) + off)
+            at[:2] += 0.35e3 * max(part.surface.size[:2]) * np.array([math.cos(middle), turned * math.sin(middle)])
+            name = f"part {part.number}" + (", begins at edge 0" if part.number == 1 else "")
+            axes.text(at[0], at[1], -8.0, name, fontsize=9, ha="center", zorder=10, bbox=_LABEL)
+        triangles = np.concatenate(shown)
+        drawn = Poly3DCollection(triangles, facecolors=np.concatenate(paint), edgecolors="none", clip_on=False)
+        axes.add_collection3d(drawn)
+        low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        axes.set_box_aspect(high - low, zoom=0.85)  # the box is turned: its corners reach beyond the axes
+        axes.view_init(38.0, math.degrees(_view(turned * angle for p in collar.parts for angle in (p.start, p.end))))
+        axes.set_title(f"end {collar.end}", fontsize=10)
+        axes.axis("off")
+
+
+def _view(cuts: Iterable[float]) -> float:
+    """Return the azimuth of a view [rad] in which no cut plane is seen edge-on: the picture would look cropped."""
+    at = np.radians(np.arange(-175.0, 185.0, 5.0))
+    slant = np.abs(np.sin(at[:, None] - np.array(list(cuts)))).min(axis=1)
+    return float(at[int((slant + 0.05 * np.cos(at + math.radians(150.0))).argmax())])

@@ -1,4 +1,4 @@
-"""Pictures of the report: the link, the layouts and the deviations from the mesh."""
+"""Pictures of the report, in one list: the link, the layouts, the jigs, and the deviations from the mesh."""
 
 from __future__ import annotations
 
@@ -9,13 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import MissingExtra
 
-from .jig_picture import draw_jig
-from .layout_picture import draw_layout
-from .link_picture import draw_link, drawn_triangles
-from .parts_picture import draw_parts
+from .link_picture import draw_jig, draw_link, draw_weights, drawn_triangles
+from .sheet_pictures import draw_layout, draw_parts, draw_seam, draw_stack
 from .sheets.sheet_design import SheetDesign
-from .stack_picture import draw_seam, draw_stack
-from .weights_picture import draw_weights
 from .workshop.build_figures import BuildFigures
 
 if TYPE_CHECKING:

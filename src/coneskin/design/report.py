@@ -6,19 +6,17 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from coneskin.design.workshop.build_figures import side_name
 from coneskin.geometry.drawing.nesting import MaterialBed
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
 
 from .files import sheet_folder
-from .sheets.sector_text import sector_text
 from .sheets.sheet_design import SheetDesign
-from .sheets.small_active_area import small_active_area
-from .sheets.summary import design_summary, material_rows
+from .sheets.summary import design_summary, material_rows, sector_text, small_active_area
 from .workshop.bill_of_materials import bill_of_materials
 from .workshop.build_figures import BuildFigures
 from .workshop.build_guide import guide_lines
-from .workshop.guide_words import side_name
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from coneskin.design.link import LinkMesh
-from coneskin.design.studio.electrode_marks import electrode_marks
-from coneskin.design.studio.first_view import first_view, seen_shares
+from coneskin.design.studio.design_text import electrode_marks
+from coneskin.design.studio.studio_page import first_view, seen_shares
 from coneskin.design.studio.workbench import Handles, Workbench
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose

@@ -13,8 +13,7 @@ from coneskin.core.errors import GeometryError
 from coneskin.design.link import LinkMesh
 from coneskin.design.link_design import design_link
 from coneskin.design.sheets.sheet_design import DesignOptions
-from coneskin.design.studio.design_text import design_facts, flat_drawing, warning_list
-from coneskin.design.studio.deviation_bands import deviation_bands
+from coneskin.design.studio.design_text import design_facts, deviation_bands, flat_drawing, warning_list
 from coneskin.design.studio.studio_page import StudioPage
 from coneskin.design.studio.workbench import Handles, Workbench, adjusted
 from coneskin.geometry.bend import Bend

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import GeometryError
-from coneskin.design.sheets.jig_plan import JigPlan
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.bill_of_materials import bill_of_materials
-from coneskin.design.workshop.build_figures import BuildFigures, measure_build
+from coneskin.design.workshop.build_figures import LOOP, BuildFigures, cable_exit, measure_build
 from coneskin.design.workshop.build_guide import guide_lines
 from coneskin.design.workshop.placement import find_placement, sharpest_bends
-from coneskin.design.workshop.wiring import LOOP, cable_exit
 from coneskin.geometry.developable import Bend
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.surface_shape import SheetSide, drawing_point

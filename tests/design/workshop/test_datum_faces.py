@@ -7,8 +7,7 @@ import pytest
 import trimesh
 from scipy.optimize import least_squares
 
-from coneskin.design.workshop.datum_faces import datum_heights, find_datum_faces, measured_faces
-from coneskin.design.workshop.placement import find_placement
+from coneskin.design.workshop.placement import datum_heights, find_datum_faces, find_placement, measured_faces
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum

@@ -9,17 +9,15 @@ import pytest
 import trimesh
 
 from coneskin.core.errors import GeometryError
-from coneskin.design.sheets.jig_plan import JigPlan
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
-from coneskin.design.workshop.jig import Collar, CollarPart, jig_collars
+from coneskin.design.workshop.jig import Collar, CollarPart, jig_collars, lip_play
 from coneskin.design.workshop.link_excess import LinkExcess
-from coneskin.design.workshop.lip_play import lip_play
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.solid.closed_surface import to_stl
+from coneskin.geometry.solid import to_stl
 
 POSE = Pose.from_xyz_rpy((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
 
@@ -217,7 +215,7 @@ def test_no_part_has_an_undercut() -> None:
             middle = 0.5 * (part.start + part.end) * (-1 if collar.end == 1 else 1)
             off = (away - middle + math.pi) % (2 * math.pi) - math.pi
             assert np.abs(off).max() < 0.5 * math.pi, "each part spans less than half a turn"
-    from coneskin.geometry.solid.radial_profile import without_undercut
+    from coneskin.geometry.solid import without_undercut
 
     phi = np.linspace(-1.5, 1.5, 61)
     bump = np.where(np.abs(phi - 0.5) < 0.2, 1.5, 1.0)[None]

@@ -7,11 +7,10 @@ import mpmath as mp
 import pytest
 
 from coneskin.core.errors import GeometryError, MissingExtra
-from coneskin.geometry.drawing.cut_sheet import cut_sheets
+from coneskin.geometry.drawing.cut_sheet import cut_sheets, make_test_piece
 from coneskin.geometry.drawing.dxf import to_dxf
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
-from coneskin.geometry.drawing.test_piece import make_test_piece
 
 from ..drawing_readers import dxf_entities, dxf_header, dxf_layers, dxf_pairs, dxf_texts, read_dxf
 from ..sheet_cases import SHEETS

@@ -6,7 +6,7 @@ import mpmath as mp
 import pytest
 
 from coneskin.core.errors import GeometryError
-from coneskin.geometry.drawing.resolution import AdConverter, forecast_resolution
+from coneskin.geometry.drawing.electrode_layout import AdConverter, forecast_resolution
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.sector import Sector, roll_up, unroll
 

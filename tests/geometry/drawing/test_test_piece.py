@@ -2,8 +2,8 @@
 
 import pytest
 
+from coneskin.geometry.drawing.cut_sheet import TEST_HOLE, TEST_SQUARE, make_test_piece
 from coneskin.geometry.drawing.nesting import nest_on_beds
-from coneskin.geometry.drawing.test_piece import TEST_HOLE, TEST_SQUARE, make_test_piece
 
 
 def test_a_square_with_a_square_hole() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from coneskin.geometry.fit.axis_plan import AxisPlan
+from coneskin.geometry.fit.bare_areas import bare_lengths, hull_note
 from coneskin.geometry.fit.cones import find_cones
-from coneskin.geometry.fit.coverage_notes import bare_lengths, hull_note
 from coneskin.geometry.fit.side import StraightSide
 from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.mesh import make_mesh

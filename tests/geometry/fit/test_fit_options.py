@@ -9,7 +9,7 @@ import pytest
 
 from coneskin.core.errors import GeometryError
 from coneskin.geometry.fit.cones import find_cones
-from coneskin.geometry.fit.developable.sheets import find_sheets
+from coneskin.geometry.fit.developable.packing import find_sheets
 from coneskin.geometry.fit.fit_options import FitOptions
 
 from ..synthetic import frustum, placed

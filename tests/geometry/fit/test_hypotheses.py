@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.geometry.fit.hypotheses import cone_hypotheses
+from coneskin.geometry.fit.candidates import cone_hypotheses
 
 from ..synthetic import TILTED, frustum, rugby, shoulder
 from .axis_cases import AXIS, hull, off

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from coneskin.geometry.fit.partial_wrap import Region, largest_region
+from coneskin.geometry.fit.axis_plan import Region, largest_region
 
 Grid = NDArray[np.bool_]
 GRIDS = arrays(bool, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=7), elements=st.booleans())

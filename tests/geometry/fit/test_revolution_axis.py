@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coneskin.geometry.fit.revolution_axis import find_revolution_axis
+from coneskin.geometry.fit.candidates import find_revolution_axis
 from coneskin.geometry.pose import Pose
 
 from ..synthetic import TILTED, Floats, Indices, barrel, joined, moved, noisy, revolve, rugby

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from coneskin.core.errors import GeometryError
-from coneskin.geometry.solid.closed_surface import shell_surface, to_stl
+from coneskin.geometry.solid import shell_surface, to_stl
 
 
 def shell(

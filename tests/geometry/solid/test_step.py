@@ -10,7 +10,7 @@ import pytest
 from coneskin.core.errors import MissingExtra
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.solid.step import WrappedLayer, require_step_writer, write_step
+from coneskin.geometry.solid import WrappedLayer, require_step_writer, write_step
 
 CONE = Frustum(0.05, 0.07, 0.15, math.radians(300))
 

@@ -3,30 +3,169 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
-from coneskin.design.sheets.sheet_design import DesignOptions
+from coneskin.core.errors import GeometryError
+from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, JigSurface
 from coneskin.geometry.drawing.cut_sheet import FaceUp
 from coneskin.geometry.drawing.dxf import ArcStyle
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK, AssemblyMode, LayerStack
 from coneskin.geometry.drawing.pdf import PageSize
 from coneskin.geometry.drawing.surface_shape import SheetSide
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.scene.tables.cone_keys import DOUBLE_CONE_KEYS
 from coneskin.scene.tables.sensor_keys import SENSOR_KEYS
 from coneskin.skin.matched_electronics import GivenElectronics
 
-from .dimensions import add_dimension_options, add_setting_option
-from .jig import add_jig_options, given_jig
+from .dimensions import add_dimension_options, add_setting_option, given_dimensions, option_name
 
 __all__ = [
     "EXAMPLES",
     "add_arguments",
+    "add_jig_options",
     "design_options",
+    "given_jig",
+    "links_from_dimensions",
+    "package_folders",
+    "refuse_dimensions",
+    "requested_wrap",
+    "seam_direction",
+    "xacro_arguments",
 ]
+
+#: lengths of a JigPlan that are options, and their help texts
+_LENGTHS = {
+    "wall": "thickness of the wall",
+    "clearance": "gap to link and sheet",
+    "reach": "length over the sheet",
+    "grip": "length on the link",
+}
+
+
+def add_jig_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add = parser.add_argument_group("printed jig: collars that hold the ends of a sheet at their places").add_argument
+    plan = JigPlan()
+    add(
+        "--jig",
+        choices=get_args(JigSurface),
+        default=plan.surface,
+        help="what the collars lie on: the link's own surface, or its cone where there is no mesh (link), always the "
+        "cone (cone); or no jig (none) (default link)",
+    )
+    for name, text in _LENGTHS.items():
+        default = getattr(plan, name) * 1e3
+        add(f"--jig-{name}-mm", type=float, default=default, metavar="MM", help=f"{text} (default {default:g})")
+    add("--jig-parts", type=int, default=plan.parts, metavar="N", help=f"parts of a collar (default {plan.parts})")
+
+
+def given_jig(args: argparse.Namespace) -> JigPlan:
+    """Return the jig that the arguments describe.
+
+    Raises:
+        GeometryError: a value is out of range.
+    """
+    lengths = {name: getattr(args, f"jig_{name}_mm") * 1e-3 for name in _LENGTHS}
+    return JigPlan(args.jig, parts=args.jig_parts, **lengths)
+
+
+def package_folders(args: argparse.Namespace) -> dict[str, str]:
+    """Return the folders of ROS packages that were named.
+
+    Raises:
+        GeometryError: one is not NAME=DIR.
+    """
+    return _pairs(args.package, "--package takes NAME=DIR, as in --package ur_description=src/ur_description")
+
+
+def xacro_arguments(args: argparse.Namespace) -> dict[str, str]:
+    """Return the arguments of a xacro file.
+
+    Raises:
+        GeometryError: one is not NAME=VALUE.
+    """
+    return _pairs(args.xacro_arg, "--xacro-arg takes NAME=VALUE, as in --xacro-arg ur_type=ur5e")
+
+
+def _pairs(texts: list[str], rule: str) -> dict[str, str]:
+    pairs = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise GeometryError(f"{rule}: {text}")
+        pairs[name] = value
+    return pairs
+
+
+def requested_wrap(args: argparse.Namespace) -> float | None:
+    """Return the wrap angle asked for [rad]; None for the widest that fits."""
+    return given_dimensions(args, [key for key in DOUBLE_CONE_KEYS if key.plain == "wrap"]).get("wrap")
+
+
+def seam_direction(args: argparse.Namespace) -> tuple[float, float, float] | None:
+    """Return the direction in which the seam of a full wrap faces; None for where the link shields it most.
+
+    Raises:
+        GeometryError: it was given twice.
+    """
+    if args.seam is not None and args.touch_side is not None:
+        raise GeometryError("--seam and --touch-side cannot go together: the seam faces away from the touch side")
+    for option, way in (("--seam", args.seam), ("--touch-side", args.touch_side)):
+        if way is not None and not 0.0 < math.hypot(*way) < math.inf:
+            raise GeometryError(
+                f"{option} takes a direction X Y Z, finite and not 0 0 0, got {' '.join(map(str, way))}"
+            )
+    if args.seam is None and args.touch_side is None:
+        return None
+    x, y, z = args.seam or (-value for value in args.touch_side)
+    return x, y, z
+
+
+def links_from_dimensions(args: argparse.Namespace) -> tuple[PlacedFrustum, ...]:
+    """Return the one or two places on a link that its radii and heights describe, in order along the axis.
+
+    Raises:
+        GeometryError: a dimension is missing or out of range.
+    """
+    values = given_dimensions(args, DOUBLE_CONE_KEYS)
+    for option in ("seam", "touch_side"):
+        if getattr(args, option) is not None:
+            raise GeometryError(
+                f"--{option.replace('_', '-')} is for a mesh: by its dimensions a link has no directions, and its seam "
+                "is at phi = 0"
+            )
+    if args.weights is not None or args.exposure:
+        option = "--exposure" if args.exposure else "--weights"
+        raise GeometryError(f"{option} is for a mesh: a link by its dimensions is covered whole")
+    if not {"radius1", "height"} <= values.keys():
+        raise GeometryError("name a mesh file, or give --radius1-mm and --height-mm")
+    if ("radius3" in values) != ("height2" in values):
+        raise GeometryError("a second cone needs both --radius3-mm and --height2-mm")
+    values = {"radius2": values["radius1"], **values}
+    if "radius3" not in values:
+        return (PlacedFrustum(Frustum(**values)),)
+    wrap = values.get("wrap", 2.0 * math.pi)
+    return double_cone(
+        values["radius1"], values["radius2"], values["radius3"], values["height"], values["height2"], wrap
+    )
+
+
+def refuse_dimensions(args: argparse.Namespace) -> None:
+    """Refuse radii and heights beside a mesh.
+
+    Raises:
+        GeometryError: one was given.
+    """
+    for key in DOUBLE_CONE_KEYS:
+        if key.plain != "wrap" and getattr(args, key.name) is not None:
+            raise GeometryError(f"a mesh and {option_name(key)} cannot go together: the radii are found in the mesh")
+
 
 EXAMPLES = """\
 examples:

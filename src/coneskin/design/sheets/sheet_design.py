@@ -6,13 +6,19 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from coneskin.core.errors import GeometryError, SensorError
 from coneskin.geometry.drawing.cut_sheet import CutSheet, FaceUp, cut_sheets
-from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, SheetLayout, lay_out_sheet
+from coneskin.geometry.drawing.electrode_layout import (
+    AdConverter,
+    ElectrodePlan,
+    ResolutionForecast,
+    SheetLayout,
+    forecast_resolution,
+    lay_out_sheet,
+)
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
-from coneskin.geometry.drawing.resolution import AdConverter, ResolutionForecast, forecast_resolution
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -22,16 +28,103 @@ from coneskin.skin.matched_electronics import GivenElectronics, match_electronic
 from coneskin.skin.sensor import sheet_resistances
 from coneskin.skin.sheet_materials import SheetMaterial, match_sheet_materials
 
-from .jig_plan import JigPlan
-from .sheet_joint import SheetJoint, adjoin, find_joint
-
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.fit.fitted_sheet import FittedSheet
 
-__all__ = ["DesignOptions", "SheetDesign", "design_sheets"]
+__all__ = [
+    "DesignOptions",
+    "JigPlan",
+    "JigSurface",
+    "SheetDesign",
+    "SheetJoint",
+    "adjoin",
+    "design_sheets",
+    "find_joint",
+]
+
+JigSurface = Literal["link", "cone", "none"]
+_SHORTEST = 4e-3  # m
+
+
+@dataclass(frozen=True, slots=True)
+class JigPlan:
+    """Dimensions of a jig [m].
+
+    Attributes:
+        surface: what the lip lies on: "link" for the negative of the mesh (of the cone where there is no mesh), "cone"
+            for the negative of the cone, "none" for no jig.
+        wall: thickness of its wall.
+        clearance: gap to the link and to the sheet.
+        parts: into how many parts a collar around a full wrap is split; of a partial wrap no part is longer than half
+            a turn.
+        reach: length of the sleeve over the sheet.
+        grip: length of the lip on the link.
+
+    Raises:
+        GeometryError: a dimension is out of range.
+    """
+
+    surface: JigSurface = "link"
+    wall: float = 3e-3
+    clearance: float = 0.3e-3
+    parts: int = 2
+    reach: float = 20e-3
+    grip: float = 15e-3
+
+    def __post_init__(self) -> None:
+        limits = {"wall": (1.5e-3, 20e-3), "clearance": (0.0, 3e-3), "reach": (8e-3, 0.2), "grip": (_SHORTEST, 0.1)}
+        for name, (least, most) in limits.items():
+            value = getattr(self, name)
+            if not 0.999 * least <= value <= 1.001 * most:  # millimetres in SI are not exact
+                raise GeometryError(
+                    f"{name} of the jig must be {least * 1e3:g} to {most * 1e3:g} mm, got {value * 1e3:.4g} mm"
+                )
+        if not 2 <= self.parts <= 8:
+            raise GeometryError(f"a jig is split into 2 to 8 parts, got {self.parts}")
+
 
 _TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class SheetJoint:
+    """The joint between a sheet and the next one on the axis.
+
+    Attributes:
+        inner: distance along the axis at the faces on the link [m].
+        outer: the same at the outer faces [m].
+        trimmed: length by which both sheets together were shortened along the axis [m].
+    """
+
+    inner: float
+    outer: float
+    trimmed: float
+
+
+def adjoin(one: PlacedFrustum, two: PlacedFrustum) -> bool:
+    """Tell whether two sheets follow each other along one axis, with the same wrap."""
+    turn = one.link_frustum.inverse() @ two.link_frustum
+    x, y, z = turn.translation
+    tilt = math.hypot(turn.rotation[0][2], turn.rotation[1][2])
+    same = abs(one.frustum.wrap - two.frustum.wrap) < 1e-6
+    same &= one.frustum.wrap > _TURN - 1e-6 or turn.rotation[0][0] > 1.0 - 1e-9
+    return same and tilt < 1e-6 and math.hypot(x, y) < 1e-6 and z > 0.5 * one.frustum.height
+
+
+def find_joint(one: PlacedFrustum, two: PlacedFrustum, stack: LayerStack, gap: float) -> SheetJoint:
+    """Return the joint of two neighbours, trimmed so that no layer of one runs into the other.
+
+    A face at the height t above the link is shifted along the axis by -t sin(half angle): at a belt the outer faces
+    separate, at a waist they approach.
+    """
+    start = two.link_frustum.translation
+    apart = one.link_frustum.inverse().apply(start)[2] - one.frustum.height
+    opening = stack.thickness * (one.frustum.sin_half_angle - two.frustum.sin_half_angle)
+    trimmed = max(0.0, gap - apart - min(0.0, opening))
+    return SheetJoint(apart + trimmed, apart + trimmed + opening, trimmed)
+
+
 _LOWER_CONDUCTIVE, _UPPER_CONDUCTIVE = 1, 3  # indices of the layers in the stack
 _MOST_STRAIN = 0.4  # of a face of a wrapped layer; foam wrinkles or tears beyond
 _STRAIGHT = 0.02  # of the fit's tolerance; a taper below it is noise of the mesh, and the side a cylinder's

@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.cut_sheet import CutSheet
-from coneskin.geometry.drawing.electrode_layout import SurfaceRectangle
+from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, SurfaceRectangle, lay_out_sheet
 from coneskin.geometry.drawing.touch_marks import touch_marks
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.sector import unroll
+from coneskin.geometry.sector import Sector, unroll
 from coneskin.scene.tables.cone_keys import CONE_KEYS
 from coneskin.skin.matched_electronics import shunt_ohms
 
 from .sheet_design import SheetDesign
 
-__all__ = ["design_summary", "material_rows", "sensor_toml"]
+__all__ = [
+    "LEAST_ACTIVE_SHARE",
+    "design_summary",
+    "material_rows",
+    "polar_text",
+    "sector_text",
+    "sensor_toml",
+    "small_active_area",
+]
 
 
 def design_summary(design: SheetDesign) -> dict[str, Any]:
@@ -228,3 +238,64 @@ def _round(value: float, digits: int = 4) -> float:
     The pose is rounded: a sheet cannot be placed to a tenth of a micrometre or of a thousandth of a degree.
     """
     return round(value, digits) + 0.0
+
+
+_FLAT = 1e4  # m; an arc of such a radius is a straight line within a micrometre
+_FAR = 5.0  # m; no compass draws a larger radius: how far the arc rises says more
+
+
+def sector_text(cone: Frustum) -> str:
+    """Return what a flat pattern is."""
+    flat = unroll(cone)
+    if flat.r1 > _FLAT:
+        return f"rectangle {flat.arc1 * 1e3:.3f} x {flat.slant * 1e3:.3f} mm"
+    return polar_text(flat)
+
+
+def polar_text(flat: Sector) -> str:
+    """Return radii and angle of a sector; of a nearly straight one how far its arcs rise above their chords."""
+    if flat.r1 > _FLAT:
+        return "a rectangle"
+    theta = f"theta0 {math.degrees(flat.theta0):.4f} deg"
+    if max(flat.r1, flat.r2) < _FAR:
+        return f"r1 {flat.r1 * 1e3:.3f} mm, r2 {flat.r2 * 1e3:.3f} mm, {theta}"
+    rises = [2.0 * radius * math.sin(0.25 * flat.theta0) ** 2 for radius in (flat.r1, flat.r2)]
+    return (
+        f"r1 {flat.r1:.3f} m, r2 {flat.r2:.3f} m, {theta}: the arcs rise by {rises[0] * 1e3:.3f} and "
+        f"{rises[1] * 1e3:.3f} mm"
+    )
+
+
+LEAST_ACTIVE_SHARE = 0.25  #: of a sheet; where less is active, it costs four wires and feels touches hardly anywhere
+
+
+def small_active_area(design: SheetDesign) -> str:
+    """Return a sentence that says how little of a sheet is active, and what would leave more; empty where it is enough.
+
+    The strip over a seam is meant to be narrow, and nothing is said of it.
+    """
+    layout, side = design.layout, design.layout.sheet
+    if design.above or layout.active_share >= LEAST_ACTIVE_SHARE:
+        return ""
+    active = layout.active
+    text = (
+        f"only {layout.active_share:.1%} of {design.name} is active, {1e4 * active.area(side):.1f} of "
+        f"{1e4 * side.area:.1f} cm2: rims and electrodes leave {1e3 * (active.u2 - active.u1):.1f} of "
+        f"{1e3 * side.slant:.1f} mm along and {math.degrees(active.phi2 - active.phi1):.0f} of "
+        f"{math.degrees(side.wrap):.0f} deg around"
+    )
+    narrow = _halved(layout.plan)
+    try:
+        share = lay_out_sheet(side, narrow).active_share
+    except GeometryError:  # a width of the user's own that cannot be halved
+        return text
+    return (
+        f"{text}; --margin-mm {1e3 * narrow.margin:g} --electrode-mm {1e3 * narrow.electrode:g} "
+        f"--lead-mm {1e3 * narrow.lead:g} --hole-mm {1e3 * narrow.hole:g} would leave {share:.0%}"
+    )
+
+
+def _halved(plan: ElectrodePlan) -> ElectrodePlan:
+    """Return a plan with margins and electrodes half as wide; holes do not fit there."""
+    margin, electrode = max(0.5 * plan.margin, plan.setback), 0.5 * plan.electrode
+    return replace(plan, margin=margin, electrode=electrode, lead=min(plan.lead, electrode), hole=0.0)

@@ -1,4 +1,4 @@
-"""Text of a design for the studio's panel, as HTML: flat layers, sizes, forecast, warnings."""
+"""Drawings of a design for the studio: its panel as HTML, bands of deviation, electrodes on the link."""
 
 from __future__ import annotations
 
@@ -7,17 +7,147 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
+from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.design.sheets.sheet_design import SheetDesign
+from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
 from coneskin.geometry.drawing.part_labels import PartLabel
 from coneskin.geometry.drawing.svg import to_svg
 from coneskin.geometry.sector import unroll
 
-from .deviation_bands import BAND_COLOURS, HOLE_COLOUR
-from .electrode_marks import ELECTRODE_COLOURS
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
-__all__ = ["design_facts", "flat_drawing", "legend", "warning_list"]
+    from coneskin.geometry.placed_frustum import PlacedFrustum
+    from coneskin.geometry.ray_casting import RayCaster
+
+__all__ = [
+    "BAND_COLOURS",
+    "ELECTRODE_COLOURS",
+    "HOLE_COLOUR",
+    "DeviationBand",
+    "ElectrodeMark",
+    "design_facts",
+    "deviation_bands",
+    "electrode_marks",
+    "flat_drawing",
+    "legend",
+    "warning_list",
+]
+
+#: of a deviation, from the mesh far below the side, over on it, to far above
+BAND_COLOURS = (
+    (33, 102, 172),
+    (103, 169, 207),
+    (176, 214, 205),
+    (164, 205, 150),
+    (236, 200, 140),
+    (239, 138, 98),
+    (178, 24, 43),
+)
+HOLE_COLOUR = (90, 90, 90)  #: of what spans a hole
+_ROWS, _COLUMNS = 40, 96
+_ABOVE = 0.0004  # m; so that the mesh does not shine through
+
+
+class DeviationBand(NamedTuple):
+    """Patches of a side with about the same deviation.
+
+    Attributes:
+        low: from this height of the mesh above the side on [m]; -inf for the lowest.
+        high: up to this one; inf for the highest. Both NaN where the side spans a hole.
+        colour: red, green and blue, 0 to 255.
+        vertices: of the patches [m], shape (n, 3).
+        faces: indices of vertices, shape (m, 3).
+    """
+
+    low: float
+    high: float
+    colour: tuple[int, int, int]
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+
+def deviation_bands(rays: RayCaster, placed: PlacedFrustum, tolerance: float) -> list[DeviationBand]:
+    """Return the bands of a sheet; one without a patch is left out.
+
+    Args:
+        rays: of the mesh.
+        placed: the sheet.
+        tolerance: deviation of the strongest colours; what lies deeper is a hole [m].
+    """
+    import numpy as np
+
+    side = placed.frustum
+    edges_u, edges_phi = np.linspace(0.0, side.slant, _ROWS + 1), np.linspace(0.0, side.wrap, _COLUMNS + 1)
+    u, phi = 0.5 * (edges_u[:-1] + edges_u[1:]), 0.5 * (edges_phi[:-1] + edges_phi[1:])
+    heights = heights_by_ray(rays, placed, u, phi, tolerance)
+    points, normals = placed.place(edges_u[:, None], edges_phi[None, :])
+    corners = (points + _ABOVE * normals).reshape(-1, 3)
+    index = np.arange(len(corners)).reshape(_ROWS + 1, _COLUMNS + 1)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    limits = tolerance * np.linspace(-1.0, 1.0, len(BAND_COLOURS) + 1)
+    hole = ~np.isfinite(heights) | (heights < -tolerance)
+    band = np.clip(np.searchsorted(limits, heights) - 1, 0, len(BAND_COLOURS) - 1)
+    band[hole] = len(BAND_COLOURS)
+    found = []
+    for number, colour in enumerate((*BAND_COLOURS, HOLE_COLOUR)):
+        here = band == number
+        if not here.any():
+            continue
+        low, high = (np.nan, np.nan) if number == len(BAND_COLOURS) else (limits[number], limits[number + 1])
+        faces = np.concatenate(
+            [np.column_stack([a[here], b[here], c[here]]), np.column_stack([a[here], c[here], d[here]])]
+        )
+        used, again = np.unique(faces, return_inverse=True)
+        found.append(DeviationBand(float(low), float(high), colour, corners[used], again.reshape(faces.shape)))
+    return found
+
+
+ELECTRODE_COLOURS = {"A": (220, 38, 38), "B": (217, 119, 6), "C": (37, 99, 235), "D": (13, 148, 136)}
+_LINE_ABOVE = 0.001  # m above the side
+_LETTER_ABOVE = 0.006  # m: in front of its line from wherever the line is seen
+_PIECES = {"A": 89, "B": 89, "C": 19, "D": 19}
+_LETTERS = {"A": (0.1, 0.43, 0.76), "B": (0.1, 0.43, 0.76), "C": (0.5,), "D": (0.5,)}  # shares of the line
+
+
+class ElectrodeMark(NamedTuple):
+    """Mark of one electrode.
+
+    Attributes:
+        letter: its name, A to D.
+        segments: of its middle line [m], shape (n, 2, 3).
+        letters: where its letter stands [m], shape (k, 3); of a ring more than once, so that one is in front.
+    """
+
+    letter: str
+    segments: NDArray[np.float32]
+    letters: NDArray[np.float64]
+
+
+def electrode_marks(design: SheetDesign) -> list[ElectrodeMark]:
+    """Return the marks of a sheet's electrodes, on the side that it covers."""
+    import numpy as np
+
+    side, box, half = design.place.frustum, design.layout.field, 0.5 * design.layout.plan.electrode
+    turn = half / min(side.radius1, side.radius2)
+    found = []
+    for letter, pieces in _PIECES.items():
+        share = np.linspace(0.0, 1.0, pieces + 1)
+        stands = np.array(_LETTERS[letter])
+
+        def place(at: NDArray[np.float64], above: float, letter: str = letter) -> NDArray[np.float64]:
+            u = {"A": box.u2 + half, "B": box.u1 - half}.get(letter, box.u1 + at * (box.u2 - box.u1))
+            phi = {"C": box.phi2 + turn, "D": box.phi1 - turn}.get(letter, box.phi1 + at * (box.phi2 - box.phi1))
+            points, normals = design.place.place(*np.broadcast_arrays(u, phi + 0.0 * at))
+            return np.asarray(points + above * normals)
+
+        line = place(share, _LINE_ABOVE).astype("float32")
+        found.append(ElectrodeMark(letter, np.stack([line[:-1], line[1:]], axis=1), place(stands, _LETTER_ABOVE)))
+    return found
+
 
 _PANEL = 340.0  # pixels; of the panel's width, for a drawing
 _TALLEST = 230.0  # pixels of a drawing

@@ -1,26 +1,232 @@
-"""Figures that a workshop needs to build one sheet: cable, readings, place on the link."""
+"""Figures that a workshop needs to build one sheet: its wires and cable, the readings to expect, its place on the link.
+
+The cable runs from the four tabs to one connector beside the rim, with strain relief on the way. The readings are ohms
+for a multimeter, and the frame of the untouched sensor.
+"""
 
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.sheet_design import SheetDesign
-from coneskin.geometry.drawing.surface_shape import ShapeTab, SurfaceShape, drawing_point
+from coneskin.design.sheets.summary import sensor_toml
+from coneskin.geometry.drawing.electrode_layout import SheetLayout, SurfaceRectangle
+from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, SurfaceShape, drawing_point
 from coneskin.geometry.frustum import Frustum
+from coneskin.scene.tables.sensor_table import build_sensor
+from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
+from coneskin.skin.sensor import sheet_resistances
 
-from .datum_faces import DatumFace
-from .expected_readings import PairReading, expected_frame, pair_readings
 from .jig import Collar, jig_collars
-from .placement import SheetPlacement, find_placement
-from .wiring import CableExit, cable_exit
+from .placement import DatumFace, SheetPlacement, find_placement
 
 if TYPE_CHECKING:
     from coneskin.geometry.mesh import Mesh
 
-__all__ = ["BuildFigures", "measure_build"]
+__all__ = [
+    "ROLLING",
+    "SETTING",
+    "SPREAD",
+    "TAPE",
+    "WIRE_COLOURS",
+    "BuildFigures",
+    "CableExit",
+    "PairReading",
+    "SheetWire",
+    "cable_exit",
+    "expected_frame",
+    "in_mm",
+    "in_ohms",
+    "measure_build",
+    "pair_readings",
+    "side_name",
+    "tie_place",
+]
+
+#: wire that lies on the tab, stripped; in the connector's contact; and the loop behind the strain relief [m]
+STRIPPED, IN_CONTACT, LOOP = 8e-3, 4e-3, 20e-3
+_ROUND_TO = 5e-3  # m; wires are cut to multiples of it
+_TIE_SHARE = 0.5  # of the way from the rim to the connector: where the wires are tied to the link
+_LEAST, _MOST = 0.03, 2.0  # m; from the rim to the connector
+
+
+@dataclass(frozen=True, slots=True)
+class SheetWire:
+    """One wire.
+
+    Attributes:
+        electrode: A, B, C or D.
+        pin: of the connector, from 1.
+        u: of the middle of the tab's foot, or where there is no tab, of the foil at the rim [m].
+        phi: the same [rad].
+        length: to be cut [m].
+    """
+
+    electrode: str
+    pin: int
+    u: float
+    phi: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class CableExit:
+    """Where the wires leave the sheet.
+
+    Attributes:
+        side: of the sheet.
+        u: of the middle of the four tabs [m].
+        phi: the same [rad], in [0, 2 pi): on a full wrap it lies beside the seam.
+        tie: distance of the strain relief from the rim, away from the sheet [m].
+        connector: the same of the connector [m].
+        wires: one for each electrode, in the order of the pins.
+    """
+
+    side: str
+    u: float
+    phi: float
+    tie: float
+    connector: float
+    wires: tuple[SheetWire, ...]
+
+
+def cable_exit(layout: SheetLayout, connector: float = 0.06) -> CableExit:
+    """Lead the wires of a sheet to one connector.
+
+    Args:
+        layout: of the sheet.
+        connector: distance of the connector from the rim [m].
+
+    Raises:
+        GeometryError: that distance is out of range.
+    """
+    if not _LEAST <= connector <= _MOST:
+        raise GeometryError(
+            f"the connector must be {_LEAST * 1e3:g} to {_MOST * 1e3:g} mm from the rim, got {connector * 1e3:.4g} mm"
+        )
+    sheet, side = layout.sheet, layout.plan.wires
+    feet = {name: _foot(layout, name) for name in "ABCD"}
+    if side.startswith("end"):
+        # around the link by the shorter way, which on a full wrap crosses the seam
+        u = next(iter(feet.values()))[0]
+        middle = math.atan2(*(math.fsum(f(phi) for _, phi in feet.values()) for f in (math.sin, math.cos)))
+        exit_at = (u, middle % (2.0 * math.pi))
+        ways = {
+            name: abs(math.remainder(phi - middle, 2.0 * math.pi)) * sheet.radius_at(u)
+            for name, (_, phi) in feet.items()
+        }
+    else:
+        middle = math.fsum(u for u, _ in feet.values()) / 4.0
+        exit_at = (middle, feet["A"][1])
+        ways = {name: abs(u - middle) for name, (u, _) in feet.items()}
+    wires = tuple(
+        SheetWire(name, pin, *feet[name], _cut(STRIPPED + ways[name] + connector + LOOP + IN_CONTACT))
+        for pin, name in enumerate("ABCD", 1)
+    )
+    return CableExit(side, *exit_at, _TIE_SHARE * connector, connector, wires)
+
+
+def _foot(layout: SheetLayout, name: str) -> tuple[float, float]:
+    """Return the place at the rim where an electrode is reached."""
+    tab = next((step for step in layout.foils[name] if isinstance(step, ShapeTab)), None)
+    if tab is not None:
+        return tab.u, tab.phi
+    sheet, side = layout.sheet, layout.plan.wires
+    corners = layout.foils[name]
+    if side.startswith("end"):
+        u = 0.0 if side == "end1" else sheet.slant
+        nearest = min(abs(corner.u - u) for corner in corners)
+        near = [corner.phi for corner in corners if abs(corner.u - u) <= nearest + 1e-9]
+        return u, min(near, key=lambda phi: abs(math.remainder(phi, 2.0 * math.pi)))  # beside the seam
+    phi = 0.0 if side == "edge0" else sheet.wrap
+    nearest = min(abs(corner.phi - phi) for corner in corners)
+    near = [corner.u for corner in corners if abs(corner.phi - phi) <= nearest + 1e-9]
+    return min(near), phi
+
+
+def _cut(length: float) -> float:
+    return math.ceil(length / _ROUND_TO - 1e-9) * _ROUND_TO
+
+
+_LOWER, _UPPER = 1, 3  # indices of the conductive layers in the stack
+
+
+class PairReading(NamedTuple):
+    """Reading of a multimeter between the two electrodes of a conductive sheet."""
+
+    pair: str  #: "A-B" or "C-D"
+    ohms: float  #: of the sheet as it is drawn, without leads
+    squares: float  #: the reading over this is the sheet resistance that the sensor file takes [1]
+    sheet_ohms: float  #: of the material, for which the reading holds [ohm per square]
+
+
+def pair_readings(design: SheetDesign) -> tuple[PairReading, PairReading]:
+    """Return what a multimeter should read on a sheet, A-B first.
+
+    The sensor's model ends at the inner edges of all four electrodes. The sheets themselves reach further, up to their
+    setback from the rim, and what lies there conducts as well: so both read less than the model, and the sheet
+    resistance that the model needs is worked out from the reading.
+    """
+    layout, field = design.layout, design.layout.field
+    phi1, phi2 = _span(layout.upper, 0.5 * (field.u1 + field.u2), along=False)
+    u1, u2 = _span(layout.lower, 0.5 * (field.phi1 + field.phi2), along=True)
+    upper = _part(design, _UPPER, SurfaceRectangle(field.u1, field.u2, phi1, phi2))
+    lower = _part(design, _LOWER, SurfaceRectangle(u1, u2, field.phi1, field.phi2))
+    radial, angular = sheet_resistances(design.active.frustum, 1.0, 1.0)
+    upper_ohms, lower_ohms = (sheet.ohms for sheet in design.conductive)
+    return (
+        PairReading("A-B", sheet_resistances(upper, upper_ohms, 1.0)[0], radial, upper_ohms),
+        PairReading("C-D", sheet_resistances(lower, 1.0, lower_ohms)[1], angular, lower_ohms),
+    )
+
+
+def expected_frame(design: SheetDesign, index: int, frame: str = "mesh") -> dict[str, int]:
+    """Return the counts of the untouched sensor, by field of a frame, as ``coneskin monitor`` expects them.
+
+    Args:
+        design: the sheet.
+        index: sensor number in the wire format.
+        frame: frame of the pose, in words.
+
+    Raises:
+        GeometryError: a scene would refuse the sensor.
+    """
+    problems: list[str] = []
+    built = build_sensor(tomllib.loads(sensor_toml(design, index, frame)), "sensor.toml", problems)
+    if built is None or problems:
+        raise GeometryError("; ".join(problems) + " (set by the options of the group electronics)")
+    return dict(zip(MEASURED, expected_counts(built[0]), strict=True))
+
+
+def _part(design: SheetDesign, index: int, box: SurfaceRectangle) -> Frustum:
+    """Return a part of a layer as a cone of its own, on the middle surface of the wrapped layer."""
+    stack = design.options.stack
+    height = stack.face_offset(index) + 0.5 * stack.layers[index].thickness
+    side = design.place.parallel(height).frustum
+    rise = (box.u2 - box.u1) * side.cos_half_angle
+    return Frustum(side.radius_at(box.u1), side.radius_at(box.u2), rise, box.phi2 - box.phi1)
+
+
+def _span(shape: SurfaceShape, at: float, along: bool) -> tuple[float, float]:
+    """Return where a line across a shape enters and leaves it.
+
+    Args:
+        shape: closed, of corners.
+        at: phi of a line along the sheet [rad], or u of a line around it [m].
+        along: True for a line along the sheet.
+    """
+    corners = [corner for corner in shape if isinstance(corner, ShapeCorner)]
+    found = []
+    for one, two in zip(corners, corners[1:] + corners[:1], strict=True):
+        (a, p), (b, q) = ((one.phi, one.u), (two.phi, two.u)) if along else ((one.u, one.phi), (two.u, two.phi))
+        if min(a, b) <= at < max(a, b):
+            found.append(0.5 * (p + q))
+    return min(found), max(found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,3 +372,51 @@ def _point(u: float, phi: float) -> dict[str, float]:
 
 def _mm(metres: float) -> float:
     return round(1e3 * metres, 3) + 0.0
+
+
+#: of the insulation, by electrode
+WIRE_COLOURS = {"A": "red", "B": "black", "C": "yellow", "D": "green"}
+
+
+SPREAD = 0.2  # of the expected ohms: conductive sheets vary by as much
+
+
+TAPE = "double-sided tape"
+
+
+#: the roller is that of the peel test of ASTM D3330: 2 kg on a width of 45 mm
+ROLLING = (
+    "a hand roller with a rubber face, pressed as hard as a weight of 2 kg presses (test it on kitchen scales), once "
+    "forth and once back, from the middle outwards, at the speed of a slow step of the hand (5 mm in a second)."
+)
+
+
+#: makers of silicone adhesives test their bonds after three days; their strength grows until then
+SETTING = "Leave it for 72 hours at room temperature (18 to 25 degrees Celsius) before anybody presses it hard."
+
+
+def in_ohms(ohms: float) -> str:
+    """Return a resistance with its unit."""
+    return f"{ohms / 1e3:.3g} kohm" if ohms >= 1e3 else f"{ohms:.3g} ohm"
+
+
+def in_mm(metres: float) -> str:
+    """Return a length with its unit."""
+    return f"{1e3 * metres:.1f} mm"
+
+
+def side_name(side: str) -> str:
+    """Return the name of a side of a sheet as the guide has it."""
+    return {"end1": "end 1", "end2": "end 2", "edge0": "edge 0", "edge1": "the edge of C"}[side]
+
+
+def tie_place(design: SheetDesign, figures: BuildFigures) -> str:
+    """Return where along its side the cable leaves a sheet."""
+    cable, side = figures.cable, design.place.frustum
+    if cable.side.startswith("edge"):
+        return f"{in_mm(cable.u)} from end 1"
+    radius = side.radius_at(cable.u)
+    arc = cable.phi * radius
+    if arc > math.pi * radius:
+        return f"{in_mm(2.0 * math.pi * radius - arc)} from edge 0, against the direction of the wrap"
+    return f"{in_mm(arc)} from edge 0, in the direction of the wrap"

@@ -19,17 +19,97 @@ from numpy.typing import NDArray
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.surface_shape import ShapeTab
+from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.solid.closed_surface import ClosedSurface, shell_surface
-from coneskin.geometry.solid.radial_profile import widest_nearby, without_undercut
+from coneskin.geometry.solid import ClosedSurface, shell_surface, widest_nearby, without_undercut
 
-from .jig_surroundings import meets_neighbour, with_sheets
 from .link_excess import LinkExcess
-from .lip_play import lip_play
 
-__all__ = ["Collar", "CollarPart", "jig_collars"]
+__all__ = ["Collar", "CollarPart", "jig_collars", "lip_play", "meets_neighbour", "with_sheets"]
 
 Floats = NDArray[np.float64]
+
+_BORDER_COLUMN = math.radians(2.0)  # step around the axis
+_RINGS = 9  # along a sheet
+
+
+def with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
+    """Return the mesh of the link with the outer faces of the sheets that it bears already."""
+    corners, faces = [mesh.vertices], [mesh.faces]
+    for other in others:
+        outer = parallel_frustum(other.place.frustum, other.options.stack.thickness)
+        shift = -other.options.stack.thickness * outer.sin_half_angle
+        phi = np.linspace(0.0, outer.wrap, max(8, math.ceil(outer.wrap / _BORDER_COLUMN)) + 1)
+        rings = [_ring(outer, u, phi, shift) for u in np.linspace(0.0, outer.slant, _RINGS)]
+        start = sum(len(block) for block in corners)
+        index = start + np.arange(len(rings) * len(phi)).reshape(len(rings), len(phi))
+        a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
+        corners.append(other.place.link_frustum.apply_all(np.concatenate(rings)))
+        faces.append(np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3))
+    if not others:
+        return mesh
+    return Mesh(np.concatenate(corners), np.concatenate(faces), mesh.source, mesh.unit)
+
+
+def _ring(outer: Frustum, u: float, phi: Floats, shift: float) -> Floats:
+    radius = outer.radius_at(float(u))
+    return np.column_stack(
+        [radius * np.cos(phi), radius * np.sin(phi), np.full(len(phi), u * outer.cos_half_angle + shift)]
+    )
+
+
+def meets_neighbour(design: SheetDesign, others: Sequence[SheetDesign], end: int) -> bool:
+    """Tell whether another sheet begins where this one ends."""
+    if end == 2:
+        return design.next_joint is not None
+    start = design.place.link_frustum.translation
+    for other in others:
+        if other.next_joint is not None and not other.above:
+            far = other.place.link_frustum.apply((0.0, 0.0, other.place.frustum.height))
+            if math.dist(far, start) < other.next_joint.inner + 1e-6:
+                return True
+    return False
+
+
+_ROWS = 61  # along the lip
+_MOST = 12  # columns of a degree; a collar that can be turned further does not show its azimuth
+
+
+def lip_play(
+    link: LinkExcess,
+    lips: Sequence[tuple[Floats, Floats, NDArray[np.bool_]]],
+    wanted: float,
+    clearance: float,
+    facets: float = 0.0,
+) -> float | None:
+    """Return the angle between the two positions in which a collar meets its link [rad]; None where there are none.
+
+    The collar stays about the axis of its sheet, but for a shift by the clearance. Facets are the mesh's, not the
+    link's: a collar that is held by nothing else does not show its azimuth.
+
+    Args:
+        link: beside the end of the sheet.
+        lips: of the parts: azimuths of the columns, evenly [rad]; lengths of the lip there [m]; where tabs leave.
+        wanted: length of a lip where nothing is in its way [m].
+        clearance: gap between lip and link [m].
+        facets: height of the corners of the mesh above its facets [m].
+    """
+    share = np.linspace(0.0, 1.0, _ROWS)
+    ways = [_MOST + 1, _MOST + 1]
+    for phi, lengths, tabs in lips:
+        excess = link.over(share, np.full(len(phi), wanted), phi, 0.0)
+        cone = link.cone(link.height(share * wanted))[:, None]
+        inside = without_undercut(cone + excess + clearance, phi) + max(clearance, facets)
+        inside = np.where((share[:, None] * wanted <= lengths) & ~tabs, inside, np.inf)
+        radius = cone + excess
+        for way, (held, met) in enumerate(((inside, radius), (inside[:, ::-1], radius[:, ::-1]))):
+            for columns in range(1, ways[way]):
+                if (met[:, columns:] > held[:, :-columns]).any():
+                    ways[way] = columns
+                    break
+    width = float(lips[0][0][1] - lips[0][0][0])
+    return None if max(ways) > _MOST else sum(ways) * width
+
 
 _TURN = 2.0 * math.pi
 _COLUMN = math.radians(1.0)  # step around the axis; an arc of 100 mm then lies 0.004 mm beside its chord

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator
 
 from coneskin.design.sheets.sheet_design import SheetDesign
+from coneskin.design.workshop.build_figures import in_mm
 
 from .build_figures import BuildFigures
-from .guide_words import in_mm
 from .placement import LinkFeature, SheetPlacement, sharpest_bends
 
 __all__ = ["placement_lines"]

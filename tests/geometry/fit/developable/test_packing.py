@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from coneskin.geometry.fit.developable.sheets import find_sheets
+from coneskin.geometry.fit.developable.packing import find_sheets
 from coneskin.geometry.fit.developable.side_fit import fit_developable
 from coneskin.geometry.mesh import make_mesh
 from coneskin.geometry.pose import Pose

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from coneskin.geometry.fit.developable.ruled_region import ruled_region
+from coneskin.geometry.fit.developable.found_sheet import ruled_region
 
 from ..profile_cases import profile_of
 

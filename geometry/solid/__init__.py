@@ -1,1 +1,0 @@
-"""Solids of a sheet: the closed surface of a printed jig, STL, and the wrapped layers for CAD."""

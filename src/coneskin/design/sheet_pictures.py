@@ -1,0 +1,370 @@
+"""Pictures of one sheet for the report, with the dimensions that a ruler measures.
+
+They show its flat layout, its parts as they are cut, its parts pulled apart in their order, and a section through its
+seam.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from coneskin.design.workshop.build_figures import side_name
+from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS
+from coneskin.geometry.drawing.outline import Outline
+from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw_shape, drawing_point
+from coneskin.geometry.sector import unroll
+
+from .sheets.sheet_design import SheetDesign
+from .sheets.summary import polar_text
+from .workshop.build_figures import BuildFigures, CableExit
+
+__all__ = ["FOIL_COLOUR", "INK_COLOUR", "draw_layout", "draw_parts", "draw_seam", "draw_stack"]
+
+INK_COLOUR = "#222222"
+FOIL_COLOUR = "#c27c0e"
+_ACTIVE_COLOUR = "#9fd3c7"
+
+
+def _xy(outline: Outline) -> tuple[list[float], list[float]]:
+    """Return the coordinates of an outline [mm]; the first point is repeated if it is closed."""
+    flat = outline.flattened(5e-5)
+    points = [(x * 1e3, y * 1e3) for x, y, _ in flat.vertices]
+    points += points[:1] if outline.closed else []
+    return [x for x, _ in points], [y for _, y in points]
+
+
+def draw_layout(figure: Any, design: SheetDesign, cable: CableExit) -> None:
+    """Draw the layout of a sheet on the cone of its upper conductive layer, with dimensions in mm, and its wires.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        design: the sheet.
+        cable: its wires, from the tabs past the strain relief to the connector.
+    """
+    axes = figure.add_subplot()
+    layout = design.layout
+    cone = design.cuts[4].surface
+    box = layout.active
+    active = tuple(
+        ShapeCorner(u, p) for u, p in ((box.u1, box.phi1), (box.u1, box.phi2), (box.u2, box.phi2), (box.u2, box.phi1))
+    )
+    axes.fill(*_xy(draw_shape(cone, active)), color=_ACTIVE_COLOUR, alpha=0.6, lw=0, label="active area")
+    axes.plot(*_xy(draw_shape(cone, layout.rim)), color=INK_COLOUR, lw=1.4, label="substrates and isolation")
+    axes.plot(*_xy(draw_shape(cone, layout.upper)), color=INK_COLOUR, lw=0.8, ls="--", label="upper conductive layer")
+    axes.plot(*_xy(draw_shape(cone, layout.lower)), color=INK_COLOUR, lw=0.8, ls=":", label="lower conductive layer")
+    for name, foil in layout.foils.items():
+        upper = name in "AB"
+        label = {"A": "foil of A, B (upper sheet)", "C": "foil of C, D (lower sheet)"}.get(name)
+        style = {"facecolor": FOIL_COLOUR, "alpha": 0.45 if upper else 0.8, "edgecolor": INK_COLOUR, "lw": 0.4}
+        axes.fill(*_xy(draw_shape(cone, foil)), label=label, **style)
+    for u, phi in layout.holes:
+        hole = _xy(draw_hole(cone, u, phi, layout.plan.hole))
+        axes.fill(*hole, facecolor="white", edgecolor=INK_COLOUR, lw=0.8)
+    if layout.holes:  # the legend would show an area as a rectangle
+        label = f"registration holes, diameter {1e3 * layout.plan.hole:g} mm"
+        axes.plot([], [], "o", mfc="white", mec=INK_COLOUR, mew=0.8, label=label)
+    if cable.side.startswith("end"):
+        _draw_cable(axes, design, cone, cable)
+    _dimensions(axes, design, cone)
+    axes.margins(0.08)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+
+
+def _draw_cable(axes: Any, design: SheetDesign, cone: Any, cable: CableExit) -> None:
+    """Draw the wires as they would lie if the link were flat too; one that crosses the seam ends at the edge."""
+    from coneskin.design.workshop.build_figures import WIRE_COLOURS
+
+    out = -1.0 if cable.side == "end1" else 1.0
+
+    def at(away: float, phi: float) -> tuple[float, float]:
+        """Return a place beyond the end [mm], away from it [m] along the ruling through phi."""
+        x, y = drawing_point(cone, cable.u, phi)
+        turn = (phi - 0.5 * cone.wrap) * cone.sin_half_angle
+        return 1e3 * (x + out * away * math.sin(turn)), 1e3 * (y + out * away * math.cos(turn))
+
+    middle = math.remainder(cable.phi, 2.0 * math.pi) if cable.phi > cone.wrap else cable.phi
+    middle = middle - 2.0 * math.pi if middle > math.pi and design.has_seam else middle
+    tab = design.layout.plan.tab
+    for wire in cable.wires:
+        name, colour = wire.electrode, WIRE_COLOURS[wire.electrode]
+        style = {"color": "#d4a800" if colour == "yellow" else colour, "lw": 1.2}
+        if abs(wire.phi - middle) > math.pi:
+            axes.plot(*zip(at(tab, wire.phi), at(0.5 * cable.tie + 0.5 * tab, cone.wrap), strict=True), **style)
+            way = "across\nthe seam" if design.has_seam else "around\nthe link"
+            axes.text(*at(cable.tie, wire.phi), f"{name}, {way}", fontsize=7, ha="center", va="center")
+            continue
+        steps = [at(tab, wire.phi), at(cable.tie, middle), at(cable.connector, middle)]
+        if abs(wire.phi - middle) > 0.6:  # around the end, not across it
+            around = [wire.phi + (middle - wire.phi) * k / 24.0 for k in range(25)]
+            steps[1:2] = [at(tab + (cable.tie - tab) * k / 24.0, phi) for k, phi in enumerate(around)]
+        axes.plot(*zip(*steps, strict=True), **style)
+    axes.plot(*zip(at(cable.tie, middle), at(cable.connector, middle), strict=True), color=INK_COLOUR, lw=2.5)  # as one
+    for away, marker, word in ((cable.tie, "s", "cable tie"), (cable.connector, "D", "connector")):
+        x, y = at(away, middle)
+        axes.plot([x], [y], marker, color=INK_COLOUR, ms=6)
+        label = f"{word}, {1e3 * away:g} mm from the rim"
+        style = {"fontsize": 8, "ha": "right", "va": "center"}
+        axes.annotate(label, (x, y), (-8.0, 0.0), textcoords="offset points", **style)  # beside the mark at any scale
+
+
+def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
+    """Draw the dimensions of the flat pattern and the names of the electrodes."""
+    wrap, slant, layout = cone.wrap, cone.slant, design.layout
+    lift = 0.06 * max(slant, 0.3 * wrap * max(cone.radius1, cone.radius2))
+    style = {"ha": "center", "va": "center", "fontsize": 9, "color": INK_COLOUR}
+
+    def at(u: float, phi: float) -> tuple[float, float]:
+        x, y = drawing_point(cone, u, phi)
+        return x * 1e3, y * 1e3
+
+    x0, y0, x1, y1 = draw_shape(cone, layout.rim).bounds
+    far = 1.5e3 * lift
+    wires = 1e3 * design.options.connector if layout.plan.wires == "end1" else 0.0
+    bottom, right = y0 * 1e3 - far - wires, x1 * 1e3 + far
+    arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.7, "shrinkA": 0, "shrinkB": 0}
+    axes.plot(
+        [x0 * 1e3, x1 * 1e3, right], [bottom - 0.6e3 * lift, bottom, bottom], lw=0.0
+    )  # arrows do not extend the axes
+    axes.annotate("", (x0 * 1e3, bottom), (x1 * 1e3, bottom), arrowprops=arrow)
+    axes.text(500.0 * (x0 + x1), bottom, f"{(x1 - x0) * 1e3:.2f} mm", **style, backgroundcolor="white")
+    axes.annotate("", (right, y0 * 1e3), (right, y1 * 1e3), arrowprops=arrow)
+    axes.text(right, 500.0 * (y0 + y1), f"{(y1 - y0) * 1e3:.2f} mm", rotation=90, **style, backgroundcolor="white")
+    flat = unroll(cone)
+    lines = [
+        f"{design.name}, upper conductive layer",
+        f"slant {slant * 1e3:.3f} mm",
+        f"arcs {flat.arc1 * 1e3:.3f} mm (end 1), {flat.arc2 * 1e3:.3f} mm (end 2)",
+    ]
+    lines.append(polar_text(flat))
+    lines.append(f"active area {1e4 * layout.active.area(layout.sheet):.1f} cm2 ({layout.active_share:.0%})")
+    tabs = design.options.connector if layout.plan.wires == "end2" else 0.0
+    axes.text(500.0 * (x0 + x1), 1e3 * (y1 + tabs) + 4.0, "\n".join(lines), **{**style, "va": "bottom"})
+    half = 0.5 * layout.plan.electrode
+    narrow = min(layout.sheet.radius1, layout.sheet.radius2)
+    field = layout.field
+    for name, u, phi in (
+        ("A", field.u2 + half, 0.42 * wrap),
+        ("B", field.u1 - half, 0.42 * wrap),
+        ("C", 0.5 * slant, field.phi2 + half / narrow),
+        ("D", 0.5 * slant, field.phi1 - half / narrow),
+    ):
+        axes.text(*at(u, phi), name, **{**style, "fontweight": "bold"})
+
+
+def draw_parts(figure: Any, design: SheetDesign) -> None:
+    """Draw all seven cut sheets of a sensor with their dimensions in mm.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        design: the sheet.
+    """
+    grid = figure.subplots(4, 2)
+    for axes, cut in zip(grid.flat, design.cuts, strict=False):
+        for part in cut.parts:
+            for stroke in part.strokes:
+                flat = stroke.outline.flattened(1e-4)
+                xy = [(1e3 * x, 1e3 * y) for x, y, _ in flat.vertices]
+                xy += xy[:1] if stroke.outline.closed else []
+                colour = tuple(value / 255.0 for value in LINE_COLOURS[stroke.kind])
+                axes.plot([x for x, _ in xy], [y for _, y in xy], color=colour, lw=0.7)
+        x0, y0, x1, y1 = (1e3 * value for value in cut.bounds)
+        off = 0.05 * max(x1 - x0, y1 - y0)
+        arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.6, "shrinkA": 0, "shrinkB": 0}
+        text = {"textcoords": "offset points", "fontsize": 7, "color": INK_COLOUR}
+        axes.annotate("", (x0, y0 - off), (x1, y0 - off), arrowprops=arrow)
+        middle = (0.5 * (x0 + x1), y0 - off)
+        axes.annotate(f"{x1 - x0:.2f}", middle, xytext=(0, -2), ha="center", va="top", **text)
+        axes.annotate("", (x1 + off, y0), (x1 + off, y1), arrowprops=arrow)
+        middle = (x1 + off, 0.5 * (y0 + y1))
+        axes.annotate(f"{y1 - y0:.2f}", middle, xytext=(3, 0), ha="left", va="center", rotation=90, **text)
+        sector = unroll(cut.surface)
+        lines = f"{cut.number} {cut.name}, {cut.face} up\nslant {1e3 * sector.slant:.2f}, arcs "
+        lines += f"{1e3 * sector.arc1:.2f} (end 1), {1e3 * sector.arc2:.2f} (end 2)"
+        lines += f"\n{polar_text(sector)}"
+        axes.set_title(lines, fontsize=7)
+        axes.plot([x0 - off, x1 + 2 * off], [y0 - 2 * off, y1 + off], lw=0)  # arrows do not extend the axes
+        axes.set_aspect("equal")
+        axes.axis("off")
+    plan = design.layout.plan
+    axes = grid.flat[7]
+    axes.axis("off")
+    holes = [
+        f"hole {n}: u {1e3 * u:.2f} mm, phi {math.degrees(phi):.3f} deg"
+        for n, (u, phi) in enumerate(design.layout.holes, 1)
+    ]
+    words = [
+        "all dimensions in mm, at the neutral surface",
+        "red cut, magenta hole, blue mark, green fold",
+        f"holes of {1e3 * plan.hole:g} mm" if holes else "no holes",
+        *holes,
+        f"electrodes {1e3 * plan.electrode:g} mm, margin {1e3 * plan.margin:g} mm",
+        f"tabs {1e3 * plan.lead:g} x {1e3 * plan.tab:g} mm at {side_name(plan.wires)}",
+    ]
+    axes.text(0.0, 0.95, "\n".join(words), va="top", fontsize=8, transform=axes.transAxes)
+
+
+_ORDER = (1, 3, 2, 4, 6, 5, 7)  # numbers of the parts, from the link outwards
+_FACES = ("#e8d9c0", "#55585e", FOIL_COLOUR, "#cfe3f1", FOIL_COLOUR, "#55585e", "#e8d9c0")
+
+
+def draw_stack(figure: Any, design: SheetDesign) -> None:
+    """Draw the seven parts above each other in their order on the link, all seen from outside.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        design: the sheet.
+    """
+    axes = figure.add_subplot()
+    width = max(cut.bounds[2] - cut.bounds[0] for cut in design.cuts) * 1e3
+    depth = max(cut.bounds[3] - cut.bounds[1] for cut in design.cuts) * 1e3
+    squeeze, lean = 0.38, 0.30
+    pitch = squeeze * depth * 0.62 + 0.05 * width
+    right = 0.0
+    stacked = sorted(design.cuts, key=lambda cut: _ORDER.index(cut.number))
+    for level, cut in enumerate(stacked):
+        lift = level * pitch
+
+        def slanted(outline: Outline, lift: float = lift, mirrored: bool = cut.face == "inside") -> Any:
+            flat = outline.flattened(2e-4)
+            points = [((-x if mirrored else x) * 1e3, y * 1e3) for x, y, _ in flat.vertices]
+            points += points[:1] if outline.closed else []
+            return [x + lean * y for x, y in points], [squeeze * y + lift for _, y in points]
+
+        for part in cut.parts:
+            for stroke in part.strokes:
+                if stroke.kind == "cut":
+                    x, y = slanted(stroke.outline)
+                    right = max(right, *x)
+                    axes.fill(x, y, facecolor=_FACES[level], edgecolor=INK_COLOUR, lw=0.7, alpha=0.92)
+            for stroke in part.strokes:
+                colour = {"hole": "#b3007a", "score": "#2040c0", "fold": "#0a7d24"}.get(stroke.kind)
+                if colour:
+                    axes.plot(*slanted(stroke.outline), color=colour, lw=0.5)
+    for level, cut in enumerate(stacked):  # beside the parts, however far the last of them lean
+        label = f"{cut.number}  {cut.name}\n    {cut.material}\n    drawing: {cut.face} up"
+        axes.text(right + 0.03 * width, level * pitch + 0.2 * squeeze * depth, label, fontsize=8, va="center")
+    axes.annotate(
+        "", (-0.62 * width, 6 * pitch), (-0.62 * width, 0), arrowprops={"arrowstyle": "->", "color": INK_COLOUR}
+    )
+    axes.text(
+        -0.65 * width, 3 * pitch, "outwards, away from the link", rotation=90, ha="right", va="center", fontsize=9
+    )
+    axes.plot([-0.7 * width] * 2, [-0.1 * pitch, 6.5 * pitch], lw=0)  # arrows and text do not extend the axes
+    axes.margins(0.04)
+    axes.set_aspect("equal")
+    axes.axis("off")
+
+
+def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
+    """Draw a section across the edges of a sheet, thickness enlarged, as it is seen from end 1.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        design: the sheet.
+        figures: for building it.
+    """
+    axes = figure.add_subplot()
+    layout, stack, plan = design.layout, design.options.stack, design.layout.plan
+    side = design.place.frustum
+    u = 0.5 * side.slant
+    radius = side.radius_at(u)
+    reach = 2.6 * (plan.margin + plan.electrode) * 1e3
+    scale = 0.28 * reach / (stack.thickness * 1e3)  # how much thickness is enlarged
+    open_gap = (2.0 * math.pi - side.wrap) * radius * 1e3
+    shown_gap = min(open_gap, 0.5 * reach)
+    heights = [stack.face_offset(i) * 1e3 * scale for i in range(6)]
+    colours = ("#e8d9c0", "#55585e", "#cfe3f1", "#55585e", "#e8d9c0")
+    axes.fill_between([-reach - shown_gap, reach], -0.12 * reach, 0.0, color="#c4c8ce")
+    axes.text(0.0, -0.06 * reach, "link", ha="center", va="center", fontsize=9)
+    arc = 1e3 * radius
+    set_lower = 1e3 * plan.setback
+    spans = {  # from the edge inwards [mm]: lower conductive, then upper conductive near D and near C
+        0: (0.0, 0.0),
+        1: _insets(layout.lower, layout.sheet.wrap, u, arc),
+        2: (0.0, 0.0),
+        3: _insets(layout.upper, layout.sheet.wrap, u, arc),
+        4: (0.0, 0.0),
+    }
+    for index in range(5):
+        first, last = spans[index]
+        low, high = heights[index], heights[index + 1]
+        high = max(high, low + 0.02 * reach)  # a thin sheet stays visible
+        axes.fill_between([first, reach], low, high, facecolor=colours[index], edgecolor=INK_COLOUR, lw=0.5)
+        axes.fill_between(
+            [-reach - shown_gap, -shown_gap - last], low, high, facecolor=colours[index], edgecolor=INK_COLOUR, lw=0.5
+        )
+        at = 0.5 * (low + high) + {1: -0.02, 3: 0.02}.get(index, 0.0) * reach  # names of thin layers beside each other
+        axes.text(reach * 1.03, at, _layer_name(design, index), fontsize=8, va="center")
+    margin = (layout.field.phi1 - _turn(plan.electrode, side)) * arc
+    width = _turn(plan.electrode, side) * arc
+    thick = 0.012 * reach
+    foils = [("D", margin, width, 1.0), ("C", -shown_gap - margin - width, width, 1.0)]
+    if plan.wires.startswith("end"):  # of the electrode at the other end, on its way to the wires
+        foils.append((f"lead of {plan.led_across}", *_lead(layout, arc), -1.0))
+    for name, start, wide, way in foils:  # on the faces of the conductive sheets, towards each other
+        face, beyond = (heights[2], heights[1]) if way > 0.0 else (heights[3], heights[4])
+        axes.fill_between([start, start + wide], face, face + way * thick, color=FOIL_COLOUR)
+        style = {"ha": "center", "va": "center", "fontsize": 9, "fontweight": "bold"}
+        axes.text(start + 0.5 * wide, beyond - 0.04 * way * reach, name, **style)
+    top = heights[5]
+    if design.options.overlap:
+        flap = 1e3 * design.options.overlap
+        axes.plot([-shown_gap, flap], [top + 0.03 * reach] * 2, color="#a07840", lw=3)
+        axes.text(0.5 * flap, top + 0.05 * reach, f"flap {flap:g} mm", ha="center", fontsize=8)
+    blind1, blind2 = layout.active.phi1 * arc, (side.wrap - layout.active.phi2) * arc
+    y = top + 0.14 * reach
+    axes.plot([0.0], [y + 0.1 * reach], lw=0)  # arrows and text do not extend the axes
+    arrow = {"arrowstyle": "<->", "color": "#b00020", "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (-shown_gap - blind2, y), (blind1, y), arrowprops=arrow)
+    blind = blind1 + blind2 + open_gap
+    axes.text(
+        0.5 * (blind1 - shown_gap - blind2),
+        y + 0.02 * reach,
+        f"no touch is located here: {blind:.1f} mm, {math.degrees(blind / arc):.1f} deg",
+        ha="center",
+        fontsize=9,
+        color="#b00020",
+    )
+    for x, text in ((0.6 * reach, "edge 0 (phi = 0)"), (-0.6 * reach - shown_gap, "edge of C (phi = wrap)")):
+        axes.text(x, -0.16 * reach, text, ha="center", va="top", fontsize=9)
+    note = f"seen from end 1, at the middle of the slant; thickness enlarged {scale:.1f} times"
+    if open_gap > shown_gap:
+        note += f"; {open_gap:.0f} mm of the link between the edges are left out"
+    cable = f"setback {set_lower:g} mm, wires leave at {side_name(figures.cable.side)}"
+    what = "its two edges, between which the link is bare" if not design.has_seam else "the seam"
+    axes.set_title(f"{design.name}: section of {what}\n{note}; {cable}", fontsize=9)
+    axes.axis("off")
+
+
+def _turn(width: float, side: Any) -> float:
+    return width / float(min(side.radius1, side.radius2))
+
+
+def _insets(shape: Any, wrap: float, u: float, arc: float) -> tuple[float, float]:
+    """Return how far a conductive sheet ends before edge 0 and before the other edge at a slant distance [mm]."""
+    from coneskin.geometry.drawing.surface_shape import ShapeCorner
+
+    corners = [corner for corner in shape if isinstance(corner, ShapeCorner)]
+    at = [
+        a.phi
+        for a, b in zip(corners, corners[1:] + corners[:1], strict=True)
+        if min(a.u, b.u) <= u < max(a.u, b.u) and abs(a.phi - b.phi) < 1e-12
+    ]
+    return min(at) * arc, (wrap - max(at)) * arc
+
+
+def _lead(layout: Any, arc: float) -> tuple[float, float]:
+    """Return where the lead along edge 0 begins, and its width [mm]."""
+    from coneskin.geometry.drawing.surface_shape import ShapeCorner
+
+    foil = layout.foils[layout.plan.led_across]
+    start, end, *_ = sorted({round(corner.phi, 9) for corner in foil if isinstance(corner, ShapeCorner)})
+    return start * arc, (end - start) * arc
+
+
+def _layer_name(design: SheetDesign, index: int) -> str:
+    layer = design.options.stack.layers[index]
+    return f"{layer.name}, {layer.thickness * 1e3:g} mm"
