@@ -283,8 +283,6 @@ def test_the_live_path_knows_no_arrays(name: str) -> None:
 
 
 def test_tests_import_nothing_of_the_benches_and_these_only_the_support_of_tests() -> None:
-    bench = {"bench", *(path.stem for path in (ROOT / "bench").rglob("*.py") if path.stem != "__init__")}
-    bench -= {path.stem for path in (ROOT / "tests").rglob("*.py")}
     wrong = []
     for path in sorted([*(ROOT / "tests").rglob("*.py"), *(ROOT / "bench").rglob("*.py")]):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -292,7 +290,7 @@ def test_tests_import_nothing_of_the_benches_and_these_only_the_support_of_tests
             names += [str(node.module)] if isinstance(node, ast.ImportFrom) and not node.level else []
             for name in names:
                 if path.is_relative_to(ROOT / "tests"):
-                    forbidden = name.split(".")[0] in bench
+                    forbidden = name.split(".")[0] == "bench"
                 else:
                     forbidden = name.split(".")[0] == "tests" and not name.startswith("tests.support.")
                 wrong += [f"{path.relative_to(ROOT)}: {name}"] if forbidden else []

@@ -4,7 +4,7 @@
 
 All three rows of the point's Jacobian J count, not only the one along v: where the arm cannot follow v, the point then
 moves in the possible direction nearest to it, and never faster than |v|. With the one row alone the least-norm joint
-speeds drift sideways by more than they retreat (bench/retreat.py prints both).
+speeds drift sideways by more than they retreat (bench `retreat` prints both).
 
 The damping is a floor of 1 mm, plus up to 50 mm as the smallest singular value of J falls below 100 mm; joint speeds
 then stay below about 14 rad/s per m/s wanted (measured: 12.4), at the price of a slower point.

@@ -1,4 +1,4 @@
-"""The fault campaign, every eleventh kind once: bench/faults.py is the whole of it, at random times."""
+"""The fault campaign, every eleventh kind once: bench `faults` is the whole of it, at random times."""
 
 import json
 import subprocess
@@ -11,12 +11,10 @@ from tests.support.paths import ROOT
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
 
-CAMPAIGN = ROOT / "bench" / "faults.py"
-
 
 def campaign(*options):
-    command = [sys.executable, str(CAMPAIGN), "--times", "1", "--json", *options]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=500)
+    command = [sys.executable, "-m", "bench", "faults", "--times", "1", "--json", *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=500, cwd=ROOT)
     return done, [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
 
 

@@ -26,7 +26,7 @@ __all__ = ["LONGEST_BEHIND", "RemotePlant", "decode_targets", "encode_state"]
 LONGEST_BEHIND = 0.25
 #: what no arm that is whole measures: joints turn twice at most. A blow of 7 kN takes 800 A
 _MOST_POSITION, _MOST_CURRENT = 8.0 * math.pi, 1e4  # rad, A
-#: of the highest speed of a joint, which no blow exceeds: in 72 collisions of bench/collision.py without any
+#: of the highest speed of a joint, which no blow exceeds: in 72 collisions of bench `collision` without any
 #: protection the fastest joint was flung to 3.2 of it
 _MOST_SPEED = 10.0
 _TARGETS = struct.Struct("<12d")

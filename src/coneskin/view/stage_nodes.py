@@ -36,7 +36,7 @@ def light_plainly(scene: Any) -> None:
     """Set two plain lights in the place of viser's own.
 
     Reflections of its surroundings and shadows of three cascades cost two thirds of a picture where a processor draws
-    it (bench/RESULTS-view.md).
+    it (bench/RESULTS.md).
 
     Args:
         scene: viser's ``SceneApi``.

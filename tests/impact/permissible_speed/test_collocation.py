@@ -108,7 +108,7 @@ def test_an_arm_of_infinite_mass_goes_as_it_is_driven() -> None:
 
 
 def test_a_body_of_ten_grams_that_stays_pressed_is_that_of_sixty_digits() -> None:
-    """The number is that of ``bench/impact_reference.py``."""
+    """The number is that of ``bench/impact/reference.py``."""
     assert integrate(pressed(1e-2), 0.1).last == pytest.approx(1317.433237406499, rel=1e-12)
 
 

@@ -39,7 +39,7 @@ def test_what_moves_into_the_touch_slowly_may_do_so_by_a_little():
 
 
 def test_a_slow_arm_that_something_holds_is_stopped():
-    """A wall that stops the surface lets the setpoints go on: 540 N more than by a stop (bench/collision.py, 514)."""
+    """A wall that stops the surface lets the setpoints go on: 540 N more than by a stop (bench `collision`, 514)."""
     rig = GuardRig(touch(0.5, 5.0, phi=(PHI + math.pi) % (2.0 * math.pi)), reaction=SLOW, speed=0.3).run(0.7)
     assert rig.core.phase is Phase.SLOWED
     rig.arm.current = [0.0, 1.9, 0.0, 0.0, 0.0, 0.0]

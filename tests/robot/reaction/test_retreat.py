@@ -110,7 +110,7 @@ def test_the_way_made_while_braking_is_made_good() -> None:
 
 
 def test_retreats_from_anywhere_end_where_they_should() -> None:
-    """bench/retreat.py prints the same over more runs, with the spread of the drift."""
+    """python -m bench retreat prints the same over more runs, with the spread of the drift."""
     source = random.Random(5)
     reaction = Reaction(kind="retreat")
     complete = 0

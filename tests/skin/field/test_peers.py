@@ -1,6 +1,6 @@
 """The field model against solvers that share nothing with it: hp finite elements in the physical plane.
 
-testing/field/reference.json holds NGSolve's solutions (bench/field_reference.py makes it); where a peer is installed it
+testing/field/reference.json holds NGSolve's solutions (bench `field-reference` makes it); where a peer is installed it
 is also asked live, about sensors that are not in the file.
 """
 
@@ -51,7 +51,7 @@ def disagreement(ours: Any, theirs: Any) -> tuple[float, float, float]:
 class TestReferenceFile:
     def test_says_where_it_comes_from(self) -> None:
         made = provenance()
-        assert made["command"] == "python bench/field_reference.py --write"
+        assert made["command"] == "python -m bench field-reference --write"
         assert set(made["versions"]) >= {"ngsolve", "numpy", "python"}
         assert made["order"].startswith("degree 12")
         assert made["date"].count("-") == 2

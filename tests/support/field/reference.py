@@ -1,4 +1,4 @@
-"""Committed solutions of the field problems by NGSolve, with their provenance; bench/field_reference.py writes them."""
+"""Committed solutions of the field problems by NGSolve, with their provenance; bench `field-reference` writes them."""
 
 from __future__ import annotations
 

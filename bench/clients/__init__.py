@@ -1,0 +1,1 @@
+"""Benches of the simulated controller with clients that others wrote."""

@@ -1,0 +1,136 @@
+"""Clients that others wrote, against the simulated controller: client x test -> pass or fail, and whose fault it is.
+
+    python -m bench ur-clients [--urcl BUILD [--source SOURCE]] [--rtde-client FOLDER] [--urx FOLDER] [--wheels FOLDER]
+                               [--only WORD,...] [--json] [--markdown FILE]
+
+| option, and environment variable | |
+|---|---|
+| ``--urcl``, URCL_BUILD | build of Universal Robots' C++ client library (github \
+UniversalRobots/Universal_Robots_Client_Library) with ``-DBUILDING_TESTS=ON -DINTEGRATION_TESTS=ON`` |
+| ``--source``, URCL_SOURCE | its source, where that is not the folder above the build |
+| ``--rtde-client``, RTDE_CLIENT | folder of Universal Robots' RTDE_Python_Client_Library; its examples run |
+| ``--urx``, PYTHON_URX | folder of python-urx, with math3d below version 4 beside it or installed |
+| ``--wheels``, UR_RTDE_WHEELS | folder of ur_rtde's wheels, from ``pip download --no-deps ur-rtde==1.5.8 -d FOLDER`` |
+
+Nothing of these is fetched here, and what is not given is skipped, with the reason. The installed ur_rtde needs no
+path and runs always. A test that fails is tried again by itself, with a controller of its own, and its row says so. The
+exit code is 0 where ur_clients_faults.py explains each failure by what is not the controller's fault.
+
+Some tests expect that nothing answers at 192.168.56.100 and .123, and port 80 must be free: where ``unshare``
+(util-linux) can make one, all runs in a network of its own that has nothing but its loopback.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from bench.report import head
+
+from .faults import explain
+from .python import rtde_client, urx
+from .urcl import Trial, urcl
+from .wheels import installed_wheel, wheels
+
+_IN_OWN_NETWORK = "UR_CLIENTS_IN_OWN_NETWORK"  # environment variable that says so
+
+
+def show(trials: Iterable[Trial]) -> list[str]:
+    """Return a table of all trials, and a line of counts for each client."""
+    trials = list(trials)
+    lines = ["| client | pass | fail | skipped | its own fake server or hardware |", "|---|---|---|---|---|"]
+    for client in dict.fromkeys(trial.client for trial in trials):
+        count = Counter(trial.result for trial in trials if trial.client == client)
+        lines.append(f"| {client} | {count['pass']} | {count['fail']} | {count['skip']} | {count['apart']} |")
+    judged = [trial for trial in trials if trial.result in ("pass", "fail")]
+    passed = sum(trial.result == "pass" for trial in judged)
+    if judged:
+        lines += ["", f"{passed} of {len(judged)} pass: {100.0 * passed / len(judged):.1f} %."]
+    lines += ["", "| client | test | result | s | whose fault, and the evidence |", "|---|---|---|---|---|"]
+    for trial in trials:
+        why = trial.why if trial.result != "fail" else explain(trial) or f"not explained: {trial.why}"
+        why = why.replace("|", "/").replace("\n", " ")[:400]
+        lines.append(f"| {trial.client} | {trial.test} | {trial.result} | {trial.seconds:.1f} | {why} |")
+    return lines
+
+
+def enter_own_network() -> None:
+    """Start this program again in a network that has nothing but its loopback, where that is possible."""
+    user = ["--map-root-user"] if os.geteuid() else []  # root stays root, and may give the controller its precedence
+    inner = ["unshare", *user, "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
+    if os.environ.get(_IN_OWN_NETWORK) or shutil.which("unshare") is None or shutil.which("ip") is None:
+        return
+    if subprocess.run([*inner, "true"], capture_output=True, check=False).returncode == 0:
+        os.environ[_IN_OWN_NETWORK] = "1"
+        os.execvp("unshare", [*inner, sys.executable, *sys.argv])
+
+
+def run_all(args: argparse.Namespace) -> Iterator[Trial]:
+    """Run what the options ask for, and say what is skipped."""
+    only = args.only.split(",")
+    if args.urcl is None:
+        skip("Universal Robots' client library", "--urcl BUILD or URCL_BUILD")
+    else:
+        yield from urcl(args.urcl, args.source or args.urcl.parent, only)
+    for name, how, folder, trials in (
+        ("the official RTDE client", "--rtde-client FOLDER or RTDE_CLIENT", args.rtde_client, rtde_client),
+        ("python-urx", "--urx FOLDER or PYTHON_URX", args.urx, urx),
+        ("other versions of ur_rtde", "--wheels FOLDER or UR_RTDE_WHEELS", args.wheels, wheels),
+    ):
+        if folder is None:
+            skip(name, how)
+        elif any(word in name for word in only):
+            yield from trials(folder)
+    if any(word in "ur_rtde wheel" for word in only):
+        yield from installed_wheel()
+
+
+def skip(name: str, how: str) -> None:
+    """Say on one line that a client is skipped, and what it wants."""
+    print(f"skipped: {name}, which nothing here fetches; give {how}", file=sys.stderr)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for option, variable, metavar in (
+        ("--urcl", "URCL_BUILD", "BUILD"),
+        ("--source", "URCL_SOURCE", "SOURCE"),
+        ("--rtde-client", "RTDE_CLIENT", "FOLDER"),
+        ("--urx", "PYTHON_URX", "FOLDER"),
+        ("--wheels", "UR_RTDE_WHEELS", "FOLDER"),
+    ):
+        given = os.environ.get(variable)
+        parser.add_argument(option, type=Path, metavar=metavar, default=Path(given).resolve() if given else None)
+    parser.add_argument(
+        "--only", default="", metavar="WORD,...", help="programs, or clients, whose name has one of these words"
+    )
+    parser.add_argument(
+        "--keep", type=Path, metavar="FILE", help="add each result to this file, and show all that it has"
+    )
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table there too")
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    enter_own_network()
+    trials = []
+    if args.keep and args.keep.exists():
+        trials = [Trial(**json.loads(line)) for line in args.keep.read_text().splitlines()]
+    for trial in run_all(args):
+        trials.append(trial)
+        if args.keep:
+            with args.keep.open("a") as file:
+                file.write(json.dumps(trial._asdict()) + "\n")
+    machine = head("ur_rtde", "urx")
+    if args.json:
+        print(json.dumps({"machine": machine, "trials": [trial._asdict() for trial in trials]}))
+    else:
+        print("\n".join([machine, "", *show(trials)]))
+    if args.markdown:
+        args.markdown.write_text("\n".join(["# UR clients", "", machine, "", *show(trials), ""]))
+    return 1 if any(trial.result == "fail" and not explain(trial) for trial in trials) else 0

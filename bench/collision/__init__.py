@@ -1,0 +1,1 @@
+"""Benches of collisions: force in the physics engine, and push-in."""

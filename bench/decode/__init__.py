@@ -1,0 +1,1 @@
+"""Benches of the decoder, against plants that share no code with it."""

@@ -1,0 +1,157 @@
+"""Cells of bench `decode`: errors of single discs over the Cramer-Rao bound."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tests.support.field.converter_plant import ConverterPlant
+
+from .bound import bound, varied
+from .plants import RADII, SHEETS, STIFFNESSES, SolvedPlants, disc_cases, radius_at, solve_bare
+from .runs import LEARNED, Decoder, Sitting
+
+MATCHED = 2.2  # of the larger untouched drive current
+BASELINES = (0.0, 3e-3, 1e-2)  # ratio; standard deviation of the drift of each sheet since it was learned
+FRAMES = 2  # of a touch; with the second comes its place, and by then the currents may have drifted, as told
+DRIFTS = 6  # drawn at each place; the draws of the noise are shared out among them
+ELLIPSE = 5.991  # chi-squared of two degrees of freedom at 95 %
+
+
+@dataclass
+class Cell:
+    """Errors of many frames in one cell.
+
+    Attributes:
+        sheet, electronics, radius, ka, baseline: of the cell.
+        bound: square root of the mean of the bounds' traces [m].
+        rms: by decoder [m].
+        inside: part of the truths in the 95 % ellipse, by decoder; NaN where it gives none.
+        interval: 95 % interval of that part, by decoder; the frames of a place are no independent draws of it.
+        frames: that were decoded, by decoder, of ``of``.
+    """
+
+    sheet: str
+    electronics: str
+    radius: float
+    ka: float
+    baseline: float
+    bound: float
+    rms: dict[str, float]
+    inside: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    frames: dict[str, int]
+    of: int
+
+
+def electronics(sheet: str) -> dict[str, ConverterPlant]:
+    """Return the electronics that a sheet is measured with."""
+    plant = SHEETS[sheet]
+    mean = 0.5 * (plant.radius1 + plant.radius2)
+    if plant.radius1 != plant.radius2:
+        mean = (plant.radius2 - plant.radius1) / math.log(plant.radius2 / plant.radius1)
+    squares = plant.slant / (plant.wrap * mean)
+    drive = 2.5 / min(plant.upper * squares, plant.lower / squares)
+    return {
+        "12 bit, 20 mA": ConverterPlant(),
+        "12 bit, matched": ConverterPlant(full_scale=MATCHED * drive),
+        "16 bit, matched": ConverterPlant(bits=16, full_scale=MATCHED * drive),
+    }
+
+
+def measure(
+    plants: SolvedPlants,
+    decoders: list[Decoder],
+    sheet: str,
+    name: str,
+    baselines: tuple[float, ...],
+    places: int,
+    draws: int,
+    radii: tuple[float, ...] = RADII,
+    stiffnesses: tuple[float, ...] = STIFFNESSES,
+) -> list[Cell]:
+    """Measure the cells of one sensor and one electronics."""
+    circuit, plant = electronics(sheet)[name], SHEETS[sheet]
+    rng = np.random.default_rng(11)
+    still = circuit.exact(plants.admittance(plant, ()))
+    sittings: list[Sitting] = []
+    keys: list[tuple[float, float, float, np.ndarray, tuple[float, float]]] = []
+    for radius in radii:
+        for ka in stiffnesses:
+            for case in disc_cases(sheet, radius, ka, places):
+                solved, patch = varied(plants, case), case.patches[0]
+                exact = circuit.exact(solved[0])
+                for baseline in baselines:
+                    alone = [math.sqrt((circuit.noise**2 + 1.0 / 12.0) / LEARNED) / still[k] for k in (5, 8)]
+                    known = math.hypot(alone[0], baseline), math.hypot(alone[1], baseline)
+                    least = bound(circuit, solved, known, FRAMES)
+                    drifts = min(DRIFTS, draws) if baseline else 1
+                    for _ in range(drifts):
+                        off = rng.normal(0.0, baseline, 2) if baseline else np.zeros(2)
+                        before = replace(plant, upper=plant.upper * (1.0 + off[0]), lower=plant.lower * (1.0 + off[1]))
+                        untouched = circuit.exact(solve_bare(before))
+                        touches = circuit.counts(np.repeat(exact[None], draws // drifts, 0), FRAMES, rng)
+                        learned = circuit.counts(untouched, LEARNED, rng)
+                        sittings.append(Sitting(plant, circuit, learned, touches, baseline))
+                        keys.append((radius, ka, baseline, least, (patch.u, patch.phi)))
+    answers = {decoder.name: decoder.decode(sittings) for decoder in decoders}
+    return _gather(sheet, name, keys, answers)
+
+
+def _gather(sheet: str, name: str, keys: list, answers: dict[str, list[dict[str, np.ndarray]]]) -> list[Cell]:
+    cells: dict[tuple[float, float, float], list[int]] = {}
+    for number, key in enumerate(keys):
+        cells.setdefault(key[:3], []).append(number)
+    found = []
+    for (radius, ka, baseline), numbers in cells.items():
+        trace = math.sqrt(np.mean([np.trace(keys[n][3]) for n in numbers]))
+        rms, inside, interval, frames = {}, {}, {}, {}
+        for decoder, said in answers.items():
+            errors, held, count = [], [], 0
+            places: dict[tuple[float, float], list[np.ndarray]] = {}
+            for n in numbers:
+                u, phi = keys[n][4]
+                answer = {k: v[:, -1] for k, v in said[n].items() if v.ndim == 2}
+                seen = answer["touched"]
+                du = answer["u"][seen] - u
+                ds = radius_at(SHEETS[sheet], u) * (answer["phi"][seen] - phi)
+                errors.append(du**2 + ds**2)
+                count += du.size
+                uu, us, ss = (answer[k][seen] for k in ("uu", "us", "ss"))
+                determinant = uu * ss - us * us
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    held.append((ss * du**2 - 2 * us * du * ds + uu * ds**2) / determinant)
+                places.setdefault((u, phi), []).append(held[-1] < ELLIPSE)
+            squares, distances = np.concatenate(errors), np.concatenate(held)
+            rms[decoder] = math.sqrt(squares.mean()) if squares.size else math.nan
+            inside[decoder] = float(np.mean(distances < ELLIPSE)) if np.isfinite(distances).any() else math.nan
+            interval[decoder] = spread_of([np.concatenate(part) for part in places.values()])
+            frames[decoder] = count
+        of = sum(answers[next(iter(answers))][n]["touched"].shape[0] for n in numbers)
+        found.append(Cell(sheet, name, radius, ka, baseline, trace, rms, inside, interval, frames, of))
+    return found
+
+
+def spread_of(places: list[np.ndarray]) -> tuple[float, float]:
+    """Return the 95 % interval of a part (Wilson), where the frames of each place may hang together.
+
+    As many frames count as independent as explain how far the parts of the places differ.
+
+    Args:
+        places: of each, which frames are of that part.
+    """
+    frames = np.concatenate(places)
+    count, part = frames.size, float(frames.mean()) if frames.size else math.nan
+    if not count:
+        return 0.0, 1.0
+    alone = part * (1.0 - part) / count
+    if alone and len(places) > 1:
+        means, share = np.array([p.mean() for p in places]), np.array([p.size for p in places]) / count
+        between = float((share**2 * (means - part) ** 2).sum()) * len(places) / (len(places) - 1)
+        count /= max(1.0, between / alone)
+    z = 1.96
+    middle = (part + 0.5 * z * z / count) / (1.0 + z * z / count)
+    half = z * math.sqrt(part * (1.0 - part) / count + 0.25 * (z / count) ** 2) / (1.0 + z * z / count)
+    return middle - half, middle + half

@@ -1,0 +1,184 @@
+"""Faults of the virtual skin: is each named correctly, and is none taken for "no touch"?
+
+    python -m bench decode-faults COUNT ANSWERS.json [FIRST]
+    python -m bench decode-fault-table ANSWERS.json... --write     # into bench/RESULTS-decode.md
+
+A case is a sensor with its electronics, a fault, the frame at which it begins, and a touch that begins before, with or
+after it, or none. The last name counts: the first frame that shows something stops the arm, the name may follow. Right
+is a name that docs/look-up/wire-format.md has for the fault, or, where that page says so, a touch.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from coneskin.core.errors import SkinConnectionError
+from coneskin.geometry.frustum import Frustum
+from coneskin.skin.detection.events import SkinFault, TouchBegan
+from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.stream import TouchStream
+from coneskin.skin.electronics import Polarity
+from coneskin.skin.matched_electronics import match_electronics
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.virtual.fault_injection import FaultInjection
+from coneskin.skin.virtual.imperfections import Imperfections
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+from coneskin.skin.virtual.skin import VirtualSkin
+
+from .fault_kinds import FaultCase, draw_kind
+
+BEGINS = 70, 90  # frame
+NAMED = 230  # frames after fault and touch, in which the name comes
+TIMED = 3  # one in so many cases is compared with a healthy sensor, frame by frame
+SILENCE = 0.03  # s
+STUCK = 25  # frames in a row that count as stuck here
+CONES = {
+    "forearm": Frustum(0.0375, 0.0375, 0.24, math.radians(350)),
+    "cone": Frustum(0.03, 0.06, 0.15, math.radians(340)),
+    "upper arm": Frustum(0.054, 0.054, 0.434),
+}
+_REST = 0.005  # m; a certain place that is farther off is a wrong one
+
+
+@dataclass
+class Account:
+    """What a detector said of a case."""
+
+    first: str = ""
+    last: str = ""
+    first_frame: int = -1  # that reported anything at all
+    named_frame: int = -1  # of the last name
+    began: bool = False
+    place_off: float = 0.0  # m, of a place that it called certain
+
+
+def sensor_of(rng: random.Random) -> Sensor:
+    """Return one of the sensors, with one of the polarities, of 12 or 16 bits."""
+    cone = CONES[rng.choice(list(CONES))]
+    polarity = Polarity(rng.choice(("B", "A")), rng.choice(("C", "D")))
+    plain = Sensor(cone, polarity=polarity)
+    parts = match_electronics(plain.radial_ohms, plain.angular_ohms)
+    return replace(plain, electronics=replace(parts, adc_bits=rng.choice((12, 12, 16))))
+
+
+def touch_of(rng: random.Random, sensor: Sensor, begins: int, case: FaultCase) -> ScriptedTouch | None:
+    """Return a firm touch, or none where the fault shows without."""
+    if rng.random() >= 0.6 and case.shows:
+        return None
+    when = 1e-3 * (begins + rng.choice((-40, -10, 10, 40, 80) if case.shows else (10, 40, 80)))
+    cone = sensor.frustum
+    place = rng.uniform(0.01, cone.slant - 0.01), rng.uniform(0.1, cone.wrap - 0.1)
+    force = math.exp(rng.uniform(math.log(3.0), math.log(40.0)))
+    ends = when + 0.12 if case.released else rng.choice((when + 0.12, 1.0))  # s; it is released, or it stays
+    return ScriptedTouch(when, ends, *place, force=force, rise=0.001)
+
+
+def listen(sensor: Sensor, skin: VirtualSkin, touch: ScriptedTouch | None) -> Account:
+    """Return what a detector says of a skin."""
+    stream, said = TouchStream([sensor], DetectorSettings(stuck_frames=STUCK)), Account()
+    now, frame = 0.0, -1
+    detector = stream.detectors[0]
+    radius = max(sensor.frustum.radius1, sensor.frustum.radius2)
+    try:
+        for frame, (time, data) in enumerate(skin.packets()):
+            now = time
+            for event in (*(stream.feed(data, now) if data else ()), *stream.silence(now, SILENCE)):
+                if isinstance(event, SkinFault):
+                    said.first = said.first or event.fault.name
+                    if event.fault.name != said.last:
+                        said.last, said.named_frame = event.fault.name, frame
+                said.began = said.began or isinstance(event, TouchBegan)
+                said.first_frame = frame if said.first_frame < 0 else said.first_frame
+            reading = detector.reading_now
+            if touch is not None and reading is not None and reading.location_valid and detector.fault is None:
+                off = math.hypot(reading.u - touch.u, radius * (reading.phi - touch.phi))
+                said.place_off = max(said.place_off, off)
+    except SkinConnectionError:
+        if now < skin.duration - 0.002:
+            said.first = said.last = said.last or "unplugged"
+            said.first_frame = said.first_frame if said.first_frame >= 0 else frame
+    return said
+
+
+@dataclass
+class Outcome:
+    """A case and what came of it.
+
+    Attributes:
+        case: the fault.
+        said: of it by the detector.
+        verdict: right, wrong, or silent.
+        late: frames by which a touch was shown later than by a healthy sensor; None where that was not compared.
+    """
+
+    case: FaultCase
+    said: Account
+    verdict: str
+    late: int | None = None
+
+
+def play(number: int) -> Outcome:
+    """Run a case."""
+    rng = random.Random(f"fault {number}")
+    sensor = sensor_of(rng)
+    begins = rng.randint(*BEGINS)
+    version = rng.choice((1, 2, 3))  # 3: version 2 with the driven electrodes' potentials
+    case = draw_kind(rng, number, sensor, begins, driven=version == 3)
+    touch = touch_of(rng, sensor, begins, case)
+
+    def skin(faults: FaultInjection, duration: float) -> VirtualSkin:
+        return VirtualSkin(
+            sensor,
+            [touch] if touch else [],
+            seed=number,
+            faults=faults,
+            model="ladder",
+            duration=duration,
+            imperfections=Imperfections(noise_counts=case.noise),
+            wire_version=min(version, 2),
+            driven_potentials=version == 3,
+        )
+
+    ends = max(1e-3 * begins, touch.start if touch else 0.0) + 1e-3 * NAMED
+    said = listen(sensor, skin(case.faults, ends), touch)
+    outcome = Outcome(case, said, case.judge(said.last, said.began, said.place_off > _REST, touch is not None))
+    if touch is not None and not case.swallows and number % TIMED == 0:
+        until = 1e-3 * math.ceil(1e3 * touch.start + 8.0)
+        healthy = listen(sensor, skin(FaultInjection(), until), None)
+        shown = said.first_frame if said.first_frame >= 0 else NAMED
+        outcome.late = max(0, shown - healthy.first_frame)
+    return outcome
+
+
+def main() -> None:
+    found: dict[str, dict[str, int]] = {}
+    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    for number in range(first, first + int(sys.argv[1])):
+        try:
+            outcome = play(number)
+        except ArithmeticError as error:  # a decoder that crashes is a finding, not the end of the run
+            row, key = found.setdefault("any", {}), f"crash: {error!r}"
+            row[key] = row.get(key, 0) + 1
+            row.setdefault("first " + key, number)
+            continue
+        said, late = outcome.said, outcome.late
+        row = found.setdefault(outcome.case.name, {})
+        key = f"{outcome.verdict}: {said.last or ('touch' if said.began else 'nothing')}"
+        row[key] = row.get(key, 0) + 1
+        row.setdefault("first " + key, number)
+        if late is not None:
+            row["timed"] = row.get("timed", 0) + 1
+        if late:
+            row["late"] = row.get("late", 0) + 1
+            row["latest"] = max(row.get("latest", 0), late)
+        if said.first != said.last:
+            row["renamed"] = row.get("renamed", 0) + 1
+            row["frames"] = max(row.get("frames", 0), said.named_frame - said.first_frame)
+        if number % 100 == 0:
+            Path(sys.argv[2]).write_text(json.dumps(found, indent=1))
+    Path(sys.argv[2]).write_text(json.dumps(found, indent=1))

@@ -1,0 +1,168 @@
+"""Presses by more than one contact in bench `decode`: is any certain place far from what presses?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from tests.support.field.flat_plant import FlatPlant, PressedPatch
+
+from .cells import electronics
+from .plants import SEVERAL, SHEETS, Case, SolvedPlants, disc_cases, several_cases
+from .runs import LEARNED, Decoder, Sitting
+
+FRAMES = 20
+DANGEROUS = math.radians(20.0)
+_AT_ONCE = 500  # sittings in one file
+
+
+@dataclass
+class Several:
+    """Presses of one kind, by one decoder.
+
+    Attributes:
+        kind: of the press.
+        cases: how many.
+        touched: of them that were a touch.
+        any_off: with a valid frame whose normal is more than 20 deg off any contact's.
+        all_off: ... off all of them.
+        valid: with any valid frame.
+        worst: numbers of the cases that are off.
+    """
+
+    kind: str
+    cases: int
+    touched: int
+    any_off: int
+    all_off: int
+    valid: int
+    worst: list[int]
+
+
+def off_normals(plant: FlatPlant, phi: np.ndarray, patches: tuple[PressedPatch, ...]) -> np.ndarray:
+    """Return the angles between the normals at places and those at the contacts [rad], shape (contacts, ...)."""
+    part = ((plant.radius2 - plant.radius1) / plant.slant) ** 2
+    turns = np.array(
+        [phi - (p.phi if 0.0 <= p.phi <= plant.wrap else np.clip(p.phi, 0.0, plant.wrap)) for p in patches]
+    )
+    return np.arccos(np.clip(part + (1.0 - part) * np.cos(turns), -1.0, 1.0))
+
+
+def measure(plants: SolvedPlants, decoders: list[Decoder], count: int, electric: str) -> dict[str, list[Several]]:
+    """Measure so many presses, of every kind on every sensor in turn."""
+    rng = np.random.default_rng(5)
+    found: dict[str, dict[str, Several]] = {
+        d.name: {k: Several(k, 0, 0, 0, 0, 0, []) for k in SEVERAL} for d in decoders
+    }
+    learned = {}
+    for name, plant in SHEETS.items():
+        circuit = electronics(name)[electric]
+        learned[name] = circuit, circuit.counts(circuit.exact(plants.admittance(plant, ())), LEARNED, rng)
+    cases = list(islice(several_cases(count), count))
+    for start in range(0, count, _AT_ONCE):
+        part = cases[start : start + _AT_ONCE]
+        by_sheet: dict[str, list[int]] = {}
+        for number, case in enumerate(part):
+            by_sheet.setdefault(case.sheet, []).append(number)
+        sittings = []
+        for name, numbers in by_sheet.items():
+            circuit, untouched = learned[name]
+            exact = np.array([circuit.exact(plants.of(part[n])) for n in numbers])
+            sittings.append(Sitting(SHEETS[name], circuit, untouched, circuit.counts(exact, FRAMES, rng)))
+        for decoder in decoders:
+            answers = decoder.decode(sittings)
+            for numbers, answer in zip(by_sheet.values(), answers, strict=True):
+                for row, n in enumerate(numbers):
+                    _count(
+                        found[decoder.name][part[n].kind], part[n], {k: v[row] for k, v in answer.items()}, start + n
+                    )
+    return {name: list(kinds.values()) for name, kinds in found.items()}
+
+
+def _count(into: Several, case: Case, said: dict[str, np.ndarray], number: int) -> None:
+    off = off_normals(SHEETS[case.sheet], said["phi"], case.patches) > DANGEROUS
+    valid = said["valid"]
+    into.cases += 1
+    into.touched += bool(said["touched"].any())
+    into.valid += bool(valid.any())
+    into.any_off += bool((valid & off.any(axis=0)).any())
+    into.all_off += bool((valid & off.all(axis=0)).any())
+    if (valid & off.any(axis=0)).any():
+        into.worst.append(number)
+
+
+@dataclass
+class Power:
+    """How often contacts are told from one disc.
+
+    Attributes:
+        what: the contacts.
+        electronics: of the sensor.
+        frames: that were averaged.
+        share: of the touches that are called not one disc, by decoder.
+        valid: of the touches whose place is certain, by decoder.
+        of: touches.
+    """
+
+    what: str
+    electronics: str
+    frames: int
+    share: dict[str, float]
+    valid: dict[str, float]
+    of: int
+
+
+def power(plants: SolvedPlants, decoders: list[Decoder], places: int, draws: int) -> list[Power]:
+    """Measure the power against two fingers 20 mm apart, the false alarms of one disc, and ellipses."""
+    plant, found = SHEETS["UR5e"], []
+    rng = np.random.default_rng(6)
+    still = plants.admittance(plant, ())
+    groups = {
+        "two discs of 5 mm, 20 mm apart": _pairs(plant, places),
+        "one disc": [
+            c for radius in (3e-3, 15e-3) for ka in (1.0, math.inf) for c in disc_cases("UR5e", radius, ka, places)
+        ],
+        "ellipse 20 x 8 mm, ka 3": _ellipses(places),
+    }
+    for electric, frames in (
+        ("12 bit, matched", 50),
+        ("12 bit, 20 mA", 50),
+        ("16 bit, matched", 1),
+        ("16 bit, matched", 20),
+    ):
+        circuit = electronics("UR5e")[electric]
+        for what, cases in groups.items():
+            exact = np.repeat(np.array([circuit.exact(plants.of(case)) for case in cases]), draws, axis=0)
+            untouched = circuit.counts(circuit.exact(still), LEARNED, rng)
+            sitting = Sitting(plant, circuit, untouched, circuit.counts(exact, frames, rng))
+            share, valid = {}, {}
+            for decoder in decoders:
+                (answer,) = decoder.decode([sitting])
+                share[decoder.name] = float(answer["notone"][:, -1].mean())
+                valid[decoder.name] = float(answer["valid"][:, -1].mean())
+            found.append(Power(what, electric, frames, share, valid, len(exact)))
+    return found
+
+
+def _pairs(plant: FlatPlant, places: int) -> list[Case]:
+    found = []
+    for k in range(places):
+        turn, u, phi = math.pi * k / places, 0.06 + 0.12 * (k * 0.618 % 1.0), 1.0 + 4.0 * (k * 0.382 % 1.0)
+        half_u, half_phi = 0.01 * math.cos(turn), 0.01 * math.sin(turn) / plant.radius1
+        pair = tuple(PressedPatch.disc(u + s * half_u, phi + s * half_phi, 5e-3, 1.0 + k % 3) for s in (-1.0, 1.0))
+        found.append(Case("pair", "UR5e", pair))
+    return found
+
+
+def _ellipses(places: int) -> list[Case]:
+    return [
+        Case(
+            "ellipse",
+            "UR5e",
+            (PressedPatch(0.12, 1.0 + 4.0 * (k * 0.382 % 1.0), 0.02, 0.008, 3.0, math.pi * k / places),),
+        )
+        for k in range(places)
+    ]

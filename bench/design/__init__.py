@@ -1,0 +1,1 @@
+"""Benches of the fit of sheets to links."""

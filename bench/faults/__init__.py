@@ -1,0 +1,1 @@
+"""Fault campaign: faults at random times, and whether the arm stands in time."""

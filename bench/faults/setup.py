@@ -1,0 +1,128 @@
+"""Setup of a trial of the fault campaign, the limits that all share, and the outcome."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from coneskin.testing.forearm import ESCALATE, start_with
+
+GOAL = start_with(140.0)
+SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
+SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
+STUCK = 200  # frames
+RETREAT = 'kind = "retreat"\ndistance_mm = 60'
+PATH = 'kind = "retreat"\ndistance_mm = 60\nfallback = "path"'
+COMPLY = 'kind = "comply"\ndistance_mm = 100'
+SLOW = 'kind = "slow"\nslow_to = 0.5\ntime_budget_s = 30'
+LONG_SLOW = f"{SLOW}\npress_mm = 30"  # an arm that goes on until the place of the touch is certain
+MONITORING = (
+    "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nstuck_frames = 200\nprogram_silence_ms = 250"
+)
+SECOND_SKIN = """
+[[link]]
+name = "upper_arm"
+[[link.sensor]]
+id = 1
+radius1_mm = 48
+radius2_mm = 48
+height_mm = 260
+xyz_mm = [0, 0, 80]
+"""
+#: s; v / a and four times escalate_ms, which docs/safety.md promises once the fault is known
+STOP = SPEED / DECELERATION + 4.0 * ESCALATE
+CLOCK = time.monotonic
+
+
+def give_precedence(task: int) -> None:
+    """Let a process or a thread run before all but the guard, as hardware does; nothing where that is not allowed."""
+    with suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, task, -10)
+        if os.getsid(task) == task:  # Linux may first divide its time among sessions: autogroup in sched(7)
+            Path(f"/proc/{task}/autogroup").write_text("-10")
+
+
+class MachineWatch:
+    """Watch that sees for how long the machine does not let a process run which only sleeps; used in a ``with``.
+
+    Attributes:
+        late: the longest time so far [s].
+    """
+
+    def __init__(self) -> None:
+        self.late = 0.0
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="machine watch")
+
+    def __enter__(self) -> MachineWatch:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        before = CLOCK()
+        while not self._over.wait(0.01):
+            now = CLOCK()
+            self.late, before = max(self.late, now - before - 0.01), now
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Setup of a trial, where it is not the usual one.
+
+    Attributes:
+        reaction: lines of [reaction].
+        sheets: model of the skin's sheets; a ladder is shorted out by a contact at each end.
+        skins: sensors: on the forearm, and on the upper arm.
+        arm: more lines of [arm].
+        mover: what moves an externally controlled arm: "" for one program, "heartbeat" for one that ends where the
+            guard is gone, "driver servoj" or "driver speedj" for bench/faults/external_control_peer.py, or arguments of
+            bench/faults/restarter.py.
+        manners: of the program, words of bench/faults/program.py.
+        files: that lie in the program's current folder: name -> text.
+    """
+
+    reaction: str = RETREAT
+    sheets: str = "ladder"
+    skins: int = 1
+    arm: str = ""
+    mover: str = ""
+    manners: tuple[str, ...] = ()
+    files: tuple[tuple[str, str], ...] = ()
+
+
+USUAL = Setup()
+
+
+@dataclass
+class Outcome:
+    """Outcome of a trial.
+
+    Attributes:
+        seconds: from the fault to the measured standstill; None where there was none to measure.
+        failures: what must not be, one line each.
+        why: reason that the guard reported.
+        machine_late: the longest time for which the machine did not let a process run that only sleeps [s].
+        skin_late: how late the machine had made the frames of the virtual skin before the fault [s].
+        repeated: trials that were thrown away for that.
+        discarded: what had failed in them.
+        held_up: the longest time that the guard's loop was held up, as it reports itself [s].
+        pushed_in: how far the surface went towards a contact beyond what a bare stop does, the worst [m].
+    """
+
+    seconds: float | None = None
+    held_up: float = 0.0
+    skin_late: float = 0.0
+    machine_late: float = 0.0
+    repeated: int = 0
+    discarded: list[str] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
+    why: str = ""
+    pushed_in: float | None = None

@@ -1,0 +1,1 @@
+"""Benches of the field model, beside other solvers."""

@@ -1,0 +1,187 @@
+"""Error against run time of the field model, beside NGSolve, scikit-fem and pyEIT, all in one run on one thread.
+
+    python -m bench field                      # about five minutes
+    python -m bench field --quick              # half a minute, fewer configurations
+    python -m bench field --plot field.png     # the curves as a picture too
+
+An error is the largest error of an electrode's potential in the radial and the angular phase, at 1 V of drive,
+against the committed reference (degree 12, bench `field-reference`). A time is the median processor time of repeated
+solutions of both phases, which on one thread is the run time of an idle machine; the peers' is given with and without
+the making of the mesh. The ratio compares the cheapest configuration of each solver that reaches an error. Without a
+peer installed the rest is still printed.
+"""
+
+from __future__ import annotations
+
+# isort: split
+import argparse
+import json
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.report import head
+from tests.support.field.port_solution import port_solution
+from tests.support.field.problems import Problem
+from tests.support.field.reference import Reference, load_references, provenance
+from tests.support.field.solution import solve_discs, solve_general
+
+from . import ours as field_ours
+from .tables import Run, draw, print_agreement, print_table, print_work, show_time
+
+ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
+CELLS = ((8, 2), (12, 3), (16, 4), (24, 5), (32, 7), (48, 9), (64, 11))
+
+
+def installed() -> list[Any]:
+    """The peers that are there; all of them need Netgen's meshes."""
+    found: list[Any] = []
+    if find_spec("ngsolve") is None:
+        return found
+    from tests.support.field import ngsolve_peer
+
+    found.append(ngsolve_peer)
+    if find_spec("skfem") is not None:
+        from tests.support.field import skfem_peer
+
+        found.append(skfem_peer)
+        if find_spec("pyeit") is not None:
+            from tests.support.field import pyeit_peer
+
+            found.append(pyeit_peer)
+    return found
+
+
+def repeat(solve: Callable[[], Any], budget: float, least: int = 3) -> tuple[float, Any]:
+    """Median seconds of a call, after one that is not counted."""
+    result = solve()
+    spent: list[float] = []
+    while len(spent) < least or sum(spent) < budget:
+        start = time.process_time()
+        result = solve()
+        spent.append(time.process_time() - start)
+    return statistics.median(spent), result
+
+
+def our_runs(reference: Reference, quick: bool) -> Iterator[Run]:
+    """The disc solver at every order, single and batched, and the general method on ever smaller cells."""
+    problem = reference.problem
+    calls: list[tuple[str, str, Any]] = []
+    if problem.discs and not problem.name.startswith("clipped"):
+        for order in ORDERS[:9] if quick else ORDERS:
+            batch = field_ours.Batch(problem, order, count=400 if quick else 2000)
+            calls.append(("coneskin batched", f"M={order}", batch))
+            calls.append(("coneskin single", f"M={order}", field_ours.Single(problem, order)))
+    for directions, rings in CELLS[:5:2] if quick else CELLS:
+        general = field_ours.General(problem, directions, rings)
+        calls.append(("coneskin general", f"{directions}x{rings}", general))
+    for solver, configuration, call in calls:
+        seconds, readings = repeat(call, 0.05 if quick else 0.3)
+        error = field_ours.error(readings, reference.ports)
+        yield Run(problem.name, solver, configuration, error, seconds / call.count, seconds / call.count)
+
+
+def peer_runs(reference: Reference, peers: list[Any], quick: bool) -> Iterator[Run]:
+    """Every installed peer over its degrees and meshes."""
+    problem = reference.problem
+    for module in peers:
+        for label, call in configurations(module, problem, quick):
+            solved = call()
+            first = sum(solved.seconds.values())
+            runs = [call() for _ in range(2 if quick else 5)] if first < 1.0 else [solved]
+            totals = [(sum(r.seconds.values()), r.seconds["mesh"]) for r in runs]
+            voltages = port_solution(solved.energies, problem.load).voltages
+            error = float(np.abs(voltages - reference.ports.voltages).max())
+            whole = statistics.median(total for total, _ in totals)
+            yield Run(
+                problem.name,
+                module.NAME,
+                label,
+                error,
+                whole,
+                statistics.median(total - mesh for total, mesh in totals),
+            )
+
+
+def configurations(module: Any, problem: Problem, quick: bool) -> Iterator[tuple[str, Callable[[], Any]]]:
+    """Degrees and mesh sizes of a peer; scikit-fem and pyEIT have no meshes of cut shapes here."""
+    if module.NAME == "NGSolve":
+        for size in (0.5,) if quick else (1.0, 0.5, 0.35, 0.25, 0.15):
+            for order in (1, 2, 3, 4, 6, 8) if quick else range(1, 11 if size > 0.3 else 7):
+                yield f"p={order} h={size}", partial(module.solve, problem, order, size, 2 * size)
+    elif problem.patches or problem.name.startswith("clipped"):
+        return
+    elif module.NAME == "scikit-fem":
+        for degree in (1, 2, 3, 4):
+            for size in (0.3, 0.1) if quick else (0.5, 0.3, 0.2, 0.14, 0.1, 0.07, 0.05, 0.035):
+                yield f"p={degree} h={size}", partial(module.solve, problem, degree, size, 2 * size)
+    else:
+        for size in (0.2, 0.1) if quick else (0.4, 0.2, 0.1, 0.05, 0.025, 0.0125):
+            yield f"p=1 h={size}", partial(module.solve, problem, size, 2 * size)
+
+
+def print_goals(references: list[Reference], quick: bool) -> None:
+    """The solver at its own choice of order for 1e-9, and a map of the whole sheet."""
+    rows = []
+    for reference in references:
+        if not reference.problem.discs or reference.problem.name.startswith("clipped"):
+            continue
+        row = [reference.problem.name]
+        for kind in (field_ours.Batch, field_ours.Single):
+            call = kind(reference.problem, None, 1e-9)
+            seconds, readings = repeat(call, 0.1 if quick else 0.5, least=1 if quick else 3)
+            row += [show_time(seconds / call.count), f"{field_ours.error(readings, reference.ports):.1e}"]
+        sheet = field_ours.Map(reference.problem)
+        seconds, _ = repeat(sheet, 0.0, least=1)
+        rows.append([*row, f"{show_time(seconds)} for {sheet.count}"])
+    print("\nThe solver's own choice of order at tolerance 1e-9, and a map of discs all over the sheet")
+    print_table(["problem", "batched", "error", "single", "error", "map"], rows)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer configurations, about half a minute")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the curves (needs matplotlib)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every run")
+    arguments = parser.parse_args()
+    peers = installed()
+    if peers:
+        import ngsolve
+
+        ngsolve.SetNumThreads(1)
+    print(head("numpy", "scipy", "ngsolve", "scikit-fem", "pyeit") + "; one thread used")
+    made = provenance()
+    print(f"reference: {made['command']}, NGSolve {made['versions']['ngsolve']}, {made['date']}; {made['order']}")
+    references = load_references()
+    general = [r for r in references if r.problem.patches or r.problem.name.startswith("clipped")]
+    discs = [r for r in references if r not in general]
+    print_agreement(discs, solve_discs, "discs at the order that the solver chooses")
+    print_agreement(general, solve_general, "general method with its default cells")
+    if not peers:
+        print("\nno peer is installed, so no ratio is printed: pip install 'coneskin[bench]'")
+    measured = [*discs[:3], *general[:3]]
+    if arguments.quick:
+        measured = [discs[0], discs[2], general[0]]
+    runs: list[Run] = []
+    for reference in measured:
+        print(f"measuring '{reference.problem.name}' ...", file=sys.stderr)
+        runs += our_runs(reference, arguments.quick)
+        runs += peer_runs(reference, peers, arguments.quick)
+    print_work(runs)
+    print_goals(measured, arguments.quick)
+    for module in peers:
+        print(f"{module.NAME}: {module.LIMITS}")
+    if arguments.plot:
+        draw(runs, arguments.plot)
+        print(f"curves: {arguments.plot}")
+    if arguments.json:
+        arguments.json.write_text(json.dumps([asdict(r) for r in runs], indent=1))
+    return 0

@@ -1,0 +1,1 @@
+"""Benches of the contact model and its integrator."""

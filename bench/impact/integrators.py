@@ -1,0 +1,244 @@
+"""Integrators of a contact: error against run time, ours and scipy's Radau, BDF and LSODA; and how stable ours is.
+
+    python -m bench impact-integrators              # tables, ten minutes
+    python -m bench impact-integrators --quick      # one case
+    python -m bench impact-integrators --last       # the one of 0.1 kg, a minute
+    python -m bench impact-integrators --stability  # the extremes only
+
+Error: of the peak force and of the force at the end, relative to the peak, against 60 digits (``impact_reference``).
+scipy's are given what the purpose-made one has: they are restarted at each event, which they locate themselves
+(``solve_ivp`` with terminal events), and try tolerances from 1e-3 to 1e-11; of those that reach an error the fastest
+counts.
+Time: of the processor, the lesser of two runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from bench.report import head
+from coneskin.impact.permissible_speed.taylor_integrator import integrate
+from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
+from coneskin.skin.padding import Padding
+
+from .reference import closed_form, reference
+
+HAND = StruckBody(0.6, tissue=75e3, support=20e3, damping=2.0 * 0.3 * math.sqrt(20e3 * 0.6))
+TURN = 2.0 * math.pi * 16.0
+METHODS = ("Radau", "BDF", "LSODA")
+TOLERANCES = tuple(10.0**-n for n in (3, 5, 7, 9, 11))
+
+
+def driven(speed: float, mass: float = 8.0) -> DrivenArm:
+    """An arm on its servo that brakes 12 ms after the layers close."""
+    return DrivenArm(speed, mass, mass * TURN**2, 2.0 * mass * TURN, 0.012, 3.0)
+
+
+CASES: dict[str, tuple[TwoMassContact, float]] = {
+    "free hand, soft, 0.2 m/s": (TwoMassContact(driven(0.2), replace(HAND, support=0.0, damping=0.0)), 0.1),
+    "held hand, braked to rest": (TwoMassContact(driven(0.2), HAND), 0.5),
+    "held hand, bottoms out": (TwoMassContact(driven(0.5), HAND), 0.5),
+    "wall, 1e6 N/m": (TwoMassContact(driven(0.5), StruckBody(math.inf)), 0.1),
+    "wall, 1e7 N/m": (TwoMassContact(driven(0.5), StruckBody(math.inf), Padding(hard_stiffness=1e7)), 0.1),
+    "free 1 kg, 1e7 N/m, 2 m/s": (TwoMassContact(driven(2.0), StruckBody(1.0), Padding(hard_stiffness=1e7)), 0.05),
+    "free 1 g, 1e7 N/m, 5 m/s": (TwoMassContact(driven(5.0), StruckBody(1e-3), Padding(hard_stiffness=1e7)), 0.01),
+    "held 0.1 kg, 1e7 N/m": (
+        TwoMassContact(driven(0.5), StruckBody(0.1, support=50e3, damping=20.0), Padding(hard_stiffness=1e7)),
+        0.1,
+    ),
+}
+
+
+def by_scipy(contact: TwoMassContact, horizon: float, method: str, tolerance: float) -> tuple[float, float]:
+    """Return peak force and force at the horizon by one of scipy's, restarted at each event."""
+    arm, body, law = contact.arm, contact.body, contact.law
+    m1 = 0.0 if math.isinf(arm.mass) else 1.0 / arm.mass
+    m2 = 0.0 if math.isinf(body.mass) else 1.0 / body.mass
+    state = {"mode": "soft", "braked": math.inf, "stands": math.inf, "closed": False}
+    drive = [0.0, 0.0, arm.speed, 0.0]  # since when; p, p', braking then
+
+    def force(s: float, w: float) -> float:
+        if state["mode"] == "free":
+            return 0.0
+        e = law.soft * s if state["mode"] == "soft" else law.end_force + law.hard * (s - law.end)
+        return e * (1.0 + law.loss * w)
+
+    def slope(t: float, y: Sequence[float]) -> list[float]:
+        s, w, x, v = y
+        since = t - drive[0]
+        p = drive[1] + since * (drive[2] - 0.5 * drive[3] * since)
+        d = drive[2] - drive[3] * since
+        f = force(s, w)
+        a1 = m1 * (arm.stiffness * (p - s - x) + arm.damping * (d - w - v) - f) if m1 else -drive[3]
+        a2 = m2 * (f - body.support * x - body.damping * v)
+        return [w, a1 - a2, v, a2]
+
+    def event(of: Callable[[Sequence[float]], float], direction: float) -> Any:
+        def found(_: float, y: Sequence[float]) -> float:
+            return of(y)
+
+        found.terminal = True  # type: ignore[attr-defined]
+        found.direction = direction  # type: ignore[attr-defined]
+        return found
+
+    def peaks(t: float, y: Sequence[float]) -> float:
+        """Growth of the force: with damping, it is greatest before the compression is."""
+        k = {"free": 0.0, "soft": law.soft, "hard": law.hard}[str(state["mode"])]
+        bare = force(y[0], 0.0)
+        return k * y[1] * (1.0 + law.loss * y[1]) + bare * law.loss * slope(t, y)[1]
+
+    peaks.direction = -1.0  # type: ignore[attr-defined]
+    t, y, peak, last = 0.0, [0.0, arm.speed, 0.0, 0.0], 0.0, 0.0
+    while t < horizon:
+        end = min(limit for limit in (horizon, state["braked"], state["stands"]) if limit > t)
+        names, events = [], []
+        if state["mode"] == "soft":
+            names, events = ["hard", "free"], [event(lambda y: y[0] - law.end, 1.0), event(lambda y: y[0], -1.0)]
+        elif state["mode"] == "hard":
+            names, events = ["soft"], [event(lambda y: y[0] - law.end, -1.0)]
+        else:
+            names, events = ["soft"], [event(lambda y: y[0], 1.0)]
+        if not state["closed"]:
+            names.append("close")
+            events.append(event(lambda y: force(y[0], y[1]) - contact.closing_force, 1.0))
+        events.append(peaks)
+        found = solve_ivp(slope, (t, end), y, method=method, rtol=tolerance, atol=1e-4 * tolerance, events=events)
+        peak = max([peak, *(force(a, b) for a, b in zip(found.y[0], found.y[1], strict=True))])
+        peak = max([peak, *(force(*state_then[:2]) for state_then in found.y_events[-1])])
+        before, t, y = t, float(found.t[-1]), found.y[:, -1].tolist()
+        last = force(y[0], y[1])
+        since = t - drive[0]
+        drive = [
+            t,
+            drive[1] + since * (drive[2] - 0.5 * drive[3] * since),
+            drive[2] - drive[3] * since,
+            drive[3],
+        ]
+        happened = next((n for n, times in zip(names, found.t_events, strict=False) if len(times)), "")
+        if happened == "close":
+            state["closed"], state["braked"] = True, t + arm.reaction
+        elif happened:
+            y[0] = {"hard": law.end, "free": 0.0, "soft": 0.0 if state["mode"] == "free" else law.end}[happened]
+            state["mode"] = happened
+        elif t == state["braked"]:
+            drive[3], state["stands"] = arm.deceleration, t + drive[2] / arm.deceleration
+        elif t == state["stands"]:
+            drive[2] = drive[3] = 0.0
+            if not m1:
+                y[1] = -y[3]
+        if t <= before and not happened:
+            break
+    return peak, last
+
+
+def timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    """Return what it gives, and the lesser processor time of two runs [s]."""
+    best, found = math.inf, None
+    for _ in range(2):
+        begin = time.process_time()
+        found = work()
+        best = min(best, time.process_time() - begin)
+    return found, best
+
+
+def error(peak: float, last: float, exact: dict[str, Any]) -> float:
+    """Return the larger error of peak and last force, relative to the peak."""
+    return float(max(abs(peak - exact["peak"]), abs(last - exact["force"])) / exact["peak"])
+
+
+def compare(name: str, contact: TwoMassContact, horizon: float) -> None:
+    exact = reference(contact, horizon)
+    ours = timed(lambda: integrate(contact, horizon))[1]
+    fine = integrate(contact, horizon)
+    print(f"\n{name}: peak {float(exact['peak']):.6g} N, at {horizon:g} s {float(exact['force']):.6g} N")
+    missed = error(fine.peak, fine.last, exact)
+    print(f"  ours   {1e3 * ours:9.2f} ms   error {missed:.1e}   {len(fine.stretches)} steps")
+    for method in METHODS:
+        points = []
+        for tolerance in TOLERANCES:
+            try:
+                (peak, last), spent = timed(lambda t=tolerance, m=method: by_scipy(contact, horizon, m, t))
+            except (ValueError, ArithmeticError):
+                continue
+            points.append((error(peak, last, exact), spent))
+        cells = []
+        for wanted in (1e-3, 1e-6, 1e-9):
+            reached = [spent for missed, spent in points if missed <= wanted]
+            cells.append(f"{min(reached) / ours:7.0f} x" if reached else "  never  ")
+        best = min(points)[0] if points else math.nan
+        print(
+            f"  {method:6} time over ours for an error of 1e-3, 1e-6, 1e-9: {'  '.join(cells)}   best error {best:.1e}"
+        )
+
+
+def check_reference() -> None:
+    """Hold the reference against the closed form of two free masses on a spring of two pieces."""
+    padding = Padding(2e-3, 10e3, 1e6, 0.0)
+    contact = TwoMassContact(DrivenArm(0.4, 8.0), StruckBody(2.0), padding)
+    mass = 1 / (1 / mp.mpf(8) + 1 / mp.mpf(2))
+    exact = closed_form(0.4, mass, 10e3, 1e6, mp.mpf(10e3) * mp.mpf(2e-3) / mp.mpf(10e3))
+    found = reference(contact, 0.02)["peak"]
+    ours = integrate(contact, 0.02).peak
+    off, ours_off = float(abs(found / exact - 1)), float(abs(ours / exact - 1))
+    print(f"reference against the closed form: {off:.1e}; ours: {ours_off:.1e}")
+
+
+def stability() -> None:
+    """Run the extremes; nothing may become infinite, and no energy may come of nothing."""
+    masses, speeds = (1e-3, 1e-1, 10.0, 1e3), (0.0, 1e-6, 1e-2, 1.0, 5.0)
+    worst, count, longest, where = 0.0, 0, 0.0, ""
+    times = []
+    for arm, body, speed, loss in itertools.product((*masses, math.inf), masses, speeds, (0.0, 0.3, 10.0)):
+        padding = Padding(1e-3, 1e4, 1e7, loss)
+        contact = TwoMassContact(DrivenArm(speed, arm), StruckBody(body), padding)
+        begin = time.process_time()
+        course = integrate(contact, 0.05)
+        spent = time.process_time() - begin
+        times.append(spent)
+        if spent > longest:
+            longest, where = spent, f"arm {arm:g} kg, body {body:g} kg, {speed:g} m/s, loss {loss:g} s/m"
+        assert math.isfinite(course.peak)
+        assert math.isfinite(course.impulse)
+        count += 1
+        if math.isfinite(arm) and speed > 0.0:
+            before = 0.5 * arm * speed**2
+            for stretch in course.stretches:
+                s, w, v = stretch.compression[0], stretch.rate[0], stretch.speed[0]
+                energy = 0.5 * arm * (w + v) ** 2 + 0.5 * body * v**2 + contact.law.energy(s)
+                worst = max(worst, energy / before - 1.0)
+    print(f"\n{count} contacts of 1e7 N/m, 1 g to 1 t against 1 g to 1 t, 0 to 5 m/s, loss 0 to 10 s/m: all finite")
+    print(f"  greatest gain of energy {worst:.1e}; time median {1e3 * float(np.median(times)):.2f} ms")
+    print(f"  longest {longest:.2f} s ({where})")
+    for body in (0.6, 1e-2, 1e-3):
+        contact = TwoMassContact(driven(1.0, 1e3), StruckBody(body, 75e3, 20e3, 10.0), Padding(hard_stiffness=1e7))
+        line = f"ours {timed(lambda c=contact: integrate(c, 0.5, keep=False))[1]:.3f} s"
+        for method, tolerance in (("Radau", 1e-6), ("LSODA", 1e-3), ("LSODA", 1e-6), ("LSODA", 1e-9)):
+            spent = timed(lambda c=contact, m=method, t=tolerance: by_scipy(c, 0.5, m, t))[1]
+            line += f", {method} ({tolerance:g}) {spent:.3f} s"
+        print(f"  {body:g} kg pressed by 1 t on servos until at rest: {line}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="one case only")
+    parser.add_argument("--last", action="store_true", help="the last case only")
+    parser.add_argument("--stability", action="store_true", help="the extremes only")
+    args = parser.parse_args()
+    print(head("scipy", "mpmath", "numpy"))
+    check_reference()
+    cases = [] if args.stability else list(CASES.items())
+    cases = cases[-1:] if args.last else cases[: 1 if args.quick else None]
+    for name, (contact, horizon) in cases:
+        compare(name, contact, horizon)
+    if not (args.quick or args.last):
+        stability()

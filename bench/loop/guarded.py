@@ -1,0 +1,164 @@
+"""Guard's own loop in bench `loop`, with its core as it runs live, and what became of each touch."""
+
+from __future__ import annotations
+
+import gc
+import socket
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from coneskin.core.channel import Channel, pair
+from coneskin.core.recording.block import Block
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.messages import StatusReport
+from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.guard.arm_supervisor import ArmSupervisor
+from coneskin.robot.guard.core import GuardCore
+from coneskin.robot.guard.loop import GuardLoop
+from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.ports import GuardPorts
+from coneskin.robot.guard.signals.contact import GuardedSensor
+from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.ur.driver import UR_DRIVER
+from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.frame.timing import TimingLimits
+from coneskin.skin.detection.stream import TouchStream
+from coneskin.skin.sources.serial_port import SerialPort
+
+from .far_end import CLOCK, CYCLE, SENSOR, TOUCHED, FarEnd
+from .stamps import Stamp, Stamps
+
+LATE = 0.5  # s; frames that the machine holds up are no matter here
+RESET_PERIOD = 0.02  # s
+
+
+class States:
+    """Reader of the controller's state, on the far end's socket."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        self._sock = sock
+        sock.setblocking(False)
+
+    def fileno(self) -> int:
+        """Return the descriptor, for the loop's selector."""
+        return self._sock.fileno()
+
+    def read(self) -> list[bytes]:
+        """Return the payloads that have come."""
+        data = self._sock.recv(1 << 16)
+        return [data[at : at + RECIPE.size] for at in range(0, len(data), RECIPE.size)]
+
+
+@dataclass
+class Guarded:
+    """Guard's loop, with a stamp between its stages.
+
+    Attributes:
+        wake, detect, decide, send, react, idle, whole: times [s], as the table names them.
+        answered: touches in which a stop was sent because of the touch.
+        missed: touches of an active guard without a stop.
+        inactive: touches that came while the guard was not active, by the reason for that.
+        other: stops that no touch was the reason of, by their reason.
+    """
+
+    wake: list[float] = field(default_factory=list)
+    detect: list[float] = field(default_factory=list)
+    decide: list[float] = field(default_factory=list)
+    send: list[float] = field(default_factory=list)
+    react: list[float] = field(default_factory=list)
+    idle: list[float] = field(default_factory=list)
+    whole: list[float] = field(default_factory=list)
+    answered: int = 0
+    missed: int = 0
+    inactive: Counter[str] = field(default_factory=Counter)
+    other: Counter[str] = field(default_factory=Counter)
+
+    def turn(self, rate_hz: float, seconds: float) -> None:
+        """Guard for some time, resetting after each touch."""
+        stamps = Stamps()
+        with FarEnd(rate_hz) as far, SerialPort(far.path) as port:
+            core = make_core(stamps)
+            (session, recorder), (driver, arm) = ((Channel(a), b) for a, b in (pair(), pair()))
+            ports = GuardPorts(session, stamps.wrap_source(port), States(far.states), stamps.wrap_driver(driver))  # type: ignore[arg-type]
+            loop = GuardLoop(core, ports, CLOCK)
+            loop._open()
+            core.take(Block(BlockKind.DRIVER, CLOCK(), StatusReport("ready").encode()), [])
+            end, reset_at, spoke = CLOCK() + seconds + 0.5, 0.0, 0.0
+            gc.disable()
+            while CLOCK() < end:
+                loop.step(0.002)
+                if CLOCK() - spoke > 0.02:
+                    spoke = CLOCK()
+                    core.take(Block(BlockKind.PROGRAM, spoke, b""), [])
+                    acknowledged = StatusReport("released", str(core._activation.number))
+                    core.take(Block(BlockKind.DRIVER, spoke, acknowledged.encode()), [])
+                drain(recorder)
+                drain(arm)
+                if core.phase is Phase.LATCHED and CLOCK() >= reset_at:  # refused until nothing stands against it
+                    reset_at = CLOCK() + RESET_PERIOD
+                    core.take(Block(BlockKind.RESET, CLOCK(), b"%d 1" % core._arm.stop_number), [])
+            gc.enable()
+            loop._close()
+            written = far.written()
+        for channel in (session, driver, recorder, arm):
+            channel.close()
+        for stamp in stamps.all:
+            self._count(stamp, written)
+        self._judge(stamps.all)
+
+    def _count(self, stamp: Stamp, written: dict[int, float]) -> None:
+        """Add the times of one read."""
+        if not stamp.sequences or stamp.sequences[-1] not in written:
+            return
+        at = written[stamp.sequences[-1]]
+        self.wake.append(stamp.read - at)
+        if not stamp.sent:
+            self.idle.append(stamp.done - stamp.read)
+        elif stamp.why == "touch":
+            self.detect.append(stamp.events - stamp.read)
+            self.decide.append(stamp.decided - stamp.events)
+            self.send.append(stamp.sent - stamp.decided)
+            self.react.append(stamp.sent - stamp.read)
+            self.whole.append(stamp.sent - at)
+
+    def _judge(self, stamps: list[Stamp]) -> None:
+        """Say what became of each touch, and why each other stop was sent."""
+        touches: dict[int, list[Stamp]] = {}
+        for stamp in stamps:
+            for sequence in stamp.sequences:
+                if sequence % CYCLE >= CYCLE - TOUCHED:
+                    touches.setdefault(sequence // CYCLE, []).append(stamp)
+            if stamp.sent and stamp.why != "touch":
+                self.other[stamp.why] += 1
+        touches.pop(max(touches, default=0), None)  # the turn may have ended before it was answered
+        for seen in touches.values():
+            if any(stamp.why == "touch" for stamp in seen):
+                self.answered += 1
+            elif seen[0].phase is Phase.ACTIVE and not any(stamp.sent for stamp in seen):
+                self.missed += 1
+            else:
+                self.inactive[seen[0].reason if seen[0].phase is not Phase.ACTIVE else seen[-1].reason] += 1
+
+
+def make_core(stamps: Stamps) -> Any:
+    """Return the guard's core with one sensor, which stamps."""
+    limits = MonitoringLimits(LATE, LATE, 0, LATE, settle=0.01)
+    settings = DetectorSettings(timing=TimingLimits(late=LATE))
+    cone = PlacedFrustum(SENSOR.frustum)
+    placed = GuardedSensor(SENSOR.name, "forearm", 3, lambda u, phi: (cone.point(u, phi), cone.normal(phi)))
+    arm = ArmSupervisor(arm_model("UR5e"), UR_DRIVER, Reaction(kind="stop"), limits, (StopPath.DRIVER,))
+    return stamps.wrap_core(GuardCore(stamps.wrap_stream(TouchStream([SENSOR], settings)), [placed], limits, arm))
+
+
+def drain(sock: socket.socket) -> None:
+    """Throw away what has come."""
+    sock.setblocking(False)
+    with suppress(BlockingIOError):
+        while sock.recv(1 << 16):
+            pass

@@ -1,0 +1,1 @@
+"""Benches of recordings: damage, size, speed and memory."""

@@ -1,0 +1,1 @@
+"""Benches of the skin: frames, ports, the virtual skin and its calibration."""

@@ -1,0 +1,1 @@
+"""Benches of the page that shows a run."""

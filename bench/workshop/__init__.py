@@ -1,0 +1,1 @@
+"""Benches of what a workshop builds from a design."""
