@@ -7,7 +7,6 @@ import sys
 
 from tests.support.paths import ROOT
 
-
 #: imports every bench; what is not installed may be missing
 IMPORT_ALL = """
 import importlib
