@@ -14,13 +14,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 
-from .electronics import Electronics, Polarity, Thresholds
-from .log_scale import LogScale
-from .matched_electronics import match_electronics
+from .electronics import Electronics, Polarity, Thresholds, match_electronics
+from .sheet_functions import LogScale
 
 if TYPE_CHECKING:
-    from .force_table import ForceTable
-    from .place_map import PlaceMap
+    from .calibration import ForceTable, PlaceMap
 
 __all__ = ["Bounds", "Sensor", "sheet_resistances"]
 

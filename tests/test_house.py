@@ -40,7 +40,7 @@ FLOORS = (
 )
 #: the only files that may import each heavy dependency, as globs
 HOMES = {
-    "serial": ("skin/sources/serial_port.py", "skin/sources/port_list.py"),
+    "serial": ("skin/sources/serial_port.py",),
     "rtde_control": ("robot/ur/control_program.py",),
     "rtde_receive": ("robot/ur/control_program.py",),
     "rtde_io": ("robot/ur/control_program.py",),

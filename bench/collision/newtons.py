@@ -30,7 +30,7 @@ from pathlib import Path
 
 from bench.report import commit, head, quantile
 from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 from .cases import KINDS, RUN_UP_ACCELERATION, draw
 

@@ -22,8 +22,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import SkinFault, TouchBegan
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
-from coneskin.skin.electronics import Polarity
-from coneskin.skin.matched_electronics import match_electronics
+from coneskin.skin.electronics import Polarity, match_electronics
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.imperfections import Imperfections

@@ -24,9 +24,8 @@ import numpy as np
 
 from bench.report import head, quantile
 from coneskin.core.errors import FieldError
-from coneskin.skin.field.coupling import Coupling
 from coneskin.skin.field.disc import Disc, Discs, centre_distance
-from coneskin.skin.field.fourport import angular_phase, radial_phase
+from coneskin.skin.field.fourport import Coupling, angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.multipole import solve_discs
 from coneskin.skin.field.sheet import SectorSheet

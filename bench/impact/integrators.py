@@ -29,7 +29,7 @@ from scipy.integrate import solve_ivp
 from bench.report import head
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 from .reference import closed_form, reference
 

@@ -26,7 +26,7 @@ from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.model import Joints
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 MODEL, LINK = arm_model("UR5e"), LINK_INDEX["forearm"]
 CONE = PlacedFrustum(Frustum(0.0376, 0.0372, 0.26), dh_mesh(MODEL, "forearm") @ Pose(translation=(0.0, 0.0, 0.08)))

@@ -21,7 +21,7 @@ import numpy as np
 from bench.report import head
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 from .integrators import TURN, by_scipy
 

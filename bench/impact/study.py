@@ -22,7 +22,7 @@ from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, Struck
 from coneskin.robot.arm.inertia import effective_mass
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 SPRING, STRUCK = 75e3, 5.6  # N/m, kg; as the group's code has them
 BARE = Padding(thickness=1.0, stiffness=1e9, loss=0.0)

@@ -19,8 +19,7 @@ from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.driver.messages import HEARTBEAT_PERIOD, Heartbeat, Shutdown
 from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SpeedSlider, StopConnections
 from coneskin.robot.guard.heartbeats.controller_heartbeat import heartbeat_count
-from coneskin.skin.sources.source import Source
-from coneskin.skin.sources.source_reopening import SourceReopening
+from coneskin.skin.sources.source import Source, SourceReopening
 
 from .core import GuardCore
 from .outbox import Outbox

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 from coneskin.core.channel import Channel
 from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SetpointWriter, SpeedSlider, StopConnections
-from coneskin.skin.sources.source import Source
-from coneskin.skin.sources.source_reopening import SourceReopening
+from coneskin.skin.sources.source import Source, SourceReopening
 
 __all__ = ["GuardPorts"]
 

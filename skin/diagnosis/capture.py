@@ -1,14 +1,29 @@
-"""Capture: the newest bytes of a line, each with the time at which it came."""
+"""Capture: the newest bytes of a line, each with the time at which it came, and the frames found in them."""
 
 from __future__ import annotations
 
+import itertools
 from bisect import bisect_right
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import NamedTuple
 
-__all__ = ["Capture", "CaptureWindow"]
+from coneskin.skin.wire import MAX_LENGTH, SYNC, Frame, frame_at
+
+__all__ = [
+    "EDGE",
+    "LENGTHS",
+    "Capture",
+    "CaptureWindow",
+    "FoundFrames",
+    "count_frames",
+    "find_frames",
+    "printable_share",
+    "short_hex",
+    "sync_places",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,3 +89,78 @@ class CaptureWindow:
     def capture(self, now: float, timed: bool = True) -> Capture:
         """Return what is kept at a host time [s]."""
         return Capture(tuple(self._pieces), now, timed, self._since)
+
+
+#: Length of a whole frame [bytes] -> its version.
+LENGTHS = {36: 1, 40: 2, 52: 2}
+EDGE = MAX_LENGTH  #: bytes at either end of a capture that may belong to a frame that is cut
+_LENGTH_AT = 3  # offset of the length in a frame
+_TEXT = frozenset({9, 10, 13, *range(32, 127)})
+
+
+class FoundFrames(NamedTuple):
+    """Valid frames of a capture."""
+
+    frames: list[Frame]
+    offsets: list[int]  #: where each starts [bytes]
+    gaps: list[bytes]  #: what stands between two of them, where anything does
+    covered: float  #: share of the bytes that belong to valid frames, the ends of the capture left out
+
+
+def find_frames(data: bytes) -> FoundFrames:
+    """Find the valid frames in a capture."""
+    frames: list[Frame] = []
+    offsets: list[int] = []
+    gaps: list[bytes] = []
+    lost = end = 0
+    at = data.find(SYNC)
+    while at >= 0:
+        frame = frame_at(data, at)
+        if frame is None:
+            at = data.find(SYNC, at + 1)
+            continue
+        if at > end and frames:
+            gaps.append(data[end:at])
+        lost += max(0, at - max(end, EDGE if not frames else 0))
+        frames.append(frame)
+        offsets.append(at)
+        end = at + data[at + _LENGTH_AT]
+        at = data.find(SYNC, end)
+    lost += max(0, len(data) - EDGE - end)
+    inside = max(1, len(data) - 2 * EDGE)
+    return FoundFrames(frames, offsets, gaps, 1.0 - min(1.0, lost / inside) if frames else 0.0)
+
+
+def count_frames(data: bytes) -> tuple[int, float]:
+    """Return how many valid frames are in the bytes, and the share of the bytes that they cover."""
+    found = find_frames(data)
+    return len(found.frames), found.covered
+
+
+def sync_places(data: bytes, sync: bytes = SYNC) -> tuple[list[int], int, float]:
+    """Find a sync word.
+
+    Returns:
+        its places, the commonest distance from one to the next [bytes] (0 where there are not two), and the share of
+        the distances that are that one.
+    """
+    places = []
+    at = data.find(sync)
+    while at >= 0:
+        places.append(at)
+        at = data.find(sync, at + 1)
+    steps = Counter(b - a for a, b in itertools.pairwise(places))
+    if not steps:
+        return places, 0, 0.0
+    step, count = steps.most_common(1)[0]
+    return places, step, count / steps.total()
+
+
+def printable_share(data: bytes) -> float:
+    """Return the share of the bytes that are printable ASCII, tabs or line ends."""
+    return sum(byte in _TEXT for byte in data) / len(data) if data else 0.0
+
+
+def short_hex(data: bytes, count: int = 12) -> str:
+    """Return the first bytes in hexadecimal, for a message."""
+    return data[:count].hex(" ").upper() + (" ..." if len(data) > count else "")

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import MAX_LENGTH, Frame, FrameDecoder
 
-from .capture import Capture
+from .capture import Capture, FoundFrames, find_frames, printable_share, short_hex
 from .cause import Cause, Diagnosis
 from .foreign_stream import find_constant, find_protocol, find_text, first_line
-from .found_frames import FoundFrames, find_frames, printable_share, short_hex
 from .frame_numbers import find_wrong_numbers, measure_numbers
 from .frame_shape import find_foreign_sync, find_shape
 from .line_coding import find_baud, find_coding

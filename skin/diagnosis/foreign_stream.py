@@ -9,10 +9,9 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
-from .capture import Capture
+from .capture import Capture, count_frames, printable_share, short_hex
 from .cause import Cause, Diagnosis
 from .checksum import crc16
-from .found_frames import count_frames, printable_share, short_hex
 
 __all__ = ["find_constant", "find_protocol", "find_text", "first_line"]
 

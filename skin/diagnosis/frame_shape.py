@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 from coneskin.skin.wire import MAX_LENGTH, SYNC, VERSIONS
 
+from .capture import LENGTHS, short_hex, sync_places
 from .cause import Cause, Diagnosis
 from .checksum import crc16, find_checksum
-from .found_frames import LENGTHS, short_hex, sync_places
 
 __all__ = ["find_foreign_sync", "find_shape"]
 

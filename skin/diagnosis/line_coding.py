@@ -9,8 +9,8 @@ from itertools import groupby, product
 
 from coneskin.skin.wire import SYNC
 
+from .capture import LENGTHS, count_frames
 from .cause import Cause, Diagnosis
-from .found_frames import LENGTHS, count_frames
 
 __all__ = ["BAUD_RATES", "find_baud", "find_coding", "receive_at", "undo_newlines", "undo_slip"]
 

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 from coneskin.skin.wire import SYNC
 
+from .capture import LENGTHS, FoundFrames, count_frames, printable_share, short_hex
 from .cause import Cause, Diagnosis
 from .checksum import find_checksum
 from .foreign_stream import first_line
-from .found_frames import LENGTHS, FoundFrames, count_frames, printable_share, short_hex
 from .line_coding import undo_newlines, undo_slip
 
 __all__ = ["find_damage"]

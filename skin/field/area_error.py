@@ -11,25 +11,98 @@ theta.
 Valid while the disc is small beside its distance D to the next edge (to the next corner between equal sheets, whose
 images in edges cancel) and to the apex: the neglected part is about (a/D)^2 of the result. It describes the
 electrical centre, that is the readings taken *at the contact*, not the mean of the guide pair.
+
+The Robin function gamma(z), what a point of contact feels of the edges and of the taper, is the value at z' = z of Ru
+G_u + Rl G_l without its logarithm. In the strip of `green`,
+
+    gamma = (1/2 pi) [ (Ra+Rb) ln|theta(2w)| - (Ra-Rb) ln|theta(2s)/theta(2ip)| ] - Rb s^2/(pi Sigma) + const
+
+with w = s + ip and the odd theta(z) = 2 sinh(z/2) prod (1 - q^2n e^z)(1 - q^2n e^-z), q = exp(-Sigma). In the flat
+sheet the stretch adds (Ru+Rl)/(2 pi) ln(r/r1). Only its gradient matters; the live decode has its own in plain
+floats (`skin/sheet_functions.py`).
 """
 
 from __future__ import annotations
 
+import cmath
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from coneskin.core.arrays import Floats
 
 from .disc import bessel_ratios
-from .robin import Robin
+from .green import Strip
+from .sheet import SectorSheet
 
 if TYPE_CHECKING:
     from .model import FieldModel
 
-__all__ = ["area_error", "effective_area"]
+__all__ = ["Robin", "area_error", "effective_area"]
 
-Floats = NDArray[np.float64]
+
+class Robin:
+    """Gradient of the Robin function of a sheet, in the rectangle (x, y), without the stretch.
+
+    Args:
+        sheet: the sheet.
+        upper_resistance: of the sheet with A and B [ohm per square].
+        lower_resistance: of the sheet with C and D [ohm per square].
+    """
+
+    __slots__ = ("_a", "_b", "_powers", "_strip")
+
+    def __init__(self, sheet: SectorSheet, upper_resistance: float, lower_resistance: float) -> None:
+        self._strip = strip = Strip.of(sheet.length, sheet.breadth)
+        upper, lower = upper_resistance, lower_resistance
+        self._a, self._b = (lower, upper) if strip.along_x else (upper, lower)
+        count = next(n for n in range(16) if (2 * n + 1) * strip.sigma > 39.0)
+        self._powers = tuple(math.exp(-2.0 * n * strip.sigma) for n in range(1, count + 1))
+
+    def gradient(self, x: float, x_far: float, y: float, y_far: float) -> tuple[float, float]:
+        """Return (d gamma/dx, d gamma/dy) [ohm/m] at distances from the four edges of the rectangle [m]."""
+        strip = self._strip
+        s, s_far, p, p_far = (x, x_far, y, y_far) if strip.along_x else (y, y_far, x, x_far)
+        flip_s, flip_p = s > s_far, p > p_far
+        k = strip.scale
+        s, p = k * (s_far if flip_s else s), k * (p_far if flip_p else p)
+        along, across = self._quarter(s, cmath.exp(-2.0 * complex(s, p)), math.exp(-2.0 * s), cmath.exp(-2j * p))
+        along, across = k * (-along if flip_s else along), k * (-across if flip_p else across)
+        return (along, across) if strip.along_x else (across, along)
+
+    def gradients(self, sheet: SectorSheet, u: ArrayLike, phi: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the same for arrays of (u, phi)."""
+        x, x_far = sheet.along(u)
+        y, y_far = sheet.across(phi)
+        strip = self._strip
+        s, s_far, p, p_far = (x, x_far, y, y_far) if strip.along_x else (y, y_far, x, x_far)
+        flip_s, flip_p = s > s_far, p > p_far
+        k = strip.scale
+        s, p = k * np.where(flip_s, s_far, s), k * np.where(flip_p, p_far, p)
+        along, across = self._quarter(s, np.exp(-2.0 * (s + 1j * p)), np.exp(-2.0 * s), np.exp(-2j * p))
+        along, across = k * np.where(flip_s, -along, along), k * np.where(flip_p, -across, across)
+        return (along, across) if strip.along_x else (across, along)
+
+    def _quarter(self, s: Any, corner: Any, end: Any, edge: Any) -> tuple[Any, Any]:
+        """In the quarter next to the corner; corner, end, edge are exp(-2w), exp(-2s), exp(-2ip)."""
+        both, differ = self._a + self._b, self._a - self._b
+        at_corner = self._slope(corner)
+        along = both * at_corner.real - 2.0 * self._b * s / self._strip.sigma
+        across = -both * at_corner.imag
+        if differ != 0.0:
+            along = along - differ * self._slope(end)
+            across = across - differ * self._slope(edge).imag
+        return along / math.pi, across / math.pi
+
+    def _slope(self, inverse: Any) -> Any:
+        """d ln theta(z)/dz at exp(-z)."""
+        total = 0.5 * (1.0 + inverse) / (1.0 - inverse)
+        for power in self._powers:
+            low, high = power * inverse, power / inverse
+            total = total + low / (1.0 - low) - high / (1.0 - high)
+        return total
 
 
 def effective_area(radius: ArrayLike, conductance: ArrayLike, resistance: float) -> Floats:

@@ -17,13 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import FieldError
 
 from .sheet import SectorSheet
 
 __all__ = ["Disc", "Discs", "bessel_ratios", "centre_distance", "check_discs"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

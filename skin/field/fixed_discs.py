@@ -12,21 +12,19 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import FieldError
 
 from .circles import green_block, make_circles
-from .coupling import Coupling
 from .disc import Discs, bessel_ratios, check_discs
+from .fourport import Coupling
 from .green import Strip
 from .model import FieldModel
-from .multipole import solve_to_tolerance
-from .order import resolution
+from .multipole import resolution, solve_to_tolerance
 
 __all__ = ["FixedDiscs"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

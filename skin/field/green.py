@@ -23,10 +23,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Strip", "StripPoints", "direct_features", "kernel", "mirrored"]
+from coneskin.core.arrays import Complex, Floats
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+__all__ = ["Strip", "StripPoints", "direct_features", "kernel", "mirrored"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 
+from coneskin.core.arrays import Complex, Floats
 from coneskin.core.errors import FieldError
 
 from .circles import Circles, circle, make_circles
@@ -23,13 +24,9 @@ from .disc import Disc, Discs, bessel_ratios, check_discs
 from .fourport import DrivePhase
 from .green import Strip, direct_features, kernel, mirrored
 from .model import FieldModel
-from .multipole import solve_to_tolerance
-from .order import resolution
+from .multipole import resolution, solve_to_tolerance
 
 __all__ = ["FieldMap"]
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,19 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import FieldError
 
-from .coupling import Coupling, admittance
 from .disc import Disc, Discs, check_discs
-from .fourport import DrivePhase, Readings, solve_phase
-from .multipole import solve_discs
-from .order import FIRST, LADDER, higher, resolution
+from .fourport import Coupling, DrivePhase, Readings, admittance, solve_phase
+from .multipole import FIRST, LADDER, higher, resolution, solve_discs
 from .rim import near_apex, solve_rims
 from .sheet import SectorSheet
 
 __all__ = ["FieldModel", "solve"]
 
-Floats = NDArray[np.float64]
 
 #: Pairs of points in one piece of a batch, measured: larger pieces leave the cache.
 PAIRS_AT_ONCE = 12000

@@ -20,7 +20,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coneskin.core.arrays import Floats
 
 from .fourport import Terminal, angular_phase, radial_phase
 from .model import FieldModel
@@ -38,7 +39,6 @@ __all__ = [
     "sensitivities",
 ]
 
-Floats = NDArray[np.float64]
 
 #: Largest errors of the point contact of figure 16 [mm], [deg]; its points are not published.
 POINT_CONTACT = (1.6, 0.5)

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coneskin.core.arrays import Floats
 
 from .model import FieldModel
 from .paper_experiment import POINT_CONTACT, Experiment, Sensitivity, lead_errors
@@ -16,7 +17,6 @@ from .pictures import make_figure
 
 __all__ = ["draw_experiment", "draw_places", "draw_point_contacts", "draw_sensitivities"]
 
-Floats = NDArray[np.float64]
 
 _PAPER, _OURS, _LEFT = "tab:green", "tab:blue", "tab:red"
 

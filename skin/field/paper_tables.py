@@ -13,7 +13,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coneskin.core.arrays import Floats
 
 from .fourport import angular_phase, radial_phase
 from .model import FieldModel
@@ -31,7 +32,6 @@ __all__ = [
     "rows",
 ]
 
-Floats = NDArray[np.float64]
 
 _UNEXPLAINED = "not reproduced: see the residuals"
 _GRID = "depends on the paper's grid of places, which is not published"

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import MissingExtra
 
 from .maps import FieldMap
@@ -17,8 +17,6 @@ from .paper_tables import ErrorMap
 from .sheet import SectorSheet
 
 __all__ = ["PlotArea", "draw_curves", "draw_error", "draw_potential", "make_figure"]
-
-Floats = NDArray[np.float64]
 
 
 class PlotArea(NamedTuple):

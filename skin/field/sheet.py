@@ -18,11 +18,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import FieldError
 
 __all__ = ["ConeShape", "SectorSheet", "log1p_over"]
-
-Floats = NDArray[np.float64]
 
 
 class ConeShape(Protocol):

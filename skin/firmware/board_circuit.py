@@ -6,12 +6,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from coneskin.core.errors import SensorError
-from coneskin.skin.electronics import LeadOhms
-from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
+from coneskin.skin.electronics import SENSE_GAIN, LeadOhms, shunt_ohms
 from coneskin.skin.sensor import Sensor
 
-from .board_facts import BOARD_FACTS, BoardFacts
-from .boards import BUILT_IN, Board, Converter, boards, converters
+from .boards import BOARD_FACTS, BUILT_IN, Board, BoardFacts, Converter, boards, converters
 
 __all__ = ["BoardCircuit", "Part", "board_circuit", "ohms_text", "value_text"]
 

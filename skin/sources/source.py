@@ -1,11 +1,18 @@
-"""Protocol of a source of bytes: what a real port and a virtual one have in common."""
+"""Protocol of a source of bytes, and reopening of one that is gone.
+
+Opening a port may take seconds, a guard's loop may not: so it is done in a thread of its own.
+"""
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
-__all__ = ["Openable", "Source"]
+from coneskin.core.errors import ConeSkinError
+
+__all__ = ["Openable", "Source", "SourceReopening", "open_again"]
 
 
 class Openable(Protocol):
@@ -60,3 +67,60 @@ class Source(Openable, Protocol):
             SkinConnectionError: it is gone, or not open.
         """
         ...
+
+
+_PERIOD = 0.5  # s between two attempts
+_ATTEMPTS = 1200  # ten minutes; after them somebody has to look at it anyway
+
+
+def open_again(source: Source, wait: Callable[[float], bool], attempts: int = _ATTEMPTS) -> bool:
+    """Close a source and open it, again and again; tell whether it is open.
+
+    Args:
+        source: it is gone; nobody else may use it meanwhile.
+        wait: lets so many seconds pass; True if the waiting shall stop.
+        attempts: after which it is left closed.
+    """
+    source.close()
+    for _ in range(attempts):
+        if wait(_PERIOD):
+            return False
+        try:
+            source.open()
+        except ConeSkinError:  # not there yet; that it is gone has been reported
+            continue
+        return True
+    return False
+
+
+class SourceReopening:
+    """Thread that opens a source again. It begins at once.
+
+    Args:
+        source: it is gone; nobody else may use it before ``done``.
+        wait: lets so many seconds pass, True if the waiting shall stop; real time by default.
+
+    Attributes:
+        opened: the source is open; it means something once ``done``.
+    """
+
+    def __init__(self, source: Source, wait: Callable[[float], bool] | None = None) -> None:
+        self._source = source
+        self._stopped = threading.Event()
+        self._wait = wait or self._stopped.wait
+        self.opened = False
+        self._thread = threading.Thread(target=self._run, name=f"opens {source.name} again", daemon=True)
+        self._thread.start()
+
+    @property
+    def done(self) -> bool:
+        """True once it is open, or given up."""
+        return not self._thread.is_alive()
+
+    def stop(self, timeout: float = 1.0) -> None:
+        """Give up, and wait for an attempt that is under way, so long at most [s]."""
+        self._stopped.set()
+        self._thread.join(timeout)
+
+    def _run(self) -> None:
+        self.opened = open_again(self._source, lambda time: self._stopped.is_set() or self._wait(time))

@@ -7,14 +7,26 @@ the leads, the pull-downs, broken wires and shorts are the same for each and are
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import DrivenPotentials, Frame
 
-__all__ = ["ContactModel", "ConverterInputs", "LayerContact", "Matrix", "WiringFaults", "measure", "solve"]
+__all__ = [
+    "ContactModel",
+    "ConverterInputs",
+    "LayerContact",
+    "Matrix",
+    "WiringFaults",
+    "counts_of",
+    "frame_of",
+    "measure",
+    "solve",
+    "with_counts",
+]
 
 Matrix = tuple[tuple[float, ...], ...]
 _A, _B, _C, _D = range(4)
@@ -206,3 +218,29 @@ def solve(matrix: list[list[float]], right: Iterable[float]) -> list[float]:
         row = matrix[k]
         x[k] = (x[k] - sum(row[j] * x[j] for j in range(k + 1, n))) / row[k]
     return x
+
+
+_DRIVEN = DrivenPotentials._fields
+_ALWAYS = tuple(name for name in ConverterInputs._fields if name not in _DRIVEN)
+
+
+def frame_of(head: tuple[int, int, int, int, int, int], counts: Mapping[str, int]) -> Frame:
+    """Return the frame of these readings.
+
+    Args:
+        head: version, device, sensor, status, sequence, clock.
+        counts: by the names of ConverterInputs; without the driven potentials where the frame carries none.
+    """
+    driven = DrivenPotentials._make(counts[name] for name in _DRIVEN) if _DRIVEN[0] in counts else None
+    return Frame._make((*head, *(counts[name] for name in _ALWAYS), driven))
+
+
+def counts_of(frame: Frame) -> dict[str, int]:
+    """Return the readings that a frame carries."""
+    counts = {name: getattr(frame, name) for name in _ALWAYS}
+    return counts if frame.driven is None else counts | frame.driven._asdict()
+
+
+def with_counts(frame: Frame, changes: Mapping[str, int]) -> Frame:
+    """Return the frame with other readings; it must carry them."""
+    return frame_of(frame[:6], {**counts_of(frame), **changes})

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, fields
 from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.skin.wire import Frame, Status, encode
 
-from .circuit import ConverterInputs, WiringFaults
-from .frame_counts import counts_of, with_counts
+from .circuit import ConverterInputs, WiringFaults, counts_of, with_counts
 
 __all__ = ["FaultInjection", "FaultyLine"]
 

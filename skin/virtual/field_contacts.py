@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from coneskin.core.errors import FieldError
-from coneskin.skin.field.coupling import Coupling
 from coneskin.skin.field.disc import centre_distance
 from coneskin.skin.field.fixed_discs import FixedDiscs
+from coneskin.skin.field.fourport import Coupling
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor

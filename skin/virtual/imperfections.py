@@ -1,15 +1,154 @@
-"""Imperfections of a virtual sensor: what distinguishes it from its drawing."""
+"""Imperfections of a virtual sensor: how the foam yields, how the layers touch, noise, leak, clock and supply.
+
+The foam under the upper layer is a standard linear solid: a part of its give comes at once, the rest with a relaxation
+time. The layers meet when it has given as much as the threshold force (0.5 N in the paper, section 4.2) presses it in
+the end. Beyond, a round body touches over a radius that grows with the cube root of the force (Hertz), and the
+conductance per area grows with the pressure, as of any rough layer. Plain floats: the virtual skin asks three times a
+frame.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from coneskin.core.errors import SensorError
 
-from .substrate import ContactLaw, Foam
+__all__ = ["ContactLaw", "Foam", "Imperfections", "RoundContact"]
 
-__all__ = ["Imperfections"]
+
+class RoundContact(NamedTuple):
+    """A round contact between the layers.
+
+    Attributes:
+        radius: [m]; 0 where the layers do not touch.
+        conductance: per area [S/m^2].
+    """
+
+    radius: float
+    conductance: float
+
+    @property
+    def siemens(self) -> float:
+        """Conductance of the whole contact, spreading in the sheets not included [S]."""
+        return self.conductance * math.pi * self.radius * self.radius
+
+
+@dataclass(frozen=True, slots=True)
+class Foam:
+    """A viscoelastic substrate, a standard linear solid.
+
+    Attributes:
+        relaxation_time: of the delayed part at constant force [s].
+        delayed: part of the final give that comes late, 0 to below 1.
+
+    Raises:
+        SensorError: a value out of range.
+    """
+
+    relaxation_time: float = 0.02
+    delayed: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.relaxation_time) and self.relaxation_time > 0.0):
+            raise SensorError(f"relaxation_time must be finite and above 0 s, got {self.relaxation_time!r} s")
+        if not 0.0 <= self.delayed < 1.0:
+            raise SensorError(f"delayed must be in [0, 1), got {self.delayed!r}")
+
+    def advance(self, state: float, force: float, time: float) -> float:
+        """Return the delayed part's state [N] after a constant force has acted; exact for any step.
+
+        Args:
+            state: before; 0 at rest.
+            force: on the skin [N].
+            time: for how long [s]; may be infinite.
+        """
+        return force + (state - force) * math.exp(-time / self.relaxation_time)
+
+    def advance_ramp(self, state: float, force: float, slope: float, time: float) -> float:
+        """Return the same while the force changes evenly; exact too.
+
+        Args:
+            state: before [N].
+            force: at the beginning [N].
+            slope: of the force [N/s].
+            time: for how long [s].
+        """
+        lag = slope * self.relaxation_time
+        return force + slope * time - lag + (state - force + lag) * math.exp(-time / self.relaxation_time)
+
+    def advance_swing(self, state: float, mean: float, swing: float, rate: float, angle: float, time: float) -> float:
+        """Return the same while the force is mean - swing cos(angle + rate t), t from 0 to time; exact too.
+
+        Args:
+            state: before [N].
+            mean: of the force [N].
+            swing: of the force [N].
+            rate: [rad/s], of either sign.
+            angle: at the beginning [rad].
+            time: for how long [s].
+        """
+        lag = rate * self.relaxation_time
+
+        def follows(at: float) -> float:
+            return mean - swing * (math.cos(at) + lag * math.sin(at)) / (1.0 + lag * lag)
+
+        left = math.exp(-time / self.relaxation_time)
+        return follows(angle + rate * time) + (state - follows(angle)) * left
+
+    def seated(self, state: float, force: float) -> float:
+        """Return the force that would in the end press the foam as far as it is now [N]."""
+        return force + self.delayed * (state - force)
+
+    def delay(self, force: float, threshold: float) -> float:
+        """Return the time from a sudden force to the moment at which the layers meet [s]; inf below the threshold."""
+        if force <= threshold:
+            return math.inf
+        if (1.0 - self.delayed) * force >= threshold:
+            return 0.0
+        return self.relaxation_time * math.log(self.delayed * force / (force - threshold))
+
+
+@dataclass(frozen=True, slots=True)
+class ContactLaw:
+    """The contact of the two layers under a force.
+
+    Attributes:
+        threshold_force: at which they meet [N]; the paper measured 0.5 N.
+        radius_at_newton: radius of the contact at 1 N above that [m].
+        conductance_at_newton: per area at 1 N above the threshold [S/m^2]; with the radius, 1 kohm for the contact.
+        pressure_exponent: conductance per area ~ pressure^this; 0.95 for elastic rough contact.
+
+    Raises:
+        SensorError: a value is negative or not finite.
+    """
+
+    threshold_force: float = 0.5
+    radius_at_newton: float = 4e-3
+    conductance_at_newton: float = 20.0
+    pressure_exponent: float = 0.95
+
+    def __post_init__(self) -> None:
+        for name in ("threshold_force", "radius_at_newton", "conductance_at_newton", "pressure_exponent"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise SensorError(f"{name} must be finite and not negative, got {value!r}")
+
+    def touch(self, force: float, radius: float = 0.0) -> RoundContact:
+        """Return the contact under a seated force.
+
+        Args:
+            force: [N].
+            radius: of a flat body's face [m]; 0 for a round body, whose contact grows.
+        """
+        beyond = force - self.threshold_force
+        if not beyond > 0.0:
+            return RoundContact(0.0, 0.0)
+        if radius == 0.0:
+            radius = self.radius_at_newton * math.cbrt(beyond)
+        pressure = beyond * (self.radius_at_newton / radius) ** 2  # over that at 1 N
+        return RoundContact(radius, self.conductance_at_newton * pressure**self.pressure_exponent)
 
 
 @dataclass(frozen=True, slots=True)

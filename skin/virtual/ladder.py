@@ -13,9 +13,9 @@ from itertools import pairwise
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 
-from .circuit import LayerContact, Matrix
+from .circuit import ContactModel, LayerContact, Matrix
 
-__all__ = ["ResistorLadder"]
+__all__ = ["RIGHT_WIRES", "ResistorLadder", "RewiredSheets", "reorder", "wire_order"]
 
 _A, _B, _C, _D = range(4)
 _LEAST_PART = 1e-6  # part of a sheet between two nodes, so that nodes may coincide
@@ -86,3 +86,43 @@ def _eliminate(y: list[list[float]], node: int) -> None:
             factor = row[j] / own
             for k in range(node):
                 y[j][k] -= factor * row[k]
+
+
+RIGHT_WIRES = "ABCD"
+
+
+def wire_order(wires: str) -> tuple[int, ...]:
+    """Return the index of the electrode on each terminal, for wires such as "BACD": terminal A has electrode B.
+
+    Raises:
+        SensorError: the letters are not A, B, C and D, each once.
+    """
+    if sorted(wires) != list(RIGHT_WIRES):
+        raise SensorError(f'wires must be the letters A, B, C, D, each once, as in "BACD", got {wires!r}')
+    return tuple(RIGHT_WIRES.index(letter) for letter in wires)
+
+
+def reorder(sheets: Matrix, order: Sequence[int]) -> Matrix:
+    """Return what the terminals see of the electrodes: the matrix [S] with its rows and columns exchanged."""
+    return tuple(tuple(sheets[i][j] for j in order) for i in order)
+
+
+class RewiredSheets:
+    """Contact model whose electrodes are on other terminals.
+
+    Args:
+        model: of the sheets.
+        wires: as in ``wire_order``.
+    """
+
+    def __init__(self, model: ContactModel, wires: str) -> None:
+        self._model = model
+        self._order = wire_order(wires)
+
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
+        """Return for each scene of contacts the matrix Y [S] as the terminals A, B, C, D see it."""
+        return [reorder(sheets, self._order) for sheets in self._model.admittances(sensor, scenes)]
+
+    def prepare(self, sensor: Sensor, contact: LayerContact) -> None:
+        """Compute beforehand what would take long when the sensor is touched there."""
+        self._model.prepare(sensor, contact)

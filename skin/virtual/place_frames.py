@@ -15,8 +15,7 @@ from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Status, encode
 
-from .circuit import ConverterInputs, LayerContact, measure
-from .frame_counts import frame_of
+from .circuit import ConverterInputs, LayerContact, frame_of, measure
 from .ladder import ResistorLadder
 
 __all__ = ["PlaceFrames"]

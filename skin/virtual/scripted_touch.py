@@ -1,15 +1,19 @@
-"""Touch of a virtual skin: where, when and how firmly."""
+"""Touch of a virtual skin: where, when and how firmly; on its sensor, across the seam, and as a shape of several."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 from coneskin.core.errors import SensorError
+from coneskin.geometry.frustum import Frustum
+from coneskin.skin.sensor import Sensor
 
-from .substrate import Foam
+from .imperfections import Foam
 
-__all__ = ["ScriptedTouch"]
+__all__ = ["PlacedTouch", "ScriptedTouch", "across_seam", "clamp", "fingers", "grip", "palm_over_seam"]
 
 _MEMORY = 40.0  # relaxation times; after them nothing is left of a touch
 
@@ -140,3 +144,129 @@ class ScriptedTouch:
             state = foam.advance_swing(state, swing, swing, -rate, rate * ramp, min(since - length, 0.0) + ramp)
         state = foam.advance(state, 0.0, max(since - length, 0.0))
         return foam.seated(state, self.force_at(time))
+
+
+_SLIDE_STEP = 1e-3  # m between the places of a touch that slides; the exact field of a new one costs about 2 ms
+_ROUNDING = 1e-12  # m, rad; of where a slide ends
+
+
+class PlacedTouch(NamedTuple):
+    """A touch on its sensor."""
+
+    touch: ScriptedTouch
+    cone: Frustum  #: the sensor's active area
+    reach: float  #: radius that its contact will have at its firmest [m]
+    dwell: float  #: time that it stays at one place as it slides [s]; 0 where it does not slide
+
+    @classmethod
+    def on(cls, sensor: Sensor, touch: ScriptedTouch, reach: float) -> Self:
+        """Put a touch on a sensor.
+
+        Raises:
+            SensorError: it begins or ends off the sensor.
+        """
+        cone = sensor.frustum
+        for u, phi in (touch.u, touch.phi), touch.place_at(touch.end):
+            if not (-_ROUNDING <= u <= cone.slant + _ROUNDING and -_ROUNDING <= phi <= cone.wrap + _ROUNDING):
+                raise SensorError(
+                    f"a touch must lie on {sensor.name}: u up to {cone.slant:g} m and phi up to {cone.wrap:g} rad, got "
+                    f"{u!r} m and {phi!r} rad"
+                )
+        way = math.hypot(touch.slide_u, max(cone.radius1, cone.radius2) * touch.slide_phi)
+        dwell = (touch.end - touch.start) / math.ceil(way / _SLIDE_STEP) if way else 0.0
+        return cls(touch, cone, reach, dwell)
+
+    def place_at(self, time: float) -> tuple[float, float]:
+        """Return u [m] and phi [rad] of its contact at a time [s], in steps of a millimetre where it slides."""
+        touch, cone = self.touch, self.cone
+        if not self.dwell:
+            return touch.u, touch.phi
+        u, phi = touch.place_at(touch.start + self.dwell * round((time - touch.start) / self.dwell))
+        return min(max(u, 0.0), cone.slant), min(max(phi, 0.0), cone.wrap)
+
+
+_LEAST = 0.01  # part of a contact; less on the other side does nothing
+
+
+def across_seam(cone: Frustum, u: float, phi: float, reach: float) -> tuple[float, float] | None:
+    """Return the part of a round contact that lies beyond the gap.
+
+    Args:
+        cone: the active area.
+        u: slant distance of its middle from end 1 [m].
+        phi: azimuth of its middle [rad].
+        reach: its radius [m].
+
+    Returns:
+        azimuth of that part's centroid [rad] and how much of the contact it is; None where nothing reaches so far.
+    """
+    radius = cone.radius_at(u)
+    gap = 2.0 * math.pi - cone.wrap
+    over_start = phi <= 0.5 * cone.wrap
+    distance = radius * (gap + (phi if over_start else cone.wrap - phi))
+    if not distance < reach:
+        return None
+    ratio = distance / reach
+    sine = math.sqrt(1.0 - ratio * ratio)
+    share = (math.acos(ratio) - ratio * sine) / math.pi
+    if share < _LEAST:
+        return None
+    inside = (2.0 / 3.0 * sine**3 / (math.pi * share) - ratio) * reach / radius  # from the other edge
+    return (cone.wrap - inside if over_start else inside), share
+
+
+def palm_over_seam(cone: Frustum, touch: ScriptedTouch, angle: float) -> list[ScriptedTouch]:
+    """Press on both sides of the seam at equal u, as a palm does that lies over it.
+
+    Args:
+        cone: the active area.
+        touch: when, where along the side, how firmly on each side; its phi is not used.
+        angle: of each press from its edge of the sensor [rad].
+    """
+    return _at(cone, touch, [(touch.u, angle), (touch.u, cone.wrap - angle)])
+
+
+def grip(cone: Frustum, touch: ScriptedTouch, second_force: float | None = None) -> list[ScriptedTouch]:
+    """Press on opposite sides at equal u, as a hand does that closes around the link.
+
+    Args:
+        cone: the active area.
+        touch: the first press.
+        second_force: of the opposite one [N]; as the first by default.
+    """
+    return clamp(cone, touch, touch.u, second_force)
+
+
+def clamp(cone: Frustum, touch: ScriptedTouch, u: float, second_force: float | None = None) -> list[ScriptedTouch]:
+    """Press on opposite sides at two places along the link, as it does that is caught between two things.
+
+    Args:
+        cone: the active area.
+        touch: the first press.
+        u: slant distance of the opposite one from end 1 [m].
+        second_force: of the opposite one [N]; as the first by default.
+    """
+    first, second = _at(cone, touch, [(touch.u, touch.phi), (u, (touch.phi + math.pi) % (2.0 * math.pi))])
+    return [first, second if second_force is None else replace(second, force=second_force)]
+
+
+def fingers(cone: Frustum, touch: ScriptedTouch, offsets: Sequence[tuple[float, float]]) -> list[ScriptedTouch]:
+    """Press with several fingers around a place.
+
+    Args:
+        cone: the active area.
+        touch: when, around which place, and how firmly each.
+        offsets: of each finger along the side and around it [m].
+    """
+    radius = cone.radius_at(touch.u)
+    return _at(cone, touch, [(touch.u + along, touch.phi + around / radius) for along, around in offsets])
+
+
+def _at(cone: Frustum, touch: ScriptedTouch, places: Sequence[tuple[float, float]]) -> list[ScriptedTouch]:
+    for u, phi in places:
+        if not (0.0 <= u <= cone.slant and 0.0 <= phi <= cone.wrap):
+            raise SensorError(
+                f"each press must lie on the sensor: u up to {cone.slant:g} m and phi up to {cone.wrap:g} rad, got "
+                f"{u!r} m and {phi!r} rad"
+            )
+    return [replace(touch, u=u, phi=phi) for u, phi in places]

@@ -13,8 +13,7 @@ from coneskin.geometry.frustum import Frustum
 
 from .circuit import WiringFaults
 from .fault_injection import FaultInjection
-from .scripted_touch import ScriptedTouch
-from .touch_shapes import fingers, grip, palm_over_seam
+from .scripted_touch import ScriptedTouch, fingers, grip, palm_over_seam
 
 __all__ = ["FAULT_NAMES", "TOUCH_SHAPES", "parse_fault", "parse_press", "parse_touch", "read_script"]
 

@@ -7,8 +7,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.scene.reader import parse_scene
-from coneskin.skin.firmware.board_facts import BOARD_FACTS
-from coneskin.skin.firmware.boards import boards, converters, firmware_folder
+from coneskin.skin.firmware.boards import BOARD_FACTS, boards, converters, firmware_folder
 
 CONE = "radius1_mm = 37.5\nradius2_mm = 37.5\nheight_mm = 240\nwrap_deg = 350\n"
 each_board = pytest.mark.parametrize("board", list(BOARD_FACTS))

@@ -21,9 +21,8 @@ from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEven
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.sim.companion_processes import CompanionProcesses
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.imperfections import Imperfections
+from coneskin.skin.virtual.imperfections import Foam, Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.skin.virtual.substrate import Foam
 from coneskin.testing.guard_rig import CONE, START_Q, make_core, touch
 
 

@@ -5,8 +5,7 @@ import math
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.electronics import LeadOhms
-from coneskin.skin.matched_electronics import GivenElectronics, match_electronics
+from coneskin.skin.electronics import GivenElectronics, LeadOhms, match_electronics
 from coneskin.skin.sensor import Sensor, sheet_resistances
 from tests.support.firmware.emulated_board import BoardPrograms
 from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools

@@ -25,8 +25,7 @@ from coneskin.scene.tables import (
     touch_table,
 )
 from coneskin.scene.tables.schema import Key
-from coneskin.skin.electronics import Polarity, Thresholds
-from coneskin.skin.matched_electronics import match_electronics
+from coneskin.skin.electronics import Polarity, Thresholds, match_electronics
 from coneskin.skin.sensor import Sensor
 from tests.support.paths import ROOT
 

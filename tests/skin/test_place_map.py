@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
+from coneskin.skin.calibration import MAP_LIMITS, PlaceMap
 from coneskin.skin.detection.detector import Detector
-from coneskin.skin.place_map import MAP_LIMITS, PlaceMap
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.wire import Frame

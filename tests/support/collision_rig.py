@@ -33,7 +33,7 @@ from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.timing import TimingLimits
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.pressed_skin import Press, PressedSkin
+from coneskin.skin.virtual.skin import Press, PressedSkin
 
 from .pressing_body import Body, Pressing
 

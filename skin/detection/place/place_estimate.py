@@ -19,8 +19,8 @@ import math
 from typing import NamedTuple
 
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
-from coneskin.skin.robin_function import RobinFunction
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.sheet_functions import RobinFunction
 
 from .dipole_strength import DipoleStrength, weigh_dipole
 from .matrix_noise import MatrixNoise

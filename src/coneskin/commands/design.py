@@ -24,7 +24,7 @@ from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.solid import require_step_writer
 from coneskin.robot.arm.link_frames import LINK_INDEX
 from coneskin.robot.sim.machine.options import DEFAULT_MODEL
-from coneskin.skin.matched_electronics import shunt_ohms
+from coneskin.skin.electronics import shunt_ohms
 
 from .arguments.design import (
     add_arguments,

@@ -13,7 +13,7 @@ from coneskin.core.errors import SkinTimeout
 from coneskin.core.time_argument import positive_seconds
 
 if TYPE_CHECKING:
-    from coneskin.skin.sources.port_list import PortFacts
+    from coneskin.skin.sources.serial_port import PortFacts
 
 __all__ = ["add_arguments", "find_port", "run"]
 
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Find a port, or list those that are there."""
     from coneskin.commissioning.line.port_search import port_trouble, stable_name
-    from coneskin.skin.sources.port_list import find_ports
+    from coneskin.skin.sources.serial_port import find_ports
 
     if args.list:
         return _list(find_ports(), args.json)

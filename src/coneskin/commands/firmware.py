@@ -44,9 +44,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the folder and say what to do next; the exit code is 0."""
     from coneskin.scene.tables.sensor_table import build_sensor, merge_sensor_file
     from coneskin.skin.firmware.board_circuit import board_circuit
-    from coneskin.skin.firmware.board_page import board_page
+    from coneskin.skin.firmware.board_page import board_page, wiring_diagram
     from coneskin.skin.firmware.boards import board_header, firmware_folder
-    from coneskin.skin.firmware.wiring_diagram import wiring_diagram
 
     problems: list[str] = []
     folder = args.sensor if args.sensor.is_dir() else args.sensor.parent

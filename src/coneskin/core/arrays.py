@@ -1,4 +1,4 @@
-"""Read-only arrays for frozen values."""
+"""Types of arrays, and read-only arrays for frozen values."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import GeometryError
 
-__all__ = ["frozen"]
+__all__ = ["Complex", "Floats", "frozen"]
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 def frozen(values: ArrayLike, shape: tuple[int | None, ...], name: str) -> NDArray[np.float64]:

@@ -200,7 +200,7 @@ def _sources(ports: Sequence[str], boards: Sequence[BoardCircuit]) -> list[str]:
 
 def _padding(thickness: float) -> str:
     """Return the table of the padding of sheets of a thickness [m]."""
-    from coneskin.skin.padding import Padding
+    from coneskin.skin.materials import Padding
 
     assumed = Padding(thickness)
     return (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from coneskin.design.workshop.build_figures import side_name
 from coneskin.geometry.drawing.nesting import MaterialBed
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
+from coneskin.skin.electronics import SENSE_GAIN, shunt_ohms
 
 from .files import sheet_folder
 from .sheets.sheet_design import SheetDesign

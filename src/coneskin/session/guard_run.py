@@ -17,7 +17,7 @@ from coneskin.scene.build import build_core, place_on_arm
 from coneskin.scene.surface_record import encode_surfaces
 from coneskin.scene.values.scene import Scene
 from coneskin.skin.sources.kinds import is_simulated, open_source
-from coneskin.skin.sources.source_reopening import SourceReopening
+from coneskin.skin.sources.source import SourceReopening
 
 __all__ = ["run_guard"]
 

@@ -33,8 +33,7 @@ _TOUCH_DELAY = 0.002  # s from a request to its touch, so that it begins on a fr
 
 def virtual_skin(scene: Scene, script: bool = True, pressed: bool = False) -> VirtualSkin:
     """Return the virtual skin that a scene's source describes, with its script or without, perhaps one to press."""
-    from coneskin.skin.virtual.pressed_skin import PressedSkin
-    from coneskin.skin.virtual.skin import VirtualSkin
+    from coneskin.skin.virtual.skin import PressedSkin, VirtualSkin
 
     assert scene.source is not None
     make = partial(PressedSkin, coarse=True) if pressed else VirtualSkin
@@ -112,7 +111,7 @@ def _serve(channel: Channel, skin: VirtualSkin, began: float) -> None:
 
 def _press(line: Channel, skin: VirtualSkin, truths: Sequence[Channel]) -> None:
     """Let the bodies press as the physics engine says, and pass on what only that knows."""
-    from coneskin.skin.virtual.pressed_skin import Press, PressedSkin
+    from coneskin.skin.virtual.skin import Press, PressedSkin
 
     assert isinstance(skin, PressedSkin)
     for message in line.receive():

@@ -34,10 +34,9 @@ from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.fault_injection import FaultInjection
-from coneskin.skin.virtual.imperfections import Imperfections
+from coneskin.skin.virtual.imperfections import Foam, Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.skin.virtual.substrate import Foam
 
 __all__ = ["CONE", "LINK", "MODEL", "START_Q", "GuardRig", "felt", "make_core", "touch"]
 

@@ -12,8 +12,8 @@ from coneskin.commissioning.calibration.marks import MARK_COUNTS, calibration_ma
 from coneskin.commissioning.calibration.refusals import KnownTouch
 from coneskin.core.errors import SkinError
 from coneskin.geometry.frustum import Frustum
+from coneskin.skin.calibration import PlaceMap
 from coneskin.skin.electronics import Polarity
-from coneskin.skin.place_map import PlaceMap
 from coneskin.skin.sensor import Sensor
 
 FOREARM = Frustum(0.0376, 0.0372, 0.26, math.radians(350.0))

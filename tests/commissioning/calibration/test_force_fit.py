@@ -11,8 +11,8 @@ from coneskin.commissioning.calibration.marks import calibration_marks
 from coneskin.core.errors import SceneError, SensorError, SkinError
 from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
 from coneskin.scene.reader import parse_scene
+from coneskin.skin.calibration import ForceTable
 from coneskin.skin.detection.frame.touch_reading import TouchReading
-from coneskin.skin.force_table import ForceTable
 from coneskin.testing.forearm import forearm_scene
 
 FORCES = (1.0, 2.0, 5.0, 10.0)

@@ -9,7 +9,7 @@ import pytest
 from coneskin.commands.find_port import find_port
 from coneskin.commissioning.line.port_search import PortSearch, port_trouble, stable_name
 from coneskin.core.errors import SkinTimeout
-from coneskin.skin.sources.port_list import PortFacts
+from coneskin.skin.sources.serial_port import PortFacts
 
 A = PortFacts("/dev/ttyUSB0", "FT232R", "USB VID:PID=0403:6001 SER=A1")
 B = PortFacts("/dev/ttyUSB1", "FT232R", "USB VID:PID=0403:6001 SER=B2")

@@ -11,7 +11,7 @@ from coneskin.impact.permissible_speed import taylor_integrator
 from coneskin.impact.permissible_speed.contact_course import ContactState
 from coneskin.impact.permissible_speed.taylor_integrator import POINTS, collocate, integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 TURN = 2.0 * math.pi * 16.0
 

@@ -27,7 +27,7 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import parse_scene
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 from coneskin.testing.forearm import forearm_scene
 
 MODEL = arm_model("UR5e")

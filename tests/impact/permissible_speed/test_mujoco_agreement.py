@@ -23,7 +23,7 @@ from coneskin.robot.arm.inertia import effective_mass
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.scene.values.body import BodyScene
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 from coneskin.testing.guard_rig import CONE, LINK, MODEL
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from coneskin.impact.permissible_speed.speed_search import ForceLimits, keeps, permissible_speed
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 
 @pytest.mark.parametrize(("arm", "body", "k"), [(10.0, 0.6, 75e3), (5.0, 4.4, 50e3), (20.0, 40.0, 25e3)])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import CompressionLaw, DrivenArm, StruckBody, TwoMassContact
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 WALL = StruckBody(math.inf)
 ELASTIC = Padding(loss=0.0)

@@ -7,7 +7,7 @@ import pytest
 from coneskin.core.errors import SensorError
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import CompressionLaw, DrivenArm, StruckBody, TwoMassContact
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 
 def test_without_tissue_the_law_is_the_paddings() -> None:

@@ -10,7 +10,7 @@ import pytest
 from coneskin.core.recording.block import Block
 from coneskin.impact.simulation.impact_outcome import TouchRecorder, TruthRecorder
 from coneskin.robot.guard.signals.journal import BlockKind, body_places, contact_force, force_block
-from coneskin.skin.virtual.pressed_skin import Press
+from coneskin.skin.virtual.skin import Press
 
 FIRM, OTHER = Press("a", 0.1, 1.0, 3.0), Press("b", 0.2, 2.0, 4.0)
 

@@ -14,7 +14,7 @@ from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.scene.values.body import BodyScene
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 

@@ -11,7 +11,7 @@ from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.plant import PlantLost
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.body import BodyScene
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 from coneskin.testing.forearm import forearm_scene, start_with
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")

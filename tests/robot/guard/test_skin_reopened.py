@@ -16,8 +16,7 @@ from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.serial_port import SerialPort
-from coneskin.skin.sources.source import Source
-from coneskin.skin.sources.source_reopening import SourceReopening
+from coneskin.skin.sources.source import Source, SourceReopening
 from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin

@@ -4,7 +4,7 @@ import pytest
 
 from coneskin.core.errors import SceneError, SensorError
 from coneskin.scene.reader import parse_scene
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 ARM = '[arm]\nmodel = "UR5e"\nhost = "127.0.0.1"\n'
 HAND = ARM + '[[body]]\nkind = "hand"\nxyz_mm = [400, 0, 500]\nmass_kg = 0.6\nstiffness_n_per_mm = 75\n'

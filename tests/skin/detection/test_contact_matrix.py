@@ -9,8 +9,8 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
 from coneskin.skin.detection.place.matrix_noise import FrameNoise
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
-from coneskin.skin.field.coupling import Coupling
 from coneskin.skin.field.disc import Disc
+from coneskin.skin.field.fourport import Coupling
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor

@@ -15,9 +15,8 @@ from coneskin.skin.detection.untouched.guides import UntouchedGuides
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, measure
 from coneskin.skin.virtual.field_contacts import FieldContacts
-from coneskin.skin.virtual.imperfections import Imperfections
+from coneskin.skin.virtual.imperfections import ContactLaw, Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.skin.virtual.substrate import ContactLaw
 from coneskin.skin.wire import Frame
 
 from ..bench_top import CONE, UR10

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import FieldError
-from coneskin.skin.field.coupling import Coupling
 from coneskin.skin.field.disc import Disc
-from coneskin.skin.field.fourport import DrivePhase, Terminal, angular_phase, radial_phase, touch_phase
+from coneskin.skin.field.fourport import Coupling, DrivePhase, Terminal, angular_phase, radial_phase, touch_phase
 from coneskin.skin.field.model import FieldModel
 from tests.support.field.exact_circuit import exact_volts
 

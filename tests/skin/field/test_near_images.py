@@ -7,12 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.skin.field.circles import circle
-from coneskin.skin.field.disc import Discs
-from coneskin.skin.field.fourport import radial_phase
-from coneskin.skin.field.model import FieldModel
-from coneskin.skin.field.multipole import solve_discs
-from coneskin.skin.field.near_images import (
+from coneskin.skin.field.circles import (
+    circle,
     edge_images,
     image_coefficients,
     image_distance,
@@ -20,6 +16,10 @@ from coneskin.skin.field.near_images import (
     pair_coefficients,
     pair_distance,
 )
+from coneskin.skin.field.disc import Discs
+from coneskin.skin.field.fourport import radial_phase
+from coneskin.skin.field.model import FieldModel
+from coneskin.skin.field.multipole import solve_discs
 from coneskin.skin.field.sheet import SectorSheet
 from tests.support.sweep import sweep
 

@@ -10,8 +10,7 @@ import pytest
 from coneskin.core.errors import FieldError
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel
-from coneskin.skin.field.patch import ContactPatch, solve_patch
-from coneskin.skin.field.shape import clip, disc, ellipse, rectangle
+from coneskin.skin.field.patch import ContactPatch, clip, disc, ellipse, rectangle, solve_patch
 from tests.support.sweep import sweep
 
 from ..field_cases import PAPER, SHEETS

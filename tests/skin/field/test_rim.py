@@ -11,10 +11,8 @@ from coneskin.core.errors import FieldError
 from coneskin.skin.field.disc import Disc, Discs
 from coneskin.skin.field.green import Strip
 from coneskin.skin.field.model import FieldModel
-from coneskin.skin.field.multipole import solve_discs
-from coneskin.skin.field.order import FIRST
-from coneskin.skin.field.rim import solve_rims
-from coneskin.skin.field.rim_points import RimPoints, log_weights
+from coneskin.skin.field.multipole import FIRST, solve_discs
+from coneskin.skin.field.rim import RimPoints, log_weights, solve_rims
 from coneskin.skin.field.sheet import SectorSheet
 from tests.support.field import rim_solution
 from tests.support.sweep import sweep

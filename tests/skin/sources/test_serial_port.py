@@ -7,8 +7,7 @@ import sys
 import pytest
 
 from coneskin.core.errors import SkinConnectionError
-from coneskin.skin.sources.port_list import list_ports
-from coneskin.skin.sources.serial_port import SerialPort
+from coneskin.skin.sources.serial_port import SerialPort, list_ports
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
 

@@ -15,13 +15,11 @@ from coneskin.skin.detection.frame.reading import Reading, read
 from coneskin.skin.electronics import Electronics, LeadOhms
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.model import FieldModel
-from coneskin.skin.field.patch import ContactPatch, solve_patch
-from coneskin.skin.field.shape import disc
+from coneskin.skin.field.patch import ContactPatch, disc, solve_patch
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact, measure
+from coneskin.skin.virtual.circuit import LayerContact, frame_of, measure
 from coneskin.skin.virtual.field_contacts import FieldContacts
-from coneskin.skin.virtual.frame_counts import frame_of
 from coneskin.skin.virtual.ladder import ResistorLadder
 
 from ..bench_top import UR10

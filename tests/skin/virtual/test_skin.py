@@ -13,14 +13,12 @@ from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact, Matrix, measure
+from coneskin.skin.virtual.circuit import LayerContact, Matrix, counts_of, measure
 from coneskin.skin.virtual.fault_injection import FaultInjection
-from coneskin.skin.virtual.frame_counts import counts_of
-from coneskin.skin.virtual.imperfections import Imperfections
+from coneskin.skin.virtual.imperfections import Foam, Imperfections
 from coneskin.skin.virtual.memory_source import ManualClock, MemorySource
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import MODELS, VirtualSkin
-from coneskin.skin.virtual.substrate import Foam
 from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder
 
 from ..bench_top import CONE, UR10

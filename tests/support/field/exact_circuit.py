@@ -6,8 +6,7 @@ import math
 
 import mpmath as mp
 
-from coneskin.skin.field.coupling import Coupling
-from coneskin.skin.field.fourport import DrivePhase
+from coneskin.skin.field.fourport import Coupling, DrivePhase
 from coneskin.skin.field.model import FieldModel
 
 __all__ = ["exact_volts"]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coneskin.skin.field import shape as field_shape
-from coneskin.skin.field.coupling import Coupling
-from coneskin.skin.field.fourport import angular_phase, radial_phase
+from coneskin.skin.field import patch as field_shape
+from coneskin.skin.field.fourport import Coupling, angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.patch import ContactPatch, solve_patch
 from coneskin.skin.field.sheet import SectorSheet

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from coneskin.skin.electronics import SENSE_GAIN, shunt_ohms
 from coneskin.skin.firmware.boards import boards
-from coneskin.skin.matched_electronics import SENSE_GAIN, shunt_ohms
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.source import Openable
 from coneskin.skin.virtual.circuit import LayerContact, Matrix

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from coneskin.commissioning.acceptance.misreadings import Place
-from coneskin.skin.place_map import MAP_LIMITS, PlaceMap, map_terms
+from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
 
 from .refusals import KnownTouch, check_bends, check_offsets_and_gains, check_touches
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from coneskin.core.errors import SensorError, SkinError
-from coneskin.skin.force_table import ForceTable
+from coneskin.skin.calibration import ForceTable
 
 __all__ = ["KnownPress", "fit_forces"]
 

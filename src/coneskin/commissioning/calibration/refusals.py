@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.commissioning.acceptance.misreadings import RIGHT, Place, explain, misfit
 from coneskin.core.errors import SkinError
-from coneskin.skin.place_map import MAP_LIMITS
+from coneskin.skin.calibration import MAP_LIMITS
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor

@@ -198,7 +198,7 @@ def _port(source: SourceScene) -> Iterator[Finding]:
         return
     path, item = Path(name), "skin, permission"
     if not path.exists():
-        from coneskin.skin.sources.port_list import list_ports
+        from coneskin.skin.sources.serial_port import list_ports
 
         there = ", ".join(list_ports()) or "none at all"
         yield Finding(item, "bad", f"there is no {name}; present: {there}", "", "plug it in, or correct source.port")

@@ -19,8 +19,7 @@ from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.skin.virtual.circuit import LayerContact, Matrix, measure
-from coneskin.skin.virtual.ladder import ResistorLadder
-from coneskin.skin.virtual.rewired_sheets import RIGHT_WIRES, reorder, wire_order
+from coneskin.skin.virtual.ladder import RIGHT_WIRES, ResistorLadder, reorder, wire_order
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from coneskin.skin.detection.stream import TouchStream
-from coneskin.skin.diagnosis.capture import CaptureWindow
+from coneskin.skin.diagnosis.capture import CaptureWindow, find_frames
 from coneskin.skin.diagnosis.cause import Diagnosis
 from coneskin.skin.diagnosis.diagnose import diagnose
-from coneskin.skin.diagnosis.found_frames import find_frames
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
 from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import Sensor

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from coneskin.skin.sources.port_list import PortFacts
+from coneskin.skin.sources.serial_port import PortFacts
 
 __all__ = ["PortSearch", "port_trouble", "stable_name"]
 

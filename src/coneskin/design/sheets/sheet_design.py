@@ -23,10 +23,9 @@ from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.tables.sensor_table import with_key_names
-from coneskin.skin.electronics import Electronics
-from coneskin.skin.matched_electronics import GivenElectronics, match_electronics
+from coneskin.skin.electronics import Electronics, GivenElectronics, match_electronics
+from coneskin.skin.materials import SheetMaterial, match_sheet_materials
 from coneskin.skin.sensor import sheet_resistances
-from coneskin.skin.sheet_materials import SheetMaterial, match_sheet_materials
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit

@@ -14,7 +14,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.sector import Sector, unroll
 from coneskin.scene.tables.cone_keys import CONE_KEYS
-from coneskin.skin.matched_electronics import shunt_ohms
+from coneskin.skin.electronics import shunt_ohms
 
 from .sheet_design import SheetDesign
 

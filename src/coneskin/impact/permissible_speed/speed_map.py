@@ -24,7 +24,7 @@ from coneskin.scene.tables.speed_limit_check import limit_digest
 from coneskin.scene.tables.speed_limit_table import limit_fingerprint
 from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
 from coneskin.scene.values.whole_file import write_whole
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 from .arm_patches import motion_positions, patches_of, weigh
 from .extra_way import ExtraWay, extra_ways

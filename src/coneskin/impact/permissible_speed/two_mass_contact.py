@@ -19,7 +19,7 @@ import math
 from dataclasses import dataclass, field
 
 from coneskin.core.errors import SensorError
-from coneskin.skin.padding import Padding
+from coneskin.skin.materials import Padding
 
 __all__ = ["CompressionLaw", "DrivenArm", "StruckBody", "TwoMassContact"]
 

@@ -35,8 +35,8 @@ from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.scene.build import build_core
 from coneskin.scene.values.body import BodyScene
 from coneskin.scene.values.scene import Scene
-from coneskin.skin.padding import Padding
-from coneskin.skin.virtual.pressed_skin import PressedSkin
+from coneskin.skin.materials import Padding
+from coneskin.skin.virtual.skin import PressedSkin
 
 from .impact_outcome import ImpactMeter, ImpactOutcome, TouchRecorder, TruthRecorder
 from .mujoco_plant import MujocoPlant

@@ -15,8 +15,8 @@ from typing import Any
 from coneskin.core.recording.block import Block
 from coneskin.geometry.pose import Vector
 from coneskin.robot.guard.signals.journal import BlockKind, force_block
-from coneskin.skin.virtual.pressed_skin import Press
-from coneskin.skin.virtual.substrate import ContactLaw
+from coneskin.skin.virtual.imperfections import ContactLaw
+from coneskin.skin.virtual.skin import Press
 
 __all__ = ["CLAMP_TIME", "ImpactMeter", "ImpactOutcome", "TouchRecorder", "TruthRecorder"]
 

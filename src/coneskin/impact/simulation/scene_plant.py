@@ -18,8 +18,8 @@ from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.plant import PlantLost, PlantState
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.values.scene import Scene
-from coneskin.skin.padding import Padding
-from coneskin.skin.virtual.pressed_skin import Press
+from coneskin.skin.materials import Padding
+from coneskin.skin.virtual.skin import Press
 
 from .mujoco_plant import MujocoPlant, Touch
 from .scene_description import SheetOnLink

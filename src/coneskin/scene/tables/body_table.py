@@ -10,7 +10,7 @@ from coneskin.scene.values.body import BODY_KINDS, BodyScene
 from .schema import Key, check
 
 if TYPE_CHECKING:
-    from coneskin.skin.padding import Padding
+    from coneskin.skin.materials import Padding
 
 __all__ = ["BODY_KEYS", "PADDING_KEYS", "read_bodies", "read_padding"]
 
@@ -83,7 +83,7 @@ def read_padding(tables: Mapping[str, Any], problems: list[str]) -> Padding | No
     """
     if "padding" not in tables:
         return None
-    from coneskin.skin.padding import Padding
+    from coneskin.skin.materials import Padding
 
     values = check(tables["padding"], PADDING_KEYS, "padding", problems)
     return Padding(values["thickness"], values["stiffness"], values["hard"], values["loss_s_per_m"])

@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from coneskin.geometry.frustum import Frustum
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.pose import Pose
+    from coneskin.skin.calibration import ForceTable, PlaceMap
     from coneskin.skin.electronics import Thresholds
-    from coneskin.skin.force_table import ForceTable
-    from coneskin.skin.place_map import PlaceMap
     from coneskin.skin.sensor import Sensor
 
 __all__ = [
@@ -109,8 +108,7 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
         return None
     from coneskin.geometry.frustum import Frustum
     from coneskin.geometry.pose import Pose
-    from coneskin.skin.electronics import LeadOhms, Polarity
-    from coneskin.skin.matched_electronics import GivenElectronics, match_electronics
+    from coneskin.skin.electronics import GivenElectronics, LeadOhms, Polarity, match_electronics
     from coneskin.skin.sensor import Sensor, sheet_resistances
 
     try:
@@ -173,7 +171,7 @@ def _place_map(frustum: Frustum, values: Mapping[str, Any]) -> PlaceMap | None:
     along, around = values["map_along"], values["map_around"]
     if along is None and around is None:
         return None
-    from coneskin.skin.place_map import PlaceMap
+    from coneskin.skin.calibration import PlaceMap
 
     return PlaceMap(frustum, along or (0.0,) * 5, around or (0.0,) * 5, values["map_note"])
 
@@ -182,7 +180,7 @@ def _force_table(values: Mapping[str, Any]) -> ForceTable | None:
     forces, levels = values["forces"], values["force_levels"]
     if not forces and not levels:
         return None
-    from coneskin.skin.force_table import ForceTable
+    from coneskin.skin.calibration import ForceTable
 
     return ForceTable(tuple(forces or ()), tuple(levels or ()), values["force_error"])
 

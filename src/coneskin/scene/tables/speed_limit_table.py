@@ -74,7 +74,7 @@ _PATCH = (
 
 def limit_fingerprint(scene: Scene) -> str:
     """Return a hash of all that permissible speeds depend on: arm, places of the sheets, padding, ways to react."""
-    from coneskin.skin.padding import Padding
+    from coneskin.skin.materials import Padding
 
     reactions = [scene.default_reaction, *(rule.reaction for rule in scene.rules)]
     facts = {

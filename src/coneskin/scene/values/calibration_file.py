@@ -253,7 +253,7 @@ def calibration_keys(place: Path, sensor: Sensor, simulated: bool) -> dict[str, 
     """
     path = calibration_path(place, sensor.device_id)
     record = find_calibration(path, sensor, simulated)
-    from coneskin.skin.place_map import PlaceMap
+    from coneskin.skin.calibration import PlaceMap
 
     try:
         PlaceMap(sensor.frustum, record.map_along, record.map_around)

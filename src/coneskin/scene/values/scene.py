@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from coneskin.robot.reaction.rules import Rule
     from coneskin.robot.reaction.types import Reaction
     from coneskin.robot.stop.limits import MonitoringLimits
-    from coneskin.skin.padding import Padding
+    from coneskin.skin.materials import Padding
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 

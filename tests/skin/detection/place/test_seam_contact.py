@@ -6,9 +6,9 @@ import random
 import pytest
 
 from coneskin.geometry.frustum import Frustum
+from coneskin.skin.calibration import PlaceMap
 from coneskin.skin.detection.frame.touch_reading import TouchReading
 from coneskin.skin.electronics import Polarity
-from coneskin.skin.place_map import PlaceMap
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
 

@@ -18,8 +18,8 @@ from coneskin.skin.detection.place.touch_place import TouchPlace
 from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.detection.untouched.leak import UntouchedLeak
 from coneskin.skin.electronics import Electronics, Polarity
-from coneskin.skin.robin_function import RobinFunction
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.sheet_functions import RobinFunction
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.wire import Frame
 

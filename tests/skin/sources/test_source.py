@@ -3,8 +3,7 @@
 import pytest
 
 from coneskin.core.errors import SkinConnectionError
-from coneskin.skin.sources.source import Source
-from coneskin.skin.sources.source_reopening import SourceReopening, open_again
+from coneskin.skin.sources.source import Source, SourceReopening, open_again
 
 
 class Absent(Source):

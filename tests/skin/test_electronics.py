@@ -6,8 +6,7 @@ import random
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.electronics import Electronics, LeadOhms
-from coneskin.skin.matched_electronics import HEADROOM, GivenElectronics, match_electronics, shunt_ohms
+from coneskin.skin.electronics import HEADROOM, Electronics, GivenElectronics, LeadOhms, match_electronics, shunt_ohms
 from coneskin.skin.sensor import Sensor
 
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from coneskin.core.errors import SensorError
-from coneskin.skin.virtual.substrate import ContactLaw, Foam
+from coneskin.skin.virtual.imperfections import ContactLaw, Foam
 
 
 def test_layers_close_at_the_papers_threshold() -> None:

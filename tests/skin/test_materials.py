@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from coneskin.skin.matched_electronics import match_electronics
-from coneskin.skin.sheet_materials import SHEET_MATERIALS, match_sheet_materials
+from coneskin.skin.electronics import match_electronics
+from coneskin.skin.materials import SHEET_MATERIALS, match_sheet_materials
 
 
 def test_an_ordinary_link_gets_one_material_of_a_kiloohm():
