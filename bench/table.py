@@ -1,65 +1,92 @@
-"""Table of all benches: name on the command line -> module."""
+"""Table of all benches: name on the command line, module, and what its figures do not show."""
 
 from __future__ import annotations
 
-__all__ = ["BENCHES"]
+from dataclasses import dataclass
+
+__all__ = ["BENCHES", "Bench"]
+
+_SIMULATED_ARM = "No real arm or controller was measured."
+_SIMULATED_SKIN = "No real skin was measured."
+
+
+@dataclass(frozen=True)
+class Bench:
+    """One row of the table.
+
+    Attributes:
+        module: that has `main()`; the first line of its docstring says what it measures.
+        not_shown: what the figures do not show.
+        one_thread: numerical libraries are held to one thread, because their run times are compared.
+    """
+
+    module: str
+    not_shown: str
+    one_thread: bool = False
+
 
 BENCHES = {
     # the guard's loop
-    "loop": "bench.loop.stages",
-    "publish": "bench.loop.publish",
-    "start": "bench.loop.start",
-    "endurance": "bench.loop.endurance",
+    "loop": Bench("bench.loop.stages", "ur_rtde, the controller, the arm, a real serial adapter, a busy machine."),
+    "publish": Bench("bench.loop.publish", "Subscribers on another computer."),
+    "start": Bench("bench.loop.start", "The start of an arm's driver."),
+    "endurance": Bench("bench.loop.endurance", "Sockets, the disk and ur_rtde: frames come from memory."),
     # the reaction
-    "reaction": "bench.reaction.times",
-    "stops": "bench.reaction.stops",
-    "retreat": "bench.reaction.retreat",
-    "deceleration": "bench.reaction.deceleration",
-    "kinematics": "bench.reaction.kinematics",
-    "speed-limit": "bench.reaction.speed_limit",
-    # faults, alone and two at once
-    "faults": "bench.faults.campaign",
-    # collisions, in virtual time and in the physics engine
-    "push-in": "bench.collision.push_in",
-    "collision": "bench.collision.newtons",
-    "collision-settled": "bench.collision.settled",
-    "collision-saturated": "bench.collision.saturated",
-    # the model of a contact
-    "impact-agreement": "bench.impact.agreement",
-    "impact-braking": "bench.impact.braking",
-    "impact-integrators": "bench.impact.integrators",
-    "impact-masses": "bench.impact.masses",
-    "impact-stability": "bench.impact.stability",
-    "impact-study": "bench.impact.study",
+    "reaction": Bench("bench.reaction.times", _SIMULATED_ARM),
+    "retreat": Bench("bench.reaction.retreat", "Dynamics: the retreats are geometry alone."),
+    "deceleration": Bench(
+        "bench.reaction.deceleration", "Friction, which helps, and the brakes and limits of a real controller."
+    ),
+    "kinematics": Bench("bench.reaction.kinematics", "The accuracy of a real arm's geometry."),
+    "speed-limit": Bench("bench.reaction.speed_limit", "How soon a real controller's slider acts."),
+    # faults, collisions, and the model of a contact
+    "faults": Bench("bench.faults.campaign", _SIMULATED_ARM + " Each kind was tried a few times on a busy machine."),
+    "push-in": Bench("bench.collision.push_in", "Forces: contacts are a stiff pad, and the arm obeys within bounds."),
+    "collision": Bench(
+        "bench.collision.newtons", "Forces that a person would bear: these figures compare ways to protect a body."
+    ),
+    "collision-settled": Bench("bench.collision.settled", "A real controller may end such a motion first (C153)."),
+    "impact-agreement": Bench(
+        "bench.impact.agreement", "Other links, other arms, and pushes by more than one joint: it bounds nothing."
+    ),
+    "impact-braking": Bench("bench.impact.braking", "Deceleration that a real arm with its payload cannot give."),
+    "impact-integrators": Bench("bench.impact.integrators", "Whether the model of the contact is right."),
+    "impact-masses": Bench("bench.impact.masses", "A bound: the positions compared with are a sample, too."),
+    "impact-stability": Bench("bench.impact.stability", "Accuracy at each point of the grid."),
+    "impact-study": Bench(
+        "bench.impact.study", "The study's measurements: only its abstract and its spring and mass could be read."
+    ),
     # the skin
-    "wire": "bench.skin.wire",
-    "sources": "bench.skin.sources",
-    "skins": "bench.skin.skins",
-    "virtual-skin": "bench.skin.virtual_skin",
-    "calibrate": "bench.skin.calibrate",
-    "decode": "bench.decode.accuracy",
-    "decode-faults": "bench.decode.faults",
-    "field": "bench.field.accuracy",
-    "field-extremes": "bench.field.extremes",
-    "field-reference": "bench.field.reference",
-    "firmware": "bench.firmware.timing",
-    "firmware-guard": "bench.firmware.guard",
+    "wire": Bench("bench.skin.wire", "Ports, and the guard behind the detector."),
+    "sources": Bench("bench.skin.sources", "Real ports: both are pseudo-terminals."),
+    "virtual-skin": Bench("bench.skin.virtual_skin", _SIMULATED_SKIN),
+    "calibrate": Bench("bench.skin.calibrate", "What a finger and an uneven sheet add: contacts are points."),
+    "decode": Bench("bench.decode.accuracy", _SIMULATED_SKIN + " Sheets are uniform.", one_thread=True),
+    "decode-faults": Bench("bench.decode.faults", _SIMULATED_SKIN),
+    "field": Bench(
+        "bench.field.accuracy",
+        "Uneven sheets, electrodes with a resistance of their own, contacts that bend the sheets.",
+        one_thread=True,
+    ),
+    "field-extremes": Bench("bench.field.extremes", "Run time.", one_thread=True),
+    "field-reference": Bench("bench.field.reference", "Solvers other than NGSolve."),
+    "firmware": Bench("bench.firmware.timing", "Sample-and-hold and non-linearity of the converter; real hardware."),
+    "firmware-guard": Bench("bench.firmware.guard", _SIMULATED_ARM + " The board is emulated."),
     # sheets for links
-    "design": "bench.design.error",
-    "design-planted": "bench.design.planted",
-    "design-links": "bench.design.links",
-    "design-reach": "bench.design.reach",
-    "design-time": "bench.design.time",
-    "developable": "bench.design.developable",
-    "developable-field": "bench.design.developable_field",
-    "build": "bench.workshop.build",
-    "build-report": "bench.workshop.report_check",
+    "design": Bench("bench.design.error", "Links that were not drawn by chance."),
+    "design-planted": Bench("bench.design.planted", "Real links: the truth is planted."),
+    "design-links": Bench("bench.design.links", "A proven bound: it is the best of many searches."),
+    "design-reach": Bench("bench.design.reach", "Whether a person would build each sheet."),
+    "design-time": Bench("bench.design.time", "Pictures, and other links."),
+    "developable": Bench("bench.design.developable", "Real links: the tubes are planted."),
+    "developable-field": Bench("bench.design.developable_field", "A sheet that was built."),
+    "build": Bench("bench.workshop.build", "Warp and shrinkage of a printer: nothing was printed."),
+    "build-report": Bench("bench.workshop.report_check", "Whether a person can build from it: nobody has yet."),
     # recordings, the page, and the simulated controller
-    "replay": "bench.replay.recordings",
-    "replay-cluster": "bench.replay.cluster",
-    "view": "bench.view.page",
-    "view-hours": "bench.view.hours",
-    "view-endurance": "bench.view.endurance",
-    "ur-clients": "bench.clients.trials",
-    "sim-ur": "bench.clients.sim_ur",
+    "replay": Bench("bench.replay.recordings", "Damage that has a right checksum, and an idle machine."),
+    "view": Bench("bench.view.page", "A GPU, or a browser on another computer: chromium drew in software."),
+    "view-hours": Bench("bench.view.hours", "A GPU."),
+    "view-endurance": Bench("bench.view.endurance", "Browsers: nobody looks at the page."),
+    "ur-clients": Bench("bench.clients.trials", "A real controller's answers to the same clients."),
+    "sim-ur": Bench("bench.clients.sim_ur", _SIMULATED_ARM),
 }

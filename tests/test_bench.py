@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -13,9 +14,9 @@ from tests.support.paths import ROOT
 IMPORT_ALL = """
 import importlib
 from bench.table import BENCHES
-for name, module in BENCHES.items():
+for name, bench in BENCHES.items():
     try:
-        assert callable(importlib.import_module(module).main), name
+        assert callable(importlib.import_module(bench.module).main), name
     except ModuleNotFoundError as error:
         assert not error.name.startswith(("bench", "coneskin", "tests")), (name, error)
 """
@@ -24,7 +25,7 @@ for name, module in BENCHES.items():
 def list_of_benches() -> dict[str, str]:
     """Return what `python -m bench` prints: name -> line."""
     done = subprocess.run([sys.executable, "-m", "bench"], cwd=ROOT, capture_output=True, text=True, check=True)
-    return dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    return dict(line.split(maxsplit=1) for line in done.stdout.split("\n\n")[-1].splitlines())
 
 
 def test_the_runner_lists_each_bench_with_a_line() -> None:
@@ -35,9 +36,29 @@ def test_the_runner_lists_each_bench_with_a_line() -> None:
 
 def test_an_unknown_bench_is_answered_with_those_there_are() -> None:
     done = subprocess.run([sys.executable, "-m", "bench", "nonsense"], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "'nonsense'" in done.stderr
-    assert "endurance" in done.stdout
+    assert "endurance" in done.stderr
+
+
+def test_the_page_of_results_is_what_the_files_make() -> None:
+    """After a change of bench/results or of its script: python -m bench page."""
+    done = subprocess.run([sys.executable, "-m", "bench", "page", "--check"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len((ROOT / "bench" / "RESULTS.md").read_text(encoding="utf-8").split()) <= 9000
+
+
+def test_a_result_says_where_it_comes_from_and_what_it_does_not_show() -> None:
+    benches = list_of_benches()
+    for file in sorted((ROOT / "bench" / "results").glob("*.json")):
+        run = json.loads(file.read_text(encoding="utf-8"))
+        assert file.name.split(".")[0] == run["bench"]
+        assert run["bench"] in benches
+        assert run["command"].startswith(f"python -m bench {run['bench']}")
+        assert all(run[word] for word in ("commit", "date", "machine", "not_shown")), file.name
+        assert run.get("tables") or run.get("printed"), file.name
+        for table in run.get("tables", ()):
+            assert {len(row) for row in table["rows"]} == {len(table["columns"])}, (file.name, table["title"])
 
 
 @pytest.mark.long

@@ -1,12 +1,14 @@
 """Rate, jitter and settling of the firmware of an Uno, as compiled, in the emulator.
 
-    python -m bench firmware [--write]
-
 First table: frames per second when the next frame begins as soon as one is done. Second table: how regular frames are
 at the usual 200 a second, by the emulated controller's cycles. Third table: how far the guides are from where they will
 settle when they are read, for contacts of several conductances and times of settling, as an error of the place; and the
-same where the sketch does not hold the guides at ground while the driven sheet settles. `--write` puts all of it into
-bench/RESULTS-firmware.md. Needs the packages that tests/firmware needs.
+same where the sketch does not hold the guides at ground while the driven sheet settles.
+Needs the packages that tests/firmware needs.
+
+The emulator counts the controller's cycles, so the numbers do not depend on this computer. Sensor: 75 mm x 240 mm, 350
+deg, 1000 ohm per square; cables of 330 pF to each electrode, 500 pF between the layers, pins of 25 ohm, inputs of 10
+Mohm.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from bench.report import head, quantile
+from bench.report import head, quantile, show
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.firmware.board_circuit import board_circuit
 from coneskin.skin.firmware.boards import firmware_folder
@@ -31,8 +33,8 @@ from tests.support.firmware.emulated_board import BoardPrograms, BoardRun, run_b
 from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 
 SENSOR = board_circuit("uno", Sensor(Frustum(0.0375, 0.0375, 0.24, math.radians(350)))).sensor
+SETTLING_TIMES = (20, 50, 150, 500)  # us
 PLACES = ((0.05, 1.0), (0.2, 5.0))  # u [m], phi [rad]
-RESULTS = Path(__file__).with_name("RESULTS-firmware.md")
 HELD = "drive_all(a == FREE ? GROUND : a, b == FREE ? GROUND : b, c == FREE ? GROUND : c, d == FREE ? GROUND : d);"
 
 
@@ -42,8 +44,8 @@ def held_sheets(contacts: Sequence[LayerContact]) -> str:
     return "0 sheets " + " ".join(repr(float(y)) for row in matrix for y in row)
 
 
-def rates(programs: BoardPrograms) -> list[str]:
-    lines = [f"{'frame':<28}" + "".join(f"{2**bits:>4} a reading" for bits in range(4))]
+def rates(programs: BoardPrograms) -> list[list[str]]:
+    rows = []
     for name, wire, driven in (("version 1", 1, 0), ("version 2, short", 2, 0), ("version 2, long (usual)", 2, 1)):
         row = []
         for bits in range(4):
@@ -52,11 +54,11 @@ def rates(programs: BoardPrograms) -> list[str]:
             frames = FrameDecoder().feed(run_board(programs, SENSOR, 1.0, commands=commands).data)
             last = max(number for number, frame in enumerate(frames) if frame.sequence == 0)  # all is set from here on
             row.append(1e6 * (frames[-1].sequence - 1) / (frames[-1].clock_us - frames[last + 1].clock_us))
-        lines.append(f"{name:<28}" + "".join(f"{rate:>14.0f}" for rate in row))
-    return lines
+        rows.append([name, *(f"{rate:.0f}" for rate in row)])
+    return rows
 
 
-def jitter(programs: BoardPrograms, folder: Path) -> list[str]:
+def jitter(programs: BoardPrograms, folder: Path) -> list[list[str]]:
     run = run_board(programs, SENSOR, 2.0, commands=[held_sheets(())], trace=folder / "trace")
     begins = [
         after.time
@@ -66,13 +68,12 @@ def jitter(programs: BoardPrograms, folder: Path) -> list[str]:
     true = [1e6 * (b - a) - 5000.0 for a, b in pairwise(begins[10:])]
     frames = FrameDecoder().feed(run.data)
     told = [float(b.clock_us - a.clock_us - 5000) for a, b in pairwise(frames[10:])]
-    lines = [f"{'interval of frames - 5000 us':<34}{'frames':>8}{'p50 us':>9}{'p99 us':>9}{'worst us':>10}"]
+    rows = []
     for name, values in (("first reading, true time", true), ("device clock in the frame", told)):
         sizes = [abs(value) for value in values]
-        lines.append(
-            f"{name:<34}{len(sizes):>8}{quantile(sizes, 0.5):>9.1f}{quantile(sizes, 0.99):>9.1f}{max(sizes):>10.1f}"
-        )
-    return lines
+        largest = quantile(sizes, 0.5), quantile(sizes, 0.99), max(sizes)
+        rows.append([name, str(len(sizes)), *(f"{size:.1f}" for size in largest)])
+    return rows
 
 
 def worst_guide(run: BoardRun) -> float:
@@ -87,12 +88,11 @@ def worst_guide(run: BoardRun) -> float:
     return worst
 
 
-def settling(programs: BoardPrograms, folder: Path) -> list[str]:
-    times = (20, 50, 150, 500)
-    lines = [f"{'contact':<30}" + "".join(f"{f'{time} us':>12}" for time in times) + "   worst of two places, mm"]
+def settling(programs: BoardPrograms, folder: Path) -> list[list[str]]:
+    rows = []
     for ohms in (math.inf, 100e3, 45e3, 20e3, 10e3, 1e3):  # level 0.10, a touch, is 45 kohm; 0.20, a place, 20 kohm
         row, conductance = [], 1.0 / ohms
-        for time in times:
+        for time in SETTLING_TIMES:
             worst = 0.0
             for u, phi in PLACES if conductance else PLACES[:1]:
                 contacts = [LayerContact(u, phi, conductance, 0.004)] if conductance else []
@@ -102,17 +102,16 @@ def settling(programs: BoardPrograms, folder: Path) -> list[str]:
             row.append(worst)
         name = {45e3: "45 kohm: a touch begins", 20e3: "20 kohm: a place is read"}.get(ohms, f"{1e-3 * ohms:g} kohm")
         name = name if conductance else "none"
-        lines.append(f"{name:<30}" + "".join(f"{worst:>12.3f}" for worst in row))
-    return lines
+        rows.append([name, *(f"{worst:.3f}" for worst in row)])
+    return rows
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help=f"write {RESULTS.name}")
-    args = parser.parse_args()
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     if missing := missing_tools():
         print(missing, file=sys.stderr)
         return 1
+    print(head())
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         programs = BoardPrograms(build_emulator(folder), build_sketch(folder))
@@ -120,23 +119,11 @@ def main() -> int:
         assert HELD in text, "the sketch no longer holds the guides as this bench knows it"
         (folder / "floating.ino").write_text(text.replace(HELD, "drive_all(a, b, c, d);"), encoding="utf-8")
         floating = BoardPrograms(programs.emulator, build_sketch(folder, folder / "floating.ino"))
-        tables = [
-            ("Frames per second, back to back", rates(programs)),
-            ("Regularity at 200 a second", jitter(programs, folder)),
-            ("Settling: error of the place when a guide is read", settling(programs, folder)),
-            ("The same, guides left floating while the driven sheet settles", settling(floating, folder)),
-        ]
-    page = ["# Results: firmware", "", _ABOUT, "", "`python -m bench firmware --write`", "", "```", head(), "```"]
-    for title, lines in tables:
-        page += ["", f"## {title}", "", "```", *lines, "```"]
-    print("\n".join(page))
-    if args.write:
-        RESULTS.write_text("\n".join([*page, ""]), encoding="utf-8")
+        show("frames per second, back to back", ["frame", "1 a reading", "2", "4", "8"], rates(programs))
+        columns = ["", "frames", "p50 us", "p99 us", "worst us"]
+        show("interval of frames less 5000 us, at 200 a second", columns, jitter(programs, folder))
+        columns = ["contact", *(f"{time} us" for time in SETTLING_TIMES)]
+        show("error of the place when a guide is read, worst of two places, mm", columns, settling(programs, folder))
+        title = "the same, guides left floating while the driven sheet settles, mm"
+        show(title, columns, settling(floating, folder))
     return 0
-
-
-_ABOUT = """\
-The sketch for an Arduino Uno as compiled, in an emulator that counts the controller's cycles, so that the numbers do
-not depend on this computer. Sensor: 75 mm x 240 mm, 350 deg, 1000 ohm per square; cables of 330 pF to each electrode,
-500 pF between the layers, pins of 25 ohm, inputs of 10 Mohm. Not in it: the converter's sample-and-hold and
-non-linearity, and real hardware at all."""
