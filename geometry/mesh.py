@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.core.arrays import frozen
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import MeshError, MissingExtra
+from coneskin.core.files import read_file
 
 from .pose import Pose
 

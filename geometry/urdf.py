@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import MeshError, MissingExtra
+from coneskin.core.files import read_file
 
 from .mesh import Mesh, load_mesh, make_mesh, refuse_entities
 from .pose import Pose, Vector

@@ -62,8 +62,8 @@ HOMES = {
     "pinocchio": ("tests/support/pinocchio_arm.py",),
     "tomli_w": (
         "src/coneskin/impact/permissible_speed/speed_map.py",
-        "src/coneskin/scene/tables/link_tables.py",
-        "src/coneskin/scene/setting_overrides.py",
+        "src/coneskin/scene/tables/sensor_tables.py",
+        "src/coneskin/scene/settings.py",
     ),
     "scipy": (
         "geometry/fit/*.py",

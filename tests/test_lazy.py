@@ -86,11 +86,11 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
         | SIMULATOR
         | {"coneskin.session.session", "coneskin.skin.sources.serial_port", "coneskin.robot.ur.ur_rtde"},
     ),
-    "no body": (_STOP, _LOAD, {*LOADED}, HEAVY | {"coneskin.scene.values.body", "coneskin.skin.materials"}),
+    "no body": (_STOP, _LOAD, {*LOADED}, HEAVY | {"coneskin.skin.materials"}),
     "bodies, which no guard knows of": (
         _STOP + '[[body]]\nkind = "post"\nxyz_mm = [0, 0, 0]\ndirection = [0, 0, 1]\n[padding]\n',
         _BUILD,
-        {*LOADED, "coneskin.scene.values.body", "coneskin.skin.materials"},
+        {*LOADED, "coneskin.skin.materials"},
         HEAVY | VIRTUAL | FIELD | SIMULATOR,
     ),
     "no mesh": (

@@ -14,8 +14,7 @@ from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.build import SensorOnArm, place_on_arm
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.values.body import BodyScene
-from coneskin.scene.values.scene import Scene
+from coneskin.scene.values.scene import BodyScene, Scene
 from coneskin.testing.commissioned import commissioned
 
 ARMS = ("UR5e", "UR10e", "UR3e")

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from bench.report import head, quantile
 from coneskin.impact.simulation.mujoco_plant import MujocoPlant
 from coneskin.impact.simulation.scene_description import SheetOnLink
-from coneskin.scene.values.body import BodyScene
+from coneskin.scene.values.scene import BodyScene
 
 from .neglected import LIMIT, Neglected, neglected
 from .pushes import CONE, HORIZON, LINK, MODEL, RADIUS, RATIO, Push, draw_push

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.core.arrays import frozen
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import GeometryError
+from coneskin.core.files import read_file
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import perpendicular_vectors

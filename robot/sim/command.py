@@ -12,9 +12,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.channel import Channel
 from coneskin.core.errors import ConeSkinError, RobotRefused
+from coneskin.core.files import read_file
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 

@@ -7,7 +7,6 @@ guard's process work from the row. A package of somebody else's brings its row a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -15,37 +14,15 @@ from itertools import permutations
 from typing import Any, Final
 
 from coneskin.core.errors import SensorError
+from coneskin.core.keys import Key, with_meanings
 
 from .source import Source
 
-__all__ = ["GROUP", "SOURCE_KINDS", "SourceKey", "SourceKind", "find_kind", "is_simulated", "open_source"]
+__all__ = ["GROUP", "SOURCE_KINDS", "SourceKind", "find_kind", "is_simulated", "open_source"]
 
 #: Kind of several sources that are read as one; its setting ``members`` holds a kind and its settings for each.
 GROUP: Final = "group"
 _ENTRY_POINTS = "coneskin.sources"
-
-
-@dataclass(frozen=True, slots=True)
-class SourceKey:
-    """A key of a scene's [source] table.
-
-    Attributes:
-        name: as it stands in the file, with its unit (``rate_hz``).
-        kind: float, int or str; dict for a list of tables.
-        default: value where the key is missing, in SI; ``...`` where the scene must have it.
-        low: smallest value, in the unit of the name.
-        high: largest value, in the unit of the name.
-        choices: the words allowed; empty for any text.
-        example: for a key that the scene must have, what to write; it ends the message that the key is missing.
-    """
-
-    name: str
-    kind: type = float
-    default: Any = ...
-    low: float = -math.inf
-    high: float = math.inf
-    choices: tuple[str, ...] = ()
-    example: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +38,7 @@ class SourceKind:
     """
 
     opener: str
-    keys: tuple[SourceKey, ...]
+    keys: tuple[Key, ...]
     simulated: bool = False
 
 
@@ -69,20 +46,34 @@ class SourceKind:
 SOURCE_KINDS: dict[str, SourceKind] = {
     "serial": SourceKind(
         "coneskin.skin.sources.serial_port:SerialPort",
-        (
-            SourceKey("port", str, example="a device such as /dev/ttyUSB0, COM3 or hwgrep://0403:6001"),
-            SourceKey("baud", int, 921600, low=1200, high=12_000_000),
+        with_meanings(
+            """
+            port: a device such as /dev/ttyUSB0 or COM3, or a pyserial URL. Use one that stays the same when it is
+                plugged in again: /dev/serial/by-id/..., hwgrep://0403:6001
+            baud: bits per second
+            """,
+            Key("port", str),
+            Key("baud", int, 921600, low=1200, high=12_000_000),
         ),
     ),
     "virtual": SourceKind(
         "coneskin.skin.sources.serial_port:SerialPort",
-        (
-            SourceKey("rate_hz", float, 1000.0, low=1.0, high=10_000.0),
-            SourceKey("seed", int, 0, low=0, high=2**31),
-            SourceKey("model", str, "field", choices=("field", "ladder")),
-            SourceKey("wire_version", int, 1, low=1, high=2),
-            SourceKey("wires", str, "ABCD", choices=tuple(map("".join, permutations("ABCD")))),
-            SourceKey("touch", dict, ()),
+        with_meanings(
+            """
+            rate_hz: frames per second of each sensor
+            seed: seed of the noise
+            model: `field`: the exact field in both sheets, so that an extended contact reads with its area error.
+                `ladder`: ideal resistors, without numpy
+            wire_version: version of the wire format that it sends
+            wires: electrodes on the terminals A, B, C, D. Another order is a wrong wiring, to try `coneskin doctor`
+            touch: scripted touches, each under `[[source.touch]]`
+            """,
+            Key("rate_hz", float, 1000.0, low=1.0, high=10_000.0),
+            Key("seed", int, 0, low=0, high=2**31),
+            Key("model", str, "field", choices=("field", "ladder")),
+            Key("wire_version", int, 1, low=1, high=2),
+            Key("wires", str, "ABCD", choices=tuple(map("".join, permutations("ABCD")))),
+            Key("touch", dict, ()),
         ),
         simulated=True,
     ),

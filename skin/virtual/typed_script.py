@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import SensorError
+from coneskin.core.files import read_file
 from coneskin.geometry.frustum import Frustum
 
 from .circuit import WiringFaults

@@ -1,7 +1,7 @@
 """Run of ``coneskin design``, and what it has written."""
 
 from coneskin.cli import main
-from coneskin.scene.tables.sensor_table import build_sensor, merge_sensor_file
+from coneskin.scene.tables.sensor_tables import build_sensor, merge_sensor_file
 
 
 def design(*words):

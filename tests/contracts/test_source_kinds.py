@@ -7,6 +7,7 @@ import pytest
 
 from coneskin.core.channel import Channel, pair
 from coneskin.core.errors import SceneError, SensorError, SkinConnectionError
+from coneskin.core.keys import Key
 from coneskin.core.recording.block import decode_blocks
 from coneskin.geometry.frustum import Frustum
 from coneskin.robot.guard.loop import GuardLoop
@@ -18,7 +19,7 @@ from coneskin.scene.summary import summarize
 from coneskin.skin.detection.events import TouchBegan
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.sources.kinds import SOURCE_KINDS, SourceKey, SourceKind, open_source
+from coneskin.skin.sources.kinds import SOURCE_KINDS, SourceKind, open_source
 from coneskin.skin.sources.source import Source
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
@@ -71,9 +72,9 @@ class PolledBus(Source):
 def i2c(monkeypatch: pytest.MonkeyPatch) -> None:
     """The one row."""
     keys = (
-        SourceKey("bus", int, low=0, high=15, example="the number N of /dev/i2c-N"),
-        SourceKey("address", int, 0x40, low=3, high=119),
-        SourceKey("poll_ms", float, 1e-3, low=1.0, high=50.0),
+        Key("bus", int, low=0, high=15, meaning="the number N of /dev/i2c-N"),
+        Key("address", int, 0x40, low=3, high=119),
+        Key("poll_ms", float, 1e-3, low=1.0, high=50.0),
     )
     monkeypatch.setitem(SOURCE_KINDS, "i2c", SourceKind(f"{__name__}:PolledBus", keys))
 

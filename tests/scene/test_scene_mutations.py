@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from coneskin.cli import main
 from coneskin.core.errors import SceneError
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.tables.schema import MAX_SIZE
+from coneskin.scene.tables.keys import MAX_SIZE
 
 from .scene_mutations import mutate
 from .scenes import FULL, SERIAL_RETREAT, SKIN_ONLY

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from coneskin.scene.tables.speed_limit_check import limit_digest
-from coneskin.scene.tables.speed_limit_table import limit_fingerprint
+from coneskin.scene.tables.speed_limit_tables import limit_digest, limit_fingerprint
 from coneskin.scene.values.scene import Scene
 
 

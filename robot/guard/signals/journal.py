@@ -60,38 +60,49 @@ class EventName(StrEnum):
     """Names of everything that a guard, or the session around it, reports.
 
     The last six are about the guard and not from it, so that a replay does not make them (``SESSION_EVENTS``).
+
+    Attributes:
+        meaning: what has happened, in a sentence for people; ``for name in EventName`` gives all of them.
     """
 
-    WAITING = "waiting"  #: the guard cannot become active yet; ``reasons`` lists why
-    ACTIVATED = "activated"  #: the guard reacts from now on
-    NOT_COMMISSIONED = "not_commissioned"  #: the arm stops where its scene lets it move away; ``what`` says why
-    CONTACT = "contact"  #: a touch has begun
-    CONTACT_LOCATED = "contact_located"  #: the place of a touch has become certain
-    CONTACT_EXTENDED = "contact_extended"  #: the touch is not one disc: its centroid and its line are known
-    TOUCH_ENDED = "touch_ended"  #: a touch is over
-    FAULT = "fault"  #: something is wrong with skin, arm or a process
-    STOPPING = "stopping"  #: a stop was sent; ``why`` says what for
-    DECELERATING = "decelerating"  #: the measured speed has begun to fall
-    STOP_FAILED = "stop_failed"  #: every stop path was used and the arm does not stand
-    STANDSTILL = "standstill"  #: the arm was measured standing
-    ESCALATED = "escalated"  #: a further stop path was used
-    RETREATING = "retreating"  #: a motion away from the touch has begun
-    MOTION_LIMITED = "motion_limited"  #: that motion is slower than set; ``by`` lists the limits
-    RETREATED = "retreated"  #: that motion is over
-    SPEED_REDUCED = "speed_reduced"  #: the speed slider was lowered because of a touch
-    SPEED_LIMITED = "speed_limited"  #: the speed slider was set so that surfaces keep their permissible speeds
-    RESUMED = "resumed"  #: the speed slider is back where it was
-    LATCHED = "latched"  #: the arm stands and waits for a manual reset
-    REFUSED = "refused"  #: a reset was refused; ``reasons`` lists why
-    RESET = "reset"  #: a person has reset the guard
-    MESSAGE = "message"  #: a remark for people
-    ENDING = "ending"  #: the guard was told to end
-    GUARD_EXITED = "guard_exited"  #: the guard's process has ended
-    GUARD_UNRESPONSIVE = "guard_unresponsive"  #: the guard sends no heartbeat
-    GUARD_RESPONSIVE = "guard_responsive"  #: its heartbeat is back
-    FALLBACK_STOP = "fallback_stop"  #: the session has stopped the arm without the guard
-    RECORDING_GAP = "recording_gap"  #: blocks are missing from the recording
-    SKIN_LINE = "skin_line"  #: what is wrong with the bytes of a skin for which the guard waits
+    meaning: str
+
+    def __new__(cls, value: str, meaning: str) -> EventName:
+        """Make a name with its meaning."""
+        name = str.__new__(cls, value)
+        name._value_, name.meaning = value, meaning
+        return name
+
+    WAITING = "waiting", "The guard cannot become active yet. `reasons` lists why."
+    ACTIVATED = "activated", "The guard reacts from now on."
+    NOT_COMMISSIONED = "not_commissioned", "The arm only stops, although its scene lets it move away. `what` says why."
+    CONTACT = "contact", "A touch has begun."
+    CONTACT_LOCATED = "contact_located", "The place of a touch has become certain."
+    CONTACT_EXTENDED = "contact_extended", "The touch is not one disc: its centroid and its line are known."
+    TOUCH_ENDED = "touch_ended", "A touch is over."
+    FAULT = "fault", "Something is wrong with the skin, the arm or a process."
+    STOPPING = "stopping", "A stop was sent. `why` says what for."
+    DECELERATING = "decelerating", "The measured speed has begun to fall."
+    STOP_FAILED = "stop_failed", "Every stop path was used, and the arm does not stand."
+    STANDSTILL = "standstill", "The arm was measured standing."
+    ESCALATED = "escalated", "A further stop path was used."
+    RETREATING = "retreating", "A motion away from the touch has begun."
+    MOTION_LIMITED = "motion_limited", "The motion away is slower than set. `by` lists the limits."
+    RETREATED = "retreated", "The motion away is over."
+    SPEED_REDUCED = "speed_reduced", "The speed slider was lowered because of a touch."
+    SPEED_LIMITED = "speed_limited", "The speed slider was set so that surfaces keep their permissible speeds."
+    RESUMED = "resumed", "The speed slider is back where it was."
+    LATCHED = "latched", "The arm stands and waits for a manual reset."
+    REFUSED = "refused", "A reset was refused. `reasons` lists why."
+    RESET = "reset", "A person has reset the guard."
+    MESSAGE = "message", "A remark for people."
+    ENDING = "ending", "The guard was told to end."
+    GUARD_EXITED = "guard_exited", "The guard's process has ended."
+    GUARD_UNRESPONSIVE = "guard_unresponsive", "The guard sends no heartbeat."
+    GUARD_RESPONSIVE = "guard_responsive", "The guard's heartbeat is back."
+    FALLBACK_STOP = "fallback_stop", "The session has stopped the arm without the guard."
+    RECORDING_GAP = "recording_gap", "Blocks are missing from the recording."
+    SKIN_LINE = "skin_line", "The guard waits for a skin, and its bytes are wrong. `what` says how."
 
 
 INPUTS = frozenset(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from coneskin.core.bounded_file import read_file
+from coneskin.core.files import read_file
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 
 from .program_file import ProgramFile, read_program

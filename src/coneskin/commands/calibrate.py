@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.commissioning.calibration.calibrate import Calibrator
     from coneskin.core.errors import SceneError
     from coneskin.scene.reader import load_scene
-    from coneskin.scene.tables.link_tables import sensor_files
+    from coneskin.scene.tables.sensor_tables import sensor_files
     from coneskin.skin.sources.kinds import is_simulated
 
     scene = load_scene(args.scene, calibrated=False)
@@ -133,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _write(args: argparse.Namespace, scene: Scene, results: list[CalibrationResult]) -> None:
     """Add the results to the files of their devices, and show them."""
-    from coneskin.scene.tables.link_tables import named_calibrations
+    from coneskin.scene.tables.sensor_tables import named_calibrations
     from coneskin.scene.values.calibration_file import add_calibration, calibration_path
 
     named = named_calibrations(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder)

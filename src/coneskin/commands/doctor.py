@@ -83,8 +83,8 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
         SceneError: the scene is written in a way in which it cannot be changed, or cannot be written.
     """
     from coneskin.commissioning.examination.scene_patch import diff_texts, set_sensor_keys
+    from coneskin.core.files import write_whole
     from coneskin.scene.reader import parse_scene
-    from coneskin.scene.values.whole_file import write_whole
 
     old = args.scene.read_text(encoding="utf-8")
     names, text = [item.sensor.name for item in scene.sensors], old

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the folder and say what to do next; the exit code is 0."""
-    from coneskin.scene.tables.sensor_table import build_sensor, merge_sensor_file
+    from coneskin.scene.tables.sensor_tables import build_sensor, merge_sensor_file
     from coneskin.skin.firmware.board_circuit import board_circuit
     from coneskin.skin.firmware.board_page import board_page, wiring_diagram
     from coneskin.skin.firmware.boards import board_header, firmware_folder

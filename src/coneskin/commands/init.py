@@ -64,10 +64,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the scene, read it again, and name the next command."""
+    from coneskin.core.files import write_whole
     from coneskin.design.first_scene import first_scene, read_design
     from coneskin.scene.reader import parse_scene
     from coneskin.scene.suspicions import suspicions
-    from coneskin.scene.values.whole_file import write_whole
 
     if args.output.exists() and not args.force:
         raise GeometryError(f"{args.output} exists already: name another file with -o, or replace it with --force")

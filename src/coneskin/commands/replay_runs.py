@@ -25,7 +25,7 @@ def replay_with_settings(path: Path, words: Sequence[str], scene_file: Path | No
     from coneskin.runs.replay.event_text import describe
     from coneskin.runs.replay.run import read_run
     from coneskin.scene.reader import load_scene
-    from coneskin.scene.setting_overrides import parse_settings
+    from coneskin.scene.settings import parse_settings
 
     if scene_file is not None and words:
         raise SceneError(["--scene and --set exclude each other: set the value in the scene"], "replay")
@@ -83,7 +83,7 @@ def replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
 
 def _variants(args: argparse.Namespace) -> list[dict[str, Any]]:
     """Return the settings of each variant: those of --set in all, and every combination of --vary."""
-    from coneskin.scene.setting_overrides import parse_choices, parse_settings
+    from coneskin.scene.settings import parse_choices, parse_settings
 
     fixed = parse_settings(args.set)
     axes = []

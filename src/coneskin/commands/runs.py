@@ -173,7 +173,7 @@ def _diff(args: argparse.Namespace) -> int:
 
 def _sides(args: argparse.Namespace) -> tuple[Decisions, Decisions]:
     from coneskin.runs.decisions import decide_again, recorded_decisions
-    from coneskin.scene.setting_overrides import parse_settings
+    from coneskin.scene.settings import parse_settings
 
     settings = parse_settings(args.set)
     first = _read(args.one)

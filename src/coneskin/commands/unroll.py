@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 
-from coneskin.scene.tables.cone_keys import LINK_CONE_KEYS
+from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
 from .arguments.dimensions import add_dimension_options, given_dimensions
 

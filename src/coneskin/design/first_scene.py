@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import GeometryError, KinematicsError
+from coneskin.core.files import read_file
 from coneskin.core.json_text import read_json
 from coneskin.robot.arm.link_frames import LINK_INDEX, link_index
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.scene.tables.sensor_table import build_sensor
+from coneskin.scene.tables.sensor_tables import build_sensor
 from coneskin.skin.firmware.board_circuit import value_text
 
 from .files import DESIGN_FILE

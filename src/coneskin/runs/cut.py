@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.core.draft_file import draft_of
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import draft_of
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.version import __version__, code_commit
 from coneskin.robot.driver.messages import Release, StatusReport
 from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, EventName, GuardEvent
 from coneskin.robot.guard.signals.outputs import Command, Output
-from coneskin.scene.resolved_settings import resolved_settings
+from coneskin.scene.settings import resolved_settings
 
 from .arm_command import command_block
 from .block_progress import Progress, silent

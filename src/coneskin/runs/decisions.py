@@ -74,7 +74,7 @@ def decide_again(
         RecordingError: a block holds what no guard records.
     """
     from coneskin.scene.build import build_core, place_on_arm
-    from coneskin.scene.setting_overrides import override_detector
+    from coneskin.scene.settings import override_detector
     from coneskin.scene.surface_record import decode_surfaces
 
     if scene is None:
@@ -104,7 +104,7 @@ def scene_with(run: Run, settings: Mapping[str, Any]) -> Scene:
     from pathlib import Path
 
     from coneskin.scene.reader import parse_scene
-    from coneskin.scene.setting_overrides import override_settings
+    from coneskin.scene.settings import override_settings
 
     if not settings:
         return run.scene()

@@ -8,8 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import read_file
 from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import is_time
 from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName, GuardEvent

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 
-    from .values.scene import Scene
-    from .values.speed_limit import SpeedLimitScene
+    from .values.scene import Scene, SpeedLimitScene
 
 __all__ = ["SensorOnArm", "build_core", "place_on_arm", "withheld_motion"]
 

@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
+from coneskin.core.files import write_whole
 from coneskin.core.json_text import read_json
 
-from .values.scene import Commissioning
-from .values.sensor_facts import round_facts, sensor_facts
-from .values.whole_file import write_whole
+from .values.scene import Commissioning, round_facts, sensor_facts
 
 if TYPE_CHECKING:
     from .values.scene import PlacedSensor, Scene

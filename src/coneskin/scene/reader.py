@@ -8,22 +8,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import SceneError
+from coneskin.core.files import read_file
+from coneskin.core.keys import check
 
-from .tables.arm_table import read_arm, read_monitoring
-from .tables.link_tables import count_sensors, inline_sensor_files, read_links
-from .tables.motion_table import read_motion
-from .tables.reaction_table import read_reaction
-from .tables.schema import MAX_SIZE, Key, check
-from .tables.source_table import read_sources
-from .tables.touch_table import read_touch
+from .tables.arm_tables import read_arm, read_bodies, read_monitoring, read_motion, read_padding, read_reaction
+from .tables.keys import COMMISSIONING_KEYS, MAX_SIZE, RECORDING_KEYS
+from .tables.sensor_tables import count_sensors, inline_sensor_files, read_links
+from .tables.source_tables import read_sources, read_touch
 from .values import scene as s
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["TABLES", "load_scene", "parse_scene"]
 
@@ -41,12 +36,6 @@ TABLES = (
     "padding",
     "speed_limit",
 )
-_RECORDING = (
-    Key("folder", str),
-    Key("max_mb", float, None, low=1.0, high=60_000.0),
-    Key("keep", int, None, low=1, high=100_000),
-)
-_COMMISSIONING = (Key("max_age_days", float, None, low=0.0, high=10_000.0, above=True),)
 #: tomllib's time for a dotted key grows with the cube of its parts: a key of 20 kB takes minutes
 _MAX_PARTS = 64
 _DOTTED = re.compile(r"[\w\"'-][ \t]*\.")
@@ -130,13 +119,14 @@ def parse_scene(
         motion=read_motion(tables, problems),
         commissioning_max_age=_max_age(tables, problems),
         commissioning=commissioning,
-        **_physics(tables, problems),
+        bodies=read_bodies(tables, problems),
+        padding=read_padding(tables, problems),
         **_speed_limit(tables, problems),
     )
     scene = replace(scene, source=_source(scene, tables, problems))
     _check_together(scene, named, tables, problems)
     if scene.speed_limit is not None:
-        from .tables.speed_limit_table import check_speed_limit
+        from .tables.speed_limit_tables import check_speed_limit
 
         check_speed_limit(scene, recorded, problems)
     if problems:
@@ -166,7 +156,7 @@ def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s
 def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> s.RecordingScene | None:
     if "recording" not in tables:
         return None
-    values = check(tables["recording"], _RECORDING, "recording", problems)
+    values = check(tables["recording"], RECORDING_KEYS, "recording", problems)
     size, keep = values["max"], values["keep"]
     if keep is not None and size is None:
         problems.append("recording.keep counts files, and without recording.max_mb there is only one: set both")
@@ -175,17 +165,8 @@ def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> 
     return s.RecordingScene(folder / values["folder"], None if size is None else round(size), keep)
 
 
-def _physics(tables: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
-    """Return what only the physics engine asks for."""
-    if "body" not in tables and "padding" not in tables:
-        return {}
-    from .tables.body_table import read_bodies, read_padding
-
-    return {"bodies": read_bodies(tables, problems), "padding": read_padding(tables, problems)}
-
-
 def _inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: list[str]) -> bool:
-    from .tables.speed_limit_table import inline_speed_limit
+    from .tables.speed_limit_tables import inline_speed_limit
 
     return inline_speed_limit(tables, folder, problems)
 
@@ -194,13 +175,13 @@ def _speed_limit(tables: Mapping[str, Any], problems: list[str]) -> dict[str, An
     """Return what only a limit of the speed asks for."""
     if "speed_limit" not in tables:
         return {}
-    from .tables.speed_limit_table import read_speed_limit
+    from .tables.speed_limit_tables import read_speed_limit
 
     return {"speed_limit": read_speed_limit(tables, problems)}
 
 
 def _max_age(tables: Mapping[str, Any], problems: list[str]) -> float | None:
-    values = check(tables.get("commissioning", {}), _COMMISSIONING, "commissioning", problems)
+    values = check(tables.get("commissioning", {}), COMMISSIONING_KEYS, "commissioning", problems)
     age: float | None = values.get("max_age")
     return age
 

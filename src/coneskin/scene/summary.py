@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from .tables.source_table import source_label
+from .tables.source_tables import source_label
 
 if TYPE_CHECKING:
     from coneskin.robot.reaction.rules import Rule

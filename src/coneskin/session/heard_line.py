@@ -62,7 +62,7 @@ class HeardLine:
 
 
 def _source_name(scene: Scene) -> str:
-    from coneskin.scene.tables.source_table import source_label
+    from coneskin.scene.tables.source_tables import source_label
 
     assert scene.source is not None
     return source_label(scene.source)

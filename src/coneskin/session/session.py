@@ -20,7 +20,7 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent, stopping_contact
 from coneskin.scene.commissioning_record import with_commissioning
 from coneskin.scene.reader import load_scene
-from coneskin.scene.resolved_settings import resolved_settings
+from coneskin.scene.settings import resolved_settings
 from coneskin.scene.summary import missing_parts
 from coneskin.scene.values.scene import Scene
 

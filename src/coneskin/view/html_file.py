@@ -13,8 +13,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from coneskin.core.draft_file import draft_of
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import draft_of
 
 from .page_server import PageServer, page_client
 from .panel import EVENT_STYLE, NOTICE

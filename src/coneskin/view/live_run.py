@@ -13,8 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
-from coneskin.core.bounded_file import open_file
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import open_file
 from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import END, Block
 from coneskin.core.recording.chunk import (

@@ -22,7 +22,7 @@ from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, Struck
 from coneskin.robot.arm.inertia import effective_mass
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.ur_inertias import arm_inertia
-from coneskin.scene.values.body import BodyScene
+from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
 from coneskin.testing.guard_rig import CONE, LINK, MODEL
 

@@ -13,8 +13,7 @@ from coneskin.robot.guard.signals.journal import BlockKind, EventName, body_plac
 from coneskin.runs.replay.run import read_run, replay
 from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.values.body import BodyScene
-from coneskin.scene.values.scene import Scene
+from coneskin.scene.values.scene import BodyScene, Scene
 from coneskin.testing.commissioned import commissioned
 from coneskin.testing.forearm import forearm_scene
 

@@ -13,7 +13,7 @@ from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
-from coneskin.scene.values.body import BodyScene
+from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")

@@ -10,7 +10,7 @@ import pytest
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.plant import PlantLost
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.values.body import BodyScene
+from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
 from coneskin.testing.forearm import forearm_scene, start_with
 

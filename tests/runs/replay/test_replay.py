@@ -21,7 +21,7 @@ from coneskin.runs.comparison_text import comparison_lines
 from coneskin.runs.decisions import decide_again, recorded_decisions
 from coneskin.runs.replay.replay import Verdict
 from coneskin.runs.replay.run import Run, read_run, replay
-from coneskin.scene.resolved_settings import resolved_settings
+from coneskin.scene.settings import resolved_settings
 from tests.scene.scenes import FULL, SKIN_ONLY, record
 from tests.support.sweep import sweep
 

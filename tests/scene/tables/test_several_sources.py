@@ -5,9 +5,10 @@ from importlib.metadata import EntryPoint, EntryPoints
 import pytest
 
 from coneskin.core.errors import SceneError, SensorError
+from coneskin.core.keys import Key
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.summary import summarize
-from coneskin.skin.sources.kinds import GROUP, SourceKey, SourceKind, open_source
+from coneskin.skin.sources.kinds import GROUP, SourceKind, open_source
 from coneskin.skin.sources.source_group import SourceGroup
 
 LINKS = """
@@ -33,7 +34,7 @@ port = "/dev/ttyUSB1"
 baud = 115200
 """
 #: a row that a package of somebody else's might bring
-BUS = SourceKind("coneskin.skin.sources.serial_port:SerialPort", (SourceKey("port", str, example="a bus"),))
+BUS = SourceKind("coneskin.skin.sources.serial_port:SerialPort", (Key("port", str, meaning="a bus"),))
 NO_ROW = 7
 
 

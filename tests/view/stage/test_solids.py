@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coneskin.scene.values.body import BodyScene
+from coneskin.scene.values.scene import BodyScene
 from coneskin.view.stage.solids import body_solids
 
 

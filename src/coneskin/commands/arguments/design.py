@@ -19,8 +19,7 @@ from coneskin.geometry.drawing.pdf import PageSize
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
-from coneskin.scene.tables.cone_keys import DOUBLE_CONE_KEYS
-from coneskin.scene.tables.sensor_keys import SENSOR_KEYS
+from coneskin.scene.tables.sensor_keys import DOUBLE_CONE_KEYS, SENSOR_KEYS
 from coneskin.skin.electronics import GivenElectronics
 
 from .dimensions import add_dimension_options, add_setting_option, given_dimensions, option_name

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from coneskin.core.errors import GeometryError, SceneError
-from coneskin.scene.tables.schema import Key, check
+from coneskin.core.keys import Key, check
 
 __all__ = ["add_dimension_options", "add_setting_option", "given_dimensions", "option_name"]
 

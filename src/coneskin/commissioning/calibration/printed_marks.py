@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.commissioning.acceptance.marks import Mark
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import SceneError
+from coneskin.core.files import read_file
 from coneskin.core.json_text import read_json
-from coneskin.scene.tables.cone_keys import CONE_KEYS
+from coneskin.scene.tables.sensor_keys import CONE_KEYS
 
 from .marks import place_words
 

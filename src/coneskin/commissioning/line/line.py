@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import SceneError, SkinConnectionError
+from coneskin.core.files import read_file
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.kinds import open_source
 from coneskin.skin.sources.source import Source

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from coneskin.core.bounded_file import open_file
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import open_file
 
 from .block import Block
 from .chunk import FILE_HEAD_SIZE, MAGIC, bits, decode_body, decode_file_head, decode_payloads

@@ -12,8 +12,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from coneskin.core.bounded_file import open_file
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import open_file
 
 if sys.platform != "win32":
     import fcntl

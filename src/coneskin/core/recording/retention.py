@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
-from coneskin.core.bounded_file import open_file
-from coneskin.core.draft_file import draft_of
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import draft_of, open_file
 
 from .block import Block
 from .chunk import FILE_HEAD_SIZE, bits, decode_body, decode_file_head, encode_chunk

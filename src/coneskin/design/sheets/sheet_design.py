@@ -22,7 +22,7 @@ from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.scene.tables.sensor_table import with_key_names
+from coneskin.scene.tables.sensor_tables import with_key_names
 from coneskin.skin.electronics import Electronics, GivenElectronics, match_electronics
 from coneskin.skin.materials import SheetMaterial, match_sheet_materials
 from coneskin.skin.sensor import sheet_resistances

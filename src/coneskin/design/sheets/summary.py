@@ -13,7 +13,7 @@ from coneskin.geometry.drawing.touch_marks import touch_marks
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.sector import Sector, unroll
-from coneskin.scene.tables.cone_keys import CONE_KEYS
+from coneskin.scene.tables.sensor_keys import CONE_KEYS
 from coneskin.skin.electronics import shunt_ohms
 
 from .sheet_design import SheetDesign

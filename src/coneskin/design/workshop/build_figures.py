@@ -18,7 +18,7 @@ from coneskin.design.sheets.summary import sensor_toml
 from coneskin.geometry.drawing.electrode_layout import SheetLayout, SurfaceRectangle
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, SurfaceShape, drawing_point
 from coneskin.geometry.frustum import Frustum
-from coneskin.scene.tables.sensor_table import build_sensor
+from coneskin.scene.tables.sensor_tables import build_sensor
 from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import sheet_resistances
 

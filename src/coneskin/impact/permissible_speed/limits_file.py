@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import ConeSkinError, SceneError
+from coneskin.core.files import read_file
+from coneskin.core.keys import Key, check
 from coneskin.robot.arm.link_frames import link_index
-from coneskin.scene.tables.schema import MAX_SIZE, Key, check
+from coneskin.scene.tables.keys import MAX_SIZE
 
 from .speed_search import ForceLimits
 from .two_mass_contact import StruckBody

@@ -19,11 +19,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
+from coneskin.core.files import write_whole
 from coneskin.core.version import __version__
-from coneskin.scene.tables.speed_limit_check import limit_digest
-from coneskin.scene.tables.speed_limit_table import limit_fingerprint
-from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
-from coneskin.scene.values.whole_file import write_whole
+from coneskin.scene.tables.speed_limit_tables import limit_digest, limit_fingerprint
+from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene
 from coneskin.skin.materials import Padding
 
 from .arm_patches import motion_positions, patches_of, weigh

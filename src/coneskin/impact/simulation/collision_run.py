@@ -33,8 +33,7 @@ from coneskin.robot.sim.companion_processes import CompanionProcesses
 from coneskin.robot.sim.mock_arm import SLIDER, MockArm
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.scene.build import build_core
-from coneskin.scene.values.body import BodyScene
-from coneskin.scene.values.scene import Scene
+from coneskin.scene.values.scene import BodyScene, Scene
 from coneskin.skin.materials import Padding
 from coneskin.skin.virtual.skin import PressedSkin
 

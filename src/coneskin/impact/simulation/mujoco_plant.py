@@ -19,7 +19,7 @@ from coneskin.core.errors import MissingExtra
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.ur_inertias import arm_inertia
-from coneskin.scene.values.body import BodyScene
+from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
 
 from .scene_description import SheetOnLink, body_link, describe_scene

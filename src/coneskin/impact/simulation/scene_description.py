@@ -19,7 +19,7 @@ from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.inertia import ArmInertia, LinkInertia, mass_matrix
 from coneskin.robot.arm.kinematics import JOINTS, cos_sin
 from coneskin.robot.arm.model import ArmModel
-from coneskin.scene.values.body import BodyScene
+from coneskin.scene.values.scene import BodyScene
 
 __all__ = ["SheetOnLink", "body_link", "describe_scene", "numbers"]
 

@@ -9,8 +9,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.core.draft_file import draft_of
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import draft_of
 from coneskin.runs.block_progress import Progress, silent
 
 from .tables import Pieces, Table, table_pieces

@@ -126,7 +126,7 @@ class Run:
         Raises:
             SceneError: this version of coneskin cannot read the scene.
         """
-        from coneskin.scene.resolved_settings import changed_settings
+        from coneskin.scene.settings import changed_settings
 
         then, now = self.recorded_by or "an unknown version", running_version()
         words = () if then == now else (f"recorded by coneskin {then}, replayed by {now}",)

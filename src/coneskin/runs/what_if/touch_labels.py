@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import read_file
 from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import is_time
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, contact_force

@@ -1,74 +1,158 @@
-"""Keys of one sensor's table: cone, bends, place, wires, electronics, sheets, thresholds, calibration."""
+"""Keys of one sensor, in a scene and in a sensor file, and of the cone of a link.
+
+``coneskin design`` writes sensor files by them, and the command line derives its options from them. The plain names of
+the keys of a cone are the attributes of ``Frustum``.
+"""
 
 from __future__ import annotations
 
-from .cone_keys import CONE_KEYS
-from .schema import Key
+import math
+from dataclasses import replace
 
-__all__ = ["CALIBRATION_KEYS", "SENSOR_KEYS"]
+from coneskin.core.keys import Key, with_meanings
 
-_PLACE = (
+__all__ = ["CALIBRATION_KEYS", "CONE_KEYS", "DOUBLE_CONE_KEYS", "FILE_KEYS", "LINK_CONE_KEYS", "SENSOR_KEYS"]
+
+_RADIUS1 = Key("radius1_mm", low=1.0, high=5000.0, meaning="radius at end 1, the arc of electrode B")
+_RADIUS2 = Key("radius2_mm", low=1.0, high=5000.0, meaning="radius at end 2, the arc of electrode A")
+_HEIGHT = Key(
+    "height_mm",
+    low=1.0,
+    high=10_000.0,
+    or_zero=True,
+    meaning="distance between the ends along the axis, 0 for a flat ring",
+)
+_WRAP = Key(
+    "wrap_deg",
+    default=2.0 * math.pi,
+    low=0.0,
+    high=360.0,
+    above=True,
+    meaning="angle covered about the axis, from electrode D (phi = 0) to C",
+)
+
+#: the active cone of a sensor, in a scene and in a sensor file; a sensor cannot reach an apex
+CONE_KEYS = (_RADIUS1, _RADIUS2, _HEIGHT, _WRAP)
+#: the side of a link, on the command line; a radius of 0 is an apex
+LINK_CONE_KEYS = (
+    replace(_RADIUS1, or_zero=True, meaning="radius at end 1"),
+    replace(_RADIUS2, or_zero=True, meaning="radius at end 2"),
+    _HEIGHT,
+    replace(_WRAP, meaning="angle covered about the axis"),
+)
+#: the same, with a second cone on end 2 of the first
+DOUBLE_CONE_KEYS = (
+    *LINK_CONE_KEYS[:3],
+    replace(_RADIUS2, name="radius3_mm", or_zero=True, meaning="far radius of a second cone on end 2"),
+    replace(_HEIGHT, name="height2_mm", meaning="height of the second cone"),
+    LINK_CONE_KEYS[3],
+)
+_BENDS = with_meanings(
+    """
+    bend_wrap_deg: of a link that is not round: shares of the wrap from phi = 0 on, each bent evenly. They add up to
+        `wrap_deg`. `coneskin design` writes them
+    bend_turn_deg: angle by which the normal turns across each share, 0 for a plane. The cone's u, phi and lengths
+        stay. Its ends are then as long as the link is around
+    bend_lift_mm: height of the sensor above the side whose rulings meet in one point, or are parallel. The bends
+        are those of the link, at their places on the sensor
+    """,
+    Key("bend_wrap_deg", list, (), low=0.0, high=360.0, above=True),
+    Key("bend_turn_deg", list, (), low=-360.0, high=360.0),
+    Key("bend_lift_mm", float, 0.0, low=0.0, high=100.0),
+)
+_PLACE = with_meanings(
+    """
+    xyz_mm: where the middle of end 1 is, in the link's `frame`
+    rpy_deg: roll, pitch, yaw about the fixed axes, as in URDF. z runs from end 1 to end 2, x points at phi = 0
+    """,
     Key("xyz_mm", list, (0.0, 0.0, 0.0), low=-10_000.0, high=10_000.0, length=3),
     Key("rpy_deg", list, (0.0, 0.0, 0.0), low=-360.0, high=360.0, length=3),
 )
-_BENDS = (
-    Key("bend_wrap_deg", list, (), low=0.0, high=360.0, above=True, meaning="shares of the wrap, evenly bent each"),
-    Key("bend_turn_deg", list, (), low=-360.0, high=360.0, meaning="angle by which each of them turns the normal"),
-    Key("bend_lift_mm", float, 0.0, low=0.0, high=100.0, meaning="height above a side whose rulings meet in a point"),
-)
-_WIRE = (
+_WIRE = with_meanings(
+    """
+    id: number of the sensor on the wire
+    device: number of its electronics on the wire
+    name: its name in events and messages. Two sensors must not share one
+    """,
     Key("id", int, 0, low=0, high=255),
     Key("device", int, 0, low=0, high=65535),
-    Key("name", str, ""),
+    Key("name", str, "", unset="from its numbers"),
 )
-_POLARITY = (
+_POLARITY = with_meanings(
+    """
+    radial_positive: which arc electrode is at the supply in the radial phase
+    angular_positive: which edge electrode is at the supply in the angular phase
+    """,
     Key("radial_positive", str, "B", choices=("A", "B")),
     Key("angular_positive", str, "C", choices=("C", "D")),
 )
-_ELECTRONICS = (
-    Key("supply_v", float, None, low=0.1, high=50.0, meaning="potential of the positive electrode"),
-    Key("adc_v", float, 3.3, low=0.1, high=50.0, meaning="potential of the highest count of the A/D converter"),
-    Key("adc_bits", int, None, low=8, high=16, meaning="resolution of the A/D converter"),
-    Key("pulldown_ohm", float, None, low=1.0, high=1e9, meaning="from C and D to ground in the touch phase"),
+_MATCHED = "matches the sheets"
+_ELECTRONICS = with_meanings(
+    """
+    supply_v: potential of the positive electrode, U0; at most 95 % of `adc_v`
+    adc_v: potential of the highest count of the A/D converter
+    adc_bits: resolution of the A/D converter
+    pulldown_ohm: from C and D to ground in the touch phase
+    input_ohm: from each guide to ground in the other phases; at least 10 times `pulldown_ohm`
+    lead_ohm: wire and switch of each electrode: one number for all, or a list for A, B, C, D
+    current_full_scale_ma: drive current of the highest count
+    """,
+    Key("supply_v", float, None, low=0.1, high=50.0, unset=_MATCHED),
+    Key("adc_v", float, 3.3, low=0.1, high=50.0),
+    Key("adc_bits", int, None, low=8, high=16, unset=_MATCHED),
+    Key("pulldown_ohm", float, None, low=1.0, high=1e9, unset=_MATCHED),
     Key("input_ohm", float, 10e6, low=1.0, high=1e12),
     Key("lead_ohm", list, (1.0,) * 4, low=0.0, high=1e6, length=4, above=True, one_for_all=True),
-    Key("current_full_scale_ma", float, None, low=1e-3, high=1e4, meaning="drive current of the highest count"),
+    Key("current_full_scale_ma", float, None, low=1e-3, high=1e4, unset=_MATCHED),
 )
-_SHEETS = (
-    Key(
-        "upper_sheet_ohm",
-        float,
-        1000.0,
-        low=1e-3,
-        high=1e9,
-        meaning="resistance of the upper conductive layer per square",
-    ),
-    Key(
-        "lower_sheet_ohm",
-        float,
-        1000.0,
-        low=1e-3,
-        high=1e9,
-        meaning="resistance of the lower conductive layer per square",
-    ),
+_SHEETS = with_meanings(
+    """
+    upper_sheet_ohm: resistance of the upper conductive layer per square
+    lower_sheet_ohm: resistance of the lower conductive layer per square
+    """,
+    Key("upper_sheet_ohm", float, 1000.0, low=1e-3, high=1e9),
+    Key("lower_sheet_ohm", float, 1000.0, low=1e-3, high=1e9),
 )
-_THRESHOLDS = (
+_THRESHOLDS = with_meanings(
+    """
+    touch_level: level from which the sensor is touched
+    touch_force_n: the same as a force, in place of `touch_level`. It needs a calibration with known forces, and one
+        of those. `location_level` then is no lower
+    release_level: level below which a touch has ended; below `touch_level`
+    location_level: level from which the place of a touch is valid; not below `touch_level`
+    """,
     Key("touch_level", float, 0.10, low=0.0, high=1.0, above=True),
-    Key("touch_force_n", float, None, low=0.01, high=1000.0, meaning="force of the touch threshold"),
-    Key("release_level", float, 0.05, low=0.03, high=1.0, above=True),  # above the drift that the detector compensates
+    Key("touch_force_n", float, None, low=0.01, high=1000.0),
+    Key("release_level", float, 0.05, low=0.03, high=1.0, above=True),
     Key("location_level", float, 0.20, low=0.0, high=1.0, above=True),
 )
 #: that a calibration stands for
-CALIBRATION_KEYS = (
-    Key("map_along", list, None, low=-0.1, high=0.1, length=5, meaning="numbers of a calibration"),
-    Key("map_around", list, None, low=-0.1, high=0.1, length=5, meaning="numbers of a calibration"),
+CALIBRATION_KEYS = with_meanings(
+    """
+    map_along: what a calibration takes off places along the side; `calibration` gives it
+    map_around: what a calibration takes off places about the axis; `calibration` gives it
+    map_note: where `map_along` and `map_around` come from
+    forces_n: known forces of a calibration, rising; `calibration` gives them
+    force_levels: levels that the known forces gave
+    force_error: standard deviation of a force that is read, as a share of it
+    """,
+    Key("map_along", list, None, low=-0.1, high=0.1, length=5),
+    Key("map_around", list, None, low=-0.1, high=0.1, length=5),
     Key("map_note", str, ""),
-    Key("forces_n", list, None, low=0.0, high=1000.0, meaning="known forces of a calibration"),
-    Key("force_levels", list, None, low=0.0, high=1.0, meaning="levels that they gave"),
-    Key("force_error", float, 0.0, low=0.0, high=0.99, meaning="standard deviation of a force, of itself"),
+    Key("forces_n", list, None, low=0.0, high=1000.0),
+    Key("force_levels", list, None, low=0.0, high=1.0),
+    Key("force_error", float, 0.0, low=0.0, high=0.99),
 )
-#: of one sensor
 SENSOR_KEYS = (
     *(*CONE_KEYS, *_BENDS, *_PLACE, *_WIRE, *_POLARITY),
     *(*_ELECTRONICS, *_SHEETS, *_THRESHOLDS, *CALIBRATION_KEYS),
+)
+#: that a scene may have beside those of the sensor
+FILE_KEYS = with_meanings(
+    """
+    file: a file with more of these keys
+    calibration: a calibration file, or the folder of such files. The newest one of this device and sensor applies
+    """,
+    Key("file", str, None),
+    Key("calibration", str, None),
 )

@@ -15,12 +15,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.bounded_file import read_file
 from coneskin.core.errors import ConeSkinError, SceneError
+from coneskin.core.files import read_file, write_whole
 from coneskin.core.json_text import read_json
 
-from .sensor_facts import round_facts, sensor_facts
-from .whole_file import write_whole
+from .scene import round_facts, sensor_facts
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor

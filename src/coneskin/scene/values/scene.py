@@ -5,13 +5,15 @@ What a scene does not name is neither imported, started nor computed. ``reader``
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
+    from coneskin.geometry.pose import Vector
     from coneskin.robot.reaction.rules import Rule
     from coneskin.robot.reaction.types import Reaction
     from coneskin.robot.stop.limits import MonitoringLimits
@@ -19,19 +21,139 @@ if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
-    from .body import BodyScene
-    from .speed_limit import SpeedLimitScene
-
 __all__ = [
+    "BODY_KINDS",
     "ArmScene",
+    "BodyScene",
     "Commissioning",
+    "LimitedPatch",
     "LinkScene",
     "MotionScene",
     "PlacedSensor",
     "RecordingScene",
     "Scene",
     "SourceScene",
+    "SpeedLimitScene",
+    "round_facts",
+    "sensor_facts",
 ]
+
+#: kind of a body -> what it is
+BODY_KINDS = {
+    "wall": "a plate that does not give way",
+    "post": "a round bar that does not give way",
+    "mass": "a free mass that nothing holds",
+    "hand": "a mass on a spring: a hand, or a head",
+    "person": "a hand that pushes back, some time after it was touched",
+    "grip": "two hands that close on the link from both sides, some time after one was touched",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class BodyScene:
+    """Body that the arm may run into. Stiffness and effective mass are the user's: none is known that holds for all.
+
+    Attributes:
+        kind: of `BODY_KINDS`.
+        place: of its middle, in the base frame [m]; of a wall, the middle of its face; of a grip, of the first hand.
+        direction: outward normal of a wall, axis of a post, way from the first to the second hand of a grip.
+        radius: of a ball or a bar [m]; half the edge of a wall.
+        length: of a bar [m].
+        mass: effective mass [kg].
+        stiffness: of the spring that holds it [N/m].
+        damping: of that spring, as a share of what is critical.
+        force: that a person wants, or each hand of a grip [N].
+        speed: at which a person follows or yields at most [m/s].
+        delay: from the first contact to the person's push, or the closing of the grip [s].
+    """
+
+    kind: str
+    place: Vector
+    direction: Vector = (1.0, 0.0, 0.0)
+    radius: float = 0.04
+    length: float = 0.3
+    mass: float = 1.0
+    stiffness: float = 0.0
+    damping: float = 0.3
+    force: float = 0.0
+    speed: float = 0.25
+    delay: float = 0.15
+
+    @property
+    def gives_way(self) -> bool:
+        """True for a body that moves when it is pushed."""
+        return self.kind not in ("wall", "post")
+
+    @property
+    def parts(self) -> tuple[Vector, ...]:
+        """Places of its parts [m]: two of a grip, one of any other."""
+        if self.kind != "grip":
+            return (self.place,)
+        x, y, z = (p + d for p, d in zip(self.place, self.direction, strict=True))
+        return self.place, (x, y, z)
+
+    @property
+    def axis(self) -> Vector:
+        """Unit vector of ``direction``."""
+        x, y, z = self.direction
+        length = math.sqrt(x * x + y * y + z * z)
+        return x / length, y / length, z / length
+
+
+@dataclass(frozen=True, slots=True)
+class LimitedPatch:
+    """Patch of a skin whose speed is limited.
+
+    Attributes:
+        sensor: its name.
+        u: slant distance from end 1 [m].
+        phi: azimuth [rad].
+        curve: number of the curve that holds within the joint positions of the motion.
+        any_curve: number of the one that holds in any.
+    """
+
+    sensor: str
+    u: float
+    phi: float
+    curve: int
+    any_curve: int
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedLimitScene:
+    """Permissible speeds of the skins of a scene.
+
+    Attributes:
+        fingerprint: of what they hold for; see ``speed_limit_table.limit_fingerprint``.
+        date: when they were computed, UTC.
+        coneskin: the version.
+        edition: document and edition that the limits of the force are from.
+        transcribed_by: who copied them from it.
+        verified_by: who compared them with it.
+        measured_by: what measured reaction time and deceleration.
+        reaction: from the closing of the layers until the arm brakes [s].
+        deceleration: of the leading joint then [rad/s^2].
+        lowest: joint positions [rad] from which on the patches' own curves hold; empty where only the others do.
+        highest: joint positions [rad] up to which they do.
+        levers: speed of a patch along its normal over that of the leading joint [m/rad], rising.
+        curves: permissible speeds along the normal [m/s], one for each lever.
+        patches: of the skins.
+    """
+
+    fingerprint: str
+    date: str
+    coneskin: str
+    edition: str
+    transcribed_by: str
+    verified_by: str
+    measured_by: str
+    reaction: float
+    deceleration: float
+    lowest: tuple[float, ...]
+    highest: tuple[float, ...]
+    levers: tuple[float, ...]
+    curves: tuple[tuple[float, ...], ...]
+    patches: tuple[LimitedPatch, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,3 +349,26 @@ class Scene:
         from coneskin.robot.stop.limits import MonitoringLimits
 
         return self.monitoring or MonitoringLimits()
+
+
+_DIGITS = 9  # of a number in a fingerprint; the last bits of a sine may differ between machines
+
+
+def sensor_facts(sensor: Sensor) -> dict[str, Any]:
+    """Return numbers, geometry, polarity, electronics and sheets of a sensor; not name, thresholds and place map."""
+    return {
+        "number": [sensor.device_id, sensor.sensor_id],
+        "frustum": asdict(sensor.frustum),
+        "polarity": asdict(sensor.polarity),
+        "electronics": asdict(sensor.electronics),
+        "sheets": [sensor.upper_sheet_ohms, sensor.lower_sheet_ohms],
+    }
+
+
+def round_facts(value: Any) -> Any:
+    """Return facts with each number rounded, so that those of two machines agree."""
+    if isinstance(value, float):
+        return round(value, _DIGITS) + 0.0  # no negative zero
+    if isinstance(value, Mapping):
+        return {key: round_facts(item) for key, item in value.items()}
+    return [round_facts(item) for item in value] if isinstance(value, list | tuple) else value

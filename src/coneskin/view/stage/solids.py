@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from coneskin.scene.values.body import BodyScene
+    from coneskin.scene.values.scene import BodyScene
 
 __all__ = ["Solid", "along", "arm_solids", "barrel", "body_solids", "joined", "quaternion", "revolve"]
 

@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.tables.sensor_table import build_sensor, merge_sensor_file
+from coneskin.scene.tables.sensor_tables import build_sensor, merge_sensor_file
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity, Thresholds
 
 SHAPE = {"radius1_mm": 40, "radius2_mm": 70, "height_mm": 150}

@@ -1,20 +1,38 @@
-"""Overrides of a scene's settings, by the names of its keys: what if this value had been another one."""
+"""Settings of a scene by name: overrides for a what-if, the detector's own, and all values once defaults are filled in.
+
+A name is the way to a key, such as ``reaction.rule.0.kind``. The detector's own settings stand in no scene: only a
+what-if sets them. Resolved settings tell what another version of the code would fill in otherwise.
+"""
 
 from __future__ import annotations
 
 import difflib
+import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import SceneError
+from coneskin.core.errors import SceneError, SensorError
+from coneskin.core.keys import Key, check
 
 from .reader import TABLES
-from .tables.detector_keys import DETECTOR, detector_settings
-from .tables.link_tables import sensor_tables
+from .tables.sensor_tables import sensor_tables
+from .values.scene import sensor_facts
 
-__all__ = ["override_detector", "override_settings", "parse_choices", "parse_settings"]
+if TYPE_CHECKING:
+    from .values.scene import Scene
+
+__all__ = [
+    "changed_settings",
+    "detector_keys",
+    "override_detector",
+    "override_settings",
+    "parse_choices",
+    "parse_settings",
+    "resolved_settings",
+]
 
 _EXAMPLE = (
     "write reaction.kind=stop, monitoring.settle_ms=100, reaction.rule.0.kind=slow, sensor.0.touch_level=0.08, "
@@ -72,8 +90,8 @@ def override_detector(settings: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         SceneError: one of them is unknown, or its value not possible.
     """
-    own = {name.partition(".")[2]: value for name, value in settings.items() if name.partition(".")[0] == DETECTOR}
-    return detector_settings(own)
+    own = {name.partition(".")[2]: value for name, value in settings.items() if name.partition(".")[0] == _DETECTOR}
+    return _detector_settings(own)
 
 
 def override_settings(text: str, settings: Mapping[str, Any]) -> str:
@@ -99,7 +117,7 @@ def override_settings(text: str, settings: Mapping[str, Any]) -> str:
     problems: list[str] = []
     for name, value in settings.items():
         parts = [quoted or plain for quoted, plain in _PART.findall(name)]
-        if parts[:1] == [DETECTOR]:
+        if parts[:1] == [_DETECTOR]:
             continue
         try:
             _override(tables, parts, value)
@@ -131,7 +149,7 @@ def _override(tables: dict[str, Any], parts: list[str], value: Any) -> None:
     elif parts[0] in TABLES:
         _put(tables.setdefault(parts[0], {}), parts[1:], value, parts[0])
     else:
-        raise _NoPlace(_unknown("table", parts[0], [*TABLES, _SENSOR, _ALL_SENSORS, DETECTOR]))
+        raise _NoPlace(_unknown("table", parts[0], [*TABLES, _SENSOR, _ALL_SENSORS, _DETECTOR]))
 
 
 def _put(place: Any, parts: list[str], value: Any, where: str) -> None:
@@ -178,3 +196,85 @@ def _unknown(what: str, part: str, known: list[str]) -> str:
     near = difflib.get_close_matches(part, known, 1, 0.5)
     said = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}" if known else "there is none at all"
     return f"there is no {what} {part}; {said}"
+
+
+_DETECTOR = "detector"  # what their names begin with
+_UNITS = {
+    "settle_distance": "_mm",
+    "move_distance": "_mm",
+    "largest_contact": "_mm",
+    "lasting_touch": "_s",
+    "drift_rate": "_per_s",
+    "current_drift": "_per_s",
+    "second_contact": "_siemens",
+}
+_OF_THE_SCENE = frozenset({"stuck_frames", "timing"})  # [monitoring] has them
+
+
+def detector_keys() -> tuple[Key, ...]:
+    """Return a key for each field of ``DetectorSettings`` that no scene sets; the unit is in its name."""
+    from coneskin.skin.detection.frame.settings import DetectorSettings
+
+    own = (item for item in fields(DetectorSettings) if item.name not in _OF_THE_SCENE)
+    return tuple(Key(item.name + _UNITS.get(item.name, ""), type(item.default), None, low=0.0) for item in own)
+
+
+def _detector_settings(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values in SI by the names of the fields of ``DetectorSettings``.
+
+    Args:
+        values: by their keys, such as ``{"release_frames": 5, "move_distance_mm": 3.0}``.
+
+    Raises:
+        SceneError: a key is unknown, or a value is not possible.
+    """
+    problems: list[str] = []
+    checked = check(values, detector_keys(), _DETECTOR, problems) if values else {}
+    found = {name: value for name, value in checked.items() if value is not None}
+    if not problems and found:
+        problems += _refusals(found)
+    if problems:
+        raise SceneError(problems, "settings")
+    return found
+
+
+def _refusals(values: Mapping[str, Any]) -> list[str]:
+    from coneskin.skin.detection.frame.settings import DetectorSettings
+
+    try:
+        DetectorSettings(**values)
+    except SensorError as exc:
+        return [str(exc)]
+    return []
+
+
+def resolved_settings(scene: Scene) -> dict[str, Any]:
+    """Return electronics, sheets and thresholds of each sensor, reaction, monitoring limits, for JSON; SI."""
+    sensors = {
+        item.sensor.name: {**sensor_facts(item.sensor), "thresholds": asdict(item.sensor.thresholds)}
+        for item in scene.sensors
+    }
+    found = {"sensors": sensors, "monitoring": asdict(scene.monitoring_limits)}
+    if scene.arm is not None:
+        found["reaction"] = asdict(scene.default_reaction)
+    plain: dict[str, Any] = json.loads(json.dumps(found))
+    return plain
+
+
+def changed_settings(recorded: Any, scene: Scene) -> list[str]:
+    """Return what today's code fills in otherwise, such as ``monitoring.settle 0.3 -> 0.5``; SI.
+
+    Args:
+        recorded: settings as a recording has them; what it does not have is not compared.
+        scene: the same scene, as it was read today.
+    """
+    return list(_changes("", recorded, resolved_settings(scene))) if isinstance(recorded, Mapping) else []
+
+
+def _changes(name: str, before: Any, now: Any) -> Iterator[str]:
+    if isinstance(before, Mapping) and isinstance(now, Mapping):
+        for key in before:
+            if key in now:
+                yield from _changes(f"{name}.{key}" if name else str(key), before[key], now[key])
+    elif before != now:
+        yield f"{name} {json.dumps(before)} -> {json.dumps(now)}"

@@ -1,29 +1,24 @@
-"""Reader of the [source] table of a scene, or of several [[source]], by the row of `SOURCE_KINDS` for its kind."""
+"""Readers of [source], or several [[source]], by the row of `SOURCE_KINDS` for the kind, and of [[source.touch]]."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SensorError
-from coneskin.skin.sources.kinds import GROUP, SOURCE_KINDS, SourceKey, find_kind
+from coneskin.core.keys import Key, check
+from coneskin.skin.sources.kinds import GROUP, SOURCE_KINDS, find_kind
 
-from .schema import Key, check
+from .keys import TOUCH_KEYS, source_keys
 
 if TYPE_CHECKING:
     from coneskin.scene.values.scene import SourceScene
+    from coneskin.skin.sensor import Sensor
+    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
-__all__ = ["read_source", "read_sources", "source_keys", "source_label"]
-
-
-def source_keys() -> tuple[Key, ...]:
-    """Return every key that a [source] may have: ``kind``, then those of each kind."""
-    found = {"kind": Key("kind", str, choices=tuple(SOURCE_KINDS))}
-    for row in SOURCE_KINDS.values():
-        for key in row.keys:
-            found.setdefault(key.name, _key(key))
-    return tuple(found.values())
+__all__ = ["read_source", "read_sources", "read_touch", "source_label"]
 
 
 def read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str]) -> dict[str, Any]:
@@ -80,9 +75,9 @@ def read_source(table: Mapping[str, Any], problems: list[str], where: str = "sou
     problems += [f"{where}.{name} means nothing to kind {table['kind']}: remove it" for name in stray]
     for key in row.keys:
         if key.default is ... and table.get(key.name, "") == "":
-            problems.append(f"{where}.{key.name} is missing: {key.example}")
+            problems.append(f"{where}.{key.name} is missing: {key.meaning}")
     known = {name: value for name, value in table.items() if name not in stray}
-    return check(known, (kind, *(_optional(_key(key)) for key in row.keys)), where, problems)
+    return check(known, (kind, *(_optional(key) for key in row.keys)), where, problems)
 
 
 def source_label(source: SourceScene) -> str:
@@ -94,14 +89,40 @@ def source_label(source: SourceScene) -> str:
 
 def _label(kind: str, settings: Mapping[str, Any]) -> str:
     row = find_kind(kind)
-    keys = [_key(key) for key in row.keys] if row else []
+    keys = row.keys if row else ()
     return " ".join([kind, *(str(settings[key.plain]) for key in keys if key.default is ...)])
-
-
-def _key(key: SourceKey) -> Key:
-    return Key(key.name, key.kind, key.default, key.low, key.high, key.choices)
 
 
 def _optional(key: Key) -> Key:
     """Return the key as an optional one; `read_source` reports better what is missing."""
     return replace(key, default=None) if key.default is ... else key
+
+
+def read_touch(
+    sensors: Sequence[Sensor | None], table: Mapping[str, Any], where: str, problems: list[str]
+) -> ScriptedTouch | None:
+    """Read a scripted touch; among the sensors, None stands for each that has a mistake."""
+    from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+
+    before = len(problems)
+    values = check(table, TOUCH_KEYS, where, problems)
+    start, end = values.get("start", -math.inf), values.get("end", math.inf)
+    if not start < end:
+        problems.append(f"{where}: start_s must be before end_s, got {start:g} s and {end:g} s")
+    wanted = values.pop("sensor")
+    known = () if wanted is None and None in sensors else sensors  # the first of them may be one with a mistake
+    sensor = next((one for one in known if one is not None and wanted in (None, one.sensor_id)), None)
+    if sensor is None:
+        if None not in sensors:  # otherwise it may be that one
+            problems.append(f"{where}: there is no sensor {'to touch' if wanted is None else f'with the id {wanted}'}")
+        return None
+    cone = sensor.frustum
+    u, phi = values.get("u", 0.0), values.get("phi", 0.0)
+    if u > cone.slant or phi > cone.wrap:
+        problems.append(
+            f"{where} is off {sensor.name}, whose u_mm ends at {1e3 * cone.slant:g} and phi_deg at "
+            f"{math.degrees(cone.wrap):g}: got {1e3 * u:g} mm and {math.degrees(phi):g} deg"
+        )
+    if values.get("grown_force") and not values.get("growth_time"):
+        problems.append(f"{where}: grown_force_n needs a growth_time_s above 0 s")
+    return ScriptedTouch(**values, sensor=sensor.name) if len(problems) == before else None

@@ -2,13 +2,14 @@
 
 import os
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from coneskin.core.bounded_file import format_size, open_file, read_file
 from coneskin.core.errors import ConeSkinError, RecordingError
+from coneskin.core.files import draft_of, format_size, open_file, read_file
 from coneskin.core.recording.chunk import MAGIC
 from coneskin.core.recording.reader import read_recording
 from coneskin.geometry.mesh import load_mesh
@@ -113,3 +114,39 @@ def test_a_long_file_that_is_no_recording_is_refused_at_its_start(tmp_path: Path
         file.truncate(60_000_000_000)
     with pytest.raises(RecordingError, match="is no recording of coneskin"):
         read_recording(path)
+
+
+@contextmanager
+def _half_a_draft(path: Path) -> Iterator[None]:
+    with draft_of(path) as draft:
+        draft.write_bytes(b"half")
+        assert draft.exists()
+        yield
+        raise ZeroDivisionError
+
+
+def test_a_draft_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    with pytest.raises(ZeroDivisionError), _half_a_draft(path):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_draft_takes_the_place_of_a_file_only_where_it_may(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"mine")
+    with pytest.raises(FileExistsError), draft_of(path) as draft:
+        draft.write_bytes(b"other")
+    assert path.read_bytes() == b"mine"
+    with draft_of(path, overwrite=True) as draft:
+        draft.write_bytes(b"other")
+    assert path.read_bytes() == b"other"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_is_written_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, order = tmp_path / "file", []
+    monkeypatch.setattr("coneskin.core.files.os.fsync", lambda _: order.append(path.exists()))
+    with draft_of(path) as draft:
+        draft.write_bytes(b"all")
+    assert order[:1] == [False]

@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 
 from coneskin.core.errors import SceneError
+from coneskin.core.keys import Key
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.setting_overrides import override_detector, override_settings, parse_choices, parse_settings
-from coneskin.scene.tables.detector_keys import detector_keys
-from coneskin.scene.tables.schema import Key
+from coneskin.scene.settings import detector_keys, override_detector, override_settings, parse_choices, parse_settings
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 

@@ -1,20 +1,21 @@
-"""Keys of a TOML table: their units, ranges and defaults, checked all at once.
+"""Keys of a TOML table: name, type, unit, range, default and meaning, checked all at once.
 
 In a file the unit is part of the name of the key (``height_mm``); checked values are in SI and radians under the plain
-name.
+name. The same keys give the options of commands, and the reference pages: ``unit``, ``bounds`` and ``default_words``
+are their columns.
 """
 
 from __future__ import annotations
 
 import difflib
+import inspect
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-__all__ = ["MAX_SIZE", "Key", "check"]
-
-MAX_SIZE = 256_000  #: bytes of a scene file or a sensor file; a scene of 100 sensors has 50 kB
+__all__ = ["Key", "check", "with_meanings"]
 
 _DEGREE = math.pi / 180.0  # rad
 _UNITS: Mapping[str, tuple[float, str]] = {
@@ -31,6 +32,7 @@ _UNITS: Mapping[str, tuple[float, str]] = {
     "_deg": (_DEGREE, "deg"),
     "_ppm": (1e-6, "ppm"),
     "_days": (86400.0, "days"),
+    "_s_per_m": (1.0, "s/m"),
     "_per_s": (1.0, "1/s"),
     "_siemens": (1.0, "S"),
     "_ms": (1e-3, "ms"),
@@ -42,6 +44,8 @@ _UNITS: Mapping[str, tuple[float, str]] = {
     "_n": (1.0, "N"),
     "_s": (1.0, "s"),
 }
+_MEANING = re.compile(r"^(\w+): (.*(?:\n .*)*)", re.MULTILINE)
+_TYPE_WORDS = {float: "ratio", int: "whole number", str: "text", bool: "true or false", dict: "tables"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,8 @@ class Key:
         above: True if low itself is not allowed.
         or_zero: True if 0 is allowed below low.
         one_for_all: True if one number may stand for a list of equal ones.
-        meaning: short description, for help texts.
+        meaning: what it is, without a full stop: for help, for a message that it is missing, and for the reference.
+        unset: what holds where the key is missing and its default is no value, in words: "none", "any".
     """
 
     name: str
@@ -73,6 +78,7 @@ class Key:
     or_zero: bool = False
     one_for_all: bool = False
     meaning: str = ""
+    unset: str = ""
 
     @property
     def suffix(self) -> str:
@@ -84,10 +90,62 @@ class Key:
         """Name without the unit."""
         return self.name.removesuffix(self.suffix)
 
+    @property
+    def unit(self) -> str:
+        """Unit or type for people: "mm", "deg, 3 numbers", "whole number", "text", "ratio"."""
+        named = _UNITS.get(self.suffix, (1.0, ""))[1]
+        if self.kind is list:
+            numbers = f"{self.length} numbers" if self.length else "numbers"
+            return ", ".join([*([named] if named else []), f"1 or {numbers}" if self.one_for_all else numbers])
+        return named or _TYPE_WORDS[self.kind]
+
+    @property
+    def bounds(self) -> str:
+        """Range for people: "1 to 500", "above 0 to 360", "A, B"; empty without one."""
+        if self.choices:
+            return ", ".join(self.choices)
+        low, high = math.isfinite(self.low), math.isfinite(self.high)
+        start = "above " if self.above else "0 or " if self.or_zero else "" if high else "at least "
+        end = f"{self.high}" if self.kind is int else f"{self.high:g}"
+        return f"{start}{self.low:g}{f' to {end}' if high else ''}" if low else f"at most {end}" if high else ""
+
+    @property
+    def default_words(self) -> str:
+        """Default for people, in the unit of the file; "-" where the key must be there."""
+        if self.default is ...:
+            return "-"
+        if self.unset or self.default is None or self.kind is dict:
+            return self.unset or "none"
+        if self.kind is list:
+            numbers = [f"{self.in_file_unit(value):g}" for value in self.default]
+            return numbers[0] if self.one_for_all and len(set(numbers)) == 1 else f"[{', '.join(numbers)}]"
+        if self.kind is bool:
+            return str(self.default).lower()
+        return f"{self.in_file_unit(self.default):g}" if self.kind is float else str(self.default) or "none"
+
     def in_file_unit(self, value: float) -> float:
         """Convert a value from SI to the unit of the key."""
         factor = _UNITS.get(self.suffix, (1.0, ""))[0]
         return value * (1.0 / factor) if factor != _DEGREE else math.degrees(value)  # 1 / 1e-3 is 1000 exactly
+
+
+def with_meanings(text: str, *keys: Key) -> tuple[Key, ...]:
+    """Return keys with their meanings.
+
+    Args:
+        text: "name: meaning" for each key that has none yet; further lines of a meaning are indented.
+        keys: without meanings.
+
+    Raises:
+        ValueError: the text has another name, or a key none.
+    """
+    meanings = {name: " ".join(words.split()) for name, words in _MEANING.findall(inspect.cleandoc(text))}
+    if extra := meanings.keys() - {key.name for key in keys}:
+        raise ValueError(f"there is no key {', '.join(sorted(extra))}")
+    found = tuple(replace(key, meaning=meanings.get(key.name, key.meaning)) for key in keys)
+    if bare := [key.name for key in found if not key.meaning]:
+        raise ValueError(f"no meaning is given for {', '.join(bare)}")
+    return found
 
 
 def check(table: Mapping[str, Any], keys: Sequence[Key], where: str, problems: list[str]) -> dict[str, Any]:
@@ -113,7 +171,7 @@ def check(table: Mapping[str, Any], keys: Sequence[Key], where: str, problems: l
             values[key.plain] = key.default
         if key.name not in table:
             if key.default is ...:
-                problems.append(f"{where}: the key {key.name} is missing")
+                problems.append(f"{where}: the key {key.name} is missing" + (f": {key.meaning}" if key.meaning else ""))
             continue
         found = _convert(key, table[key.name], f"{where}.{key.name}", problems.append)
         if found is not None:

@@ -9,67 +9,39 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.bounded_file import read_file
-from coneskin.scene.values.sensor_facts import round_facts
-from coneskin.scene.values.speed_limit import LimitedPatch, SpeedLimitScene
+from coneskin.core.files import read_file
+from coneskin.core.keys import Key, check
+from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene, round_facts
 
-from .schema import Key, check
-from .speed_limit_check import limit_digest, uncovered, unfit
+from .keys import CURVE_KEYS, MAX_ROWS, PATCH_KEYS, SPEED_LIMIT_KEYS
 
 if TYPE_CHECKING:
+    from coneskin.geometry.frustum import Frustum
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.scene.values.scene import Scene
 
 __all__ = [
-    "SPEED_LIMIT_KEYS",
     "check_speed_limit",
     "inline_speed_limit",
+    "limit_digest",
     "limit_fingerprint",
     "read_speed_limit",
+    "uncovered",
+    "unfit",
 ]
 
 _MODEL_NUMBER = 1  # part of the fingerprint: raise it where the computation changes, so that computed files are void
 _MAX_BYTES = 1 << 20  # of a file; a map of ten sheets has 100 kB
-_MAX_ROWS = 20_000
 _MAX_LINES = 10  # of mistakes
-HOW_TO = "run `coneskin permissible`, and name what it writes"
-SPEED_LIMIT_KEYS = (
-    Key("digest", str),
-    Key("fingerprint", str),
-    Key("date", str),
-    Key("coneskin", str),
-    Key("edition", str),
-    Key("transcribed_by", str),
-    Key("verified_by", str),
-    Key("measured_by", str),
-    Key("reaction_ms", low=0.0, high=1000.0),
-    Key("deceleration_rad_s2", low=0.1, high=100.0),
-    Key("lowest_deg", list, (), low=-363.0, high=363.0),
-    Key("highest_deg", list, (), low=-363.0, high=363.0),
-    Key("levers_mm", list, low=0.1, high=10_000.0),
-    Key("curve", dict),
-    Key("patch", dict),
-)
-_CURVE = (
-    Key("region", str),
-    Key("mass_kg", float, None, low=0.0, high=1e6),
-    Key("lag_mm", float, 0.0, low=0.0, high=1e5),
-    Key("bend_mm", float, 0.0, low=0.0, high=1e5),
-    Key("speeds_mm_s", list, low=0.0, high=10_000.0),
-)
-_PATCH = (
-    Key("sensor", str),
-    Key("u_mm", low=0.0, high=10_000.0),
-    Key("phi_deg", low=0.0, high=360.001),
-    Key("curve", int, low=0, high=_MAX_ROWS),
-    Key("any_curve", int, low=0, high=_MAX_ROWS),
-)
+_HOW_TO = "run `coneskin permissible`, and name what it writes"
 
 
 def limit_fingerprint(scene: Scene) -> str:
@@ -124,13 +96,13 @@ def _read(tables: dict[str, Any], path: Path, problems: list[str]) -> None:
     try:
         found = tomllib.loads(read_file(path, _MAX_BYTES).decode("utf-8-sig"))
     except OSError as exc:
-        problems.append(f"arm.speed_limit_from: {path} cannot be read: {exc.strerror or exc}; {HOW_TO}")
+        problems.append(f"arm.speed_limit_from: {path} cannot be read: {exc.strerror or exc}; {_HOW_TO}")
         return
     except (ValueError, RecursionError) as exc:
         problems.append(f"arm.speed_limit_from: {path} is not TOML: {exc}")
         return
     if set(found) != {"speed_limit"} or not isinstance(found["speed_limit"], dict):
-        problems.append(f"arm.speed_limit_from: {path} must hold one table, [speed_limit]; {HOW_TO}")
+        problems.append(f"arm.speed_limit_from: {path} must hold one table, [speed_limit]; {_HOW_TO}")
         return
     tables["speed_limit"] = found["speed_limit"]
 
@@ -148,19 +120,19 @@ def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLim
     table = tables["speed_limit"]
     values = check(table, SPEED_LIMIT_KEYS, "speed_limit", lines)
     digest = values.pop("digest", "")
-    rows = values.pop("curve", ())[:_MAX_ROWS]
-    curves = [check(row, _CURVE, f"speed_limit.curve {n}", lines) for n, row in enumerate(rows)]
-    rows = values.pop("patch", ())[:_MAX_ROWS]
-    patches = [check(row, _PATCH, f"speed_limit.patch {n}", lines) for n, row in enumerate(rows)]
+    rows = values.pop("curve", ())[:MAX_ROWS]
+    curves = [check(row, CURVE_KEYS, f"speed_limit.curve {n}", lines) for n, row in enumerate(rows)]
+    rows = values.pop("patch", ())[:MAX_ROWS]
+    patches = [check(row, PATCH_KEYS, f"speed_limit.patch {n}", lines) for n, row in enumerate(rows)]
     found = None
     if not lines:
         speeds = tuple(tuple(curve["speeds"]) for curve in curves)
-        limited = tuple(LimitedPatch(*(row[key.plain] for key in _PATCH)) for row in patches)
+        limited = tuple(LimitedPatch(*(row[key.plain] for key in PATCH_KEYS)) for row in patches)
         found = SpeedLimitScene(curves=speeds, patches=limited, **values)
         lines += unfit(found)
         if digest != limit_digest(table):
             lines.insert(0, "speed_limit.digest is not that of the table: the file was cut, or changed by hand")
-    problems += [f"{line}; {HOW_TO}" for line in lines[:_MAX_LINES]]
+    problems += [f"{line}; {_HOW_TO}" for line in lines[:_MAX_LINES]]
     return None if lines else found
 
 
@@ -189,7 +161,7 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
     if limit.fingerprint != limit_fingerprint(scene):
         problems.append(
             f"arm.speed_limit_from: the permissible speeds of {limit.date[:10]} are of another scene: arm, sheets, "
-            f"padding or reactions are others now, or coneskin computes them otherwise; {HOW_TO}"
+            f"padding or reactions are others now, or coneskin computes them otherwise; {_HOW_TO}"
         )
         return
     sheets = {item.sensor.name: item.placed for link in scene.links if link_index(link.name) for item in link.sensors}
@@ -202,4 +174,97 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
     lines = lines or [
         line for name, placed in sheets.items() for line in uncovered(name, placed.frustum, of_sheet[name])
     ]
-    problems += [f"arm.speed_limit_from: {line}; {HOW_TO}" for line in lines[:_MAX_LINES]]
+    problems += [f"arm.speed_limit_from: {line}; {_HOW_TO}" for line in lines[:_MAX_LINES]]
+
+
+_STEEPER = 1.05  # of the lever's growth by which a speed may grow; the search leaves 1 %, rounding another
+_ROUNDED = 2e-5  # m/s that rounding leaves of two speeds
+_WIDEST = math.radians(90.0)  # between two patches around a sheet; beyond, no factor makes up for what lies between
+_SLACK = 1e-7  # m and rad that the rounding of a file leaves
+
+
+def limit_digest(table: Mapping[str, Any]) -> str:
+    """Return the hash of a table [speed_limit], as it is in the file, without its own digest."""
+    facts = {name: value for name, value in table.items() if name != "digest"}
+    return hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def unfit(limit: SpeedLimitScene) -> list[str]:
+    """Return what in a table does not fit together; nothing where all does."""
+    lines = []
+    levers = limit.levers
+    if not levers or any(b <= a for a, b in pairwise(levers)):
+        lines.append("speed_limit.levers_mm must rise")
+    if not limit.curves:
+        lines.append("speed_limit.curve: there must be one")
+    if {len(limit.lowest), len(limit.highest)} not in ({0}, {6}):
+        lines.append("speed_limit: lowest_deg and highest_deg have six numbers each, or none")
+    for joint, (low, high) in enumerate(zip(limit.lowest, limit.highest, strict=False), 1):
+        if low > high:
+            lines.append(
+                f"speed_limit: joint {joint} has a lowest_deg of {math.degrees(low):.6g} deg, above its highest_deg of "
+                f"{math.degrees(high):.6g} deg: no joint position is between them"
+            )
+    for number, curve in enumerate(limit.curves):
+        where = f"speed_limit.curve {number}"
+        if len(curve) != len(levers):
+            lines.append(f"{where} needs one speed for each of levers_mm: {len(levers)}, got {len(curve)}")
+        elif not lines:
+            lines += [f"{where}: {line}" for line in _bends(levers, curve)]
+    if not limit.patches:
+        lines.append("speed_limit.patch: there must be one")
+    for number, patch in enumerate(limit.patches):
+        if max(patch.curve, patch.any_curve) >= len(limit.curves):
+            lines.append(f"speed_limit.patch {number} needs a curve that there is, 0 to {len(limit.curves) - 1}")
+    return lines
+
+
+def _bends(levers: tuple[float, ...], curve: tuple[float, ...]) -> list[str]:
+    """Return where a curve is none that a computation gives."""
+    if curve[-1] <= 0.0:
+        return ["the last of speeds_mm_s must be above 0 mm/s: the arm could not move"]
+    for (before, low), (after, high) in pairwise(zip(levers, curve, strict=True)):
+        at = f"{1e3 * high:.6g} mm/s after {1e3 * low:.6g} mm/s"
+        if high < low:
+            return [f"speeds_mm_s must not fall with a longer lever, got {at}"]
+        if low > 0.0 and high > _STEEPER * low * after / before + _ROUNDED:
+            return [
+                f"speeds_mm_s must not grow more than the lever does, from {1e3 * before:.6g} to {1e3 * after:.6g} mm "
+                f"here, got {at}: the straight line between them would be above what is permissible"
+            ]
+    return []
+
+
+def uncovered(name: str, sheet: Frustum, patches: list[LimitedPatch]) -> list[str]:
+    """Return what patches leave of a sheet without a speed, and which of them are not on it.
+
+    The speed along the normal changes evenly between the ends of a sheet: both ends covered, all is.
+
+    Args:
+        name: of the sensor.
+        sheet: its frustum.
+        patches: of that sensor.
+    """
+    for patch in patches:
+        if patch.u > sheet.slant + _SLACK:
+            return [f"{name}: u_mm = {1e3 * patch.u:.6g} is off the sheet, which ends at {1e3 * sheet.slant:.6g} mm"]
+        if patch.phi > sheet.wrap + _SLACK:
+            wrap = math.degrees(sheet.wrap)
+            return [f"{name}: phi_deg = {math.degrees(patch.phi):.6g} is off the sheet, which ends at {wrap:.6g} deg"]
+    for u in (0.0, sheet.slant):
+        around = sorted(patch.phi for patch in patches if abs(patch.u - u) <= _SLACK)
+        if not around:
+            return [f"{name}: no patch at its end u_mm = {1e3 * u:.6g}"]
+        for start, end in _gaps(around, sheet.wrap):
+            part = f"from {math.degrees(start):.6g} to {math.degrees(end):.6g} deg"
+            return [f"{name}: no patch {part} at its end u_mm = {1e3 * u:.6g}"]
+    return []
+
+
+def _gaps(around: list[float], wrap: float) -> list[tuple[float, float]]:
+    """Return where patches are too far apart, or an edge has none [rad]."""
+    gaps = [(a, b) for a, b in pairwise(around) if b - a > _WIDEST + _SLACK]
+    if wrap > 2.0 * math.pi - 1e-9:
+        beyond = around[0] + 2.0 * math.pi
+        return gaps + [(around[-1], beyond)] * (beyond - around[-1] > _WIDEST + _SLACK)
+    return gaps + [(a, b) for a, b in ((0.0, around[0]), (around[-1], wrap)) if b - a > _SLACK]

@@ -1,14 +1,20 @@
-"""Bounded reading of files: only regular ones and up to a limit, so that no file blocks a process or fills memory."""
+"""Files: reading within bounds, and writing whole or not at all.
+
+Only regular files are read, and up to a limit, so that no file blocks a process or fills memory. What is written stands
+beside the file until all of it is on the disk, and then takes its place.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["format_size", "open_file", "read_file"]
+__all__ = ["draft_of", "format_size", "open_file", "read_file", "write_whole"]
 
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -83,3 +89,47 @@ def _check(path: Path, found: os.stat_result, limit: int) -> None:
 def _too_long(path: Path, size: int, limit: int) -> OSError:
     what = f"it has {format_size(size)} or more, and at most {format_size(limit)} are read; is it the right file?"
     return OSError(errno.EFBIG, what, str(path))
+
+
+@contextmanager
+def draft_of(path: Path, overwrite: bool = False) -> Iterator[Path]:
+    """Yield where to write a file, so that whoever reads it, or pulls the plug, finds the whole file or none.
+
+    Args:
+        path: the file; at the end of the ``with`` the draft gets its name. After an error there is neither.
+        overwrite: in place of an older file.
+
+    Raises:
+        FileExistsError: there is one, and it must stay.
+        OSError: the draft cannot be written or renamed.
+    """
+    draft = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        yield draft
+        _bring_to_disk(draft)
+        if not overwrite and path.exists():
+            raise FileExistsError(17, "File exists", str(path))
+        draft.replace(path)
+        with suppress(OSError):  # a folder cannot be opened everywhere
+            _bring_to_disk(path.parent)
+    finally:
+        with suppress(OSError):
+            draft.unlink()
+
+
+def _bring_to_disk(path: Path) -> None:
+    number = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text in place of an older file, or of none, as ``draft_of`` does.
+
+    Raises:
+        OSError: it cannot be written; what was there is still there.
+    """
+    with draft_of(path, overwrite=True) as draft:
+        draft.write_text(text, encoding="utf-8")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.scene.tables.schema import Key, check
+from coneskin.core.keys import Key, check
 
 KEYS = (
     Key("length_mm", low=1.0, high=500.0),

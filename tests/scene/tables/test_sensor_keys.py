@@ -12,21 +12,20 @@ from coneskin.commands import design as design_command
 from coneskin.commands import unroll as unroll_command
 from coneskin.commands.arguments.dimensions import given_dimensions, option_name
 from coneskin.core.errors import GeometryError
+from coneskin.core.keys import Key, check
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.design.sheets.summary import design_summary, sensor_toml
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.scene.tables.cone_keys import CONE_KEYS, DOUBLE_CONE_KEYS, LINK_CONE_KEYS
-from coneskin.scene.tables.schema import Key, check
-from coneskin.scene.tables.sensor_keys import SENSOR_KEYS
+from coneskin.scene.tables.sensor_keys import CONE_KEYS, DOUBLE_CONE_KEYS, LINK_CONE_KEYS, SENSOR_KEYS
 
 SOURCE = Path(coneskin.__file__).parent
 NAMES = {key.name for key in DOUBLE_CONE_KEYS}
-TABLE = SOURCE / "scene" / "tables" / "cone_keys.py"
+TABLE = SOURCE / "scene" / "tables" / "sensor_keys.py"
 #: the folder itself; geometry, skin and robot are links, and may not know of scenes
 MODULES = sorted(
     path
-    for folder in ("commands", "design", "scene", "session", "replay")
+    for folder in ("commands", "design", "scene", "session", "runs")
     for path in (SOURCE / folder).rglob("*.py")
     if path != TABLE
 )
