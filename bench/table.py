@@ -82,6 +82,8 @@ BENCHES = {
     "developable-field": Bench("bench.design.developable_field", "A sheet that was built."),
     "build": Bench("bench.workshop.build", "Warp and shrinkage of a printer: nothing was printed."),
     "build-report": Bench("bench.workshop.report_check", "Whether a person can build from it: nobody has yet."),
+    # the tests of all this
+    "mutations": Bench("bench.mutations.campaign", "Whether a survivor is equivalent: a person has to look."),
     # recordings, the page, and the simulated controller
     "replay": Bench("bench.replay.recordings", "Damage that has a right checksum, and an idle machine."),
     "view": Bench("bench.view.page", "A GPU, or a browser on another computer: chromium drew in software."),

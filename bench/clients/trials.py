@@ -69,7 +69,7 @@ def enter_own_network() -> None:
         return
     if subprocess.run([*inner, "true"], capture_output=True, check=False).returncode == 0:
         os.environ[_IN_OWN_NETWORK] = "1"
-        os.execvp("unshare", [*inner, sys.executable, *sys.argv])
+        os.execvp("unshare", [*inner, sys.executable, *sys.orig_argv[1:]])
 
 
 def run_all(args: argparse.Namespace) -> Iterator[Trial]:

@@ -56,8 +56,8 @@ class Bench:
         """Return the mean of what some frames of a touch are decoded to."""
         skin = VirtualSkin(self.built, model=_Held(place), imperfections=Imperfections(settling_time=0.0))
         skin.seed = self.rng.getrandbits(32)
-        seen = [read(self.known, frame) for _, (_, frame) in zip(range(frames), skin.frames(), strict=False)]
-        return Place(statistics.fmean(one.u for one in seen), statistics.fmean(one.phi for one in seen))
+        seen = [read(self.known, frame).centre for _, (_, frame) in zip(range(frames), skin.frames(), strict=False)]
+        return Place(*(statistics.fmean(values) for values in zip(*seen, strict=True)))
 
     def known_touches(self, count: int) -> list[KnownTouch]:
         """Touch marks that are not quite where they should be."""
