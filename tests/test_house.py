@@ -26,10 +26,10 @@ FLOORS = (
     "skin.firmware skin.sources",
     "robot.guard.heartbeats robot.stop robot.ur skin.detection.untouched skin.virtual",
     "robot.sim.machine scene.values skin.detection.place",
-    "robot.sim.functions scene.tables skin.detection",
-    "design.sheets robot.guard.signals robot.sim.runtime",
+    "scene.tables skin.detection",
+    "design.sheets robot.guard.signals",
     "commands.arguments design.workshop robot.guard.motion robot.guard.speed robot.sim.ports",
-    "design robot.guard robot.sim.polyscope",
+    "design robot.guard",
     "robot.sim scene",
     "impact.permissible_speed runs.replay session view.stage",
     "commissioning.acceptance commissioning.line impact.simulation runs view",
@@ -327,9 +327,7 @@ def test_nothing_of_ours_is_called_safe() -> None:
     """Nothing here is a safety function; the simulator and the driver name the controller's own safety system."""
     allowed = {
         "robot/sim",
-        "robot/sim/functions",
         "robot/sim/machine",
-        "robot/sim/runtime",
         "robot/sim/urscript",
         "robot/ur",
     }

@@ -22,7 +22,7 @@ VIRTUAL = {
 }
 FIELD = {"coneskin.skin.field", "coneskin.skin.virtual.field_contacts"}
 KINEMATICS = {"coneskin.robot.arm.link_frames", "coneskin.robot.arm.compiled_kinematics"}
-SIMULATOR = {"coneskin.robot.sim.runtime.controller", "coneskin.robot.sim.process", "coneskin.robot.sim.server"}
+SIMULATOR = {"coneskin.robot.sim.machine.controller", "coneskin.robot.sim.process", "coneskin.robot.sim.server"}
 CALIBRATION = {
     "coneskin.commissioning.calibration",
     "coneskin.scene.values.calibration_file",
@@ -144,7 +144,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "the process of the simulated arm": (
         "",
         "import coneskin.robot.sim.command",
-        {"coneskin.robot.sim.runtime.controller", "coneskin.robot.sim.motion.remote_plant"},
+        {"coneskin.robot.sim.machine.controller", "coneskin.robot.sim.motion.remote_plant"},
         HEAVY | VIRTUAL | FIELD,
     ),
     "the driver of ur_rtde": (

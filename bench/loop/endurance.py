@@ -30,7 +30,7 @@ from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
-from coneskin.robot.sim.companion_processes import CompanionProcesses
+from coneskin.robot.sim.mock_arm import CompanionProcesses
 from coneskin.robot.ur.state_reader import RECIPE
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene

@@ -18,10 +18,10 @@ from coneskin.core.files import read_file
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 
-from .machine.options import DEFAULT_MODEL, START_Q, Options, Version
-from .memory_bound import SIMULATOR, bounded_memory
+from .compiler import SIMULATOR, bounded_memory
+from .machine.controller import Controller
+from .machine.states import DEFAULT_MODEL, START_Q, Options, Version
 from .motion.remote_plant import RemotePlant
-from .runtime.controller import Controller
 from .server import PORTS, Server, is_loopback
 
 __all__ = ["EXAMPLE", "add_arguments", "main", "run"]

@@ -16,17 +16,85 @@ import sys
 import threading
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
 
-from coneskin.robot.sim.urscript.quirk_fixes import QUIRK_FIXES
-from coneskin.robot.sim.urscript.translator import Translation, translate
-from coneskin.robot.sim.urscript.values import ScriptError
+from .machine.builtins import Builtins
+from .urscript.translator import Translation, translate
+from .urscript.values import ScriptError
 
-from .functions.builtins import Builtins
-from .memory_bound import TRANSLATOR, bounded_memory
+__all__ = ["QUIRK_FIXES", "SIMULATOR", "TRANSLATOR", "Compiler", "bounded_memory"]
 
-__all__ = ["Compiler"]
+#: definition in which stopL and stopJ do what their names say, and end the speed and servo threads first
+_STOP = """
+def exec_stopl_stopj(command, message):
+  deceleration = read_input_float_reg(0)
+  background = read_input_integer_reg(1)
+  enter_critical
+  if stop_thrd != 0:
+    kill stop_thrd
+    global stop_thrd = 0
+    signal_async_operation_finished()
+  end
+  kill speed_thrd
+  kill servo_thrd
+  kill servoc_thrd
+  global speed_thrd = 0
+  global servo_thrd = 0
+  global servoc_thrd = 0
+  global is_speeding = 0
+  global is_servoing = 0
+  exit_critical
+  stop_async_move()
+  global stop_dec = deceleration
+  if command == 33:
+    global stop_type = 1
+  else:
+    global stop_type = 0
+  end
+  if background == 1:
+    global stop_thrd = run stop_thread()
+  elif stop_type == 1:
+    stopl(deceleration)
+  else:
+    stopj(deceleration)
+  end
+end
+"""
+
+#: name of a function of the uploaded program -> corrected definition
+QUIRK_FIXES = {"exec_stopl_stopj": _STOP}
+
+
+SIMULATOR = 512 * 2**20  #: bytes that the simulated controller may take beyond what it has at its start
+TRANSLATOR = 1024 * 2**20  #: bytes for the translation of a program, likewise
+_STATUS = Path("/proc/self/statm")
+
+
+@contextmanager
+def bounded_memory(beyond: int) -> Iterator[bool]:
+    """Let this process take so many bytes more than it has now; a request for more raises MemoryError.
+
+    Yields:
+        whether that is possible: on Linux alone.
+    """
+    try:
+        import resource
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+        now = int(_STATUS.read_text().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (now + beyond, hard))
+    except (ImportError, OSError, ValueError):
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
 
 TRANSLATION_TIME = 10.0  #: s; a translation that takes longer is ended, and the program refused
 MOST_KNOWN = 100  #: programs whose translation is kept

@@ -15,8 +15,7 @@ from typing import Any, Protocol
 
 from coneskin.core.errors import RobotRefused
 
-from .runtime.controller import Controller
-from .runtime.controller_state import describe
+from .machine.controller import Controller, describe
 
 __all__ = ["FaultInjector", "Services"]
 

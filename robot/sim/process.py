@@ -24,7 +24,7 @@ from typing import Any
 
 from coneskin.core.errors import RobotConnectionError, RobotTimeout
 
-from .machine.options import DEFAULT_MODEL
+from .machine.states import DEFAULT_MODEL
 from .server import PORTS
 
 __all__ = ["SimulatedController", "free_host"]

@@ -1,4 +1,4 @@
-"""Sockets of the simulated controller, and the loop that keeps its 500 Hz cycle.
+"""Sockets of the simulated controller, what stands behind each port, and the loop that keeps its 500 Hz cycle.
 
 One thread and `select`: its timeout is exact to microseconds, that of epoll is rounded up to whole milliseconds.
 """
@@ -15,18 +15,67 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.sim.urscript.translator import Translation
 
 from .compiler import Compiler
 from .fault_injection import FaultInjector
+from .machine.controller import Controller
 from .motion.arm import CYCLE
-from .polyscope.user_interface import UserInterface
-from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client
-from .ports.publisher import Publisher
-from .runtime.controller import Controller
-from .services import SCRIPT_PORTS, PortServices
+from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client, LineReader
+from .ports.client_interface import Publisher, ScriptPort
+from .ports.dashboard import WELCOME, Dashboard
+from .ports.robot_api import RequestReader, RobotApi
+from .ports.rtde import RtdeOutputs, RtdeSession
+from .ports.user_interface import UserInterface
+from .urscript.translator import Translation
 
-__all__ = ["PORTS", "Server", "is_loopback"]
+__all__ = ["PORTS", "SCRIPT_PORTS", "PortServices", "Server", "is_loopback"]
+
+SCRIPT_PORTS = ("primary", "secondary", "realtime")  #: that take URScript, and send the state
+
+
+class PortServices:
+    """Services of one controller.
+
+    Args:
+        interface: its PolyScope, behind dashboard and robot API.
+        faults: takes the lines of its port, and silences the dashboard.
+        publisher: makes what a new client gets first.
+    """
+
+    def __init__(self, interface: UserInterface, faults: FaultInjector, publisher: Publisher) -> None:
+        self._interface, self._faults, self._publisher = interface, faults, publisher
+        self._controller = interface.controller
+        self._outputs = RtdeOutputs(self._controller)
+        self._api = RobotApi(interface)
+
+    def client(self, name: str, sock: socket.socket) -> Client:
+        """Return a new client of a service."""
+        if name == "RTDE":
+            session = RtdeSession(self._controller, self._outputs)
+            return Client(sock, session.receive, session.close, outputs=session.outputs, patience=UNREAD_TIMEOUT)
+        if name == "dashboard":
+            dashboard = Dashboard(self._interface)
+            return Client(sock, LineReader(self._unless_silent(dashboard.answer)), left=lambda: dashboard.left)
+        if name == "robot API":
+            return Client(sock, RequestReader(self._api.answer))
+        if name == "faults":
+            return Client(sock, LineReader(self._faults.answer))
+        port = ScriptPort(self._controller, self._interface.run, messages=name == "primary")
+        return Client(sock, port, left=lambda: port.left)
+
+    def greeting(self, name: str) -> bytes:
+        """Return what a new client of a service gets first."""
+        if name == "dashboard" and not self._faults.dashboard_silent:
+            return WELCOME.encode() + b"\n"
+        return self._publisher.greeting(name) if name in SCRIPT_PORTS else b""
+
+    def _unless_silent(self, answer: Callable[[str], str]) -> Callable[[str], str]:
+        def reply(line: str) -> str:
+            text = answer(line)
+            return "" if self._faults.dashboard_silent else text
+
+        return reply
+
 
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
 PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}

@@ -19,7 +19,7 @@ from coneskin.robot.driver.stop_path import StopPath, UseStopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.reaction.types import Reaction
-from coneskin.robot.sim.companion_processes import CompanionProcesses
+from coneskin.robot.sim.mock_arm import CompanionProcesses
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Foam, Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin

@@ -11,12 +11,12 @@ import pytest
 
 from coneskin.core.channel import Channel, pair
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.sim.machine.options import Options
+from coneskin.robot.sim.machine.controller import Controller
+from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
 from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantState
 from coneskin.robot.sim.motion.remote_plant import RemotePlant, decode_targets, encode_state
-from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene
 from coneskin.testing.forearm import START, forearm_scene

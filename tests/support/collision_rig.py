@@ -25,8 +25,7 @@ from coneskin.robot.guard.signals.contact import GuardedSensor
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
-from coneskin.robot.sim.companion_processes import CompanionProcesses
-from coneskin.robot.sim.mock_arm import SLIDER, MockArm
+from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
 from coneskin.skin.detection.frame.settings import DetectorSettings

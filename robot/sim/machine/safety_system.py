@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from coneskin.robot.sim.motion.arm import CYCLE
-from coneskin.robot.sim.motion.stop_cause import StopCause
+from coneskin.robot.sim.motion.arm import CYCLE, StopCause
 
-from .notices import ErrorNotice, Notice, Report, SafetyNotice
-from .safety import MOVING, SafetyMode
+from .states import MOVING, ErrorNotice, Notice, Report, SafetyMode, SafetyNotice
 
 __all__ = ["SafetySystem"]
 

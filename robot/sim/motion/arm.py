@@ -4,12 +4,16 @@ Positions and speeds are those that the trajectory generator commands; what the 
 default one tracks ideally: no friction, no vibration, no payload. What the motors cannot do is not done: a motion that
 takes more torque than they have ends in a protective stop. Stops are not held to that: each is a ramp of joint speeds
 to zero.
+
+Source of the causes of a stop: Universal Robots, "Error Codes", PolyScope 5: numbers, arguments and titles. What
+exactly makes a real controller give each is not published. docs/look-up/sim-ur.md has what makes this one give it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from coneskin.core.errors import RobotRefused
@@ -20,29 +24,64 @@ from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 from coneskin.robot.arm.ur_inertias import arm_inertia
 
 from .plant import KinematicPlant, PlantState
-from .stop_cause import (
-    CLOSE_TO_JOINT_LIMITS,
-    IN_SINGULARITY,
-    INVALID_SETPOINT,
-    NEAR_SINGULARITY,
-    SUDDEN_CHANGE,
-    StopCause,
-    deviation,
-)
 
 __all__ = [
+    "CLOSE_TO_JOINT_LIMITS",
     "CYCLE",
     "DEFAULT_DECELERATION",
+    "INVALID_SETPOINT",
+    "IN_SINGULARITY",
     "JOINT_ACCELERATION",
     "MAX_ACCELERATION",
+    "NEAR_SINGULARITY",
+    "SUDDEN_CHANGE",
+    "TRIGGERED",
     "Motion",
     "MotionFault",
     "SimulatedArm",
+    "StopCause",
     "decelerate",
+    "deviation",
     "integrate",
     "max_abs",
     "solve_linear",
 ]
+
+_JOINT_NAMES = ("Base", "Shoulder", "Elbow", "Wrist 1", "Wrist 2", "Wrist 3")
+
+
+@dataclass(frozen=True, slots=True)
+class StopCause:
+    """Cause of a protective stop.
+
+    Attributes:
+        code: number after the C.
+        argument: number after the A.
+        title: that it has in the published list.
+    """
+
+    code: int
+    argument: int
+    title: str
+
+    def __str__(self) -> str:
+        return f"C{self.code}A{self.argument}"
+
+
+CLOSE_TO_JOINT_LIMITS = StopCause(150, 0, "Position close to joint limits")
+IN_SINGULARITY = StopCause(154, 0, "Position in singularity")
+SUDDEN_CHANGE = StopCause(204, 1, "Path sanity check failed: Sudden change in target position")
+INVALID_SETPOINT = StopCause(204, 5, "Path sanity check failed: Robot program resulted in invalid setpoint")
+NEAR_SINGULARITY = StopCause(
+    204, 7, "Path sanity check failed: Robot approaching singularity - Acceleration threshold failed"
+)
+TRIGGERED = StopCause(209, 0, "A protective stop was triggered (for test purposes only)")
+
+
+def deviation(joint: int) -> StopCause:
+    """Return the cause of a joint, counted from 0, that cannot follow its path."""
+    return StopCause(153, joint, f"Position deviates from path: Detected by the {_JOINT_NAMES[joint]} joint.")
+
 
 CYCLE = 0.002  #: control cycle of an e-Series controller [s]
 DEFAULT_DECELERATION = 10.0  #: of the leading joint where the command gives none [rad/s^2]; an assumption

@@ -14,13 +14,13 @@ from .arm import (
     DEFAULT_DECELERATION,
     JOINT_ACCELERATION,
     MAX_ACCELERATION,
+    SUDDEN_CHANGE,
     MotionFault,
     SimulatedArm,
     decelerate,
     integrate,
     max_abs,
 )
-from .stop_cause import SUDDEN_CHANGE
 
 __all__ = ["ServoJoints", "SpeedJoints", "SpeedTool", "StopJoints", "StopTool"]
 

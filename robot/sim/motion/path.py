@@ -1,4 +1,4 @@
-"""Path of the simulated arm, in steps of 2 ms: speed along it, its beginning while the arm moves, its blend at the end.
+"""Moves of the simulated arm in steps of 2 ms: lines in joint space, lines and arcs of its tool.
 
 Assumed, because no manual says it: the speed slider acts through the motion's own acceleration; the speed that an arm
 has when a path begins fades out while the path sets in. That makes a blend too: a move with a blend radius ends for its
@@ -11,12 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from coneskin.geometry.pose import Pose
+from coneskin.core.errors import KinematicsError
+from coneskin.geometry.pose import Pose, Vector
+from coneskin.robot.arm.inverse_kinematics import nearest
+from coneskin.robot.sim.urscript.values import interpolate, rotation_of, rotvec_between
 
-from .arm import CYCLE, DEFAULT_DECELERATION, MotionFault, SimulatedArm, max_abs
-from .stop_cause import INVALID_SETPOINT
+from .arm import CYCLE, DEFAULT_DECELERATION, INVALID_SETPOINT, JOINT_ACCELERATION, MotionFault, SimulatedArm, max_abs
 
-__all__ = ["Path", "Residual"]
+__all__ = ["JointLine", "Path", "Residual", "ToolArc", "ToolLine"]
 
 
 class _Profile:
@@ -99,3 +101,200 @@ class Path:
             self.done = self.profile.s >= self.profile.length
             return q, qd
         return [a + b for a, b in zip(q, rest[0], strict=True)], [a + b for a, b in zip(qd, rest[1], strict=True)]
+
+
+TURN_LENGTH = 0.25  #: path length that takes as long as a turn of 1 rad [m/rad]; an assumption
+_SAMPLES = 40  # places on a path at which its joint speeds are looked at
+# of a move with a time that is too short for it; assumptions: share of what the motors can do at first, m/s, m/s2
+_SHARE_OF_TORQUE, _MOST_TOOL_SPEED, _MOST_TOOL_ACCELERATION = 0.7, 1.0, 10.0
+_STRAIGHT = 1e-6  # m^2; three positions that enclose less have no circle
+
+
+class JointLine(Path):
+    """Straight line in joint space (movej); speed and acceleration are those of the leading joint."""
+
+    def __init__(
+        self,
+        arm: SimulatedArm,
+        target: Sequence[float],
+        acceleration: float,
+        speed: float,
+        time: float = 0.0,
+        limits: Sequence[float] | None = None,
+    ) -> None:
+        acceleration = max(acceleration, 1e-6)
+        way = Residual(arm.qd, acceleration).way
+        self.start = [a + b for a, b in zip(arm.q, way, strict=True)]
+        delta = [a - b for a, b in zip(target, self.start, strict=True)]
+        length = max_abs(delta)
+        self.unit = [value / length for value in delta] if length else [0.0] * 6
+        if time > 0.0:  # a time that is too short makes the move as fast as it can be
+            speed, acceleration = max(1.5 * length / time, 1e-9), max(4.5 * length / time**2, 1e-9)
+            most = _SHARE_OF_TORQUE * arm.feasible_acceleration(self.unit)
+            acceleration = min(acceleration, JOINT_ACCELERATION, most)
+        for share, limit in zip(self.unit, limits or arm.model.joint_speed, strict=True):
+            if abs(share) * speed > limit:
+                speed = limit / abs(share)
+        self.goal = arm.tcp_pose(target)
+        super().__init__(arm, length, speed, acceleration, acceleration)
+
+    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+        self.advance(arm, scale, hold)
+        s, sdot = self.profile.s, self.profile.sdot
+        q = [a + b * s for a, b in zip(self.start, self.unit, strict=True)]
+        return self.settle(q, [b * sdot for b in self.unit])
+
+
+class _ToolPath(Path):
+    """Path of the tool centre point, followed by closed-form inverse kinematics.
+
+    Raises:
+        MotionFault: the target is out of reach.
+    """
+
+    of_tool = True
+
+    def __init__(self, arm: SimulatedArm, length: float, acceleration: float, speed: float, time: float) -> None:
+        if time > 0.0:
+            speed, acceleration = max(1.5 * length / time, 1e-9), max(4.5 * length / time**2, 1e-9)
+            speed, acceleration = min(speed, _MOST_TOOL_SPEED), min(acceleration, _MOST_TOOL_ACCELERATION)
+        self._place(arm, 1.0)  # raises if the target is out of reach, before the arm moves
+        super().__init__(arm, length, speed, acceleration, self.rate)
+
+    def _begin(self, arm: SimulatedArm, acceleration: float) -> None:
+        """Set where it begins: where the arm would stop, in a blend with the acceleration of the path [m/s^2]."""
+        self.rate = DEFAULT_DECELERATION
+        if arm.blends and (speed := math.hypot(*arm.twist()[:3])) > 0.0:
+            self.rate = min(self.rate, max_abs(arm.qd) * max(acceleration, 1e-3) / speed)
+        way = Residual(arm.qd, self.rate).way
+        self.q = [a + b for a, b in zip(arm.q, way, strict=True)]
+        self.start = arm.tcp_pose(self.q)
+        self.back = arm.tcp.inverse()
+
+    def _pose(self, share: float) -> Pose:
+        """Return the pose at a share of the path."""
+        raise NotImplementedError
+
+    def _place(self, arm: SimulatedArm, share: float) -> list[float]:
+        try:
+            return list(nearest(arm.model, self._pose(share) @ self.back, self.q))
+        except KinematicsError as exc:
+            raise MotionFault(INVALID_SETPOINT, str(exc)) from exc
+
+    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+        self.advance(arm, scale, hold)
+        profile = self.profile
+        q = self._place(arm, profile.s / profile.length) if profile.length else self.q
+        before, self.q = self.q, q
+        qd = [(a - b) / CYCLE for a, b in zip(q, before, strict=True)]
+        if profile.s >= profile.length:  # arrived: the last step was shorter than the speed says
+            qd = [0.0] * 6
+        return self.settle(list(q), qd)
+
+
+class ToolLine(_ToolPath):
+    """Straight line of the tool centre point, its orientation turning about one axis (movel, movep).
+
+    Raises:
+        MotionFault: the target is out of reach.
+    """
+
+    def __init__(self, arm: SimulatedArm, target: Pose, acceleration: float, speed: float, time: float = 0.0) -> None:
+        self._begin(arm, acceleration)
+        a, b = self.start.translation, target.translation
+        self.shift: Vector = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+        self.turn = rotvec_between(self.start, target)
+        self.goal = target
+        length = max(math.dist(a, b), TURN_LENGTH * math.hypot(*self.turn))
+        super().__init__(arm, length, acceleration, speed, time)
+
+    def limit(self, arm: SimulatedArm, acceleration: float, speed: float) -> None:
+        """Go at shares of what the joints are able to do, 0..1 (optimovel)."""
+        length = self.profile.length
+        if not length:
+            return
+        start, before, largest, quickest = self.q, self.q, math.inf, math.inf
+        for i in range(1, _SAMPLES + 1):
+            here = self.q = self._place(arm, i / _SAMPLES)
+            for a, b, limit in zip(here, before, arm.model.joint_speed, strict=True):
+                rate = max(abs(a - b) * _SAMPLES / length, 1e-9)  # of a joint, along the path [rad/m]
+                largest, quickest = min(largest, limit / rate), min(quickest, JOINT_ACCELERATION / rate)
+            before = here
+        self.q = start
+        # half of the acceleration is left for the bends of the joints' paths
+        self.profile.speed, self.profile.acceleration = speed * largest, 0.5 * acceleration * quickest
+
+    def _pose(self, share: float) -> Pose:
+        return interpolate(self.start, self.shift, self.turn, share)
+
+
+class ToolArc(_ToolPath):
+    """Arc of a circle of the tool centre point (movec); a straight line where the three positions are on one.
+
+    Args:
+        arm: the arm as it is now.
+        via: position on the arc.
+        target: its end.
+        acceleration: of the tool [m/s^2].
+        speed: of the tool [m/s].
+        fixed: the tool turns with the arc, instead of to the orientation of the target.
+
+    Raises:
+        MotionFault: the target is out of reach.
+    """
+
+    def __init__(
+        self, arm: SimulatedArm, via: Vector, target: Pose, acceleration: float, speed: float, fixed: bool
+    ) -> None:
+        self._begin(arm, acceleration)
+        a, c = self.start.translation, target.translation
+        u, w = _minus(via, a), _minus(c, a)
+        normal = _cross(u, w)
+        area = _dot(normal, normal)
+        self.fixed = fixed
+        self.turn = rotvec_between(self.start, target)
+        self.shift = w
+        if math.sqrt(area) < _STRAIGHT:
+            self.angle, length = 0.0, math.sqrt(_dot(w, w))
+        else:
+            uu, ww = _dot(u, u), _dot(w, w)
+            to_centre = [
+                (ww * x + uu * y) / (2.0 * area) for x, y in zip(_cross(normal, u), _cross(w, normal), strict=True)
+            ]
+            self.axis: Vector = _scaled(normal, 1.0 / math.sqrt(area))
+            self.centre: Vector = (a[0] + to_centre[0], a[1] + to_centre[1], a[2] + to_centre[2])
+            self.arm_length: Vector = _minus(a, self.centre)
+            end = _minus(c, self.centre)
+            angle = math.atan2(_dot(self.axis, _cross(self.arm_length, end)), _dot(self.arm_length, end))
+            self.angle = angle % (2.0 * math.pi)  # about this axis the way leads over via
+            length = self.angle * math.hypot(*self.arm_length)
+        self.goal = self._pose(1.0)
+        super().__init__(arm, max(length, TURN_LENGTH * math.hypot(*self.turn)), acceleration, speed, 0.0)
+
+    def _pose(self, share: float) -> Pose:
+        if not self.angle:
+            return interpolate(self.start, self.shift, self.turn, share)
+        spin = Pose(rotation_of(_scaled(self.axis, self.angle * share)))
+        x, y, z = spin.rotate(self.arm_length)
+        here = (self.centre[0] + x, self.centre[1] + y, self.centre[2] + z)
+        if self.fixed:
+            return Pose((spin @ Pose(self.start.rotation)).rotation, here)
+        return Pose((Pose(self.start.rotation) @ Pose(rotation_of(_scaled(self.turn, share)))).rotation, here)
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _scaled(a: Vector, factor: float) -> Vector:
+    return a[0] * factor, a[1] * factor, a[2] * factor

@@ -1,15 +1,265 @@
-"""Parser of URScript, as far as `urscript` says: lines to a tree of statements, expressions to Python text."""
+"""Parser of URScript: text to numbered lines, lines to a tree of statements, expressions to Python text.
+
+Expressions are parsed by precedence climbing. In their Python text a call is written as NUL name ( arguments ) SOH, and
+a named argument as STX name = value: whether a function is the program's own, and whether it takes time, is known only
+when the whole program has been read. `translator` says what is understood.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from .expression import ExpressionParser
-from .values import ScriptError
+from .values import MAX_ITEMS, ScriptError
 
-__all__ = ["Function", "Parser"]
+__all__ = ["ExpressionParser", "Function", "Parser", "numbered_lines"]
+
+_UNFINISHED = re.compile(r"(?:,|\b(?:and|or|xor|not))$")  # end of a line that goes on in the next
+_NUMBER = re.compile(r"[-+]?[\d.eE]+")
+_QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
+
+
+def numbered_lines(text: str) -> list[tuple[int, str]]:
+    """Return a program's lines, each with the number of its first one, from 1.
+
+    A line goes on in the next while a bracket is open, or after a comma or a logical operator. What PolyScope writes to
+    show where its program is, ``$ 2 "MoveJ"``, is left out. ur_rtde writes the value of ``global offset =`` at the
+    start of the next line, before that line's own statement.
+    """
+    lines: list[tuple[int, str]] = []
+    parts: list[str] = []  # of a line that goes on
+    first = depth = 0
+    for number, raw in enumerate(text.splitlines(), 1):
+        line = (raw if "#" not in raw else _without_comment(raw)).strip()
+        if not line or line.startswith("$"):
+            continue
+        if not parts and lines and lines[-1][1].endswith("=") and (value := _NUMBER.match(line)):
+            lines[-1] = (lines[-1][0], f"{lines[-1][1]} {value[0]}")
+            line = line[value.end() :].strip()
+            if not line:
+                continue
+        first = first if parts else number
+        parts.append(line)
+        depth = max(0, depth + _opened(line))
+        if depth == 0 and not _UNFINISHED.search(line):
+            lines.append((first, " ".join(parts)))
+            parts = []
+    return [*lines, (first, " ".join(parts))] if parts else lines
+
+
+def _opened(line: str) -> int:
+    """Return how many brackets a line opens and does not close."""
+    bare = _QUOTED.sub("", line) if '"' in line or "'" in line else line
+    return bare.count("(") + bare.count("[") - bare.count(")") - bare.count("]")
+
+
+def _without_comment(line: str) -> str:
+    quote = ""
+    for position, letter in enumerate(line):
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        elif letter == "#":
+            return line[:position]
+    return line
+
+
+MAX_DEPTH = 50  #: of an expression: brackets, signs, powers
+#: next token of an expression, after any blanks
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<string>\"[^\"]*\"|'[^']*')|(?P<pose>p(?=\[))"
+    r"|(?P<name>[A-Za-z_]\w*)|(?P<op>==|!=|<=|>=|[-+*/%^<>=()\[\],:.]))"
+)
+#: logical operators of URScript -> of Python, by rising precedence
+_BINARY = ({"or": "or", "xor": "^"}, {"and": "and"})
+_SUM = {"+": "_add", "-": "_subtract"}
+_PRODUCT = {"*": "_multiply", "/": "_divide", "%": "_modulo"}
+#: comparison operators
+_COMPARISONS = {"==", "!=", "<", ">", "<=", ">="}
+
+
+class ExpressionParser:
+    """Parser of one expression after the other.
+
+    Args:
+        fail: returns the error that says a problem and the line.
+        calls: takes the name of each function that an expression calls.
+    """
+
+    def __init__(self, fail: Callable[[str], ScriptError], calls: Callable[[str], None]) -> None:
+        self._fail = fail
+        self._calls = calls
+        self._tokens: list[tuple[str, str]] = []
+        self._token = self._depth = 0
+
+    def parse(self, text: str) -> str:
+        """Return the expression as Python text.
+
+        Raises:
+            ScriptError: it is none.
+        """
+        self._read(text)
+        made = self._binary(0)
+        if self._token < len(self._tokens):
+            raise self._fail(f"{self._tokens[self._token][1]!r} is unexpected")
+        return made
+
+    def parameters(self, text: str) -> list[tuple[str, str]]:
+        """Return the name of each parameter of a definition, and its default as Python text: empty without one.
+
+        Raises:
+            ScriptError: the text is no list of parameters.
+        """
+        self._read(text)
+        found: list[tuple[str, str]] = []
+        while self._token < len(self._tokens):
+            kind, name = self._take()
+            if kind != "name" or any(name == known for known, _ in found) or len(found) >= MAX_ITEMS:
+                raise self._fail("parameters must be plain names, each once")
+            default = ""
+            if self._next_is("="):
+                self._take()
+                default = self._binary(0)
+            found.append((name, default))
+            if self._token < len(self._tokens):
+                self._take(",")
+        return found
+
+    def _read(self, text: str) -> None:
+        """Cut a text into tokens."""
+        self._tokens, self._token, self._depth, position = [], 0, 0, 0
+        text = text.rstrip()
+        while position < len(text):
+            match = _TOKEN.match(text, position)
+            if match is None:
+                raise self._fail(f"{text[position:]!r} is not URScript")
+            self._tokens.append((match.lastgroup or "", match[match.lastgroup or 0]))
+            position = match.end()
+
+    def _next_is(self, *values: str) -> bool:
+        return self._token < len(self._tokens) and self._tokens[self._token][1] in values
+
+    def _take(self, value: str = "") -> tuple[str, str]:
+        if self._token >= len(self._tokens):
+            raise self._fail("the line ends too early")
+        found = self._tokens[self._token]
+        if value and found[1] != value:
+            raise self._fail(f"expected {value!r}, got {found[1]!r}")
+        self._token += 1
+        return found
+
+    def _binary(self, level: int) -> str:
+        if level == len(_BINARY):
+            return self._comparison()
+        left = self._binary(level + 1)
+        while self._next_is(*_BINARY[level]):
+            operator = _BINARY[level][self._take()[1]]
+            right = self._binary(level + 1)
+            left = f"(bool({left}) ^ bool({right}))" if operator == "^" else f"({left} {operator} {right})"
+        return left
+
+    def _comparison(self) -> str:
+        left = self._sum()
+        if self._next_is(*_COMPARISONS):
+            return f"({left} {self._take()[1]} {self._sum()})"
+        return left
+
+    def _sum(self) -> str:
+        left = self._product()
+        while self._next_is("+", "-"):
+            left = f"{_SUM[self._take()[1]]}({left}, {self._product()})"
+        return left
+
+    def _product(self) -> str:
+        left = self._unary()
+        while self._next_is("*", "/", "%"):
+            left = f"{_PRODUCT[self._take()[1]]}({left}, {self._unary()})"
+        return left
+
+    def _unary(self) -> str:
+        if self._depth > MAX_DEPTH:
+            raise self._fail(f"more than {MAX_DEPTH} levels of an expression")
+        self._depth += 1
+        made = self._signed()
+        self._depth -= 1
+        return made
+
+    def _signed(self) -> str:
+        if self._next_is("-", "+"):
+            return f"_negate({self._unary()})" if self._take()[1] == "-" else self._unary()
+        if self._next_is("not"):
+            self._take()
+            return f"(not {self._comparison()})"
+        base = self._postfix()
+        if self._next_is("^"):
+            self._take()
+            return f"_power({base}, {self._unary()})"
+        return base
+
+    def _postfix(self) -> str:
+        made = self._atom()
+        while self._next_is("["):
+            self._take()
+            made = f"{made}[{self._binary(0)}]"
+            while self._next_is(","):
+                self._take()
+                made = f"{made}[{self._binary(0)}]"
+            self._take("]")
+        return made
+
+    def _atom(self) -> str:
+        kind, text = self._take()
+        if kind == "number":
+            whole = text.isdigit()
+            return f"{text}.0" if whole and len(text) > 9 else (text.lstrip("0") or "0") if whole else text
+        if kind == "string":
+            return repr(text[1:-1])
+        if kind == "pose":
+            self._take("[")
+            parts = self._items("]")
+            if len(parts) == 1:  # not a pose, but an element of a variable named p
+                return f"v_p[{parts[0]}]"
+            return f"_pose(({_tuple(parts)}))"
+        if text == "[":
+            return f"_list(({_tuple(self._items(']'))}))"
+        if text == "(":
+            inner = self._binary(0)
+            self._take(")")
+            return f"({inner})"
+        if kind != "name":
+            raise self._fail(f"{text!r} is unexpected")
+        if text in ("True", "False"):
+            return text
+        if text == "run":
+            name = self._take()[1]
+            self._take("(")
+            return f"_run(f_{name}, ({_tuple(self._items(')'))}))"
+        if self._next_is("("):
+            self._take()
+            self._calls(text)
+            return f"\0{text}({_tuple(self._items(')'))})\1"  # the writer knows whether it blocks
+        return f"v_{text}"
+
+    def _items(self, close: str) -> list[str]:
+        parts = []
+        while not self._next_is(close):
+            if self._token + 1 < len(self._tokens) and self._tokens[self._token + 1][1] == "=":
+                parts.append(f"\2{self._take()[1]}{self._take('=')[1]}{self._binary(0)}")
+            else:
+                parts.append(self._binary(0))
+            if not self._next_is(close):
+                self._take(",")
+            if len(parts) > MAX_ITEMS:
+                raise self._fail(f"more than {MAX_ITEMS} elements or arguments")
+        self._take(close)
+        return parts
+
+
+def _tuple(parts: list[str]) -> str:
+    return "".join(part + ", " for part in parts)
+
 
 MAX_BLOCKS = 20  #: of blocks inside each other
 MAX_FUNCTIONS = 1000  #: of one program
@@ -45,7 +295,7 @@ class Function:
 class Parser:
     """Parser of statements line by line, into a tree.
 
-    It takes numbered lines without comments and blank lines, as `urscript` prepares them.
+    It takes the lines of `numbered_lines`.
 
     Attributes:
         functions: name -> function defined so far.

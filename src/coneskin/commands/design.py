@@ -23,7 +23,7 @@ from coneskin.design.sheets.summary import small_active_area
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.solid import require_step_writer
 from coneskin.robot.arm.link_frames import LINK_INDEX
-from coneskin.robot.sim.machine.options import DEFAULT_MODEL
+from coneskin.robot.sim.machine.states import DEFAULT_MODEL
 from coneskin.skin.electronics import shunt_ohms
 
 from .arguments.design import (

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import GeometryError, SceneError
-from coneskin.robot.sim.machine.options import DEFAULT_MODEL
+from coneskin.robot.sim.machine.states import DEFAULT_MODEL
 
 from .terminal.hints import print_hint
 

@@ -45,7 +45,7 @@ def simulated_arm(scene: Scene, bodies: bool = False) -> Iterator[socket.socket 
             f"--simulated starts a controller on this computer, but arm.host is {host}: leave --simulated out, or set "
             'host = "127.0.0.1"'
         )
-    from coneskin.robot.sim.machine.options import START_Q
+    from coneskin.robot.sim.machine.states import START_Q
     from coneskin.robot.sim.process import SimulatedController
 
     start_q = scene.motion.waypoints[0] if scene.motion else START_Q

@@ -6,11 +6,11 @@ import io
 import json
 from typing import Any
 
-from coneskin.robot.sim.functions.builtins import Builtins
-from coneskin.robot.sim.machine.options import Options
-from coneskin.robot.sim.polyscope.dashboard import Dashboard
-from coneskin.robot.sim.polyscope.user_interface import UserInterface
-from coneskin.robot.sim.runtime.controller import Controller
+from coneskin.robot.sim.machine.builtins import Builtins
+from coneskin.robot.sim.machine.controller import Controller
+from coneskin.robot.sim.machine.states import Options
+from coneskin.robot.sim.ports.dashboard import Dashboard
+from coneskin.robot.sim.ports.user_interface import UserInterface
 from coneskin.robot.sim.urscript.translator import translate
 
 FAR = "[1.5, -1.5708, 1.5708, -1.5708, -1.5708, 0]"

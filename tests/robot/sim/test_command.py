@@ -16,9 +16,9 @@ import pytest
 from coneskin.core.errors import RobotConnectionError, RobotTimeout
 from coneskin.robot.sim import command, server
 from coneskin.robot.sim.command import main
-from coneskin.robot.sim.machine.options import Options
+from coneskin.robot.sim.machine.controller import Controller
+from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.process import SimulatedController, free_host
-from coneskin.robot.sim.runtime.controller import Controller
 
 COMMAND = [sys.executable, "-m", "coneskin.robot.sim.command"]
 PROC = Path("/proc")

@@ -63,7 +63,7 @@ def test_a_translator_that_hangs_is_ended_and_another_started(
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux bounds the memory of a process")
 def test_a_process_with_a_bound_gets_no_more_memory_than_that() -> None:
     code = (
-        "from coneskin.robot.sim.memory_bound import bounded_memory\n"
+        "from coneskin.robot.sim.compiler import bounded_memory\n"
         "with bounded_memory(50 * 2**20) as bounded:\n"
         "  try:\n    bytes(100 * 2**20)\n  except MemoryError:\n    print(bounded)\n"
         "print(len(bytes(100 * 2**20)))\n"

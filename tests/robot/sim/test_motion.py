@@ -14,7 +14,7 @@ from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.sim.motion.arm import CYCLE, DEFAULT_DECELERATION, Motion, MotionFault, SimulatedArm, solve_linear
 from coneskin.robot.sim.motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
-from coneskin.robot.sim.motion.path_motions import JointLine, ToolLine
+from coneskin.robot.sim.motion.path import JointLine, ToolLine
 
 ARM = arm_model("ur10e")
 HOME = (0.1, -1.4, 1.5, -1.7, -1.4, 0.2)

@@ -10,16 +10,14 @@ import pytest
 
 from coneskin.core.channel import Channel, pair
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.sim.machine.options import START_Q, Options
-from coneskin.robot.sim.machine.safety import RobotMode, SafetyMode
+from coneskin.robot.sim.machine.controller import Controller, describe
+from coneskin.robot.sim.machine.states import START_Q, Options, RobotMode, SafetyMode
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
 from coneskin.robot.sim.motion.plant import PlantLost, PlantState
 from coneskin.robot.sim.motion.remote_plant import LONGEST_BEHIND, RemotePlant, decode_targets, encode_state
-from coneskin.robot.sim.ports.realtime_packet import encode_realtime
-from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
-from coneskin.robot.sim.runtime.controller import Controller
-from coneskin.robot.sim.runtime.controller_state import describe
+from coneskin.robot.sim.ports.client_interface import encode_realtime
+from coneskin.robot.sim.ports.rtde import RtdeOutputs
 
 ELSEWHERE = PlantState(
     (0.1, -1.0, 1.0, -1.0, -1.0, 0.2), (0.3, 0.0, 0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)

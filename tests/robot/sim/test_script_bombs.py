@@ -11,13 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.sim.functions.builtins import Builtins
-from coneskin.robot.sim.machine.options import Options
-from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
-from coneskin.robot.sim.ports.rtde_session import RtdeSession
+from coneskin.robot.sim.machine.builtins import Builtins
+from coneskin.robot.sim.machine.controller import Controller
+from coneskin.robot.sim.machine.program import MAX_SECONDARY
+from coneskin.robot.sim.machine.states import Options
+from coneskin.robot.sim.ports.rtde import RtdeOutputs, RtdeSession
 from coneskin.robot.sim.process import free_host
-from coneskin.robot.sim.runtime.controller import Controller
-from coneskin.robot.sim.runtime.secondary_programs import MAX_SECONDARY
 from coneskin.robot.sim.server import MAX_CLIENTS, PORTS, Server
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs, translate
 from coneskin.robot.sim.urscript.values import ScriptError

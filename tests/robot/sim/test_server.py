@@ -7,9 +7,9 @@ import socket
 
 import pytest
 
-from coneskin.robot.sim.machine.options import Options
+from coneskin.robot.sim.machine.controller import Controller
+from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.process import free_host
-from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.sim.server import PORTS, Server
 from coneskin.robot.ur.rtde_codec import Packet, PacketKind, Recipe, pack_outputs_request, pack_start_request, split
 

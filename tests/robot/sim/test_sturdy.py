@@ -14,16 +14,14 @@ from typing import Any
 
 import pytest
 
-from coneskin.robot.sim import compiler, services
+from coneskin.robot.sim import compiler
 from coneskin.robot.sim import server as server_module
-from coneskin.robot.sim.machine.options import Options
+from coneskin.robot.sim.machine.controller import Controller
+from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.ports import client as client_module
-from coneskin.robot.sim.ports.client_messages import MESSAGE
-from coneskin.robot.sim.ports.robot_state import ROBOT_STATE
-from coneskin.robot.sim.ports.rtde_outputs import RtdeOutputs
-from coneskin.robot.sim.ports.rtde_session import RtdeSession
+from coneskin.robot.sim.ports.client_interface import MESSAGE, ROBOT_STATE
+from coneskin.robot.sim.ports.rtde import RtdeOutputs, RtdeSession
 from coneskin.robot.sim.process import free_host
-from coneskin.robot.sim.runtime.controller import Controller
 from coneskin.robot.sim.server import PORTS, Server
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, Translation
 from coneskin.robot.ur.rtde_codec import (
@@ -241,8 +239,7 @@ def test_one_that_acknowledges_nothing_any_more_gives_its_inputs_back(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """To the system one that never reads is as one that is gone: before this process has anything left to send."""
-    monkeypatch.setattr(services, "UNREAD_TIMEOUT", 0.1)
-    monkeypatch.setattr(server_module, "UNREAD_TIMEOUT", math.inf)
+    monkeypatch.setattr(server_module, "UNREAD_TIMEOUT", 0.1)
     with socket.socket() as gone:
         gone.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SLOW_READER)
         gone.connect((server.host, PORTS["RTDE"]))
@@ -250,6 +247,7 @@ def test_one_that_acknowledges_nothing_any_more_gives_its_inputs_back(
         gone.sendall(pack_outputs_request([f"output_double_register_{i}" for i in range(48)]) + pack_start_request())
         turn(server, 5)
         assert server.controller.inputs.owners
+        monkeypatch.setattr(server_module, "UNREAD_TIMEOUT", math.inf)  # for the server's own check of unread bytes
         end = time.monotonic() + 20.0
         while server._clients["RTDE"] and time.monotonic() < end:
             turn(server)

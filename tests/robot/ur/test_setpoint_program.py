@@ -14,8 +14,7 @@ from coneskin.robot.ur.setpoint_program import REGISTERS, program_text, register
 from coneskin.robot.ur.setpoint_writer import RegisterWriter
 from coneskin.robot.ur.state_reader import StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
-
-from ..sim.test_controller import Bench
+from tests.robot.sim.machine.test_controller import Bench
 
 QD = (0.3, -0.2, 0.1, 0.0, 0.4, -0.5)
 CYCLE = 0.002

@@ -29,8 +29,7 @@ from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetSpeedSlider
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
-from coneskin.robot.sim.companion_processes import CompanionProcesses
-from coneskin.robot.sim.mock_arm import SLIDER, MockArm
+from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.scene.build import build_core
 from coneskin.scene.values.scene import BodyScene, Scene

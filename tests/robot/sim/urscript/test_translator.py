@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from coneskin.robot.sim.functions.builtins import Builtins
-from coneskin.robot.sim.machine.options import Options
-from coneskin.robot.sim.runtime.controller import Controller
+from coneskin.robot.sim.machine.builtins import Builtins
+from coneskin.robot.sim.machine.controller import Controller
+from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.urscript.translator import Translation, complete_programs, translate
 from coneskin.robot.sim.urscript.values import ScriptError
 

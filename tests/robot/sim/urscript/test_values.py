@@ -8,16 +8,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.sim.urscript.arithmetic import add, divide, modulo, multiply, negate, power, subtract
 from coneskin.robot.sim.urscript.values import (
     Array,
     PoseValue,
     ScriptError,
+    add,
     copy,
+    divide,
+    modulo,
+    multiply,
+    negate,
     numbers,
     pose_of,
+    power,
     rotation_of,
     rotvec_of,
+    subtract,
     values_of,
 )
 

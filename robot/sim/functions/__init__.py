@@ -1,1 +1,0 @@
-"""URScript functions of the simulated controller, and what they see of it."""

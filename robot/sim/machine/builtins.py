@@ -1,0 +1,285 @@
+"""URScript functions of the simulated controller: time, kinematics and payload, and those that it inherits.
+
+Every public method of `Builtins`, inherited ones included, is one such function under its URScript name and with its
+argument names; one that takes time is a generator. The mass matrix and the Coriolis torques are those of the bare arm;
+outer joint torques are NaN.
+
+Source: Universal Robots, "The URScript Programming Language", modules motion and internals.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from inspect import isgeneratorfunction
+from typing import Any
+
+from coneskin.core.errors import KinematicsError
+from coneskin.robot.arm.inertia import joint_torques, mass_matrix
+from coneskin.robot.arm.inverse_kinematics import nearest, solutions
+from coneskin.robot.arm.kinematics import forward
+from coneskin.robot.arm.model import ZERO_VELOCITY
+from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
+from coneskin.robot.sim.motion.path import Path
+from coneskin.robot.sim.urscript.value_functions import MathFunctions, StringFunctions
+from coneskin.robot.sim.urscript.values import (
+    Array,
+    PoseValue,
+    number,
+    numbers,
+    pose_of,
+    show,
+    values_of,
+)
+
+from .force_functions import ForceFunctions
+from .io_functions import InstallationFunctions, IoFunctions, index_of
+from .moves import MoveFunctions, Wait
+from .socket_functions import SocketFunctions
+from .states import PopupNotice, TextNotice
+
+__all__ = ["Builtins"]
+
+NAN6 = (math.nan,) * 6  #: value of what is not simulated, for six joints
+
+
+class Builtins(
+    MoveFunctions,
+    IoFunctions,
+    InstallationFunctions,
+    SocketFunctions,
+    ForceFunctions,
+    StringFunctions,
+    MathFunctions,
+):
+    """All URScript functions, bound to one program of one controller."""
+
+    @classmethod
+    def names(cls) -> frozenset[str]:
+        """Return the names of all functions."""
+        return frozenset(name for name in dir(cls) if not name.startswith("_") and name not in ("names", "blocking"))
+
+    @classmethod
+    def blocking(cls) -> frozenset[str]:
+        """Return the names of the functions that take time."""
+        return frozenset(name for name in cls.names() if isgeneratorfunction(getattr(cls, name)))
+
+    # time and text
+
+    def sync(self) -> Wait:
+        """Wait for the next cycle."""
+        yield
+
+    def sleep(self, t: float) -> Wait:
+        """Wait for a time [s]."""
+        for _ in range(round(t / CYCLE)):
+            yield
+
+    def textmsg(self, *words: Any) -> None:
+        """Write a line to the log, and tell it to the clients."""
+        text = "".join(map(show, words))
+        self._host.log("text", text=text)
+        self._host.tell(TextNotice(text))
+
+    def popup(self, s: Any = "", title: Any = "Popup", warning: Any = False, error: Any = False, **_: Any) -> None:
+        """Write a line to the log, and tell it to the clients; nobody is there to close a blocking one."""
+        self._host.log("popup", text=show(s), title=show(title))
+        self._host.tell(PopupNotice(show(title), show(s), bool(warning), bool(error)))
+
+    def get_steptime(self) -> float:
+        """Return the control cycle [s]."""
+        return CYCLE
+
+    # kinematics
+
+    def get_inverse_kin_has_solution(self, x: Any, *_: Any) -> bool:
+        """Return whether a tool pose can be reached."""
+        return bool(solutions(self._arm.model, pose_of(x) @ self._arm.tcp.inverse()))
+
+    def get_forward_kin(self, q: Any = None, tcp: Any = None) -> PoseValue:
+        """Return the tool pose at joint positions, by default at the present ones with the present tool."""
+        tool = self._arm.tcp if tcp is None else pose_of(tcp)
+        return values_of(forward(self._arm.model, self._arm.q if q is None else q) @ tool)
+
+    def get_actual_tcp_pose(self) -> PoseValue:
+        """Return the tool pose."""
+        return values_of(self._arm.tcp_pose(self._arm.measured.q))
+
+    def get_target_tcp_pose(self) -> PoseValue:
+        """Return the tool pose that is commanded."""
+        return values_of(self._arm.tcp_pose())
+
+    get_target_tcp_pose_along_path = get_target_tcp_pose  # no path has an offset
+
+    def get_actual_tool_flange_pose(self) -> PoseValue:
+        """Return the flange pose."""
+        return values_of(forward(self._arm.model, self._arm.measured.q))
+
+    def get_actual_tcp_speed(self) -> Array:
+        """Return the velocity of the tool [m/s, rad/s]."""
+        return Array(self._arm.measured_twist())
+
+    def get_target_tcp_speed(self) -> Array:
+        """Return the velocity of the tool that is commanded [m/s, rad/s]."""
+        return Array(self._arm.twist())
+
+    get_target_tcp_speed_along_path = get_target_tcp_speed
+
+    def get_actual_joint_positions(self) -> Array:
+        """Return the joint positions [rad]."""
+        return Array(self._arm.measured.q)
+
+    get_joint_positions = get_actual_joint_positions
+
+    def get_target_joint_positions(self) -> Array:
+        """Return the joint positions that are commanded [rad]."""
+        return Array(self._arm.q)
+
+    def get_actual_joint_speeds(self) -> Array:
+        """Return the joint speeds [rad/s]."""
+        return Array(self._arm.measured.qd)
+
+    def get_target_joint_speeds(self) -> Array:
+        """Return the joint speeds that are commanded [rad/s]."""
+        return Array(self._arm.qd)
+
+    def get_target_joint_accelerations(self) -> Array:
+        """Return the joint accelerations [rad/s^2]."""
+        return Array(self._arm.qdd)
+
+    get_actual_joint_accelerations = get_target_joint_accelerations
+
+    def get_actual_joint_positions_history(self, steps: int = 0) -> Array:
+        """Return the joint positions of some cycles ago [rad]."""
+        history = self._host.history
+        return Array(history[max(0, len(history) - 1 - int(steps))] if history else self._arm.measured.q)
+
+    def get_target_waypoint(self) -> PoseValue:
+        """Return the tool pose at which the present motion ends; the present pose if nothing moves the arm."""
+        motion = self._arm.motion
+        if isinstance(motion, Path):
+            return values_of(motion.goal)
+        return self.get_actual_tcp_pose()
+
+    def get_jacobian(self, q: Any = None, tcp: Any = None) -> Array:
+        """Return the Jacobian of the tool at joint positions, 6 x 6; by default at the present ones with its tool."""
+        return Array(Array(row) for row in self._posed(q, tcp).jacobian())
+
+    def get_jacobian_time_derivative(self, q: Any = None, qd: Any = None, tcp: Any = None) -> Array:
+        """Return the time derivative of the Jacobian: a central difference along joint speeds (the present ones)."""
+        step = 1e-6
+        here, speeds = self._posed(q, tcp), self._arm.qd if qd is None else numbers(qd, 6, "qd")
+        ahead, behind = (
+            self._posed([q + shift * qd for q, qd in zip(here.q, speeds, strict=True)], tcp) for shift in (step, -step)
+        )
+        pairs = zip(ahead.jacobian(), behind.jacobian(), strict=True)
+        return Array(Array((a - b) / (2 * step) for a, b in zip(new, old, strict=True)) for new, old in pairs)
+
+    def _posed(self, q: Any, tcp: Any) -> SimulatedArm:
+        """Return an arm like this one at joint positions, with a tool."""
+        arm = SimulatedArm(self._arm.model, self._arm.q if q is None else numbers(q, 6, "q"))
+        arm.tcp = self._arm.tcp if tcp is None else pose_of(tcp)
+        return arm
+
+    def get_mass_matrix(self, q: Any = None, include_rotors_inertia: bool = False) -> Array:
+        """Return the mass matrix of the bare arm at joint positions, 6 x 6 [kg m^2]; by default at the present ones."""
+        inertia = self._arm.inertia
+        rotor = inertia.rotor if include_rotors_inertia else ZERO_VELOCITY
+        rows = mass_matrix(self._arm.model, replace(inertia, rotor=rotor), self._posed(q, None).q)
+        return Array(Array(row) for row in rows)
+
+    def get_coriolis_and_centrifugal_torques(self, q: Any = None, qd: Any = None) -> Array:
+        """Return what joint speeds alone take of torque, of the bare arm [N m]; by default the present ones."""
+        model, inertia, here = self._arm.model, self._arm.inertia, self._posed(q, None).q
+        speeds = self._arm.qd if qd is None else numbers(qd, 6, "qd")
+        moving = joint_torques(model, inertia, here, speeds, ZERO_VELOCITY)
+        standing = joint_torques(model, inertia, here, ZERO_VELOCITY, ZERO_VELOCITY)
+        return Array(a - b for a, b in zip(moving, standing, strict=True))
+
+    def get_joint_torques(self) -> Array:
+        """Return six NaN: outer torques are not simulated."""
+        return Array(NAN6)
+
+    def is_steady(self) -> bool:
+        """Return whether the arm stands."""
+        return not self._arm.turning
+
+    def is_within_safety_limits(self, where: Any) -> bool:
+        """Return whether joint positions are within their limits, or such positions reach a tool pose."""
+        model = self._arm.model
+        if isinstance(where, PoseValue):
+            try:
+                nearest(model, pose_of(where) @ self._arm.tcp.inverse(), self._arm.q)
+            except KinematicsError:
+                return False
+            return True
+        return all(low <= q <= high for low, q, high in zip(model.joint_lower, where, model.joint_upper, strict=True))
+
+    def set_tcp(self, pose: Any, *_: Any) -> None:
+        """Set the tool centre point in the flange frame."""
+        self._arm.tcp = pose_of(numbers(pose, 6, "a tool centre point"))
+
+    def get_tcp_offset(self) -> PoseValue:
+        """Return the tool centre point in the flange frame."""
+        return values_of(self._arm.tcp)
+
+    def get_joint_temp(self, j: int) -> float:
+        """Return the temperature of a joint [degrees Celsius]: a constant."""
+        index_of(j, 6)
+        return 30.0
+
+    def get_controller_temp(self) -> float:
+        """Return the temperature of the control box [degrees Celsius]: a constant."""
+        return 30.0
+
+    get_tool_temp = get_controller_temp
+
+    def get_tool_current(self) -> float:
+        """Return the current of the tool [A]: a constant."""
+        return 0.0
+
+    def get_tool_accelerometer_reading(self) -> Array:
+        """Return the acceleration of the tool [m/s^2]: that of an arm at rest, as RTDE has it."""
+        return Array((0.0, 0.0, -9.81))
+
+    # safety and payload
+
+    def protective_stop(self) -> Wait:
+        """Stop the arm as if it had hit something; the program goes on only once a person has unlocked it."""
+        self._host.protective_stop(f"protective_stop() in {self._program.name}")
+        yield
+
+    def set_payload(self, m: float, cog: Any = None, inertia: Any = None) -> None:
+        """Set the payload [kg], its centre of gravity [m] and inertia [kg m^2]; it has no effect on the motion.
+
+        What is not given: the centre of gravity stays as it is, the inertia becomes zero.
+        """
+        self._host.payload = number(m, "a payload")
+        if cog is not None:
+            self._host.payload_cog = tuple(numbers(cog, 3, "a centre of gravity"))
+        self._host.payload_inertia = (0.0,) * 6 if inertia is None else tuple(numbers(inertia, 6, "an inertia"))
+
+    def set_target_payload(self, m: float, cog: Any, inertia: Any = None, transition_time: float = 0.0) -> None:
+        """Set the payload at once: what it weighs has no effect on the motion."""
+        number(transition_time, "a transition time")
+        self.set_payload(m, cog, inertia)
+
+    def set_payload_mass(self, m: float) -> None:
+        """Set the mass of the payload [kg]."""
+        self.set_payload(m)
+
+    def set_payload_cog(self, CoG: Any) -> None:
+        """Set the centre of gravity of the payload [m]."""
+        self.set_payload(self._host.payload, CoG)
+
+    def get_target_payload(self) -> float:
+        """Return the payload [kg]."""
+        return self._host.payload
+
+    def get_target_payload_cog(self) -> Array:
+        """Return the centre of gravity of the payload [m]."""
+        return Array(self._host.payload_cog)
+
+    def get_target_payload_inertia(self) -> Array:
+        """Return the inertia of the payload [kg m^2]."""
+        return Array(self._host.payload_inertia)

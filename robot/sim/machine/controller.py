@@ -1,0 +1,352 @@
+"""Simulated controller: registers, programs, safety system, and the control cycle that joins them. No sockets.
+
+Order of a cycle: the registers hold what clients have written since the last one; a program that is due starts; the
+watchdog is checked; every thread of the program takes its turn; the targets of the arm move for 2 ms, and the plant
+follows them; clients are sent the new state.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import IO, Any
+
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.sim.motion.arm import CYCLE, TRIGGERED, SimulatedArm, StopCause
+from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantLost
+from coneskin.robot.sim.urscript.translator import Translation
+from coneskin.robot.sim.urscript.values import ScriptError, values_of
+from coneskin.robot.ur.rtde_codec import Value
+
+from .inputs_outputs import ClientInputs, InputWatchdog, Terminals, digital_outputs
+from .program import Program, SecondaryPrograms
+from .safety_system import SafetySystem
+from .states import MOVING, Notice, Options, ProgramFailed, ProgramNotice, RobotMode, Runtime, SafetyMode
+
+__all__ = ["POWER_COMMANDS", "Controller", "describe", "power", "write_event"]
+
+
+def write_event(file: IO[str], cycle: int, timestamp: float, event: str, facts: dict[str, Any]) -> None:
+    """Write one line: cycle, controller's time [s], this machine's monotonic clock [s], event and its facts."""
+    line = {"cycle": cycle, "time": round(timestamp, 3), "monotonic": time.monotonic(), "event": event}
+    file.write(json.dumps(line | facts, default=_plain) + "\n")
+
+
+def _plain(value: object) -> object:
+    return list(value) if isinstance(value, list | tuple) else str(value)
+
+
+MAX_NOTICES = 1000  #: that wait to be sent; a program that writes more in a cycle loses the oldest
+HISTORY = 500  #: cycles; the range of get_actual_joint_positions_history
+REDUCED_SHARE = 0.5  #: of the speed slider, in reduced mode; a real controller has limits of its own instead
+_AT_STANDSTILL = {Runtime.STOPPING: Runtime.STOPPED, Runtime.PAUSING: Runtime.PAUSED}
+
+
+class Controller:
+    """Controller of one arm.
+
+    Args:
+        options: its kind.
+        log: file for a JSON line for each event.
+        plant: what its targets move; by default the arm follows them exactly.
+
+    Attributes:
+        cycle: number of control cycles since power-on.
+        outside_time: returns the time of those outside [s]; late cycles are made up for in less of it.
+        inputs: what clients write.
+        program: main program; None while none is loaded.
+        secondary: ``sec`` programs that run beside it.
+        safety_system: what may stop the arm whatever the program does.
+        notices: what clients are still to be told.
+        history: measured joint positions of the last cycles, oldest first [rad].
+        plant_lost: why the plant does not count any more; empty while it does.
+    """
+
+    def __init__(self, options: Options, log: IO[str] | None = None, plant: Plant | None = None) -> None:
+        self.options = options
+        self.arm = SimulatedArm(arm_model(options.model), options.start_q)
+        self.plant: Plant = KinematicPlant() if plant is None else plant
+        self.arm.kinematic = plant is None
+        self.plant_lost = ""
+        self.cycle = 0
+        self.inputs = ClientInputs(self.arm, options.quirks == "fixed", self.log)
+        self.output_ints = [0] * 48
+        self.output_doubles = [0.0] * 48
+        self.digital_outputs = 0
+        self.terminals = Terminals()
+        self.outside_time: Callable[[], float] = lambda: self.timestamp
+        self.frozen = 0.0  # time in which no cycle ran though its clock went on [s]
+        self.beyond = False  # programs may connect to other computers
+        self.slider = 1.0
+        self.resistance = [0.0] * 6  # current that each motor takes beyond the model of the arm [A]
+        self.gravity: tuple[float, ...] = (0.0, 0.0, 9.82)
+        self.payload = 0.0
+        self.payload_cog: tuple[float, ...] = (0.0, 0.0, 0.0)
+        self.payload_inertia: tuple[float, ...] = (0.0,) * 6
+        self.program: Program | None = None
+        self.secondary = SecondaryPrograms(self)
+        self.runtime = Runtime.STOPPED
+        self.robot_mode = RobotMode.RUNNING
+        self.safety_system = SafetySystem(options.unlock_after, self.log, self.tell)
+        self.history: deque[list[float]] = deque([list(self.arm.q)], maxlen=HISTORY)
+        self.notices: deque[Notice] = deque(maxlen=MAX_NOTICES)
+        self._arrived = 0  # cycle in which the last program came in
+        self._due: tuple[int, Translation] | None = None
+        self._log = log
+
+    # control cycle
+
+    @property
+    def timestamp(self) -> float:
+        """Time since power-on [s]."""
+        return self.cycle * CYCLE + self.frozen
+
+    @property
+    def speed_scaling(self) -> float:
+        """Share of the commanded speeds at which paths run; the safety system's own stops are not in it."""
+        return self.slider * REDUCED_SHARE if self.safety is SafetyMode.REDUCED else self.slider
+
+    def step(self) -> None:
+        """Run one control cycle."""
+        self.cycle += 1
+        if self._due is not None and self.cycle >= self._due[0]:
+            self._start(self._due[1])
+        for watchdog in list(self.inputs.watchdogs.values()):
+            self._check_watchdog(watchdog)
+        self._turn_programs()
+        was_turning = self.arm.turning
+        held = self.runtime.paused or self.safety not in MOVING
+        fault = self.arm.step(self.speed_scaling, hold=held)
+        self._advance_plant()
+        if was_turning and not self.arm.turning:
+            self.log("standstill", q=self.arm.measured.q)
+        if not self.arm.moving:
+            self.runtime = _AT_STANDSTILL.get(self.runtime, self.runtime)
+        if fault is not None:
+            self.protective_stop(str(fault), fault.cause)
+            self.stop_program("ended by the safety system")
+        self.history.append(list(self.arm.measured.q))
+
+    def _advance_plant(self) -> None:
+        """Let the plant follow the targets. Without it the arm has no power, and shows what was measured last."""
+        if self.plant_lost:
+            return
+        try:
+            self.arm.measured = self.plant.advance(self.arm.q, self.arm.qd)
+        except PlantLost as exc:
+            self.plant_lost = str(exc)
+            self.plant.close()
+            self.safety_system.lose_plant(self.plant_lost)
+            self.robot_mode = RobotMode.POWER_OFF
+            self.stop_program("the plant is lost")
+
+    def _turn_programs(self) -> None:
+        self.secondary.turn()
+        program = self.program
+        if program is None or self.runtime is not Runtime.PLAYING:
+            return
+        try:
+            program.turn()
+        except ScriptError as exc:
+            self.fail(program.name, exc)
+        if not program.running:
+            self.stop_program("end of the program")
+        elif program.driven != self.cycle and self.runtime is Runtime.PLAYING and not self.arm.blends:
+            self.arm.motion = None  # no thread commands a motion in this cycle: the arm brakes
+
+    # programs
+
+    def program_arrived(self) -> None:
+        """End the running program, because the last byte of a new one has come; the new one starts after the delay."""
+        if self.ready:
+            self.stop_program("replaced by another")
+        self._arrived = self.cycle
+
+    def load(self, translation: Translation) -> None:
+        """Start a translated program: a ``sec`` program now, another once the start delay is over."""
+        if translation.secondary:
+            self.secondary.start(translation)
+            return
+        delay = max(1, round(self.options.start_delay / CYCLE))
+        self._due = (self._arrived + delay, translation)
+
+    def _start(self, translation: Translation) -> None:
+        self._due = None
+        if not self.ready:
+            reason = f"{self.robot_mode.name}, {self.safety.name}"
+            self.log("refused", program=translation.name, reason=reason)
+            self.tell(ProgramFailed(f"{translation.name} does not start: {reason}"))
+            return
+        self.stop_program("replaced by another")
+        self.program = Program(self, translation)
+        self.runtime = Runtime.PLAYING
+        self.log("program", program=translation.name)
+        self.tell(ProgramNotice(translation.name, "STARTED"))
+
+    @property
+    def ready(self) -> bool:
+        """True where a program may start."""
+        return self.robot_mode is RobotMode.RUNNING and self.safety in MOVING
+
+    def stop_program(self, reason: str) -> None:
+        """End the program; the arm brakes if it moves. Registers keep their values."""
+        self._due = None
+        self.inputs.watchdogs.clear()
+        if self.program is not None:
+            self.log("stopped", program=self.program.name, reason=reason)
+            self.tell(ProgramNotice(self.program.name, "STOPPED"))
+            self.program.close()
+        self.program = None
+        self.arm.motion = None
+        self.runtime = Runtime.STOPPING if self.arm.moving else Runtime.STOPPED
+
+    def pause_program(self) -> bool:
+        """Hold the program and the arm; return False where no program plays."""
+        if self.program is None or self.runtime is not Runtime.PLAYING:
+            return False
+        self.runtime = Runtime.PAUSING if self.arm.moving else Runtime.PAUSED
+        self.log("paused", program=self.program.name)
+        self.tell(ProgramNotice(self.program.name, "PAUSED"))
+        return True
+
+    def resume_program(self) -> bool:
+        """Go on after a pause, with the motion that was interrupted; return False where that is not possible."""
+        if self.program is None or not self.runtime.paused or self.safety not in MOVING:
+            return False
+        self.runtime = Runtime.PLAYING
+        for watchdog in self.inputs.watchdogs.values():
+            watchdog.fed = self.cycle
+        self.log("resumed", program=self.program.name)
+        self.tell(ProgramNotice(self.program.name, "RESUMED"))
+        return True
+
+    def _check_watchdog(self, watchdog: InputWatchdog) -> None:
+        if self.runtime is not Runtime.PLAYING or not watchdog.expired(self.cycle):
+            return
+        self.log("watchdog", variable=watchdog.variable, action=watchdog.action)
+        if watchdog.action == "stop":
+            self.stop_program(f"watchdog of {watchdog.variable}")
+        elif watchdog.action == "pause":
+            self.pause_program()
+        self.inputs.watchdogs.pop(watchdog.variable, None)
+
+    # safety system
+
+    @property
+    def safety(self) -> SafetyMode:
+        """State of the safety system."""
+        return self.safety_system.mode
+
+    def protective_stop(self, reason: str, cause: StopCause = TRIGGERED) -> None:
+        """Stop the arm and hold the program, until a person unlocks it."""
+        if not self.safety_system.protective_stop(reason, cause, self.cycle):
+            return
+        if self.options.after_protective_stop == "stop":
+            self.stop_program("protective stop")
+        else:
+            self.pause_program()
+
+    def unlock(self, early: bool = False) -> bool:
+        """End a protective stop; return False where it is too early, and that is not allowed."""
+        return self.safety_system.unlock(self.cycle, early)
+
+    def safeguard(self, open: bool) -> str:
+        """Open or close the safeguard: the arm brakes, the program is held, and a person has to start it again."""
+        if not open:
+            self.safety_system.close_safeguard()
+        elif self.safety_system.open_safeguard():
+            self.pause_program()
+        return self.safety.name
+
+    def reduce(self, on: bool) -> str:
+        """Begin or end reduced mode, in which paths and speeds are at most `REDUCED_SHARE` of what is commanded."""
+        self.safety_system.reduce(on)
+        return self.safety.name
+
+    def emergency_stop(self) -> None:
+        """Act on the emergency stop button: the arm brakes and loses power, the program ends."""
+        self.safety_system.emergency_stop()
+        self.robot_mode = RobotMode.POWER_OFF
+        self.stop_program("emergency stop")
+
+    # inputs
+
+    def write_inputs(self, values: Mapping[str, Value]) -> None:
+        """Take the values of a client's data packet, name -> value, in the order of its recipe."""
+        self.inputs.write(values, self.cycle)
+        if values.get("speed_slider_mask"):
+            self.slider = min(1.0, max(0.0, float(values["speed_slider_fraction"])))  # type: ignore[arg-type]
+            self.log("slider", fraction=self.slider)
+        for bit, on in digital_outputs(values):
+            self.set_digital(1 << bit, on)
+        self.terminals.write_analog(values)
+
+    def set_digital(self, bit: int, on: bool) -> None:
+        """Switch digital outputs: bits 0-7 standard, 8-15 configurable, 16-17 tool."""
+        self.digital_outputs = self.digital_outputs | bit if on else self.digital_outputs & ~bit
+        self.log("digital", outputs=self.digital_outputs)
+
+    # clients and log
+
+    def tell(self, notice: Notice) -> None:
+        """Keep a notice until the server sends it to every client of the primary interface."""
+        self.notices.append(notice)
+
+    def fail(self, program: str, problem: ScriptError) -> None:
+        """Report a program that cannot be run, or that has failed."""
+        self.log("abort", program=program, reason=str(problem))
+        self.tell(ProgramFailed(problem.title, problem.line, problem.column))
+
+    def log(self, event: str, **facts: Any) -> None:
+        """Write one JSON line: cycle, controller time, this machine's monotonic clock, event and its facts."""
+        if self._log is not None:
+            write_event(self._log, self.cycle, self.timestamp, event, facts)
+
+    @property
+    def currents(self) -> list[float]:
+        """Current that each motor takes beyond the model of the arm [A]: what the plant measures, and a fault line."""
+        return [a + b for a, b in zip(self.resistance, self.arm.measured.current, strict=True)]
+
+
+def describe(controller: Controller) -> dict[str, Any]:
+    """Return the state: positions and speeds as they are measured [rad], [rad/s], and the words of its modes."""
+    arm = controller.arm
+    return {
+        "cycle": controller.cycle,
+        "q": list(arm.measured.q),
+        "qd": list(arm.measured.qd),
+        "turning": arm.turning,
+        "plant_lost": controller.plant_lost,
+        "tcp": list(values_of(arm.tcp_pose(arm.measured.q))),
+        "program": controller.program.name if controller.program is not None else "",
+        "runtime": controller.runtime.name,
+        "robot_mode": controller.robot_mode.name,
+        "safety": controller.safety.name,
+        "slider": controller.slider,
+        "resistance": list(controller.resistance),
+        "digital_outputs": controller.digital_outputs,
+    }
+
+
+#: commands that change the power of the arm
+POWER_COMMANDS = ("power on", "power off", "brake release", "restart safety")
+
+
+def power(controller: Controller, command: str) -> str:
+    """Carry out one of `POWER_COMMANDS`; return what the dashboard answers."""
+    if command == "power off":
+        controller.stop_program("power off")
+        controller.robot_mode = RobotMode.POWER_OFF
+        return "Powering off"
+    if command == "restart safety":
+        if controller.safety_system.restart():
+            controller.robot_mode = RobotMode.POWER_OFF
+        return "Restarting safety"
+    if controller.safety in MOVING:
+        if command == "brake release":
+            controller.robot_mode = RobotMode.RUNNING
+        elif controller.robot_mode is RobotMode.POWER_OFF:
+            controller.robot_mode = RobotMode.IDLE
+    return "Brake releasing" if command == "brake release" else "Powering on"

@@ -1,0 +1,216 @@
+"""Running URScript programs of the simulated controller: their threads take turns in each control cycle.
+
+In a cycle the main thread goes first, then the others in the order in which they were started; each runs until it
+blocks. Only one thread may move the arm in a cycle: as on the real controller, a second one ends the program. ``sec``
+programs run beside the main one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator
+from inspect import isgenerator
+from typing import Any
+
+from coneskin.robot.sim.urscript.translator import Translation
+from coneskin.robot.sim.urscript.values import OPERATIONS, ScriptError
+
+from .builtins import Builtins
+from .script_host import ScriptHost
+from .script_socket import ScriptSocket
+from .states import ProgramFailed, ProgramNotice
+
+__all__ = ["MAX_SECONDARY", "Program", "SecondaryPrograms", "Thread"]
+
+MAX_STEPS = 100_000  #: iterations of loops, and calls, in one cycle; a program with more never waits, and is ended
+MAX_TIME = 0.1  #: s of the processor that a program may use in one cycle, likewise
+MAX_THREADS = 100  #: of a program, with those that have ended in this cycle
+
+
+class Thread:
+    """Thread of a program: a generator that yields where it waits for the next cycle."""
+
+    __slots__ = ("alive", "body", "name")
+
+    def __init__(self, name: str, body: Iterator[object]) -> None:
+        self.name, self.body, self.alive = name, body, True
+
+
+class _Halted(Exception):
+    """Statement ``halt`` of a program."""
+
+
+class Program:
+    """Program with its compiled text and the state of its threads.
+
+    Attributes:
+        name: name in the program's text.
+        secondary: True for a ``sec`` program, which runs beside the main one and must not move the arm.
+        driver: thread that moves the arm, or None.
+        driven: cycle in which that thread last did; -1 before the first time.
+        current: thread that runs now.
+        sockets: connections that it has opened, by their names.
+        told: what its clients have been told is not simulated.
+        damping: of force mode, 0..1.
+        gain_scaling: of force mode, 0..2.
+    """
+
+    def __init__(self, host: ScriptHost, translation: Translation) -> None:
+        self._host = host
+        self.name, self.secondary = translation.name, translation.secondary
+        self.driver: Thread | None = None
+        self.driven = -1
+        self.current: Thread
+        self.sockets: dict[str, ScriptSocket] = {}
+        self.told: set[str] = set()
+        self.damping, self.gain_scaling = 0.025, 1.0  # of force mode, until the program sets them
+        self._steps = 0
+        self._end_time = 0.0
+        space: dict[str, Any] = {
+            **OPERATIONS,
+            "_absent": object(),
+            "_halt": self._halt,
+            "_pause": self._pause,
+            "_join": self._join,
+            "_kill": self._kill,
+            "_run": self._run,
+            "_count_step": self._count_step,
+        }
+        builtins = Builtins(host, self)
+        space |= {f"b_{name}": getattr(builtins, name) for name in Builtins.names()}
+        exec(translation.code, space)  # the text was parsed, and nothing but its own names is in it
+        self._main = Thread("main", space["main"]())
+        self.threads = [self._main]
+
+    @property
+    def running(self) -> bool:
+        """True until the main thread has come to its end."""
+        return self._main.alive
+
+    def close(self) -> None:
+        """Close the connections that it has opened."""
+        for connection in self.sockets.values():
+            connection.close()
+        self.sockets.clear()
+
+    def turn(self) -> None:
+        """Run every thread for one control cycle.
+
+        Raises:
+            ScriptError: the program has failed, and has ended.
+        """
+        self._steps = 0
+        self._end_time = time.thread_time() + MAX_TIME
+        for thread in self.threads:  # threads started in this cycle are appended, and run in it
+            if not thread.alive:
+                continue
+            self.current = thread
+            try:
+                next(thread.body)
+            except StopIteration:
+                if thread is self._main and self._host.arm.blends:
+                    thread.body = self._finish_path()
+                    continue
+                thread.alive = False
+                if thread is self._main:
+                    break
+            except _Halted:
+                self._main.alive = False
+                break
+            except ScriptError:
+                self._main.alive = False
+                raise
+            except Exception as exc:  # whatever a text made Python do: it ends the program, never the controller
+                self._main.alive = False
+                raise ScriptError(f"{type(exc).__name__}: {exc}"[:1000]) from exc
+        if len(self.threads) > 1:
+            self.threads = [thread for thread in self.threads if thread.alive]
+
+    def _finish_path(self) -> Generator[None, None, None]:
+        """Wait for the end of a path whose blend no further move has begun."""
+        while self._host.arm.blends:
+            self.drive()
+            yield
+
+    def drive(self) -> None:
+        """Claim the arm for the thread that runs now.
+
+        Raises:
+            ScriptError: another living thread moves it in this cycle, or the program is a ``sec`` one.
+        """
+        if self.secondary:
+            raise ScriptError("a secondary program must not move the arm")
+        cycle = self._host.cycle
+        if self.driven == cycle and self.driver is not self.current and self.driver is not None and self.driver.alive:
+            raise ScriptError("Another thread is already controlling the robot")
+        self.driver, self.driven = self.current, cycle
+
+    # called by the translated program
+
+    def _run(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Thread:
+        if len(self.threads) >= MAX_THREADS:
+            raise ScriptError(f"more than {MAX_THREADS} threads")
+        body = function(*arguments)
+        thread = Thread(function.__name__[2:], body if isgenerator(body) else iter([]))
+        self.threads.append(thread)
+        return thread
+
+    def _kill(self, thread: Any) -> None:
+        if isinstance(thread, Thread) and thread.alive:
+            if isinstance(thread.body, Generator):
+                thread.body.close()
+            thread.alive = False
+
+    def _join(self, thread: Any) -> Generator[None, None, None]:
+        while isinstance(thread, Thread) and thread.alive:
+            yield
+
+    def _pause(self) -> None:
+        if self.secondary:
+            raise ScriptError("a secondary program must not pause the main one")
+        self._host.pause_program()
+
+    def _halt(self) -> None:
+        raise _Halted
+
+    def _count_step(self) -> None:
+        """Count an iteration or a call; end a program that would hold the control cycle up."""
+        self._steps += 1
+        if self._steps > MAX_STEPS or time.thread_time() > self._end_time:
+            raise ScriptError("an endless loop without sync() or sleep()")
+
+
+MAX_SECONDARY = 20  #: that run at once
+
+
+class SecondaryPrograms:
+    """Secondary programs of one controller."""
+
+    def __init__(self, host: ScriptHost) -> None:
+        self._host = host
+        self._running: list[Program] = []
+
+    def __len__(self) -> int:
+        return len(self._running)
+
+    def start(self, translation: Translation) -> None:
+        """Start one, unless too many run already."""
+        if len(self._running) >= MAX_SECONDARY:
+            reason = f"{MAX_SECONDARY} sec programs run already"
+            self._host.log("refused", program=translation.name, reason=reason)
+            self._host.tell(ProgramFailed(f"{translation.name} does not start: {reason}"))
+            return
+        self._running.append(Program(self._host, translation))
+        self._host.tell(ProgramNotice(translation.name, "STARTED"))
+
+    def turn(self) -> None:
+        """Run each for one control cycle, and forget those that have ended."""
+        for program in list(self._running):
+            try:
+                program.turn()
+            except ScriptError as exc:
+                self._host.fail(program.name, exc)
+            if not program.running:
+                self._running.remove(program)
+                program.close()
+                self._host.tell(ProgramNotice(program.name, "STOPPED"))

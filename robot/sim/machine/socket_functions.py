@@ -1,0 +1,226 @@
+"""URScript functions of sockets: a program is the client of a server.
+
+A read that has nothing to return by its timeout, or whose server has gone, returns at the earliest in the next cycle,
+so that a program which reads for ever gives way; so does one that is sent more than it reads. A timeout of 0 waits
+without an end.
+
+Source: Universal Robots, "The URScript Programming Language", module interfaces (socket_close to socket_set_var).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from collections.abc import Callable, Generator
+from typing import Any
+
+from coneskin.robot.sim.motion.arm import CYCLE
+from coneskin.robot.sim.urscript.value_functions import text_of
+from coneskin.robot.sim.urscript.values import Array, ScriptError, number, show
+
+from .script_host import CallingProgram, ScriptHost
+from .script_socket import ScriptSocket, may_connect
+
+__all__ = ["SocketFunctions"]
+
+MAX_SOCKETS = 32  #: of one program, at once; an assumption
+MAX_VALUES = 30  #: of one read
+MAX_LINE = 1023  #: characters that socket_read_line and socket_read_string return
+CONNECT_TIMEOUT = 2.0  #: s; an assumption
+_NAME = "socket_0"  # of a connection that the program does not name
+_LIST = re.compile(rb"[^(]*\(([^()]*)\)")
+
+
+class SocketFunctions:
+    """URScript functions of sockets."""
+
+    _host: ScriptHost
+    _program: CallingProgram
+
+    def socket_open(self, address: Any, port: Any, socket_name: Any = _NAME) -> Generator[None, None, bool]:
+        """Connect to a server; return whether that worked."""
+        where = may_connect(str(address), self._host.beyond)
+        if not 0 < int(port) < 65536:
+            raise ScriptError(f"a port is from 1 to 65535, got {show(port)}")
+        self.socket_close(socket_name)
+        if len(self._program.sockets) >= MAX_SOCKETS:
+            raise ScriptError(f"a program opens at most {MAX_SOCKETS} sockets at once")
+        self._program.sockets[str(socket_name)] = connection = ScriptSocket(where, int(port))
+        for _ in range(round(CONNECT_TIMEOUT / CYCLE)):
+            connected = connection.connect()
+            if connected:
+                return True
+            if connected is not None:
+                break
+            yield
+        self.socket_close(socket_name)
+        yield
+        return False
+
+    def socket_close(self, socket_name: Any = _NAME) -> None:
+        """Close a connection, if there is one of that name."""
+        connection = self._program.sockets.pop(str(socket_name), None)
+        if connection is not None:
+            connection.close()
+
+    # write
+
+    def socket_send_byte(self, value: Any, socket_name: Any = _NAME) -> bool:
+        """Send one byte; return whether that worked."""
+        return self._send(bytes([int(value) & 0xFF]), socket_name)
+
+    def socket_send_byte_list(self, values: Any, socket_name: Any = _NAME) -> bool:
+        """Send bytes; return whether that worked."""
+        return self._send(bytes(int(value) & 0xFF for value in values), socket_name)
+
+    def socket_send_int(self, value: Any, socket_name: Any = _NAME) -> bool:
+        """Send a whole number as four bytes, the highest first; return whether that worked."""
+        return self._send(struct.pack(">I", int(value) & 0xFFFFFFFF), socket_name)
+
+    def socket_send_line(self, str: Any, socket_name: Any = _NAME) -> bool:
+        """Send a value as text with an end of line; return whether that worked."""
+        return self._send(text_of(str).encode() + b"\n", socket_name)
+
+    def socket_send_string(self, str: Any, socket_name: Any = _NAME) -> bool:
+        """Send a value as text; return whether that worked."""
+        return self._send(text_of(str).encode(), socket_name)
+
+    def socket_set_var(self, name: Any, value: Any, socket_name: Any = _NAME) -> None:
+        """Send ``SET name value``, as a server of variables takes it."""
+        self._send(f"SET {text_of(name)} {int(value)}\n".encode(), socket_name)
+
+    def _send(self, data: bytes, name: Any) -> bool:
+        connection = self._program.sockets.get(str(name))
+        return connection is not None and connection.send(data)
+
+    # read
+
+    def socket_get_var(self, name: Any, socket_name: Any = _NAME) -> Generator[None, None, int]:
+        """Ask a server of variables for a whole number; 0 where it does not answer within 2 s."""
+        self._send(f"GET {text_of(name)}\n".encode(), socket_name)
+        line = yield from self.socket_read_line(socket_name)
+        match = re.fullmatch(rf"{re.escape(text_of(name))}\s+(-?\d{{1,10}})\s*", line)
+        return int(match[1]) if match else 0
+
+    def socket_read_ascii_float(
+        self, number: Any, socket_name: Any = _NAME, timeout: Any = 2
+    ) -> Generator[None, None, Array]:
+        """Read numbers as text, ``(1.5, 2)``; return how many came, and their values; 0 and NaN after the timeout."""
+        count = _count(number)
+        values: list[float] = []
+
+        def take(connection: ScriptSocket) -> bool:
+            match = _LIST.match(connection.unread)
+            if match is None:
+                connection.forget_if_full()
+                return False
+            parts = match[1].split(b",")  # a match reads the bytes again, so before they are taken
+            connection.take(match.end())
+            for part in parts:
+                try:
+                    values.append(float(part))
+                except ValueError:
+                    break
+            return True
+
+        yield from self._wait(socket_name, timeout, take)
+        values = values[:count]
+        return Array([len(values), *values, *[math.nan] * (count - len(values))])
+
+    def socket_read_binary_integer(
+        self, number: Any, socket_name: Any = _NAME, timeout: Any = 2
+    ) -> Generator[None, None, Array]:
+        """Read whole numbers of four bytes; return their number, and them; 0 and -1 after the timeout."""
+        count = _count(number)
+        data = yield from self._read(4 * count, socket_name, timeout)
+        return Array([count, *struct.unpack(f">{count}i", data)] if data else [0, *[-1] * count])
+
+    def socket_read_byte_list(
+        self, number: Any, socket_name: Any = _NAME, timeout: Any = 2
+    ) -> Generator[None, None, Array]:
+        """Read bytes; return their number, and them; 0 and -1 after the timeout."""
+        count = _count(number)
+        data = yield from self._read(count, socket_name, timeout)
+        return Array([count, *data] if data else [0, *[-1] * count])
+
+    def socket_read_line(self, socket_name: Any = _NAME, timeout: Any = 2) -> Generator[None, None, str]:
+        """Read a line, without its end; an empty text after the timeout."""
+        line = yield from self.socket_read_string(socket_name, suffix="\n", timeout=timeout)
+        return line.removesuffix("\r")
+
+    def socket_read_string(
+        self,
+        socket_name: Any = _NAME,
+        prefix: Any = "",
+        suffix: Any = "",
+        interpret_escape: Any = False,
+        timeout: Any = 2,
+    ) -> Generator[None, None, str]:
+        """Read a text: what stands between prefix and suffix, or without them what has come."""
+        first, last = (_bytes(text, bool(interpret_escape)) for text in (prefix, suffix))
+        found: list[bytes] = []
+
+        def take(connection: ScriptSocket) -> bool:
+            unread = connection.unread
+            start = unread.find(first) if first else 0
+            end = len(unread)
+            if start >= 0 and last:
+                end = unread.find(last, start + len(first))
+            if start < 0 or end < 0 or not unread:
+                connection.forget_if_full()
+                return False
+            found.append(connection.take(end + len(last))[start + len(first) : end][:MAX_LINE])
+            return True
+
+        yield from self._wait(socket_name, timeout, take)
+        return found[0].decode("utf-8", "replace") if found else ""
+
+    def _read(self, count: int, name: Any, timeout: Any) -> Generator[None, None, bytes]:
+        """Read so many bytes, none of them after the timeout."""
+        found: list[bytes] = []
+
+        def take(connection: ScriptSocket) -> bool:
+            if len(connection.unread) < count:
+                return False
+            found.append(connection.take(count))
+            return True
+
+        yield from self._wait(name, timeout, take)
+        return found[0] if found else b""
+
+    def _wait(self, name: Any, timeout: Any, take: Callable[[ScriptSocket], bool]) -> Generator[None, None, None]:
+        """Wait until something could be taken, the timeout [s] is over, or the server has gone."""
+        limit = number(timeout, "a timeout")
+        cycles = round(limit / CYCLE) if limit > 0.0 else 0
+        begin, waited = self._host.outside_time(), 0
+        while True:
+            connection = self._program.sockets.get(str(name))
+            if connection is not None:
+                connection.fill()
+                if connection.gives_way(self._host.cycle):
+                    yield
+                    continue
+                if take(connection):
+                    return
+            yield
+            waited += 1
+            late = waited >= cycles and self._host.outside_time() - begin > limit - 0.5 * CYCLE  # the server's time too
+            if connection is None or connection.ended or (limit > 0.0 and late):
+                return
+
+
+def _count(value: Any) -> int:
+    if not 1 <= int(value) <= MAX_VALUES:
+        raise ScriptError(f"one read takes 1 to {MAX_VALUES} values, got {show(value)}")
+    return int(value)
+
+
+def _bytes(value: Any, interpret_escape: bool) -> bytes:
+    if not isinstance(value, str):
+        raise ScriptError(f"expected a text, got {show(value)}")
+    text: str = value
+    if interpret_escape:
+        for written, meant in (("\\n", "\n"), ("\\r", "\r"), ("\\t", "\t"), ("\\\\", "\\")):
+            text = text.replace(written, meant)
+    return text.encode()

@@ -1,0 +1,239 @@
+"""Options, states and notices of the simulated controller, as values with the numbers of RTDE.
+
+Source: Universal Robots, "RTDE Guide" (robot_mode, safety_mode, runtime_state and the two words of bits) and the
+dashboard server's manual (names).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import Literal
+
+__all__ = [
+    "DEFAULT_MODEL",
+    "MOVING",
+    "START_Q",
+    "ErrorNotice",
+    "Notice",
+    "Options",
+    "PopupNotice",
+    "ProgramFailed",
+    "ProgramNotice",
+    "Report",
+    "RobotMode",
+    "Runtime",
+    "SafetyMode",
+    "SafetyNotice",
+    "TextNotice",
+    "Version",
+    "robot_bits",
+    "safety_bits",
+]
+
+
+class Runtime(IntEnum):
+    """State of the program: RTDE's runtime_state."""
+
+    STOPPING = 0
+    STOPPED = 1
+    PLAYING = 2
+    PAUSING = 3
+    PAUSED = 4
+    RESUMING = 5
+
+    @property
+    def paused(self) -> bool:
+        """True for a program that is held, or that is being held while the arm brakes."""
+        return self in (Runtime.PAUSING, Runtime.PAUSED)
+
+    @property
+    def word(self) -> str:
+        """State as PolyScope says it: STOPPED, PLAYING or PAUSED."""
+        return "PLAYING" if self is Runtime.PLAYING else "PAUSED" if self.paused else "STOPPED"
+
+
+class RobotMode(IntEnum):
+    """State of the arm: RTDE's robot_mode."""
+
+    POWER_OFF = 3
+    POWER_ON = 4
+    IDLE = 5
+    RUNNING = 7
+
+
+class SafetyMode(IntEnum):
+    """State of the safety system: RTDE's safety_mode."""
+
+    NORMAL = 1
+    REDUCED = 2
+    PROTECTIVE_STOP = 3
+    RECOVERY = 4
+    SAFEGUARD_STOP = 5
+    SYSTEM_EMERGENCY_STOP = 6
+    ROBOT_EMERGENCY_STOP = 7
+    VIOLATION = 8
+    FAULT = 9
+
+
+#: state -> word of RTDE's safety_status_bits
+_SAFETY_BITS = {
+    SafetyMode.NORMAL: 1 << 0,
+    SafetyMode.REDUCED: 1 << 1,
+    SafetyMode.PROTECTIVE_STOP: 1 << 2 | 1 << 10,
+    SafetyMode.RECOVERY: 1 << 3,
+    SafetyMode.SAFEGUARD_STOP: 1 << 4 | 1 << 10,
+    SafetyMode.SYSTEM_EMERGENCY_STOP: 1 << 5 | 1 << 7 | 1 << 10,
+    SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | 1 << 7 | 1 << 10,
+    SafetyMode.VIOLATION: 1 << 8 | 1 << 10,
+    SafetyMode.FAULT: 1 << 9 | 1 << 10,
+}
+
+
+#: states in which the arm may move and programs run
+MOVING = frozenset((SafetyMode.NORMAL, SafetyMode.REDUCED))
+
+
+def safety_bits(mode: SafetyMode) -> int:
+    """Return RTDE's safety_status_bits."""
+    return _SAFETY_BITS[mode]
+
+
+def robot_bits(mode: RobotMode, program: bool) -> int:
+    """Return RTDE's robot_status_bits: 0 power on, 1 program running, 2 teach button, 3 power button."""
+    return int(mode is not RobotMode.POWER_OFF) | int(program) << 1
+
+
+Version = tuple[int, int]
+
+#: arm that is simulated where none is named
+DEFAULT_MODEL = "UR5e"
+#: default joint positions at the start [rad]; clear of every singular position
+START_Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Kind of a simulated controller, and its deliberate deviations.
+
+    Attributes:
+        model: name of the arm.
+        version: of PolyScope, major and minor.
+        start_q: joint positions at the start [rad].
+        quirks: "real": the program of ur_rtde runs as it is; "fixed": with the corrections of docs/look-up/sim-ur.md.
+        wrong_size: treatment of a data packet longer than its recipe; that of the real controller is not known.
+        start_delay: from a program's last byte to its first cycle [s].
+        unlock_after: time that must pass before a protective stop can be unlocked [s].
+        after_protective_stop: effect of a protective stop on the program: paused (e-Series) or ended.
+        program: URScript that the dashboard's ``play`` starts.
+        programs: folder of the programs and installations that the dashboard can load.
+        external_control: host and port from which a program takes the script of its External Control node.
+        remote_control: whether the robot says that it is under remote control; it takes commands in any case.
+        robot_api_port: on which the robot API of PolyScope X is served; 0 where it is not.
+    """
+
+    model: str = DEFAULT_MODEL
+    version: Version = (5, 25)
+    start_q: Sequence[float] = START_Q
+    quirks: Literal["real", "fixed"] = "real"
+    wrong_size: Literal["truncate", "drop"] = "truncate"
+    start_delay: float = 0.010
+    unlock_after: float = 5.0
+    after_protective_stop: Literal["pause", "stop"] = "pause"
+    program: str = ""
+    programs: Path | None = None
+    external_control: tuple[str, int] = ("127.0.0.1", 50002)
+    remote_control: bool = True
+    robot_api_port: int = 0
+
+
+class Report(IntEnum):
+    """How grave an error is: the report level of the client interface."""
+
+    DEBUG = 0
+    INFO = 1
+    WARNING = 2
+    VIOLATION = 3
+    FAULT = 4
+    CRITICAL_FAULT = 5
+
+
+@dataclass(frozen=True, slots=True)
+class TextNotice:
+    """Text of a program's ``textmsg``."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class PopupNotice:
+    """Window that a program's ``popup`` opens.
+
+    Attributes:
+        title: of the window.
+        text: in it.
+        warning: whether it is shown as a warning.
+        error: whether it is shown as an error.
+    """
+
+    title: str
+    text: str
+    warning: bool = False
+    error: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramNotice:
+    """Program that has started, or stopped.
+
+    Attributes:
+        name: of the program.
+        event: "STARTED", "STOPPED", "PAUSED" or "RESUMED".
+    """
+
+    name: str
+    event: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramFailed:
+    """Program that cannot be run, or that has failed.
+
+    Attributes:
+        text: what is wrong.
+        line: of the program, from 1; 0 where it is not known.
+        column: in that line, from 1; 0 where it is not known.
+    """
+
+    text: str
+    line: int = 0
+    column: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyNotice:
+    """New state of the safety system."""
+
+    mode: SafetyMode
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorNotice:
+    """Entry of the controller's log, such as C153A0.
+
+    Attributes:
+        code: number after the C.
+        argument: number after the A.
+        report: how grave it is.
+        text: what happened.
+    """
+
+    code: int
+    argument: int
+    report: Report
+    text: str = ""
+
+
+Notice = TextNotice | PopupNotice | ProgramNotice | ProgramFailed | SafetyNotice | ErrorNotice

@@ -1,0 +1,197 @@
+"""Programs that the dashboard can load: the folder that stands for the disk, and program files as URScript.
+
+A ``.urp`` file is XML, packed with gzip or not, in which each node of the program tree is an element; see
+`program_tree`. PolyScope writes the URScript of a program beside it, in a ``.script`` file of the same name: where that
+exists it is run instead, whatever the nodes. A ``.urpx`` file of PolyScope X is JSON that has the URScript in it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import xml.etree.ElementTree as ET
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from coneskin.core.files import read_file
+from coneskin.robot.sim.urscript.translator import MAX_LENGTH
+from coneskin.robot.sim.urscript.values import ScriptError
+
+from .program_tree import EXTERNAL_CONTROL, program_lines
+
+__all__ = ["ProgramFile", "ProgramFolder", "program_information", "read_program"]
+
+_GZIP = 31  # window bits for zlib: the largest, in gzip's format
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramFile:
+    """Program that is loaded.
+
+    Attributes:
+        name: of its file, with the extension.
+        path: of its file, as PolyScope gives it.
+        text: its URScript, from ``def`` to ``end``.
+    """
+
+    name: str
+    path: str
+    text: str
+
+    @property
+    def takes_external_script(self) -> bool:
+        """True where a node of it takes its script from another program."""
+        return EXTERNAL_CONTROL in self.text
+
+    @property
+    def function(self) -> str:
+        """Name of the program in its text; empty where it has none."""
+        match = re.search(r"^[ \t]*def[ \t]+(\w+)", self.text, re.MULTILINE)
+        return match[1] if match else ""
+
+
+def read_program(name: str, data: bytes) -> str:
+    """Return the URScript of a program file.
+
+    Args:
+        name: of the file, with ``.urp``, ``.urpx`` or ``.script``.
+        data: its content.
+
+    Raises:
+        ScriptError: it is none of them, or has a node that is not simulated.
+    """
+    function = re.sub(r"\W", "_", name.rpartition(".")[0]) or "program"
+    if name.endswith(".urpx"):
+        return f"def {function}():\n{_script_of(name, data)}\nend\n"
+    if not name.endswith(".urp"):
+        text = data.decode("utf-8", "replace")
+        lines = (line.strip() for line in text.splitlines())
+        first = next((line for line in lines if line and not line.startswith("#")), "")
+        return text if first.startswith("def ") else f"def {function}():\n{text}\nend\n"
+    if data[:2] == b"\x1f\x8b":
+        try:
+            data = zlib.decompressobj(_GZIP).decompress(data, MAX_LENGTH)
+        except zlib.error as exc:
+            raise ScriptError(f"{name} is not a program: {exc}") from exc
+    if b"<!DOCTYPE" in data:
+        raise ScriptError(f"{name} is not a program: it declares a document type")
+    try:
+        root = ET.fromstring(data)
+    except ET.ParseError as exc:
+        raise ScriptError(f"{name} is not a program: {exc}") from exc
+    try:
+        return "\n".join([*program_lines(root, function), ""])
+    except (ScriptError, RecursionError) as exc:
+        raise ScriptError(f"{name}: {exc}") from exc
+
+
+def program_information(data: bytes) -> dict[str, object]:
+    """Return what a ``.urpx`` file says of its program: name, description, dates.
+
+    Raises:
+        ValueError: it is not such a file.
+    """
+    try:
+        found = json.loads(data)["program"]["programInformation"]
+        if isinstance(found["name"], str) and found["name"]:
+            return dict(found)
+    except (KeyError, TypeError, RecursionError) as exc:
+        raise ValueError(f"no program of PolyScope X: {exc}") from exc
+    raise ValueError("no program of PolyScope X: it has no name")
+
+
+def _script_of(name: str, data: bytes) -> str:
+    try:
+        return str(json.loads(data)["program"]["urscript"]["script"])
+    except (ValueError, KeyError, TypeError, RecursionError) as exc:
+        raise ScriptError(f"{name} is not a program of PolyScope X: {type(exc).__name__} {exc}") from exc
+
+
+#: where PolyScope has its programs, on a robot and in Universal Robots' own simulator
+_ROOTS = ("/ursim/programs/", "/programs/")
+_LARGEST_PROGRAM = 4 * MAX_LENGTH  # bytes of a file
+
+
+class ProgramFolder:
+    """Folder with the programs that the dashboard can load; sub-folders count, and nothing outside it does.
+
+    Args:
+        root: the folder; without one no file is found, and nothing can be saved.
+    """
+
+    def __init__(self, root: Path | None) -> None:
+        self.root = root.resolve() if root is not None else None
+
+    def locate(self, name: str) -> Path:
+        """Return the path of a file in the folder.
+
+        Args:
+            name: relative to the folder, or from ``/programs/`` or ``/ursim/programs/``.
+
+        Raises:
+            FileNotFoundError: it would be outside, or there is no folder.
+        """
+        for start in _ROOTS:
+            name = name.removeprefix(start)
+        if self.root is None or not name or "\0" in name:
+            raise FileNotFoundError(name)
+        try:
+            path = (self.root / name).resolve()
+        except (RuntimeError, ValueError) as exc:  # links in a circle, a name that no file can have
+            raise FileNotFoundError(name) from exc
+        if not path.is_relative_to(self.root):
+            raise FileNotFoundError(name)
+        return path
+
+    def read(self, name: str) -> bytes:
+        """Return the content of a file.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            OSError: it cannot be read, or is too long.
+        """
+        path = self.locate(name)
+        if not path.is_file():
+            raise FileNotFoundError(name)
+        return read_file(path, _LARGEST_PROGRAM)
+
+    def load(self, name: str) -> ProgramFile:
+        """Return a program.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            OSError: it cannot be read.
+            ScriptError: it is not a program, or not one that is simulated.
+        """
+        path, source = self.locate(name), name
+        data = self.read(name)
+        beside = path.with_suffix(".script")
+        if path.suffix == ".urp" and beside.is_file():
+            data, source = read_file(beside, _LARGEST_PROGRAM), beside.name
+        assert self.root is not None
+        shown = f"{_ROOTS[1]}{path.relative_to(self.root).as_posix()}"
+        return ProgramFile(path.name, shown, read_program(Path(source).name, data))
+
+    def has(self, name: str) -> bool:
+        """Return whether there is such a file."""
+        try:
+            return self.locate(name).is_file()
+        except FileNotFoundError:
+            return False
+
+    def names(self, *suffixes: str) -> Iterable[str]:
+        """Return the paths, relative to the folder, of all files that end in one of these ways."""
+        found = sorted(self.root.rglob("*")) if self.root is not None else []
+        return [path.relative_to(self.root).as_posix() for path in found if path.suffix in suffixes]  # type: ignore[arg-type]
+
+    def save(self, name: str, data: bytes) -> Path:
+        """Write a file into the folder, and return its path.
+
+        Raises:
+            OSError: it cannot be written, would be outside, or there is no folder.
+        """
+        path = self.locate(name)
+        path.write_bytes(data)
+        return path

@@ -1,0 +1,226 @@
+"""State of PolyScope, which dashboard and robot API share: the loaded program, modes, log messages, reports.
+
+The script of an External Control node is asked for at ``play``, from the program that has it, without holding a cycle
+up. That program listens on a TCP port and answers the line ``request_program`` with URScript. Nothing marks its end, so
+that it ends with the connection or with a pause. Source: Universal Robots, External Control URCap and client library.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import socket
+import threading
+import time
+import zipfile
+from collections import deque
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+
+from coneskin.robot.sim.machine.controller import Controller, describe
+from coneskin.robot.sim.urscript.translator import MAX_LENGTH
+from coneskin.robot.sim.urscript.values import ScriptError
+
+from .program_file import ProgramFile, ProgramFolder
+from .program_tree import EXTERNAL_CONTROL
+
+__all__ = ["SERIAL_NUMBER", "ScriptRequest", "UserInterface"]
+
+REQUEST = b"request_program\n"
+CONNECT_TIMEOUT = 2.0  #: s
+FIRST_TIMEOUT = 2.0  #: s; until the script begins to come
+PAUSE = 0.1  #: s; the script has come to its end when nothing more comes for so long
+
+
+class ScriptRequest:
+    """Request for a script, made in a thread of its own.
+
+    Args:
+        address: host and port of the program that has it.
+    """
+
+    def __init__(self, address: tuple[str, int]) -> None:
+        self.address = address
+        self._answer: SimpleQueue[str | OSError] = SimpleQueue()
+        threading.Thread(target=self._ask, daemon=True).start()
+
+    def result(self) -> str | OSError | None:
+        """Return the script, or why there is none; None while it is still to come."""
+        try:
+            return self._answer.get_nowait()
+        except Empty:
+            return None
+
+    def _ask(self) -> None:
+        try:
+            with socket.create_connection(self.address, CONNECT_TIMEOUT) as sock:
+                sock.sendall(REQUEST)
+                self._answer.put(_read(sock).decode("utf-8", "replace"))
+        except OSError as exc:
+            self._answer.put(exc)
+
+
+def _read(sock: socket.socket) -> bytes:
+    """Read until the other side closes, or pauses after its first bytes.
+
+    Raises:
+        OSError: nothing comes, or too much.
+    """
+    text = b""
+    end = time.monotonic() + FIRST_TIMEOUT
+    while time.monotonic() < end or text:
+        sock.settimeout(PAUSE if text else FIRST_TIMEOUT)
+        try:
+            more = sock.recv(65536)
+        except TimeoutError:
+            break
+        if not more:
+            break
+        text += more
+        if len(text) > MAX_LENGTH:
+            raise OSError(f"the script has more than {MAX_LENGTH} characters")
+    if not text:
+        raise OSError("no script came")
+    return text
+
+
+SERIAL_NUMBER = "20250000001"  #: of every simulated arm
+MOST_MESSAGES = 1000  #: log messages that are kept
+MOST_REPORTS = 10  #: flight reports that are kept
+NO_MODE = "NONE"  #: operational mode that no client controls
+
+
+class UserInterface:
+    """PolyScope of one controller.
+
+    Args:
+        controller: runs the programs.
+        run: takes the text of a program and starts it once it is translated.
+        check: raises a ScriptError where the text of a program cannot be translated, as far as that shows at once.
+
+    Attributes:
+        run: as given.
+        folder: its disk.
+        loaded: program that ``play`` starts; None before the first.
+        installation: that is loaded.
+        operational_mode: that a client has set; NO_MODE where none has.
+        user_role: of CB3.
+        popup: text of the window that a client has opened; empty where none is open.
+    """
+
+    def __init__(
+        self, controller: Controller, run: Callable[[str], None], check: Callable[[str], object] = lambda _: None
+    ) -> None:
+        options = controller.options
+        self.controller = controller
+        self.folder = ProgramFolder(options.programs)
+        self.loaded = ProgramFile("play.script", "play.script", options.program) if options.program else None
+        self.installation = "default.installation"
+        self.operational_mode = NO_MODE
+        self.user_role = "PROGRAMMER"
+        self.popup = ""
+        self.messages: deque[str] = deque(maxlen=MOST_MESSAGES)
+        self.reports: deque[str] = deque(maxlen=MOST_REPORTS)
+        self.run = run
+        self._check = check
+        self._request: ScriptRequest | None = None
+        self._count = 0
+
+    # programs
+
+    def load(self, name: str) -> None:
+        """Load a program; the one that runs is stopped.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            OSError: it cannot be read.
+            ScriptError: it is not a program, or not one that is simulated.
+        """
+        loaded = self.folder.load(name)
+        self.stop("another program was loaded")
+        self.loaded = loaded
+        self.controller.log("loaded", program=loaded.path)
+
+    def play(self) -> bool:
+        """Go on with the paused program, or start the loaded one; return False where neither is possible.
+
+        A short program that cannot be translated is told to all clients, and is not started; of a long one they are
+        told later.
+        """
+        controller = self.controller
+        if controller.resume_program():
+            return True
+        if controller.runtime.paused or self.loaded is None:
+            return False
+        if controller.program is not None or self._request is not None:
+            return True  # it runs, or is about to
+        if not controller.ready:
+            return False
+        try:
+            self._check(self.loaded.text)
+        except ScriptError as exc:
+            controller.fail(self.loaded.name, exc)
+            return False
+        if self.loaded.takes_external_script:
+            self._request = ScriptRequest(controller.options.external_control)
+        else:
+            self.run(self.loaded.text)
+        return True
+
+    def turn(self) -> None:
+        """Start the loaded program once the script of its External Control node has come; called in each cycle."""
+        if self._request is None or (script := self._request.result()) is None:
+            return
+        address, self._request = self._request.address, None
+        if isinstance(script, str) and self.loaded is not None:
+            self.run(self.loaded.text.replace(EXTERNAL_CONTROL, script))
+        else:
+            host, port = address
+            problem = f"the node External Control got no script from {host} port {port}: {script}"
+            self.controller.fail(self.loaded.name if self.loaded else "", ScriptError(problem))
+
+    def stop(self, reason: str) -> None:
+        """Stop the program that runs, or is about to."""
+        self._request = None
+        self.controller.stop_program(reason)
+
+    @property
+    def program_name(self) -> str:
+        """Name of the program that runs; where none does, of the one that is loaded."""
+        running, loaded = self.controller.program, self.loaded
+        if running is not None and (loaded is None or running.name != loaded.function):
+            return running.name
+        return loaded.name if loaded is not None else "<unnamed>"
+
+    # log and reports
+
+    def save_log(self) -> None:
+        """Write the log messages of clients to the folder.
+
+        Raises:
+            OSError: that is not possible, or there is no folder.
+        """
+        self.folder.save("log_history.txt", "".join(f"{line}\n" for line in self.messages).encode())
+
+    def report(self, kind: str) -> int:
+        """Keep the present state as a flight report; return its number."""
+        self._count += 1
+        facts = {"id": self._count, "type": kind or "system", "state": describe(self.controller)}
+        self.reports.append(json.dumps(facts))
+        return self._count
+
+    def support_file(self, folder: str) -> str:
+        """Write log messages and flight reports, packed, into a folder on the disk; return the file's path there.
+
+        Raises:
+            OSError: that is not possible, or there is no such folder.
+        """
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("log_history.txt", "\n".join(self.messages))
+            for number, text in enumerate(self.reports, 1):
+                archive.writestr(f"flight_reports/{number}.json", text)
+        name = f"ur_{SERIAL_NUMBER}_{self.controller.cycle}.zip"
+        where = name if folder in ("", ".", "/") else f"{folder}/{name}"
+        self.folder.save(where, packed.getvalue())
+        return where

@@ -1,1 +1,0 @@
-"""Controller of the simulation, and the programs that it runs."""

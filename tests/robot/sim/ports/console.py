@@ -1,0 +1,50 @@
+"""Controller with its user interface, without sockets: what a test of PolyScope's clients needs."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+from coneskin.robot.sim.machine.builtins import Builtins
+from coneskin.robot.sim.machine.controller import Controller
+from coneskin.robot.sim.machine.states import Options
+from coneskin.robot.sim.ports.dashboard import Dashboard
+from coneskin.robot.sim.ports.user_interface import UserInterface
+from coneskin.robot.sim.urscript.translator import Translation, translate
+
+WAIT = '<Wait type="Sleep"><waitTime>0.01</waitTime></Wait>'
+EXTERNAL = (
+    '<Contributed strategyClass="com.fzi.externalcontrol.ExternalControlNode" '
+    'strategyProgramNodeType="External Control"><dataModel/></Contributed>'
+)
+
+
+def packed(nodes: str, once: str = "false") -> bytes:
+    """Return a ``.urp`` file with these nodes."""
+    main = f'<MainProgram runOnlyOnce="{once}"><children>{nodes}</children></MainProgram>'
+    return gzip.compress(f"<URProgram><children><InitVariablesNode/>{main}</children></URProgram>".encode())
+
+
+class Console:
+    """Controller, its user interface and one client of its dashboard."""
+
+    def __init__(self, programs: Path | None = None, **options: Any) -> None:
+        self.controller = Controller(Options(programs=programs, **options))
+        self.interface = UserInterface(self.controller, self.run, self.translate)
+        self.dashboard = Dashboard(self.interface)
+
+    def translate(self, text: str) -> Translation:
+        return translate(text, Builtins.names(), Builtins.blocking())
+
+    def run(self, text: str) -> None:
+        self.controller.program_arrived()
+        self.controller.load(self.translate(text))
+
+    def step(self, cycles: int) -> None:
+        for _ in range(cycles):
+            self.interface.turn()
+            self.controller.step()
+
+    def say(self, line: str) -> str:
+        return self.dashboard.answer(line)
