@@ -18,7 +18,7 @@ from coneskin.core.files import read_file
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 
-from .compiler import SIMULATOR, bounded_memory
+from .compiler import SIMULATOR_MEMORY, bounded_memory
 from .machine.controller import Controller
 from .machine.states import DEFAULT_MODEL, START_Q, Options, Version
 from .motion.remote_plant import RemotePlant
@@ -150,7 +150,7 @@ def _serve(args: argparse.Namespace) -> int:
     try:
         plant = None if args.plant_descriptor is None else _plant(args.plant_descriptor, options)
         controller = Controller(options, log, plant)
-        with Server(controller, args.host, faults=args.faults) as server, bounded_memory(SIMULATOR):
+        with Server(controller, args.host, faults=args.faults) as server, bounded_memory(SIMULATOR_MEMORY):
             for number in (signal.SIGTERM, signal.SIGINT):
                 signal.signal(number, lambda *_: server.stop())
             _announce(args, controller, server)

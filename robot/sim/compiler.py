@@ -26,10 +26,10 @@ from .machine.builtins import Builtins
 from .urscript.translator import Translation, translate
 from .urscript.values import ScriptError
 
-__all__ = ["QUIRK_FIXES", "SIMULATOR", "TRANSLATOR", "Compiler", "bounded_memory"]
+__all__ = ["SIMULATOR_MEMORY", "Compiler", "bounded_memory"]
 
 #: definition in which stopL and stopJ do what their names say, and end the speed and servo threads first
-_STOP = """
+_EXEC_STOP = """
 def exec_stopl_stopj(command, message):
   deceleration = read_input_float_reg(0)
   background = read_input_integer_reg(1)
@@ -66,12 +66,12 @@ end
 """
 
 #: name of a function of the uploaded program -> corrected definition
-QUIRK_FIXES = {"exec_stopl_stopj": _STOP}
+_QUIRK_FIXES = {"exec_stopl_stopj": _EXEC_STOP}
 
 
-SIMULATOR = 512 * 2**20  #: bytes that the simulated controller may take beyond what it has at its start
-TRANSLATOR = 1024 * 2**20  #: bytes for the translation of a program, likewise
-_STATUS = Path("/proc/self/statm")
+SIMULATOR_MEMORY = 512 * 2**20  #: bytes that the simulated controller may take beyond what it has at its start
+_TRANSLATOR_MEMORY = 1024 * 2**20  # bytes for the translation of a program, likewise
+_STATUS_FILE = Path("/proc/self/statm")
 
 
 @contextmanager
@@ -85,7 +85,7 @@ def bounded_memory(beyond: int) -> Iterator[bool]:
         import resource
 
         soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-        now = int(_STATUS.read_text().split()[0]) * resource.getpagesize()
+        now = int(_STATUS_FILE.read_text().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (now + beyond, hard))
     except (ImportError, OSError, ValueError):
         yield False
@@ -96,11 +96,11 @@ def bounded_memory(beyond: int) -> Iterator[bool]:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
-TRANSLATION_TIME = 10.0  #: s; a translation that takes longer is ended, and the program refused
-MOST_KNOWN = 100  #: programs whose translation is kept
-IN_PLACE_LIMIT = 4000  #: characters; a shorter program is translated in place, in about a millisecond
-IN_PLACE_TIME = 0.0005  #: s of the processor in one cycle, beyond which no further one is begun in place
-MOST_WAITING = 5000  #: programs that have come and are not translated yet; a packet holds fewer
+_TRANSLATION_TIME = 10.0  # s; a translation that takes longer is ended, and the program refused
+_MAX_KNOWN = 100  # programs whose translation is kept
+_IN_PLACE_LENGTH = 4000  # characters; a shorter program is translated in place, in about a millisecond
+_IN_PLACE_TIME = 0.0005  # s of the processor in one cycle, beyond which no further one is begun in place
+_MAX_WAITING = 5000  # programs that have come and are not translated yet; a packet holds fewer
 _LENGTH_PREFIX = struct.Struct(">I")  #: bytes that follow, before each message of the translating process
 
 #: number of a program, and its translation or what is wrong with it
@@ -140,8 +140,8 @@ class Compiler:
             text: of the program.
             secondary: it runs beside another, and neither overtakes nor is overtaken.
         """
-        if len(self._waiting) >= MOST_WAITING:
-            self._done.put((number, ScriptError(f"{MOST_WAITING} programs wait already")))
+        if len(self._waiting) >= _MAX_WAITING:
+            self._done.put((number, ScriptError(f"{_MAX_WAITING} programs wait already")))
             return
         if not secondary:
             self._newest = number
@@ -153,7 +153,7 @@ class Compiler:
             return
         if text in self._known:
             self._done.put((number, self._known[text]))
-        elif len(text) <= IN_PLACE_LIMIT:
+        elif len(text) <= _IN_PLACE_LENGTH:
             try:
                 self._done.put((number, _translate(text, self._fix_quirks)))
             except ScriptError as exc:
@@ -167,12 +167,12 @@ class Compiler:
         Raises:
             ScriptError: it cannot be translated.
         """
-        if text not in self._known and len(text) <= IN_PLACE_LIMIT:
+        if text not in self._known and len(text) <= _IN_PLACE_LENGTH:
             _translate(text, self._fix_quirks)
 
     def results(self) -> list[Result]:
         """Return what has been translated since the last call; once in each control cycle."""
-        end = time.thread_time() + IN_PLACE_TIME
+        end = time.thread_time() + _IN_PLACE_TIME
         while self._waiting and time.thread_time() < end:
             self._begin(*self._waiting.popleft())
         ready = []
@@ -189,13 +189,13 @@ class Compiler:
                 try:
                     made = _ask(worker, text, self._fix_quirks)
                 except (OSError, struct.error, EOFError, pickle.UnpicklingError) as exc:  # it has died of this program
-                    why = f"the translation has failed, or took more than {TRANSLATION_TIME:g} s: {type(exc).__name__}"
+                    why = f"the translation has failed, or took more than {_TRANSLATION_TIME:g} s: {type(exc).__name__}"
                     self._done.put((number, ScriptError(why)))
                     _end(worker)
                     worker = _start_worker()
                     continue
                 if isinstance(made, Translation):
-                    if len(self._known) >= MOST_KNOWN:
+                    if len(self._known) >= _MAX_KNOWN:
                         self._known.clear()
                     self._known[text] = made
                 self._done.put((number, made))
@@ -217,7 +217,7 @@ def _end(worker: subprocess.Popen[bytes]) -> None:
 def _ask(worker: subprocess.Popen[bytes], text: str, fix_quirks: bool) -> Translation | ScriptError:
     assert worker.stdin is not None
     assert worker.stdout is not None
-    deadline = threading.Timer(TRANSLATION_TIME, worker.kill)  # the read below then ends
+    deadline = threading.Timer(_TRANSLATION_TIME, worker.kill)  # the read below then ends
     deadline.start()
     try:
         _send(worker.stdin, pickle.dumps((text, fix_quirks)))
@@ -233,7 +233,7 @@ def _ask(worker: subprocess.Popen[bytes], text: str, fix_quirks: bool) -> Transl
 def serve() -> None:
     """Translate what comes on stdin until it ends: the main function of the translating process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the controller, which ends this process
-    with bounded_memory(TRANSLATOR):
+    with bounded_memory(_TRANSLATOR_MEMORY):
         _serve(sys.stdin.buffer, sys.stdout.buffer)
 
 
@@ -251,7 +251,7 @@ def _serve(source: IO[bytes], target: IO[bytes]) -> None:
 
 
 def _translate(text: str, fix_quirks: bool) -> Translation:
-    return translate(text, Builtins.names(), Builtins.blocking(), QUIRK_FIXES if fix_quirks else None)
+    return translate(text, Builtins.names(), Builtins.blocking(), _QUIRK_FIXES if fix_quirks else None)
 
 
 def _send(pipe: IO[bytes], data: bytes) -> None:

@@ -21,7 +21,7 @@ __all__ = ["FaultInjector", "Services"]
 
 _WITH_NUMBERS = ("resist JOINT AMPERES", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
 #: word of a line -> the services that it means
-_SERVICES = {
+_SERVICE_PORTS = {
     "rtde": ("RTDE",),
     "dashboard": ("dashboard",),
     "scripts": ("primary", "secondary", "realtime"),
@@ -67,7 +67,7 @@ class FaultInjector:
             "reduced mode on": lambda: controller.reduce(True),
             "reduced mode off": lambda: controller.reduce(False),
         }
-        for word, names in _SERVICES.items():
+        for word, names in _SERVICE_PORTS.items():
             if word != "network":
                 self._lines[f"close {word}"] = partial(_sum, services.drop_all, names)
             self._lines[f"cut {word}"] = partial(_each, services.cut, names)

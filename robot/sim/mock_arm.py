@@ -16,7 +16,7 @@ __all__ = ["SLIDER", "CompanionProcesses", "MockArm"]
 #: what a controller reports of its speed slider
 SLIDER = Recipe(("target_speed_fraction",))
 
-_CYCLE = 0.002  # s
+_CONTROL_CYCLE = 0.002  # s
 
 
 @dataclass
@@ -87,15 +87,15 @@ class MockArm:
 
     def advance(self) -> None:
         """Go on by one control cycle."""
-        self.clock += _CYCLE
+        self.clock += _CONTROL_CYCLE
         if self.following and self.registers is not None and self.registers.token == self.following:
             self.target, self.acceleration = list(self.registers.qd), self.registers.acceleration
         if self.target is not None:
             target = [self.slider * t if self.heeds else t for t in self.target]
             gap = max(abs(t - v) for t, v in zip(target, self.qd, strict=True))
-            share = min(1.0, self.acceleration * _CYCLE / gap) if gap else 1.0
+            share = min(1.0, self.acceleration * _CONTROL_CYCLE / gap) if gap else 1.0
             self.qd = [v + share * (t - v) for t, v in zip(target, self.qd, strict=True)]
-        self.q = [x + v * _CYCLE for x, v in zip(self.q, self.qd, strict=True)]
+        self.q = [x + v * _CONTROL_CYCLE for x, v in zip(self.q, self.qd, strict=True)]
 
     def packet(self, q: Sequence[float], qd: Sequence[float], current: Sequence[float]) -> bytes:
         """Return the payload of an RTDE packet with these positions [rad], speeds [rad/s] and currents [A] measured."""
@@ -103,7 +103,7 @@ class MockArm:
         return RECIPE.pack((self.clock, tuple(q), tuple(qd), *modes, tuple(current), (0.0,) * 6))
 
 
-_PERIOD = 0.02  # s between two heartbeats
+_REPORT_PERIOD = 0.02  # s between two heartbeats
 
 
 class CompanionProcesses:
@@ -132,7 +132,7 @@ class CompanionProcesses:
         """Return what they say by a host time [s]; to be asked continuously."""
         due = now >= self._due
         if due:
-            self._due = now + _PERIOD
+            self._due = now + _REPORT_PERIOD
         if due and not self.program_is_mute:
             yield Block(BlockKind.PROGRAM, now, b"")
         if self.process_is_mute:

@@ -28,12 +28,12 @@ from .ports.rtde import RtdeOutputs, RtdeSession
 from .ports.user_interface import UserInterface
 from .urscript.translator import Translation
 
-__all__ = ["PORTS", "SCRIPT_PORTS", "PortServices", "Server", "is_loopback"]
+__all__ = ["PORTS", "Server", "is_loopback"]
 
-SCRIPT_PORTS = ("primary", "secondary", "realtime")  #: that take URScript, and send the state
+_SCRIPT_PORTS = ("primary", "secondary", "realtime")  # that take URScript, and send the state
 
 
-class PortServices:
+class _PortServices:
     """Services of one controller.
 
     Args:
@@ -67,7 +67,7 @@ class PortServices:
         """Return what a new client of a service gets first."""
         if name == "dashboard" and not self._faults.dashboard_silent:
             return WELCOME.encode() + b"\n"
-        return self._publisher.greeting(name) if name in SCRIPT_PORTS else b""
+        return self._publisher.greeting(name) if name in _SCRIPT_PORTS else b""
 
     def _unless_silent(self, answer: Callable[[str], str]) -> Callable[[str], str]:
         def reply(line: str) -> str:
@@ -79,19 +79,19 @@ class PortServices:
 
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
 PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
-OPTIONAL = ("robot API", "faults")  #: services with a port of one's own choice
-MAX_LATENESS = 0.05  #: s; later cycles are skipped, not made up for: the process was frozen
-_LOOPBACK = "127."  # of every address that no other computer can reach
-_BACKLOG = 16  # connections that wait to be accepted
-MAX_CLIENTS = 50  #: of each service
+_OPTIONAL_PORTS = ("robot API", "faults")  # services with a port of one's own choice
+_MAX_LATENESS = 0.05  # s; later cycles are skipped, not made up for: the process was frozen
+_LOOPBACK_PREFIX = "127."  # of every address that no other computer can reach
+_ACCEPT_BACKLOG = 16  # connections that wait to be accepted
+_MAX_CLIENTS = 50  # of each service
 #: bytes of one client that are read at a time. What a client has sent whose connection it resets, as ur_rtde does
 #: after each upload, is lost unless it is read at once; lines of the dashboard are dear, and their clients wait
-READ, READ_OF_DASHBOARD = 65536, 4096
+_READ_SIZE, _DASHBOARD_READ_SIZE = 65536, 4096
 
 
 def is_loopback(host: str) -> bool:
     """Return whether no other computer can have an address."""
-    return host.startswith(_LOOPBACK) or host == "localhost"
+    return host.startswith(_LOOPBACK_PREFIX) or host == "localhost"
 
 
 class Server:
@@ -117,10 +117,10 @@ class Server:
         self._publisher = Publisher(controller)
         self._selector = selectors.SelectSelector()
         self._listeners: dict[str, socket.socket] = {}
-        self._clients: dict[str, list[Client]] = {name: [] for name in (*PORTS, *OPTIONAL)}
+        self._clients: dict[str, list[Client]] = {name: [] for name in (*PORTS, *_OPTIONAL_PORTS)}
         self._compiler = Compiler(controller.options.quirks)
         self._interface = UserInterface(controller, self._program, self._compiler.check)
-        self._services = PortServices(self._interface, self.faults, self._publisher)
+        self._services = _PortServices(self._interface, self.faults, self._publisher)
         self._cut: set[str] = set()  # services that the network does not reach
         self._fillers: dict[str, socket.socket] = {}
         self._programs = 0
@@ -165,7 +165,7 @@ class Server:
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             sock.bind((host, port))
-            sock.listen(_BACKLOG)
+            sock.listen(_ACCEPT_BACKLOG)
         except OSError as exc:
             sock.close()
             taken = exc.errno == errno.EADDRINUSE
@@ -201,7 +201,7 @@ class Server:
             return
         self._cut.remove(name)
         self._fillers.pop(name).close()
-        self._listeners[name].listen(_BACKLOG)
+        self._listeners[name].listen(_ACCEPT_BACKLOG)
         self._selector.register(self._listeners[name], selectors.EVENT_READ, name)
         for client in self._clients[name]:
             self._selector.register(client.socket, selectors.EVENT_READ, (name, client))
@@ -221,7 +221,7 @@ class Server:
                 self._poll(wait)
                 continue
             self._poll(0.0)
-            if wait < -MAX_LATENESS:
+            if wait < -_MAX_LATENESS:
                 before, due = due, time.monotonic()
                 self.controller.frozen += due - before  # or its states would look ever later than they are
             while due <= time.monotonic():
@@ -250,7 +250,7 @@ class Server:
         self.controller.step()
 
     def _publish(self) -> None:
-        listening = frozenset(name for name in SCRIPT_PORTS if self._clients[name])
+        listening = frozenset(name for name in _SCRIPT_PORTS if self._clients[name])
         for name, (state, messages) in self._publisher.due(listening).items():
             for client in list(self._clients[name]) if name not in self._cut else ():
                 late = len(client.unsent)  # one that does not read misses states, and in the end messages too
@@ -276,7 +276,7 @@ class Server:
             sock, _ = listener.accept()
         except OSError:
             return
-        if len(self._clients[name]) >= MAX_CLIENTS:
+        if len(self._clients[name]) >= _MAX_CLIENTS:
             sock.close()
             return
         client = self._services.client(name, sock)
@@ -288,7 +288,7 @@ class Server:
         if client not in self._clients[name] or name in self._cut:
             return  # dropped, or cut, while this batch of events was handled
         try:
-            data = client.socket.recv(READ_OF_DASHBOARD if name == "dashboard" else READ)
+            data = client.socket.recv(_DASHBOARD_READ_SIZE if name == "dashboard" else _READ_SIZE)
         except BlockingIOError:
             return
         except OSError:

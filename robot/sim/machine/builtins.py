@@ -40,7 +40,7 @@ from .states import PopupNotice, TextNotice
 
 __all__ = ["Builtins"]
 
-NAN6 = (math.nan,) * 6  #: value of what is not simulated, for six joints
+_NOT_SIMULATED = (math.nan,) * 6  # value of what is not simulated, for six joints
 
 
 class Builtins(
@@ -198,7 +198,7 @@ class Builtins(
 
     def get_joint_torques(self) -> Array:
         """Return six NaN: outer torques are not simulated."""
-        return Array(NAN6)
+        return Array(_NOT_SIMULATED)
 
     def is_steady(self) -> bool:
         """Return whether the arm stands."""

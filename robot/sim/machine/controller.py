@@ -38,9 +38,9 @@ def _plain(value: object) -> object:
     return list(value) if isinstance(value, list | tuple) else str(value)
 
 
-MAX_NOTICES = 1000  #: that wait to be sent; a program that writes more in a cycle loses the oldest
-HISTORY = 500  #: cycles; the range of get_actual_joint_positions_history
-REDUCED_SHARE = 0.5  #: of the speed slider, in reduced mode; a real controller has limits of its own instead
+_MAX_NOTICES = 1000  # that wait to be sent; a program that writes more in a cycle loses the oldest
+_HISTORY_LENGTH = 500  # cycles; the range of get_actual_joint_positions_history
+_REDUCED_SHARE = 0.5  # of the speed slider, in reduced mode; a real controller has limits of its own instead
 _AT_STANDSTILL = {Runtime.STOPPING: Runtime.STOPPED, Runtime.PAUSING: Runtime.PAUSED}
 
 
@@ -90,8 +90,8 @@ class Controller:
         self.runtime = Runtime.STOPPED
         self.robot_mode = RobotMode.RUNNING
         self.safety_system = SafetySystem(options.unlock_after, self.log, self.tell)
-        self.history: deque[list[float]] = deque([list(self.arm.q)], maxlen=HISTORY)
-        self.notices: deque[Notice] = deque(maxlen=MAX_NOTICES)
+        self.history: deque[list[float]] = deque([list(self.arm.q)], maxlen=_HISTORY_LENGTH)
+        self.notices: deque[Notice] = deque(maxlen=_MAX_NOTICES)
         self._arrived = 0  # cycle in which the last program came in
         self._due: tuple[int, Translation] | None = None
         self._log = log
@@ -106,7 +106,7 @@ class Controller:
     @property
     def speed_scaling(self) -> float:
         """Share of the commanded speeds at which paths run; the safety system's own stops are not in it."""
-        return self.slider * REDUCED_SHARE if self.safety is SafetyMode.REDUCED else self.slider
+        return self.slider * _REDUCED_SHARE if self.safety is SafetyMode.REDUCED else self.slider
 
     def step(self) -> None:
         """Run one control cycle."""
@@ -261,7 +261,7 @@ class Controller:
         return self.safety.name
 
     def reduce(self, on: bool) -> str:
-        """Begin or end reduced mode, in which paths and speeds are at most `REDUCED_SHARE` of what is commanded."""
+        """Begin or end reduced mode, in which paths and speeds are at most `_REDUCED_SHARE` of what is commanded."""
         self.safety_system.reduce(on)
         return self.safety.name
 

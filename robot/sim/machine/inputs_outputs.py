@@ -137,8 +137,8 @@ class ClientInputs:
 
 CURRENT = 0  #: domain of an analog terminal
 VOLTAGE = 1  #: the other
-_RANGES = {CURRENT: (0.004, 0.020), VOLTAGE: (0.0, 10.0)}  # of an output at 0 and at 1 [A], [V]
-_LARGEST = {CURRENT: 0.020, VOLTAGE: 10.0}  # of an input
+_OUTPUT_RANGES = {CURRENT: (0.004, 0.020), VOLTAGE: (0.0, 10.0)}  # of an output at 0 and at 1 [A], [V]
+_MAX_INPUT = {CURRENT: 0.020, VOLTAGE: 10.0}  # of an input
 _DIGITAL, _ANALOG = 18, 4
 
 
@@ -190,7 +190,7 @@ class Terminals:
         """
         if not 0 <= index < _ANALOG:
             raise RobotRefused(f"an analog input is a number from 0 to {_ANALOG - 1}, got {index}")
-        largest = _LARGEST[self.input_domains[index]]
+        largest = _MAX_INPUT[self.input_domains[index]]
         if not 0.0 <= value <= largest:
             raise RobotRefused(f"analog input {index} takes 0 to {largest:g} V or A, got {value:g}")
         self.analog_inputs[index] = value
@@ -208,7 +208,7 @@ class Terminals:
 
     def analog_output(self, index: int) -> float:
         """Return what an analog output gives [A or V]."""
-        low, high = _RANGES[self.output_domains[index]]
+        low, high = _OUTPUT_RANGES[self.output_domains[index]]
         return low + self.ratios[index] * (high - low)
 
     def analog_types(self) -> int:

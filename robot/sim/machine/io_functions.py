@@ -21,7 +21,7 @@ __all__ = ["InstallationFunctions", "IoFunctions", "index_of"]
 
 STANDARD, CONFIGURABLE, TOOL = 0, 8, 16  #: first bit of each kind of digital terminal
 _REGISTERS, _BITS = 48, 128
-_ACTIONS = ("pause", "stop", "ignore")
+_INPUT_ACTION_NAMES = ("pause", "stop", "ignore")
 
 
 def index_of(address: Any, count: int) -> int:
@@ -88,8 +88,8 @@ class IoFunctions:
         name, wanted = str(variable_name), str(action).lower()
         if name not in self._host.inputs or name not in VARIABLES:
             raise ScriptError(f"rtde_set_watchdog: there is no input {name[:99]!r}")
-        if wanted not in _ACTIONS:
-            raise ScriptError(f"rtde_set_watchdog: an action is {', '.join(_ACTIONS)}, got {wanted[:99]!r}")
+        if wanted not in _INPUT_ACTION_NAMES:
+            raise ScriptError(f"rtde_set_watchdog: an action is {', '.join(_INPUT_ACTION_NAMES)}, got {wanted[:99]!r}")
         self._host.inputs.watch(name, float(min_frequency), wanted, self._host.cycle)
 
     # digital

@@ -20,11 +20,11 @@ from .script_host import ScriptHost
 from .script_socket import ScriptSocket
 from .states import ProgramFailed, ProgramNotice
 
-__all__ = ["MAX_SECONDARY", "Program", "SecondaryPrograms", "Thread"]
+__all__ = ["Program", "SecondaryPrograms", "Thread"]
 
-MAX_STEPS = 100_000  #: iterations of loops, and calls, in one cycle; a program with more never waits, and is ended
-MAX_TIME = 0.1  #: s of the processor that a program may use in one cycle, likewise
-MAX_THREADS = 100  #: of a program, with those that have ended in this cycle
+_MAX_STEPS = 100_000  # iterations of loops, and calls, in one cycle; a program with more never waits, and is ended
+_MAX_TURN_TIME = 0.1  # s of the processor that a program may use in one cycle, likewise
+_MAX_THREADS = 100  # of a program, with those that have ended in this cycle
 
 
 class Thread:
@@ -100,7 +100,7 @@ class Program:
             ScriptError: the program has failed, and has ended.
         """
         self._steps = 0
-        self._end_time = time.thread_time() + MAX_TIME
+        self._end_time = time.thread_time() + _MAX_TURN_TIME
         for thread in self.threads:  # threads started in this cycle are appended, and run in it
             if not thread.alive:
                 continue
@@ -148,8 +148,8 @@ class Program:
     # called by the translated program
 
     def _run(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Thread:
-        if len(self.threads) >= MAX_THREADS:
-            raise ScriptError(f"more than {MAX_THREADS} threads")
+        if len(self.threads) >= _MAX_THREADS:
+            raise ScriptError(f"more than {_MAX_THREADS} threads")
         body = function(*arguments)
         thread = Thread(function.__name__[2:], body if isgenerator(body) else iter([]))
         self.threads.append(thread)
@@ -176,11 +176,11 @@ class Program:
     def _count_step(self) -> None:
         """Count an iteration or a call; end a program that would hold the control cycle up."""
         self._steps += 1
-        if self._steps > MAX_STEPS or time.thread_time() > self._end_time:
+        if self._steps > _MAX_STEPS or time.thread_time() > self._end_time:
             raise ScriptError("an endless loop without sync() or sleep()")
 
 
-MAX_SECONDARY = 20  #: that run at once
+_MAX_SECONDARY = 20  # that run at once
 
 
 class SecondaryPrograms:
@@ -195,8 +195,8 @@ class SecondaryPrograms:
 
     def start(self, translation: Translation) -> None:
         """Start one, unless too many run already."""
-        if len(self._running) >= MAX_SECONDARY:
-            reason = f"{MAX_SECONDARY} sec programs run already"
+        if len(self._running) >= _MAX_SECONDARY:
+            reason = f"{_MAX_SECONDARY} sec programs run already"
             self._host.log("refused", program=translation.name, reason=reason)
             self._host.tell(ProgramFailed(f"{translation.name} does not start: {reason}"))
             return

@@ -11,9 +11,9 @@ from coneskin.robot.sim.urscript.values import ScriptError
 
 __all__ = ["ScriptSocket", "may_connect"]
 
-_PENDING = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
-MAX_UNREAD = 65_536  #: bytes that have come and that the program has not read; more wait in the network
-MAX_READS = 10  #: of one connection in a control cycle; an assumption, so that a program that is sent more gives way
+_PENDING_ERRORS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
+_MAX_UNREAD = 65_536  # bytes that have come and that the program has not read; more wait in the network
+_MAX_READS = 10  # of one connection in a control cycle; an assumption, so that a program that is sent more gives way
 
 
 def may_connect(address: str, beyond: bool) -> str:
@@ -62,13 +62,13 @@ class ScriptSocket:
     def connect(self) -> bool | None:
         """Return whether it is connected; None while that is not known yet."""
         error = self._socket.connect_ex(self._peer)
-        if error in _PENDING:
+        if error in _PENDING_ERRORS:
             return None
         return error in (0, errno.EISCONN)
 
     def fill(self) -> None:
         """Take what has come, as far as there is room."""
-        while not self.ended and (room := MAX_UNREAD - len(self.unread)) > 0:
+        while not self.ended and (room := _MAX_UNREAD - len(self.unread)) > 0:
             try:
                 data = self._socket.recv(room)
             except BlockingIOError:
@@ -84,7 +84,7 @@ class ScriptSocket:
         if cycle != self._cycle:
             self._cycle, self._reads = cycle, 0
         self._reads += 1
-        return bool(self.unread) and self._reads > MAX_READS
+        return bool(self.unread) and self._reads > _MAX_READS
 
     def take(self, count: int) -> bytes:
         """Return the first bytes of what has come, and forget them."""
@@ -94,7 +94,7 @@ class ScriptSocket:
 
     def forget_if_full(self) -> None:
         """Forget what has come where it leaves no room for what a program looks for."""
-        if len(self.unread) >= MAX_UNREAD:
+        if len(self.unread) >= _MAX_UNREAD:
             self.unread.clear()
 
     def send(self, data: bytes) -> bool:

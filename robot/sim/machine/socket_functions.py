@@ -24,12 +24,12 @@ from .script_socket import ScriptSocket, may_connect
 
 __all__ = ["SocketFunctions"]
 
-MAX_SOCKETS = 32  #: of one program, at once; an assumption
-MAX_VALUES = 30  #: of one read
+_MAX_SOCKETS = 32  # of one program, at once; an assumption
+_MAX_VALUES = 30  # of one read
 MAX_LINE = 1023  #: characters that socket_read_line and socket_read_string return
 CONNECT_TIMEOUT = 2.0  #: s; an assumption
-_NAME = "socket_0"  # of a connection that the program does not name
-_LIST = re.compile(rb"[^(]*\(([^()]*)\)")
+_SOCKET_NAME = "socket_0"  # of a connection that the program does not name
+_NUMBER_LIST = re.compile(rb"[^(]*\(([^()]*)\)")
 
 
 class SocketFunctions:
@@ -38,14 +38,14 @@ class SocketFunctions:
     _host: ScriptHost
     _program: CallingProgram
 
-    def socket_open(self, address: Any, port: Any, socket_name: Any = _NAME) -> Generator[None, None, bool]:
+    def socket_open(self, address: Any, port: Any, socket_name: Any = _SOCKET_NAME) -> Generator[None, None, bool]:
         """Connect to a server; return whether that worked."""
         where = may_connect(str(address), self._host.beyond)
         if not 0 < int(port) < 65536:
             raise ScriptError(f"a port is from 1 to 65535, got {show(port)}")
         self.socket_close(socket_name)
-        if len(self._program.sockets) >= MAX_SOCKETS:
-            raise ScriptError(f"a program opens at most {MAX_SOCKETS} sockets at once")
+        if len(self._program.sockets) >= _MAX_SOCKETS:
+            raise ScriptError(f"a program opens at most {_MAX_SOCKETS} sockets at once")
         self._program.sockets[str(socket_name)] = connection = ScriptSocket(where, int(port))
         for _ in range(round(CONNECT_TIMEOUT / CYCLE)):
             connected = connection.connect()
@@ -58,7 +58,7 @@ class SocketFunctions:
         yield
         return False
 
-    def socket_close(self, socket_name: Any = _NAME) -> None:
+    def socket_close(self, socket_name: Any = _SOCKET_NAME) -> None:
         """Close a connection, if there is one of that name."""
         connection = self._program.sockets.pop(str(socket_name), None)
         if connection is not None:
@@ -66,27 +66,27 @@ class SocketFunctions:
 
     # write
 
-    def socket_send_byte(self, value: Any, socket_name: Any = _NAME) -> bool:
+    def socket_send_byte(self, value: Any, socket_name: Any = _SOCKET_NAME) -> bool:
         """Send one byte; return whether that worked."""
         return self._send(bytes([int(value) & 0xFF]), socket_name)
 
-    def socket_send_byte_list(self, values: Any, socket_name: Any = _NAME) -> bool:
+    def socket_send_byte_list(self, values: Any, socket_name: Any = _SOCKET_NAME) -> bool:
         """Send bytes; return whether that worked."""
         return self._send(bytes(int(value) & 0xFF for value in values), socket_name)
 
-    def socket_send_int(self, value: Any, socket_name: Any = _NAME) -> bool:
+    def socket_send_int(self, value: Any, socket_name: Any = _SOCKET_NAME) -> bool:
         """Send a whole number as four bytes, the highest first; return whether that worked."""
         return self._send(struct.pack(">I", int(value) & 0xFFFFFFFF), socket_name)
 
-    def socket_send_line(self, str: Any, socket_name: Any = _NAME) -> bool:
+    def socket_send_line(self, str: Any, socket_name: Any = _SOCKET_NAME) -> bool:
         """Send a value as text with an end of line; return whether that worked."""
         return self._send(text_of(str).encode() + b"\n", socket_name)
 
-    def socket_send_string(self, str: Any, socket_name: Any = _NAME) -> bool:
+    def socket_send_string(self, str: Any, socket_name: Any = _SOCKET_NAME) -> bool:
         """Send a value as text; return whether that worked."""
         return self._send(text_of(str).encode(), socket_name)
 
-    def socket_set_var(self, name: Any, value: Any, socket_name: Any = _NAME) -> None:
+    def socket_set_var(self, name: Any, value: Any, socket_name: Any = _SOCKET_NAME) -> None:
         """Send ``SET name value``, as a server of variables takes it."""
         self._send(f"SET {text_of(name)} {int(value)}\n".encode(), socket_name)
 
@@ -96,7 +96,7 @@ class SocketFunctions:
 
     # read
 
-    def socket_get_var(self, name: Any, socket_name: Any = _NAME) -> Generator[None, None, int]:
+    def socket_get_var(self, name: Any, socket_name: Any = _SOCKET_NAME) -> Generator[None, None, int]:
         """Ask a server of variables for a whole number; 0 where it does not answer within 2 s."""
         self._send(f"GET {text_of(name)}\n".encode(), socket_name)
         line = yield from self.socket_read_line(socket_name)
@@ -104,14 +104,14 @@ class SocketFunctions:
         return int(match[1]) if match else 0
 
     def socket_read_ascii_float(
-        self, number: Any, socket_name: Any = _NAME, timeout: Any = 2
+        self, number: Any, socket_name: Any = _SOCKET_NAME, timeout: Any = 2
     ) -> Generator[None, None, Array]:
         """Read numbers as text, ``(1.5, 2)``; return how many came, and their values; 0 and NaN after the timeout."""
         count = _count(number)
         values: list[float] = []
 
         def take(connection: ScriptSocket) -> bool:
-            match = _LIST.match(connection.unread)
+            match = _NUMBER_LIST.match(connection.unread)
             if match is None:
                 connection.forget_if_full()
                 return False
@@ -129,7 +129,7 @@ class SocketFunctions:
         return Array([len(values), *values, *[math.nan] * (count - len(values))])
 
     def socket_read_binary_integer(
-        self, number: Any, socket_name: Any = _NAME, timeout: Any = 2
+        self, number: Any, socket_name: Any = _SOCKET_NAME, timeout: Any = 2
     ) -> Generator[None, None, Array]:
         """Read whole numbers of four bytes; return their number, and them; 0 and -1 after the timeout."""
         count = _count(number)
@@ -137,21 +137,21 @@ class SocketFunctions:
         return Array([count, *struct.unpack(f">{count}i", data)] if data else [0, *[-1] * count])
 
     def socket_read_byte_list(
-        self, number: Any, socket_name: Any = _NAME, timeout: Any = 2
+        self, number: Any, socket_name: Any = _SOCKET_NAME, timeout: Any = 2
     ) -> Generator[None, None, Array]:
         """Read bytes; return their number, and them; 0 and -1 after the timeout."""
         count = _count(number)
         data = yield from self._read(count, socket_name, timeout)
         return Array([count, *data] if data else [0, *[-1] * count])
 
-    def socket_read_line(self, socket_name: Any = _NAME, timeout: Any = 2) -> Generator[None, None, str]:
+    def socket_read_line(self, socket_name: Any = _SOCKET_NAME, timeout: Any = 2) -> Generator[None, None, str]:
         """Read a line, without its end; an empty text after the timeout."""
         line = yield from self.socket_read_string(socket_name, suffix="\n", timeout=timeout)
         return line.removesuffix("\r")
 
     def socket_read_string(
         self,
-        socket_name: Any = _NAME,
+        socket_name: Any = _SOCKET_NAME,
         prefix: Any = "",
         suffix: Any = "",
         interpret_escape: Any = False,
@@ -211,8 +211,8 @@ class SocketFunctions:
 
 
 def _count(value: Any) -> int:
-    if not 1 <= int(value) <= MAX_VALUES:
-        raise ScriptError(f"one read takes 1 to {MAX_VALUES} values, got {show(value)}")
+    if not 1 <= int(value) <= _MAX_VALUES:
+        raise ScriptError(f"one read takes 1 to {_MAX_VALUES} values, got {show(value)}")
     return int(value)
 
 

@@ -26,14 +26,11 @@ from coneskin.robot.arm.ur_inertias import arm_inertia
 from .plant import KinematicPlant, PlantState
 
 __all__ = [
-    "CLOSE_TO_JOINT_LIMITS",
     "CYCLE",
     "DEFAULT_DECELERATION",
     "INVALID_SETPOINT",
-    "IN_SINGULARITY",
     "JOINT_ACCELERATION",
     "MAX_ACCELERATION",
-    "NEAR_SINGULARITY",
     "SUDDEN_CHANGE",
     "TRIGGERED",
     "Motion",
@@ -41,7 +38,6 @@ __all__ = [
     "SimulatedArm",
     "StopCause",
     "decelerate",
-    "deviation",
     "integrate",
     "max_abs",
     "solve_linear",
@@ -68,17 +64,17 @@ class StopCause:
         return f"C{self.code}A{self.argument}"
 
 
-CLOSE_TO_JOINT_LIMITS = StopCause(150, 0, "Position close to joint limits")
-IN_SINGULARITY = StopCause(154, 0, "Position in singularity")
+_CLOSE_TO_JOINT_LIMITS = StopCause(150, 0, "Position close to joint limits")
+_IN_SINGULARITY = StopCause(154, 0, "Position in singularity")
 SUDDEN_CHANGE = StopCause(204, 1, "Path sanity check failed: Sudden change in target position")
 INVALID_SETPOINT = StopCause(204, 5, "Path sanity check failed: Robot program resulted in invalid setpoint")
-NEAR_SINGULARITY = StopCause(
+_NEAR_SINGULARITY = StopCause(
     204, 7, "Path sanity check failed: Robot approaching singularity - Acceleration threshold failed"
 )
 TRIGGERED = StopCause(209, 0, "A protective stop was triggered (for test purposes only)")
 
 
-def deviation(joint: int) -> StopCause:
+def _deviation(joint: int) -> StopCause:
     """Return the cause of a joint, counted from 0, that cannot follow its path."""
     return StopCause(153, joint, f"Position deviates from path: Detected by the {_JOINT_NAMES[joint]} joint.")
 
@@ -87,8 +83,8 @@ CYCLE = 0.002  #: control cycle of an e-Series controller [s]
 DEFAULT_DECELERATION = 10.0  #: of the leading joint where the command gives none [rad/s^2]; an assumption
 JOINT_ACCELERATION = 40.0  #: highest acceleration of a joint, as a UR5e reports it in its configuration [rad/s^2]
 MAX_ACCELERATION = 100.0  #: of a joint; a step of speed beyond it is a trajectory fault [rad/s^2]
-_STANDS = 1e-3  # rad/s; measured speeds up to it count as none: a plant with dynamics never rests entirely
-SPEED_MARGIN = 1.01  #: share of its highest speed at which the safety system stops a joint
+_STANDSTILL_SPEED = 1e-3  # rad/s; measured speeds up to it count as none: a plant with dynamics never rests entirely
+_SPEED_MARGIN = 1.01  # share of its highest speed at which the safety system stops a joint
 _EASY_ACCELERATION = 5.0  # rad/s^2, of every joint; what no arm's motors lack the torque for: it is not worked out
 
 
@@ -194,7 +190,7 @@ class SimulatedArm:
     @property
     def turning(self) -> bool:
         """True while any joint turns, as measured, or is commanded to."""
-        return self.moving or max_abs(self.measured.qd) > _STANDS
+        return self.moving or max_abs(self.measured.qd) > _STANDSTILL_SPEED
 
     @property
     def blends(self) -> bool:
@@ -210,15 +206,15 @@ class SimulatedArm:
                 raise MotionFault(INVALID_SETPOINT, f"joint {i + 1}: its position or its speed is not a number")
             if abs(speed - self.qd[i]) > MAX_ACCELERATION * CYCLE:
                 detail = f"joint {i + 1}: speed jumps by {speed - self.qd[i]:.2f} rad/s in one cycle"
-                raise MotionFault(NEAR_SINGULARITY if of_tool else SUDDEN_CHANGE, detail)
-            if abs(speed) > SPEED_MARGIN * model.joint_speed[i]:
+                raise MotionFault(_NEAR_SINGULARITY if of_tool else SUDDEN_CHANGE, detail)
+            if abs(speed) > _SPEED_MARGIN * model.joint_speed[i]:
                 detail = f"joint {i + 1}: speed {speed:.2f} rad/s above its limit {model.joint_speed[i]:.2f}"
-                raise MotionFault(NEAR_SINGULARITY if of_tool else INVALID_SETPOINT, detail)
+                raise MotionFault(_NEAR_SINGULARITY if of_tool else INVALID_SETPOINT, detail)
             if speed:
                 rest = q[i] + speed * abs(speed) / (2.0 * DEFAULT_DECELERATION)  # where braking at once would end
                 if (speed > 0.0 and rest > model.joint_upper[i]) or (speed < 0.0 and rest < model.joint_lower[i]):
                     detail = f"joint {i + 1}: position {q[i]:.3f} rad is about to leave its limits"
-                    raise MotionFault(CLOSE_TO_JOINT_LIMITS, detail)
+                    raise MotionFault(_CLOSE_TO_JOINT_LIMITS, detail)
 
     def _check_torques(self, qd: list[float]) -> None:
         """Refuse a motion for which a motor has not the torque: a real arm would fall behind it."""
@@ -229,7 +225,7 @@ class SimulatedArm:
         for i, (torque, limit) in enumerate(zip(torques, self.inertia.torque, strict=True)):
             if abs(torque) > limit:
                 detail = f"it takes {abs(torque):.0f} N m, and the motor has {limit:.0f} N m"
-                raise MotionFault(deviation(i), detail)
+                raise MotionFault(_deviation(i), detail)
 
     def feasible_acceleration(self, direction: Sequence[float]) -> float:
         """Return the highest acceleration along a direction of the joints for which their motors have the torque.
@@ -294,7 +290,7 @@ def solve_linear(rows: Sequence[Sequence[float]], right: Sequence[float]) -> lis
     for k in range(n):
         lead = max(range(k, n), key=lambda i: abs(m[i][k]))
         if abs(m[lead][k]) < 1e-4:
-            raise MotionFault(IN_SINGULARITY, "the arm is in a singular position")
+            raise MotionFault(_IN_SINGULARITY, "the arm is in a singular position")
         m[k], m[lead] = m[lead], m[k]
         pivot = m[k]
         for i in range(k + 1, n):

@@ -25,7 +25,7 @@ from .arm import (
 __all__ = ["ServoJoints", "SpeedJoints", "SpeedTool", "StopJoints", "StopTool"]
 
 
-class Sustained:
+class _Sustained:
     """Motion that goes on while the program repeats its command.
 
     Attributes:
@@ -38,7 +38,7 @@ class Sustained:
     surplus = 0.0
 
 
-class SpeedJoints(Sustained):
+class SpeedJoints(_Sustained):
     """Constant joint speeds, reached with one acceleration of the leading joint and held (speedj)."""
 
     def __init__(self, target: Sequence[float], acceleration: float) -> None:
@@ -63,7 +63,7 @@ class SpeedJoints(Sustained):
         return integrate(arm.q, arm.qd, qd), qd
 
 
-class SpeedTool(Sustained):
+class SpeedTool(_Sustained):
     """Constant velocity and angular velocity of the tool centre point in the base frame (speedl)."""
 
     of_tool = True
@@ -94,7 +94,7 @@ class SpeedTool(Sustained):
         return integrate(arm.q, arm.qd, qd), qd
 
 
-class ServoJoints(Sustained):
+class ServoJoints(_Sustained):
     """Follower of a stream of positions, smoothed by look-ahead time and gain (servoj).
 
     As the URScript manual has it: the gain is the P-term towards the position, and the look-ahead time projects the

@@ -18,7 +18,7 @@ from coneskin.robot.sim.urscript.values import interpolate, rotation_of, rotvec_
 
 from .arm import CYCLE, DEFAULT_DECELERATION, INVALID_SETPOINT, JOINT_ACCELERATION, MotionFault, SimulatedArm, max_abs
 
-__all__ = ["JointLine", "Path", "Residual", "ToolArc", "ToolLine"]
+__all__ = ["JointLine", "Path", "ToolArc", "ToolLine"]
 
 
 class _Profile:
@@ -41,7 +41,7 @@ class _Profile:
         self.sdot = speed
 
 
-class Residual:
+class _Residual:
     """Speed that the arm still has when a new path begins: it fades out while the path sets in."""
 
     def __init__(self, qd: Sequence[float], rate: float) -> None:
@@ -76,7 +76,7 @@ class Path:
             detail = f"speed and acceleration must be above 0, got {speed} and {acceleration}"
             raise MotionFault(INVALID_SETPOINT, detail)
         self.profile = _Profile(length, speed, acceleration)
-        self.residual = Residual(arm.qd, rate)
+        self.residual = _Residual(arm.qd, rate)
         self.done = self.blends = False
 
     def within(self, arm: SimulatedArm, radius: float) -> bool:
@@ -103,11 +103,11 @@ class Path:
         return [a + b for a, b in zip(q, rest[0], strict=True)], [a + b for a, b in zip(qd, rest[1], strict=True)]
 
 
-TURN_LENGTH = 0.25  #: path length that takes as long as a turn of 1 rad [m/rad]; an assumption
-_SAMPLES = 40  # places on a path at which its joint speeds are looked at
+_TURN_LENGTH = 0.25  # path length that takes as long as a turn of 1 rad [m/rad]; an assumption
+_LENGTH_SAMPLES = 40  # places on a path at which its joint speeds are looked at
 # of a move with a time that is too short for it; assumptions: share of what the motors can do at first, m/s, m/s2
-_SHARE_OF_TORQUE, _MOST_TOOL_SPEED, _MOST_TOOL_ACCELERATION = 0.7, 1.0, 10.0
-_STRAIGHT = 1e-6  # m^2; three positions that enclose less have no circle
+_TORQUE_SHARE, _MAX_TOOL_SPEED, _MAX_TOOL_ACCELERATION = 0.7, 1.0, 10.0
+_STRAIGHT_SINE = 1e-6  # m^2; three positions that enclose less have no circle
 
 
 class JointLine(Path):
@@ -123,14 +123,14 @@ class JointLine(Path):
         limits: Sequence[float] | None = None,
     ) -> None:
         acceleration = max(acceleration, 1e-6)
-        way = Residual(arm.qd, acceleration).way
+        way = _Residual(arm.qd, acceleration).way
         self.start = [a + b for a, b in zip(arm.q, way, strict=True)]
         delta = [a - b for a, b in zip(target, self.start, strict=True)]
         length = max_abs(delta)
         self.unit = [value / length for value in delta] if length else [0.0] * 6
         if time > 0.0:  # a time that is too short makes the move as fast as it can be
             speed, acceleration = max(1.5 * length / time, 1e-9), max(4.5 * length / time**2, 1e-9)
-            most = _SHARE_OF_TORQUE * arm.feasible_acceleration(self.unit)
+            most = _TORQUE_SHARE * arm.feasible_acceleration(self.unit)
             acceleration = min(acceleration, JOINT_ACCELERATION, most)
         for share, limit in zip(self.unit, limits or arm.model.joint_speed, strict=True):
             if abs(share) * speed > limit:
@@ -158,7 +158,7 @@ class _ToolPath(Path):
     def __init__(self, arm: SimulatedArm, length: float, acceleration: float, speed: float, time: float) -> None:
         if time > 0.0:
             speed, acceleration = max(1.5 * length / time, 1e-9), max(4.5 * length / time**2, 1e-9)
-            speed, acceleration = min(speed, _MOST_TOOL_SPEED), min(acceleration, _MOST_TOOL_ACCELERATION)
+            speed, acceleration = min(speed, _MAX_TOOL_SPEED), min(acceleration, _MAX_TOOL_ACCELERATION)
         self._place(arm, 1.0)  # raises if the target is out of reach, before the arm moves
         super().__init__(arm, length, speed, acceleration, self.rate)
 
@@ -167,7 +167,7 @@ class _ToolPath(Path):
         self.rate = DEFAULT_DECELERATION
         if arm.blends and (speed := math.hypot(*arm.twist()[:3])) > 0.0:
             self.rate = min(self.rate, max_abs(arm.qd) * max(acceleration, 1e-3) / speed)
-        way = Residual(arm.qd, self.rate).way
+        way = _Residual(arm.qd, self.rate).way
         self.q = [a + b for a, b in zip(arm.q, way, strict=True)]
         self.start = arm.tcp_pose(self.q)
         self.back = arm.tcp.inverse()
@@ -207,7 +207,7 @@ class ToolLine(_ToolPath):
         self.shift: Vector = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
         self.turn = rotvec_between(self.start, target)
         self.goal = target
-        length = max(math.dist(a, b), TURN_LENGTH * math.hypot(*self.turn))
+        length = max(math.dist(a, b), _TURN_LENGTH * math.hypot(*self.turn))
         super().__init__(arm, length, acceleration, speed, time)
 
     def limit(self, arm: SimulatedArm, acceleration: float, speed: float) -> None:
@@ -216,10 +216,10 @@ class ToolLine(_ToolPath):
         if not length:
             return
         start, before, largest, quickest = self.q, self.q, math.inf, math.inf
-        for i in range(1, _SAMPLES + 1):
-            here = self.q = self._place(arm, i / _SAMPLES)
+        for i in range(1, _LENGTH_SAMPLES + 1):
+            here = self.q = self._place(arm, i / _LENGTH_SAMPLES)
             for a, b, limit in zip(here, before, arm.model.joint_speed, strict=True):
-                rate = max(abs(a - b) * _SAMPLES / length, 1e-9)  # of a joint, along the path [rad/m]
+                rate = max(abs(a - b) * _LENGTH_SAMPLES / length, 1e-9)  # of a joint, along the path [rad/m]
                 largest, quickest = min(largest, limit / rate), min(quickest, JOINT_ACCELERATION / rate)
             before = here
         self.q = start
@@ -256,7 +256,7 @@ class ToolArc(_ToolPath):
         self.fixed = fixed
         self.turn = rotvec_between(self.start, target)
         self.shift = w
-        if math.sqrt(area) < _STRAIGHT:
+        if math.sqrt(area) < _STRAIGHT_SINE:
             self.angle, length = 0.0, math.sqrt(_dot(w, w))
         else:
             uu, ww = _dot(u, u), _dot(w, w)
@@ -271,7 +271,7 @@ class ToolArc(_ToolPath):
             self.angle = angle % (2.0 * math.pi)  # about this axis the way leads over via
             length = self.angle * math.hypot(*self.arm_length)
         self.goal = self._pose(1.0)
-        super().__init__(arm, max(length, TURN_LENGTH * math.hypot(*self.turn)), acceleration, speed, 0.0)
+        super().__init__(arm, max(length, _TURN_LENGTH * math.hypot(*self.turn)), acceleration, speed, 0.0)
 
     def _pose(self, share: float) -> Pose:
         if not self.angle:

@@ -1,7 +1,7 @@
 """Remote plant: one in a process of its own, in real time, over a channel.
 
 Each cycle its targets are sent, and what has come back is taken: what is measured is a cycle old where the plant keeps
-up, and older where it does not. A plant that is gone, `LONGEST_BEHIND` behind or ahead of its targets is lost, and so
+up, and older where it does not. A plant that is gone, `_MAX_LAG` behind or ahead of its targets is lost, and so
 is one that measures what no arm does: also a joint that jumps from one answer to the next.
 
 A message of targets is 12 doubles, q [rad] and qd [rad/s]; the answer 18: measured q, qd and current [A].
@@ -20,22 +20,22 @@ from coneskin.robot.arm.model import ArmModel
 from .arm import CYCLE
 from .plant import PlantLost, PlantState
 
-__all__ = ["LONGEST_BEHIND", "RemotePlant", "decode_targets", "encode_state"]
+__all__ = ["RemotePlant", "decode_targets", "encode_state"]
 
 #: s that a plant may be behind; as long as a pseudo-terminal on a busy computer can stall
-LONGEST_BEHIND = 0.25
+_MAX_LAG = 0.25
 #: what no arm that is whole measures: joints turn twice at most. A blow of 7 kN takes 800 A
-_MOST_POSITION, _MOST_CURRENT = 8.0 * math.pi, 1e4  # rad, A
+_MAX_POSITION, _MAX_CURRENT = 8.0 * math.pi, 1e4  # rad, A
 #: of the highest speed of a joint, which no blow exceeds: in 72 collisions of bench `collision` without any
 #: protection the fastest joint was flung to 3.2 of it
-_MOST_SPEED = 10.0
-_TARGETS = struct.Struct("<12d")
-_STATE = struct.Struct("<18d")
+_MAX_SPEED_RATIO = 10.0
+_TARGETS_MESSAGE = struct.Struct("<12d")
+_STATE_MESSAGE = struct.Struct("<18d")
 
 
 def encode_state(state: PlantState) -> bytes:
     """Return the answer to targets."""
-    return _STATE.pack(*state.q, *state.qd, *state.current)
+    return _STATE_MESSAGE.pack(*state.q, *state.qd, *state.current)
 
 
 def decode_targets(message: bytes) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -44,9 +44,9 @@ def decode_targets(message: bytes) -> tuple[tuple[float, ...], tuple[float, ...]
     Raises:
         ValueError: it is none.
     """
-    if len(message) != _TARGETS.size:
-        raise ValueError(f"targets of a plant must be {_TARGETS.size} bytes, got {len(message)}")
-    values = _TARGETS.unpack(message)
+    if len(message) != _TARGETS_MESSAGE.size:
+        raise ValueError(f"targets of a plant must be {_TARGETS_MESSAGE.size} bytes, got {len(message)}")
+    values = _TARGETS_MESSAGE.unpack(message)
     return values[:6], values[6:]
 
 
@@ -61,13 +61,13 @@ class RemotePlant:
 
     def __init__(self, channel: Channel, q: Sequence[float], model: ArmModel) -> None:
         self._channel = channel
-        self._fastest = [_MOST_SPEED * speed for speed in model.joint_speed]
+        self._fastest = [_MAX_SPEED_RATIO * speed for speed in model.joint_speed]
         self._state = PlantState(tuple(q), (0.0,) * JOINTS, (0.0,) * JOINTS)
         self._behind = 0  # cycles that are not answered yet
 
     def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
         """Send the targets, and return what was measured last; see `Plant`."""
-        self._channel.send(_TARGETS.pack(*q, *qd))
+        self._channel.send(_TARGETS_MESSAGE.pack(*q, *qd))
         self._behind += 1
         for message in self._channel.receive():
             self._state = self._measured(message)
@@ -76,9 +76,9 @@ class RemotePlant:
                 raise PlantLost("the plant has answered targets that it was not sent")
         if self._channel.closed:
             raise PlantLost("the process of the plant has ended")
-        if self._behind * CYCLE > LONGEST_BEHIND:
+        if self._behind * CYCLE > _MAX_LAG:
             raise PlantLost(
-                f"the plant is more than {1e3 * LONGEST_BEHIND:g} ms behind real time: end what else keeps this "
+                f"the plant is more than {1e3 * _MAX_LAG:g} ms behind real time: end what else keeps this "
                 "computer busy, or put fewer bodies and skins into the scene"
             )
         return self._state
@@ -89,15 +89,15 @@ class RemotePlant:
 
     def _measured(self, message: bytes) -> PlantState:
         """Return what an answer says; raise PlantLost for what no arm can have measured after the last."""
-        if len(message) != _STATE.size:
-            raise PlantLost(f"the plant has answered {len(message)} bytes, not {_STATE.size}")
-        values = _STATE.unpack(message)
+        if len(message) != _STATE_MESSAGE.size:
+            raise PlantLost(f"the plant has answered {len(message)} bytes, not {_STATE_MESSAGE.size}")
+        values = _STATE_MESSAGE.unpack(message)
         state = PlantState(values[:6], values[6:12], values[12:])
         ways = [after - before for before, after in zip(self._state.q, state.q, strict=True)]
         for what, own, most, unit in (
-            ("a position", state.q, [_MOST_POSITION] * JOINTS, "rad"),
+            ("a position", state.q, [_MAX_POSITION] * JOINTS, "rad"),
             ("a speed", state.qd, self._fastest, "rad/s"),
-            ("a current", state.current, [_MOST_CURRENT] * JOINTS, "A"),
+            ("a current", state.current, [_MAX_CURRENT] * JOINTS, "A"),
             (f"a way in {1e3 * CYCLE:g} ms", ways, [CYCLE * speed for speed in self._fastest], "rad"),
         ):
             for joint, (value, bound) in enumerate(zip(own, most, strict=True), 1):

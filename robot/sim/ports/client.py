@@ -6,14 +6,14 @@ import socket
 import time
 from collections.abc import Callable
 
-__all__ = ["MAX_LINE", "MAX_MESSAGES", "MAX_UNSENT", "UNREAD_TIMEOUT", "Client", "LineReader"]
+__all__ = ["MAX_LINE", "MAX_MESSAGES", "UNREAD_TIMEOUT", "Client", "LineReader"]
 
 MAX_LINE = 10_000  #: bytes of a line to the dashboard
-MAX_UNSENT = 1_000_000  #: bytes that a client may leave unread
+_MAX_UNSENT = 1_000_000  # bytes that a client may leave unread
 MAX_MESSAGES = 100_000  #: bytes that a client may leave unread and still be sent messages
 UNREAD_TIMEOUT = 10.0  #: s; a client of RTDE that reads nothing for so long is dropped, and its inputs are free again
 #: option of a connection -> s of silence before the first question whether the other side lives, s between, questions
-_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
+_KEEPALIVE_OPTIONS = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 
 
 def _release_nothing() -> None:
@@ -67,7 +67,7 @@ class Client:
         if patience is not None and hasattr(socket, "TCP_USER_TIMEOUT"):
             self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * patience))
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        for name, value in _KEEPALIVE.items():
+        for name, value in _KEEPALIVE_OPTIONS.items():
             if (option := getattr(socket, name, None)) is not None:  # not every system has them
                 self.socket.setsockopt(socket.IPPROTO_TCP, option, value)
 
@@ -81,7 +81,7 @@ class Client:
         self.unsent += data
         if not self.unsent:
             return
-        if len(self.unsent) > MAX_UNSENT:
+        if len(self.unsent) > _MAX_UNSENT:
             raise OSError("the client does not read the answers")
         try:
             sent = self.socket.send(self.unsent)

@@ -43,14 +43,6 @@ __all__ = [
     "ROBOT_STATE",
     "Publisher",
     "ScriptPort",
-    "encode_first_state",
-    "encode_notice",
-    "encode_realtime",
-    "encode_state",
-    "encode_version",
-    "pack",
-    "realtime_size",
-    "robot_type",
 ]
 
 MESSAGE = 20  #: kind of a packet that holds one message
@@ -65,16 +57,16 @@ _TEXT_MESSAGE, _POPUP_MESSAGE, _VERSION_MESSAGE, _SAFETY_MESSAGE, _ERROR_MESSAGE
 )
 _RUNTIME, _INTERFACE = 253, 254  # source of a message: the runtime machine, the interface itself
 _NO_DATA = 0  # of a report: it carries no further value
-_LARGEST_TITLE = 255  # bytes: its length is one byte
+_MAX_TITLE_LENGTH = 255  # bytes: its length is one byte
 
 
-def pack(kind: int, body: bytes) -> bytes:
+def _pack(kind: int, body: bytes) -> bytes:
     """Return a packet of the client interface."""
     return struct.pack(">iB", 5 + len(body), kind) + body
 
 
 def _message(time: float, source: int, kind: int, body: bytes) -> bytes:
-    return pack(MESSAGE, struct.pack(">QBB", round(time * 1e6), source, kind) + body)
+    return _pack(MESSAGE, struct.pack(">QBB", round(time * 1e6), source, kind) + body)
 
 
 def _bytes(text: str) -> bytes:
@@ -82,7 +74,7 @@ def _bytes(text: str) -> bytes:
     return text.encode("utf-8", "replace")
 
 
-def encode_version(time: float, version: Version) -> bytes:
+def _encode_version(time: float, version: Version) -> bytes:
     """Return the message that a client of the primary interface gets first.
 
     Args:
@@ -95,7 +87,7 @@ def encode_version(time: float, version: Version) -> bytes:
     return _message(time, _INTERFACE, _VERSION_MESSAGE, body)
 
 
-def encode_notice(time: float, notice: Notice) -> bytes:
+def _encode_notice(time: float, notice: Notice) -> bytes:
     """Return a notice as a message.
 
     Args:
@@ -106,7 +98,7 @@ def encode_notice(time: float, notice: Notice) -> bytes:
         case TextNotice(text):
             return _message(time, _RUNTIME, _TEXT_MESSAGE, _bytes(text))
         case PopupNotice(title, text, warning, error):
-            head = _bytes(title)[:_LARGEST_TITLE]
+            head = _bytes(title)[:_MAX_TITLE_LENGTH]
             flags = struct.pack(">IBBBBB", 0, 0, warning, error, False, len(head))
             return _message(time, _RUNTIME, _POPUP_MESSAGE, flags + head + _bytes(text))
         case ProgramNotice(name, event):
@@ -123,16 +115,18 @@ def encode_notice(time: float, notice: Notice) -> bytes:
 
 _ZEROS3, _ZEROS6 = (0.0,) * 3, (0.0,) * 6
 #: first version of PolyScope 5, and of CB3, with packets of so many bytes
-_SIZES = (((5, 10), (3, 15), 1220), ((5, 9), (3, 14), 1140), ((5, 4), (3, 10), 1116))
-_SMALLEST = 1108  # bytes; of older ones, whose packets end with the speed of the elbow
+_PACKET_SIZES = (((5, 10), (3, 15), 1220), ((5, 9), (3, 14), 1140), ((5, 4), (3, 10), 1116))
+_MIN_PACKET_SIZE = 1108  # bytes; of older ones, whose packets end with the speed of the elbow
 
 
-def realtime_size(version: Version) -> int:
+def _realtime_size(version: Version) -> int:
     """Return the length of a packet of that version [bytes]."""
-    return next((size for e, cb3, size in _SIZES if version >= (cb3 if version[0] == 3 else e)), _SMALLEST)
+    return next(
+        (size for e, cb3, size in _PACKET_SIZES if version >= (cb3 if version[0] == 3 else e)), _MIN_PACKET_SIZE
+    )
 
 
-def encode_realtime(c: Controller) -> bytes:
+def _encode_realtime(c: Controller) -> bytes:
     """Return the packet of the present cycle."""
     arm = c.arm
     measured, powered = arm.measured, c.robot_mode is not RobotMode.POWER_OFF
@@ -151,7 +145,7 @@ def encode_realtime(c: Controller) -> bytes:
         *(*_ZEROS3, *_ZEROS3, float(c.safety)),  # elbow: position, speed; safety state
         *(0.0, 0.0, 0.0, c.payload, *c.payload_cog, *c.payload_inertia),
     )
-    size = realtime_size(c.options.version)
+    size = _realtime_size(c.options.version)
     return struct.pack(f">i{(size - 4) // 8}d", size, *values[: (size - 4) // 8])
 
 
@@ -162,26 +156,32 @@ _CONTROL_MODE_POSITION = 0
 _JOINT_RUNNING, _JOINT_OFF, _JOINT_IDLE = 253, 239, 255  # modes of a joint
 _TOOL_RUNNING = 253  # mode of the tool
 #: size of an arm -> its number as robot type
-_TYPES = {"UR5": 1, "UR7": 1, "UR10": 2, "UR3": 3, "UR16": 4, "UR20": 7, "UR30": 8, "UR15": 9}
-_SUBTYPE = {3: 0, 5: 3}  # major version of the software -> sub-type, as recorded from 5.24
+_ROBOT_TYPES = {"UR5": 1, "UR7": 1, "UR10": 2, "UR3": 3, "UR16": 4, "UR20": 7, "UR30": 8, "UR15": 9}
+_ROBOT_SUBTYPES = {3: 0, 5: 3}  # major version of the software -> sub-type, as recorded from 5.24
 _BOX, _BOARD_VERSION = 4, 6  # of an e-Series control box, as recorded
-_DEFAULTS = (math.radians(60.0), math.radians(80.0), 0.25, 1.2, 0.25)  # joint and tool v and a, and the radius to them
+_DEFAULT_MOTION = (
+    math.radians(60.0),
+    math.radians(80.0),
+    0.25,
+    1.2,
+    0.25,
+)  # joint and tool v and a, and the radius to them
 
 
-def robot_type(model: ArmModel) -> int:
+def _robot_type(model: ArmModel) -> int:
     """Return the number of an arm's size in the client interface; 0 where it has none."""
-    return _TYPES.get(model.name.removesuffix("e"), 0)
+    return _ROBOT_TYPES.get(model.name.removesuffix("e"), 0)
 
 
-def encode_state(controller: Controller) -> bytes:
+def _encode_state(controller: Controller) -> bytes:
     """Return the packet of the present state."""
-    return pack(ROBOT_STATE, b"".join(_changing(controller)))
+    return _pack(ROBOT_STATE, b"".join(_changing(controller)))
 
 
-def encode_first_state(controller: Controller) -> bytes:
+def _encode_first_state(controller: Controller) -> bytes:
     """Return the packet of the present state, with kinematics and configuration: what a new client gets first."""
     model, version = controller.arm.model, controller.options.version
-    return pack(ROBOT_STATE, b"".join((*_changing(controller), _kinematics(model), _configuration(model, version[0]))))
+    return _pack(ROBOT_STATE, b"".join((*_changing(controller), _kinematics(model), _configuration(model, version[0]))))
 
 
 def _sub(kind: int, body: bytes) -> bytes:
@@ -233,8 +233,8 @@ def _configuration(model: ArmModel, major: int) -> bytes:
     limits = [max(-turn, min(turn, q)) for pair in zip(model.joint_lower, model.joint_upper, strict=True) for q in pair]
     motion = [value for speed in model.joint_speed for value in (speed, JOINT_ACCELERATION)]
     table = (*model.a, *model.d, *model.alpha, *model.theta)
-    numbers = struct.pack(">53d", *limits, *motion, *_DEFAULTS, *table)
-    box = struct.pack(">iiii", _BOARD_VERSION, _BOX, robot_type(model), _SUBTYPE.get(major, 3))
+    numbers = struct.pack(">53d", *limits, *motion, *_DEFAULT_MOTION, *table)
+    box = struct.pack(">iiii", _BOARD_VERSION, _BOX, _robot_type(model), _ROBOT_SUBTYPES.get(major, 3))
     return _sub(_CONFIGURATION, numbers + box)
 
 
@@ -254,7 +254,7 @@ class Publisher:
         c = self._controller
         if name == "realtime":
             return b""
-        return encode_version(c.timestamp, c.options.version) + encode_first_state(c)
+        return _encode_version(c.timestamp, c.options.version) + _encode_first_state(c)
 
     def due(self, listening: frozenset[str]) -> dict[str, tuple[bytes, bytes]]:
         """Return what is due in this cycle: port -> state and messages for each of its clients.
@@ -269,18 +269,18 @@ class Publisher:
         notices = [c.notices.popleft() for _ in range(len(c.notices))]
         changed = any(isinstance(notice, SafetyNotice) for notice in notices)  # whose state comes no later
         if (changed or c.cycle % _STATE_CYCLES == 0) and listening & {"primary", "secondary"}:
-            states |= dict.fromkeys(listening & {"primary", "secondary"}, encode_state(c))
+            states |= dict.fromkeys(listening & {"primary", "secondary"}, _encode_state(c))
         if "realtime" in listening and c.cycle % self._realtime_cycles == 0:
-            states["realtime"] = encode_realtime(c)
+            states["realtime"] = _encode_realtime(c)
         due = {name: (state, b"") for name, state in states.items()}
         if "primary" in listening and notices:
-            messages = b"".join([encode_notice(c.timestamp, notice) for notice in notices])
+            messages = b"".join([_encode_notice(c.timestamp, notice) for notice in notices])
             due["primary"] = (states.get("primary", b""), messages)
         return due
 
 
 #: line of a client -> what the controller does
-_COMMANDS: dict[str, Callable[[Controller], object]] = {
+_COMMAND_LINES: dict[str, Callable[[Controller], object]] = {
     "power on": lambda c: power(c, "power on"),
     "power off": lambda c: power(c, "power off"),
     "set robotmode run": lambda c: power(c, "brake release"),
@@ -315,17 +315,17 @@ class ScriptPort:
             self._rest, self.left = "", True
             problem = f"a program has at most {MAX_LENGTH} characters"
             self._controller.log("dropped", reason=problem)
-            return encode_notice(self._controller.timestamp, ProgramFailed(problem)) if self._messages else b""
+            return _encode_notice(self._controller.timestamp, ProgramFailed(problem)) if self._messages else b""
         last = True  # of two that move the arm in one batch the first would never start
         kept = []
         for text in reversed(programs):
-            if text.strip() in _COMMANDS or text.lstrip().startswith("sec "):
+            if text.strip() in _COMMAND_LINES or text.lstrip().startswith("sec "):
                 kept.append(text)
             elif last:
                 kept.append(text)
                 last = False
         for text in reversed(kept):
-            command = _COMMANDS.get(text.strip())
+            command = _COMMAND_LINES.get(text.strip())
             if command is None:
                 self._run(text)
             else:

@@ -21,30 +21,30 @@ __all__ = ["WELCOME", "Dashboard", "available"]
 #: line that the server sends when a client connects
 WELCOME = "Connected: Universal Robots Dashboard Server"
 #: reply to an unlock that comes too early
-UNLOCK_REFUSED = (
+_UNLOCK_REFUSED = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
-_ROLES = ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED")
+_USER_ROLES = ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED")
 _OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
-_NEVER = None
+_NO_VERSION = None
 #: command -> first minor version of PolyScope 5 that has it, and of CB3; all others have it since 5.0 and 3.0
-_SINCE: dict[str, tuple[int | None, int | None]] = {
+_FIRST_VERSIONS: dict[str, tuple[int | None, int | None]] = {
     "addToLog": (0, 0),
-    "clear operational mode": (0, _NEVER),
+    "clear operational mode": (0, _NO_VERSION),
     "generate flight report": (8, 13),
     "generate support file": (8, 13),
-    "get operational mode": (6, _NEVER),
+    "get operational mode": (6, _NO_VERSION),
     "get robot model": (6, 12),
     "get serial number": (6, 12),
-    "getUserRole": (_NEVER, 1),
-    "is in remote control": (6, _NEVER),
+    "getUserRole": (_NO_VERSION, 1),
+    "is in remote control": (6, _NO_VERSION),
     "load installation": (0, 2),
     "restart safety": (1, 7),
-    "safetystatus": (4, _NEVER),
+    "safetystatus": (4, _NO_VERSION),
     "saveLog": (8, 13),
-    "set operational mode": (0, _NEVER),
-    "setUserRole": (_NEVER, 1),
-    "version": (0, _NEVER),
+    "set operational mode": (0, _NO_VERSION),
+    "setUserRole": (_NO_VERSION, 1),
+    "version": (0, _NO_VERSION),
 }
 
 
@@ -90,7 +90,7 @@ class Dashboard:
             "setUserRole": self._set_user_role,
             "shutdown": self._shut_down,
             "stop": self._stop,
-            "unlock protective stop": lambda _: "Protective stop releasing" if self._c.unlock() else UNLOCK_REFUSED,
+            "unlock protective stop": lambda _: "Protective stop releasing" if self._c.unlock() else _UNLOCK_REFUSED,
             "version": lambda _: self._version,
         }
         for name in POWER_COMMANDS:
@@ -188,7 +188,7 @@ class Dashboard:
         return f"No longer controlling the operational mode. Current operational mode: {NO_MODE}."
 
     def _set_user_role(self, role: str) -> str:
-        if role.upper() not in _ROLES:
+        if role.upper() not in _USER_ROLES:
             return f"Failed setting user role: {role}"
         self._i.user_role = role.upper()
         return f"Setting user role: {role}"
@@ -204,6 +204,6 @@ class Dashboard:
 
 def available(command: str, version: Version) -> bool:
     """Return whether a version of the software has a command."""
-    e_series, cb3 = _SINCE.get(command, (0, 0))
+    e_series, cb3 = _FIRST_VERSIONS.get(command, (0, 0))
     first = cb3 if version[0] == 3 else e_series
     return first is not None and (version[0] > 5 or version[1] >= first)

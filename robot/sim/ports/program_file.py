@@ -21,9 +21,9 @@ from coneskin.robot.sim.urscript.values import ScriptError
 
 from .program_tree import EXTERNAL_CONTROL, program_lines
 
-__all__ = ["ProgramFile", "ProgramFolder", "program_information", "read_program"]
+__all__ = ["ProgramFile", "ProgramFolder", "program_information"]
 
-_GZIP = 31  # window bits for zlib: the largest, in gzip's format
+_GZIP_WINDOW = 31  # window bits for zlib: the largest, in gzip's format
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class ProgramFile:
         return match[1] if match else ""
 
 
-def read_program(name: str, data: bytes) -> str:
+def _read_program(name: str, data: bytes) -> str:
     """Return the URScript of a program file.
 
     Args:
@@ -72,7 +72,7 @@ def read_program(name: str, data: bytes) -> str:
         return text if first.startswith("def ") else f"def {function}():\n{text}\nend\n"
     if data[:2] == b"\x1f\x8b":
         try:
-            data = zlib.decompressobj(_GZIP).decompress(data, MAX_LENGTH)
+            data = zlib.decompressobj(_GZIP_WINDOW).decompress(data, MAX_LENGTH)
         except zlib.error as exc:
             raise ScriptError(f"{name} is not a program: {exc}") from exc
     if b"<!DOCTYPE" in data:
@@ -110,8 +110,8 @@ def _script_of(name: str, data: bytes) -> str:
 
 
 #: where PolyScope has its programs, on a robot and in Universal Robots' own simulator
-_ROOTS = ("/ursim/programs/", "/programs/")
-_LARGEST_PROGRAM = 4 * MAX_LENGTH  # bytes of a file
+_PROGRAM_ROOTS = ("/ursim/programs/", "/programs/")
+_MAX_PROGRAM_SIZE = 4 * MAX_LENGTH  # bytes of a file
 
 
 class ProgramFolder:
@@ -133,7 +133,7 @@ class ProgramFolder:
         Raises:
             FileNotFoundError: it would be outside, or there is no folder.
         """
-        for start in _ROOTS:
+        for start in _PROGRAM_ROOTS:
             name = name.removeprefix(start)
         if self.root is None or not name or "\0" in name:
             raise FileNotFoundError(name)
@@ -155,7 +155,7 @@ class ProgramFolder:
         path = self.locate(name)
         if not path.is_file():
             raise FileNotFoundError(name)
-        return read_file(path, _LARGEST_PROGRAM)
+        return read_file(path, _MAX_PROGRAM_SIZE)
 
     def load(self, name: str) -> ProgramFile:
         """Return a program.
@@ -169,10 +169,10 @@ class ProgramFolder:
         data = self.read(name)
         beside = path.with_suffix(".script")
         if path.suffix == ".urp" and beside.is_file():
-            data, source = read_file(beside, _LARGEST_PROGRAM), beside.name
+            data, source = read_file(beside, _MAX_PROGRAM_SIZE), beside.name
         assert self.root is not None
-        shown = f"{_ROOTS[1]}{path.relative_to(self.root).as_posix()}"
-        return ProgramFile(path.name, shown, read_program(Path(source).name, data))
+        shown = f"{_PROGRAM_ROOTS[1]}{path.relative_to(self.root).as_posix()}"
+        return ProgramFile(path.name, shown, _read_program(Path(source).name, data))
 
     def has(self, name: str) -> bool:
         """Return whether there is such a file."""

@@ -20,10 +20,10 @@ __all__ = ["EXTERNAL_CONTROL", "program_lines"]
 EXTERNAL_CONTROL = "# script of the node External Control"
 _EXTERNAL_CONTROL_CLASS = "com.fzi.externalcontrol.ExternalControlNode"
 _WITHOUT_EFFECT = ("Comment", "InitVariablesNode")
-_MOVES = {"MoveJ": "movej", "MoveL": "movel", "MoveP": "movep"}
+_MOVE_FUNCTIONS = {"MoveJ": "movej", "MoveL": "movel", "MoveP": "movep"}
 #: sign of PolyScope's keyboard for expressions -> URScript
-_SIGNS = str.maketrans({"≟": "==", "≠": "!=", "≤": "<=", "≥": ">="})
-_BASE = "Joint_0_name"  # name of the feature that is the base
+_EXPRESSION_SIGNS = str.maketrans({"≟": "==", "≠": "!=", "≤": "<=", "≥": ">="})
+_BASE_FEATURE = "Joint_0_name"  # name of the feature that is the base
 
 
 def program_lines(root: ET.Element, function: str) -> list[str]:
@@ -98,8 +98,8 @@ class _Tree:
         raise self._unknown(node)
 
     def _move(self, node: ET.Element) -> list[str]:
-        kind, feature = _MOVES.get(node.get("motionType", "")), node.find("feature")
-        if kind is None or (feature is not None and feature.get("referencedName") != _BASE):
+        kind, feature = _MOVE_FUNCTIONS.get(node.get("motionType", "")), node.find("feature")
+        if kind is None or (feature is not None and feature.get("referencedName") != _BASE_FEATURE):
             raise self._unknown(node)
         limits = ", ".join(
             f"{key}={_number(node.get(name, ''), 'a move')!r}" for key, name in (("a", "acceleration"), ("v", "speed"))
@@ -124,7 +124,7 @@ class _Tree:
                 raise self._unknown(part)
         if "\n" in text or not text.strip():
             raise ScriptError(f"the node {node.tag} has no expression of one line")
-        return text.strip().translate(_SIGNS)
+        return text.strip().translate(_EXPRESSION_SIGNS)
 
     def _variable(self, element: ET.Element | None) -> str:
         """Return the name of a variable, which may be a reference to where it stands first."""

@@ -23,11 +23,11 @@ from coneskin.robot.sim.urscript.values import ScriptError
 from .program_file import program_information
 from .user_interface import NO_MODE, UserInterface
 
-__all__ = ["BASE", "Answer", "Request", "RequestReader", "RobotApi", "uploaded_file"]
+__all__ = ["BASE_PATH", "Answer", "Request", "RequestReader", "RobotApi"]
 
-MAX_HEAD = 16_000  #: bytes of the request line and the headers
-MAX_BODY = 2_000_000  #: bytes; a program of PolyScope X that only waits has 100 000
-_REASONS = {
+_MAX_HEAD = 16_000  # bytes of the request line and the headers
+_MAX_BODY = 2_000_000  # bytes; a program of PolyScope X that only waits has 100 000
+_STATUS_REASONS = {
     **{200: "OK", 400: "Bad Request", 403: "Forbidden"},
     **{404: "Not Found", 405: "Method Not Allowed", 409: "Conflict"},
 }
@@ -66,7 +66,7 @@ class Answer:
         """Return the bytes of the answer."""
         body = json.dumps(self.content).encode()
         head = (
-            f"HTTP/1.1 {self.status} {_REASONS.get(self.status, 'Error')}\r\n"
+            f"HTTP/1.1 {self.status} {_STATUS_REASONS.get(self.status, 'Error')}\r\n"
             f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
         )
         return head.encode() + body
@@ -94,8 +94,8 @@ class RequestReader:
                 return answers
             body, self._rest = self._rest[end + 4 : end + 4 + size], self._rest[end + 4 + size :]
             answers += self._answer(Request(request.method, request.path, request.headers, body)).encode()
-        if len(self._rest) > MAX_HEAD:
-            raise ValueError(f"a request has at most {MAX_HEAD} bytes of headers")
+        if len(self._rest) > _MAX_HEAD:
+            raise ValueError(f"a request has at most {_MAX_HEAD} bytes of headers")
         return answers
 
 
@@ -113,12 +113,12 @@ def _length(request: Request) -> int:
     if "transfer-encoding" in request.headers:
         raise ValueError("a body in chunks is not taken")
     length = request.headers.get("content-length", "0")
-    if not re.fullmatch(r"[0-9]{1,9}", length) or int(length) > MAX_BODY:
-        raise ValueError(f"the length of a body is a number up to {MAX_BODY}, got {length[:20]!r}")
+    if not re.fullmatch(r"[0-9]{1,9}", length) or int(length) > _MAX_BODY:
+        raise ValueError(f"the length of a body is a number up to {_MAX_BODY}, got {length[:20]!r}")
     return int(length)
 
 
-def uploaded_file(request: Request) -> bytes:
+def _uploaded_file(request: Request) -> bytes:
     """Return the file that a form uploads; the whole body where it is no form.
 
     Raises:
@@ -134,12 +134,12 @@ def uploaded_file(request: Request) -> bytes:
     raise ValueError("the form has no part named file")
 
 
-BASE = "/universal-robots/robot-api"  #: with which every path begins
-DEFAULT_PROGRAM = "Default program"  #: name of the one that is loaded at first
-_SUFFIXES = (".urpx", ".urp", ".script")  # of the files that a name may stand for
-_EMERGENCY = (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP)
+BASE_PATH = "/universal-robots/robot-api"  #: with which every path begins
+_DEFAULT_PROGRAM = "Default program"  # name of the one that is loaded at first
+_PROGRAM_SUFFIXES = (".urpx", ".urp", ".script")  # of the files that a name may stand for
+_EMERGENCY_STOPS = (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP)
 #: action -> command of the power
-_POWER = {
+_POWER_ACTIONS = {
     "POWER_ON": "power on",
     "POWER_OFF": "power off",
     "BRAKE_RELEASE": "brake release",
@@ -180,10 +180,10 @@ class RobotApi:
         self._c.log("robot_api", method=request.method, path=request.path)
         if "origin" in request.headers:  # a browser sends it, and whose page it shows nobody knows
             return _refuse(403, "the robot API takes no requests of web pages")
-        path = request.path.removeprefix(BASE)
+        path = request.path.removeprefix(BASE_PATH)
         try:
             if path == request.path:
-                return _refuse(404, f"there is nothing at {request.path}; every path begins with {BASE}")
+                return _refuse(404, f"there is nothing at {request.path}; every path begins with {BASE_PATH}")
             if request.method == "GET" and path in self._gets:
                 return Answer(200, self._gets[path]())
             if request.method == "PUT" and path in self._puts:
@@ -210,7 +210,7 @@ class RobotApi:
 
     def _mode_of_stop(self) -> object:
         mode = self._c.safety
-        return {"mode": "EMERGENCY_STOP" if mode in _EMERGENCY else mode.name}
+        return {"mode": "EMERGENCY_STOP" if mode in _EMERGENCY_STOPS else mode.name}
 
     def _operational_mode(self) -> object:
         mode = self._i.operational_mode
@@ -218,11 +218,11 @@ class RobotApi:
 
     @property
     def _loaded(self) -> str:
-        return self._i.loaded.name.rpartition(".")[0] if self._i.loaded is not None else DEFAULT_PROGRAM
+        return self._i.loaded.name.rpartition(".")[0] if self._i.loaded is not None else _DEFAULT_PROGRAM
 
     def _programs(self) -> object:
         found = []
-        for name in self._i.folder.names(*_SUFFIXES):
+        for name in self._i.folder.names(*_PROGRAM_SUFFIXES):
             stem, _, suffix = name.rpartition(".")
             facts: dict[str, object] = {"name": stem, "description": "", "programState": "FINAL"}
             facts |= {"createdDate": 0, "lastSavedDate": None, "lastModifiedDate": None}
@@ -258,10 +258,10 @@ class RobotApi:
         action = _field(request, "action")
         if action == "UNLOCK_PROTECTIVE_STOP":
             return _done(self._c.unlock(early=True), "it cannot be unlocked")
-        if action not in _POWER:
-            known = ", ".join((*_POWER, "UNLOCK_PROTECTIVE_STOP"))
+        if action not in _POWER_ACTIONS:
+            known = ", ".join((*_POWER_ACTIONS, "UNLOCK_PROTECTIVE_STOP"))
             return _refuse(400, f"action must be one of {known}, got {action!r}")
-        power(self._c, _POWER[action])
+        power(self._c, _POWER_ACTIONS[action])
         return Answer(200, {"message": action})
 
     def _load(self, request: Request, key: str) -> Answer:
@@ -277,7 +277,7 @@ class RobotApi:
 
     def _stored(self, name: str) -> str | None:
         """Return the file of a program; None where there is none."""
-        return next((name + suffix for suffix in _SUFFIXES if self._i.folder.has(name + suffix)), None)
+        return next((name + suffix for suffix in _PROGRAM_SUFFIXES if self._i.folder.has(name + suffix)), None)
 
     def _file(self, request: Request, name: str) -> Answer:
         if request.method == "GET":
@@ -287,7 +287,7 @@ class RobotApi:
             return Answer(200, json.loads(self._i.folder.read(file)))
         if name or request.method not in ("POST", "PUT"):
             return _refuse(405, f"{request.method} is not possible for a program")
-        data = uploaded_file(request)
+        data = _uploaded_file(request)
         known = str(program_information(data)["name"])
         exists = self._stored(known) is not None
         if exists != (request.method == "PUT"):

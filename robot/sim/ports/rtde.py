@@ -26,12 +26,12 @@ from coneskin.robot.ur.rtde_variables import VARIABLES
 
 __all__ = ["RtdeOutputs", "RtdeSession", "available"]
 
-_ELBOW = 2  # number of the frame at the elbow
+_ELBOW_FRAME = 2  # number of the frame at the elbow
 _JOINT_OFF = 239
 _JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.IDLE: 255}  # of joints, and of the tool
-_ZEROS = (0.0,) * 6  #: six zeros, for any vector of that length
+_SIX_ZEROS = (0.0,) * 6  # six zeros, for any vector of that length
 #: output -> constant value of a sensor that is not simulated, in the unit of RTDE
-_CONSTANTS: dict[str, Value] = {
+_CONSTANT_OUTPUTS: dict[str, Value] = {
     "joint_temperatures": (30.0,) * 6,
     "actual_main_voltage": 48.0,
     "actual_robot_voltage": 48.0,
@@ -44,7 +44,7 @@ _CONSTANTS: dict[str, Value] = {
 }
 
 #: output that older controllers lack -> first minor version of PolyScope 5, and of CB3 (None: never)
-_SINCE: dict[str, tuple[int, int | None]] = {
+_FIRST_VERSIONS: dict[str, tuple[int, int | None]] = {
     "actual_current_as_torque": (23, None),
     "ft_raw_wrench": (9, None),
     "wrench_calc_from_currents": (9, None),
@@ -60,7 +60,7 @@ def available(name: str, version: Version) -> bool:
     """Return whether a controller of that version has this output. The input registers are outputs too."""
     if name not in VARIABLES or (name in INPUTS and not name.startswith("input_")):
         return False
-    since, cb3 = _SINCE.get(name, (0, 0))
+    since, cb3 = _FIRST_VERSIONS.get(name, (0, 0))
     if version[0] == 3:
         return cb3 is not None and version[1] >= cb3
     return version[0] > 5 or version[1] >= since
@@ -72,9 +72,9 @@ class RtdeOutputs:
     def __init__(self, controller: Controller) -> None:
         self._c = c = controller
         self._pose_at: tuple[object, object] = (None, None)
-        self._pose: Value = _ZEROS
+        self._pose: Value = _SIX_ZEROS
         self._twist_at = -1
-        self._twist: Value = _ZEROS
+        self._twist: Value = _SIX_ZEROS
         arm = c.arm
         self._getters: dict[str, Callable[[], Value | Sequence[float]]] = {
             "timestamp": lambda: c.timestamp,
@@ -116,7 +116,7 @@ class RtdeOutputs:
             "output_bit_registers32_to_63": lambda: c.terminals.output_bits >> 32 & 0xFFFFFFFF,
             "joint_mode": lambda: (_JOINT_MODES.get(c.robot_mode, _JOINT_OFF),) * 6,
             "tool_mode": lambda: _JOINT_MODES.get(c.robot_mode, _JOINT_OFF),
-            "elbow_position": lambda: link_pose(arm.model, arm.measured.q, _ELBOW).translation,
+            "elbow_position": lambda: link_pose(arm.model, arm.measured.q, _ELBOW_FRAME).translation,
             "elbow_velocity": lambda: elbow_velocity(arm),
             "actual_TCP_force": c.inputs.wrench,
             "tcp_force_scalar": lambda: math.hypot(*c.inputs.wrench()[:3]),
@@ -148,7 +148,7 @@ class RtdeOutputs:
             return lambda: c.inputs[name]
         kind = VARIABLES[name]
         zero: Value = (0.0,) * int(kind[6]) if kind.startswith("VECTOR") else 0
-        constant = _CONSTANTS.get(name, zero)
+        constant = _CONSTANT_OUTPUTS.get(name, zero)
         return lambda: constant
 
     def _tcp_pose(self) -> Value:
@@ -177,7 +177,7 @@ class RtdeOutputs:
 def elbow_velocity(arm: SimulatedArm) -> Vector:
     """Return the measured velocity of the elbow in the base frame [m/s]."""
     q, qd, _ = arm.measured
-    rows = point_jacobian(arm.model, q, _ELBOW)
+    rows = point_jacobian(arm.model, q, _ELBOW_FRAME)
     x, y, z = (sum(a * b for a, b in zip(row, qd, strict=False)) for row in rows)
     return x, y, z
 

@@ -24,15 +24,15 @@ from coneskin.robot.sim.urscript.values import ScriptError
 from .program_file import ProgramFile, ProgramFolder
 from .program_tree import EXTERNAL_CONTROL
 
-__all__ = ["SERIAL_NUMBER", "ScriptRequest", "UserInterface"]
+__all__ = ["SERIAL_NUMBER", "UserInterface"]
 
-REQUEST = b"request_program\n"
-CONNECT_TIMEOUT = 2.0  #: s
-FIRST_TIMEOUT = 2.0  #: s; until the script begins to come
-PAUSE = 0.1  #: s; the script has come to its end when nothing more comes for so long
+_SCRIPT_REQUEST = b"request_program\n"
+_CONNECT_TIMEOUT = 2.0  # s
+_FIRST_TIMEOUT = 2.0  # s; until the script begins to come
+_SCRIPT_PAUSE = 0.1  # s; the script has come to its end when nothing more comes for so long
 
 
-class ScriptRequest:
+class _ScriptRequest:
     """Request for a script, made in a thread of its own.
 
     Args:
@@ -53,8 +53,8 @@ class ScriptRequest:
 
     def _ask(self) -> None:
         try:
-            with socket.create_connection(self.address, CONNECT_TIMEOUT) as sock:
-                sock.sendall(REQUEST)
+            with socket.create_connection(self.address, _CONNECT_TIMEOUT) as sock:
+                sock.sendall(_SCRIPT_REQUEST)
                 self._answer.put(_read(sock).decode("utf-8", "replace"))
         except OSError as exc:
             self._answer.put(exc)
@@ -67,9 +67,9 @@ def _read(sock: socket.socket) -> bytes:
         OSError: nothing comes, or too much.
     """
     text = b""
-    end = time.monotonic() + FIRST_TIMEOUT
+    end = time.monotonic() + _FIRST_TIMEOUT
     while time.monotonic() < end or text:
-        sock.settimeout(PAUSE if text else FIRST_TIMEOUT)
+        sock.settimeout(_SCRIPT_PAUSE if text else _FIRST_TIMEOUT)
         try:
             more = sock.recv(65536)
         except TimeoutError:
@@ -85,8 +85,8 @@ def _read(sock: socket.socket) -> bytes:
 
 
 SERIAL_NUMBER = "20250000001"  #: of every simulated arm
-MOST_MESSAGES = 1000  #: log messages that are kept
-MOST_REPORTS = 10  #: flight reports that are kept
+_MAX_MESSAGES = 1000  # log messages that are kept
+_MAX_REPORTS = 10  # flight reports that are kept
 NO_MODE = "NONE"  #: operational mode that no client controls
 
 
@@ -119,11 +119,11 @@ class UserInterface:
         self.operational_mode = NO_MODE
         self.user_role = "PROGRAMMER"
         self.popup = ""
-        self.messages: deque[str] = deque(maxlen=MOST_MESSAGES)
-        self.reports: deque[str] = deque(maxlen=MOST_REPORTS)
+        self.messages: deque[str] = deque(maxlen=_MAX_MESSAGES)
+        self.reports: deque[str] = deque(maxlen=_MAX_REPORTS)
         self.run = run
         self._check = check
-        self._request: ScriptRequest | None = None
+        self._request: _ScriptRequest | None = None
         self._count = 0
 
     # programs
@@ -162,7 +162,7 @@ class UserInterface:
             controller.fail(self.loaded.name, exc)
             return False
         if self.loaded.takes_external_script:
-            self._request = ScriptRequest(controller.options.external_control)
+            self._request = _ScriptRequest(controller.options.external_control)
         else:
             self.run(self.loaded.text)
         return True

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 
 from .values import MAX_ITEMS, ScriptError
 
-__all__ = ["ExpressionParser", "Function", "Parser", "numbered_lines"]
+__all__ = ["Function", "Parser", "numbered_lines"]
 
-_UNFINISHED = re.compile(r"(?:,|\b(?:and|or|xor|not))$")  # end of a line that goes on in the next
-_NUMBER = re.compile(r"[-+]?[\d.eE]+")
-_QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
+_UNFINISHED_LINE = re.compile(r"(?:,|\b(?:and|or|xor|not))$")  # end of a line that goes on in the next
+_LEADING_NUMBER = re.compile(r"[-+]?[\d.eE]+")
+_QUOTED_TEXT = re.compile(r"\"[^\"]*\"|'[^']*'")
 
 
 def numbered_lines(text: str) -> list[tuple[int, str]]:
@@ -34,7 +34,7 @@ def numbered_lines(text: str) -> list[tuple[int, str]]:
         line = (raw if "#" not in raw else _without_comment(raw)).strip()
         if not line or line.startswith("$"):
             continue
-        if not parts and lines and lines[-1][1].endswith("=") and (value := _NUMBER.match(line)):
+        if not parts and lines and lines[-1][1].endswith("=") and (value := _LEADING_NUMBER.match(line)):
             lines[-1] = (lines[-1][0], f"{lines[-1][1]} {value[0]}")
             line = line[value.end() :].strip()
             if not line:
@@ -42,7 +42,7 @@ def numbered_lines(text: str) -> list[tuple[int, str]]:
         first = first if parts else number
         parts.append(line)
         depth = max(0, depth + _opened(line))
-        if depth == 0 and not _UNFINISHED.search(line):
+        if depth == 0 and not _UNFINISHED_LINE.search(line):
             lines.append((first, " ".join(parts)))
             parts = []
     return [*lines, (first, " ".join(parts))] if parts else lines
@@ -50,7 +50,7 @@ def numbered_lines(text: str) -> list[tuple[int, str]]:
 
 def _opened(line: str) -> int:
     """Return how many brackets a line opens and does not close."""
-    bare = _QUOTED.sub("", line) if '"' in line or "'" in line else line
+    bare = _QUOTED_TEXT.sub("", line) if '"' in line or "'" in line else line
     return bare.count("(") + bare.count("[") - bare.count(")") - bare.count("]")
 
 
@@ -66,21 +66,21 @@ def _without_comment(line: str) -> str:
     return line
 
 
-MAX_DEPTH = 50  #: of an expression: brackets, signs, powers
+_MAX_DEPTH = 50  # of an expression: brackets, signs, powers
 #: next token of an expression, after any blanks
-_TOKEN = re.compile(
+_NEXT_TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<string>\"[^\"]*\"|'[^']*')|(?P<pose>p(?=\[))"
     r"|(?P<name>[A-Za-z_]\w*)|(?P<op>==|!=|<=|>=|[-+*/%^<>=()\[\],:.]))"
 )
 #: logical operators of URScript -> of Python, by rising precedence
-_BINARY = ({"or": "or", "xor": "^"}, {"and": "and"})
-_SUM = {"+": "_add", "-": "_subtract"}
-_PRODUCT = {"*": "_multiply", "/": "_divide", "%": "_modulo"}
+_LOGIC_OPERATORS = ({"or": "or", "xor": "^"}, {"and": "and"})
+_SUM_OPERATORS = {"+": "_add", "-": "_subtract"}
+_PRODUCT_OPERATORS = {"*": "_multiply", "/": "_divide", "%": "_modulo"}
 #: comparison operators
-_COMPARISONS = {"==", "!=", "<", ">", "<=", ">="}
+_COMPARISON_OPERATORS = {"==", "!=", "<", ">", "<=", ">="}
 
 
-class ExpressionParser:
+class _ExpressionParser:
     """Parser of one expression after the other.
 
     Args:
@@ -132,7 +132,7 @@ class ExpressionParser:
         self._tokens, self._token, self._depth, position = [], 0, 0, 0
         text = text.rstrip()
         while position < len(text):
-            match = _TOKEN.match(text, position)
+            match = _NEXT_TOKEN.match(text, position)
             if match is None:
                 raise self._fail(f"{text[position:]!r} is not URScript")
             self._tokens.append((match.lastgroup or "", match[match.lastgroup or 0]))
@@ -151,36 +151,36 @@ class ExpressionParser:
         return found
 
     def _binary(self, level: int) -> str:
-        if level == len(_BINARY):
+        if level == len(_LOGIC_OPERATORS):
             return self._comparison()
         left = self._binary(level + 1)
-        while self._next_is(*_BINARY[level]):
-            operator = _BINARY[level][self._take()[1]]
+        while self._next_is(*_LOGIC_OPERATORS[level]):
+            operator = _LOGIC_OPERATORS[level][self._take()[1]]
             right = self._binary(level + 1)
             left = f"(bool({left}) ^ bool({right}))" if operator == "^" else f"({left} {operator} {right})"
         return left
 
     def _comparison(self) -> str:
         left = self._sum()
-        if self._next_is(*_COMPARISONS):
+        if self._next_is(*_COMPARISON_OPERATORS):
             return f"({left} {self._take()[1]} {self._sum()})"
         return left
 
     def _sum(self) -> str:
         left = self._product()
         while self._next_is("+", "-"):
-            left = f"{_SUM[self._take()[1]]}({left}, {self._product()})"
+            left = f"{_SUM_OPERATORS[self._take()[1]]}({left}, {self._product()})"
         return left
 
     def _product(self) -> str:
         left = self._unary()
         while self._next_is("*", "/", "%"):
-            left = f"{_PRODUCT[self._take()[1]]}({left}, {self._unary()})"
+            left = f"{_PRODUCT_OPERATORS[self._take()[1]]}({left}, {self._unary()})"
         return left
 
     def _unary(self) -> str:
-        if self._depth > MAX_DEPTH:
-            raise self._fail(f"more than {MAX_DEPTH} levels of an expression")
+        if self._depth > _MAX_DEPTH:
+            raise self._fail(f"more than {_MAX_DEPTH} levels of an expression")
         self._depth += 1
         made = self._signed()
         self._depth -= 1
@@ -261,8 +261,8 @@ def _tuple(parts: list[str]) -> str:
     return "".join(part + ", " for part in parts)
 
 
-MAX_BLOCKS = 20  #: of blocks inside each other
-MAX_FUNCTIONS = 1000  #: of one program
+_MAX_BLOCKS = 20  # of blocks inside each other
+_MAX_FUNCTIONS = 1000  # of one program
 
 
 @dataclass(slots=True)
@@ -308,7 +308,7 @@ class Parser:
         self.functions: dict[str, Function] = {}
         self.globals: set[str] = set()
         self._inside: list[Function] = []
-        self._expressions = ExpressionParser(self._fail, self._note_call)
+        self._expressions = _ExpressionParser(self._fail, self._note_call)
 
     def program(self) -> Function:
         """Parse the whole text: one def or sec, with the functions defined in it.
@@ -338,8 +338,8 @@ class Parser:
         match = re.fullmatch(r"(def|sec|thread)\s+(\w+)\s*\((.*)\)\s*:", self._lines[self._at][1])
         if match is None:
             raise self._fail("expected 'def name():'")
-        if match[2] in self.functions or len(self.functions) >= MAX_FUNCTIONS:
-            raise self._fail(f"a function is defined twice, or there are more than {MAX_FUNCTIONS}")
+        if match[2] in self.functions or len(self.functions) >= _MAX_FUNCTIONS:
+            raise self._fail(f"a function is defined twice, or there are more than {_MAX_FUNCTIONS}")
         made = Function(match[1], match[2])
         if self._inside:
             made.outer = frozenset(self._inside[0].assigned)
@@ -356,8 +356,8 @@ class Parser:
     def _block(self, ends: tuple[str, ...]) -> list[tuple[object, ...]]:
         body: list[tuple[object, ...]] = []
         self._blocks += 1
-        if self._blocks > MAX_BLOCKS:
-            raise self._fail(f"more than {MAX_BLOCKS} blocks inside each other")
+        if self._blocks > _MAX_BLOCKS:
+            raise self._fail(f"more than {_MAX_BLOCKS} blocks inside each other")
         while (line := self._peek()) is not None:
             word = re.match(r"\w*", line)
             if word is not None and word[0] in ends:

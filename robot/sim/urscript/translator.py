@@ -23,7 +23,7 @@ from types import CodeType
 from .syntax import Function, Parser, numbered_lines
 from .values import ScriptError
 
-__all__ = ["MAX_LENGTH", "NOT_SIMULATED", "Translation", "complete_programs", "translate"]
+__all__ = ["MAX_LENGTH", "Translation", "complete_programs", "translate"]
 
 _BY_SUBJECT = {
     "field buses": """modbus_add_rw_signal modbus_add_signal modbus_delete_signal modbus_get_error
@@ -50,7 +50,7 @@ _BY_SUBJECT = {
 }
 
 #: name of each function -> its subject
-NOT_SIMULATED: dict[str, str] = {name: subject for subject, names in _BY_SUBJECT.items() for name in names.split()}
+_NOT_SIMULATED: dict[str, str] = {name: subject for subject, names in _BY_SUBJECT.items() for name in names.split()}
 
 
 MAX_LENGTH = 256_000  #: characters of a program; that of ur_rtde has 50 000
@@ -252,7 +252,7 @@ def _unknown_function(made: Function, unknown: Set[str], text: str) -> ScriptErr
     name = min(unknown, key=lambda name: (made.calls[name], name))
     number, lines = made.calls[name], text.splitlines()
     column = lines[number - 1].find(name) + 1 if 0 < number <= len(lines) else 0
-    known = sorted(unknown & NOT_SIMULATED.keys())
+    known = sorted(unknown & _NOT_SIMULATED.keys())
     here = f"; {', '.join(known)}: URScript, but not simulated" if known else ""
     return ScriptError(
         f"{made.name}: the controller has no function {', '.join(sorted(unknown))}{here}",

@@ -156,8 +156,8 @@ for _name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "flo
     setattr(MathFunctions, _name, staticmethod(getattr(math, _name)))
 
 
-MAX_TEXT = 1023  #: characters that str_cat and to_str make
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_MAX_TEXT = 1023  # characters that str_cat and to_str make
+_NUMBER_TEXT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 def text_of(value: Any) -> str:
@@ -167,8 +167,8 @@ def text_of(value: Any) -> str:
         ScriptError: it is no text, number, truth value, list or pose, or makes too long a text.
     """
     text = _text_of(value)
-    if len(text) > MAX_TEXT:
-        raise ScriptError(f"a text made of values has at most {MAX_TEXT} characters, got {len(text)}")
+    if len(text) > _MAX_TEXT:
+        raise ScriptError(f"a text made of values has at most {_MAX_TEXT} characters, got {len(text)}")
     return text
 
 
@@ -197,8 +197,8 @@ class StringFunctions:
     def str_cat(self, op1: Any, op2: Any) -> str:
         """Return two values as one text."""
         text = text_of(op1) + text_of(op2)
-        if len(text) > MAX_TEXT:
-            raise ScriptError(f"str_cat makes at most {MAX_TEXT} characters, got {len(text)}")
+        if len(text) > _MAX_TEXT:
+            raise ScriptError(f"str_cat makes at most {_MAX_TEXT} characters, got {len(text)}")
         return text
 
     def str_empty(self, str: Any) -> bool:
@@ -223,7 +223,7 @@ class StringFunctions:
     def to_num(self, str: Any) -> int | float:
         """Return the number that a text shows: whole where it has no decimals."""
         text = _text(str).strip()
-        if _NUMBER.fullmatch(text) is None:
+        if _NUMBER_TEXT.fullmatch(text) is None:
             raise ScriptError(f"{show(text)!r} is not a number")
         number = float(text)
         whole = text.lstrip("+-").isdigit() and abs(number) < 2**31

@@ -39,8 +39,8 @@ __all__ = [
     "values_of",
 ]
 
-_LARGEST = 1e6  # of a position, a speed, a time, an acceleration
-_MOST_SHOWN, _LONGEST_SHOWN = 50, 1000  # elements of a list, characters of a text
+_MAX_NUMBER = 1e6  # of a position, a speed, a time, an acceleration
+_MAX_ITEMS_SHOWN, _MAX_TEXT_SHOWN = 50, 1000  # elements of a list, characters of a text
 _Rotation = tuple[Vector, Vector, Vector]
 
 
@@ -89,18 +89,18 @@ def number(value: Any, name: str) -> float:
     Raises:
         ScriptError: it is no number, or not from -1e6 to 1e6.
     """
-    if not isinstance(value, int | float) or not abs(value) <= _LARGEST:
-        raise ScriptError(f"{name} must be finite, at most {_LARGEST:g}, got {show(value)}")
+    if not isinstance(value, int | float) or not abs(value) <= _MAX_NUMBER:
+        raise ScriptError(f"{name} must be finite, at most {_MAX_NUMBER:g}, got {show(value)}")
     return float(value)
 
 
 def show(value: Any) -> str:
     """Return a value as text for the log, shortened where it is long."""
     if isinstance(value, list):
-        rest = ", ..." if len(value) > _MOST_SHOWN else ""
-        shown = (repr(item)[:99] if isinstance(item, str) else show(item) for item in value[:_MOST_SHOWN])
+        rest = ", ..." if len(value) > _MAX_ITEMS_SHOWN else ""
+        shown = (repr(item)[:99] if isinstance(item, str) else show(item) for item in value[:_MAX_ITEMS_SHOWN])
         return f"{'p' * isinstance(value, PoseValue)}[{', '.join(shown)}{rest}]"
-    return str(value)[:_LONGEST_SHOWN]
+    return str(value)[:_MAX_TEXT_SHOWN]
 
 
 def rotation_of(rotvec: Sequence[float]) -> _Rotation:

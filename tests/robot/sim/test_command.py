@@ -207,7 +207,7 @@ def test_ports_beyond_this_computer_are_announced_loudly(
     """No other computer's address is there to listen on, so this one's own counts as one."""
     arguments = argparse.Namespace(host=free_host(), version="5.25", json=True)
     for loopback, local in (("127.", True), ("203.", False)):
-        monkeypatch.setattr(server, "_LOOPBACK", loopback)
+        monkeypatch.setattr(server, "_LOOPBACK_PREFIX", loopback)
         controller = Controller(Options())
         with server.Server(controller, arguments.host, faults=True) as served:
             command._announce(arguments, controller, served)

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 import pytest
 
 from coneskin.robot.sim import compiler
-from coneskin.robot.sim.compiler import IN_PLACE_LIMIT, Compiler, Result
+from coneskin.robot.sim.compiler import _IN_PLACE_LENGTH, Compiler, Result
 from coneskin.robot.sim.urscript.translator import Translation
 from coneskin.robot.sim.urscript.values import ScriptError
 
-LONG = "def long():\n" + "  sync()\n" * (IN_PLACE_LIMIT // 8) + "end\n"
+LONG = "def long():\n" + "  sync()\n" * (_IN_PLACE_LENGTH // 8) + "end\n"
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def test_a_long_program_is_translated_and_its_error_has_its_line(translator: Com
     translator.submit(2, LONG.replace("end", "  explode()\nend"))
     _, problem = result(translator)
     assert isinstance(problem, ScriptError)
-    assert problem.line == IN_PLACE_LIMIT // 8 + 2
+    assert problem.line == _IN_PLACE_LENGTH // 8 + 2
 
 
 def test_a_translator_that_hangs_is_ended_and_another_started(
@@ -49,7 +49,7 @@ def test_a_translator_that_hangs_is_ended_and_another_started(
 ) -> None:
     translator.submit(1, LONG)
     result(translator)
-    monkeypatch.setattr(compiler, "TRANSLATION_TIME", 1e-9)
+    monkeypatch.setattr(compiler, "_TRANSLATION_TIME", 1e-9)
     translator.submit(2, LONG + " ")
     number, problem = result(translator)
     assert (number, isinstance(problem, ScriptError)) == (2, True)

@@ -15,8 +15,8 @@ from coneskin.robot.sim.machine.states import START_Q, Options, RobotMode, Safet
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
 from coneskin.robot.sim.motion.plant import PlantLost, PlantState
-from coneskin.robot.sim.motion.remote_plant import LONGEST_BEHIND, RemotePlant, decode_targets, encode_state
-from coneskin.robot.sim.ports.client_interface import encode_realtime
+from coneskin.robot.sim.motion.remote_plant import _MAX_LAG, RemotePlant, decode_targets, encode_state
+from coneskin.robot.sim.ports.client_interface import _encode_realtime
 from coneskin.robot.sim.ports.rtde import RtdeOutputs
 
 ELSEWHERE = PlantState(
@@ -65,7 +65,7 @@ def test_what_is_measured_is_the_plant_and_what_is_the_target_is_not(moving) -> 
     assert list(outputs.getter("actual_current")()) == [1.5, 2.0, 3.0, 0.0, 0.0, 0.0]
     assert outputs.getter("actual_TCP_pose")() != outputs.getter("target_TCP_pose")()
     assert outputs.getter("actual_TCP_speed")() != outputs.getter("target_TCP_speed")()
-    packet = struct.unpack_from(">6d", encode_realtime(controller), 4 + 8 * 31)  # q actual: the 32nd double
+    packet = struct.unpack_from(">6d", _encode_realtime(controller), 4 + 8 * 31)  # q actual: the 32nd double
     assert packet == ELSEWHERE.q
     assert describe(controller)["q"] == list(ELSEWHERE.q)
     assert describe(controller)["turning"]
@@ -180,7 +180,7 @@ def test_a_plant_that_answers_what_it_was_not_asked_is_lost(remote) -> None:  # 
 
 def test_a_plant_that_falls_behind_is_lost_and_one_that_catches_up_is_not(remote) -> None:  # type: ignore[no-untyped-def]
     plant, other = remote
-    most = round(LONGEST_BEHIND / CYCLE)
+    most = round(_MAX_LAG / CYCLE)
     for _ in range(most):
         plant.advance(START_Q, QD)
     for _ in range(most):

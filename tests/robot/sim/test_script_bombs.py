@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.program import MAX_SECONDARY
+from coneskin.robot.sim.machine.program import _MAX_SECONDARY
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.ports.rtde import RtdeOutputs, RtdeSession
 from coneskin.robot.sim.process import free_host
-from coneskin.robot.sim.server import MAX_CLIENTS, PORTS, Server
+from coneskin.robot.sim.server import _MAX_CLIENTS, PORTS, Server
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs, translate
 from coneskin.robot.sim.urscript.values import ScriptError
 from coneskin.robot.ur.rtde_codec import PacketKind, pack, pack_inputs_request, pack_outputs_request, pack_start_request
@@ -201,7 +201,7 @@ def test_a_program_of_many_is_refused_beyond_a_number() -> None:
     watched = Watched()
     for _ in range(50):
         watched.run("sec s():\n while True:\n  sync()\n end\nend\n", cycles=1)
-    assert len(watched.controller.secondary) == MAX_SECONDARY
+    assert len(watched.controller.secondary) == _MAX_SECONDARY
 
 
 def _requests() -> dict[str, tuple[str, bytes]]:
@@ -248,7 +248,7 @@ def test_no_client_ends_the_server() -> None:
             assert server.controller.cycle > 0, name
         crowd = [socket.create_connection((server.host, PORTS["dashboard"]), 5.0) for _ in range(5)]
         turn(20)
-        assert 0 < len(server._clients["dashboard"]) <= MAX_CLIENTS
+        assert 0 < len(server._clients["dashboard"]) <= _MAX_CLIENTS
         for sock in crowd:
             sock.close()
 
@@ -256,9 +256,9 @@ def test_no_client_ends_the_server() -> None:
 def test_more_clients_than_the_operating_system_can_watch_are_turned_away() -> None:
     with Server(Controller(Options()), free_host()) as server:
         crowd = []
-        for _ in range(MAX_CLIENTS + 10):
+        for _ in range(_MAX_CLIENTS + 10):
             crowd.append(socket.create_connection((server.host, PORTS["dashboard"]), 5.0))
             server._poll(0.0)
-        assert len(server._clients["dashboard"]) == MAX_CLIENTS
+        assert len(server._clients["dashboard"]) == _MAX_CLIENTS
         for sock in crowd:
             sock.close()

@@ -14,7 +14,7 @@ from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.ports.rtde import RtdeOutputs
-from coneskin.robot.sim.urscript.translator import NOT_SIMULATED, translate
+from coneskin.robot.sim.urscript.translator import _NOT_SIMULATED, translate
 from coneskin.robot.sim.urscript.values import ScriptError
 from tests.robot.sim.function_examples import EXAMPLES, NO_EFFECT
 from tests.support.paths import ROOT
@@ -72,7 +72,7 @@ end
 def test_every_function_has_an_example_and_none_is_simulated_and_refused_at_once() -> None:
     assert set(_ALL) == Builtins.names()
     assert set(_ALL) >= NO_EFFECT
-    assert not NOT_SIMULATED.keys() & Builtins.names()
+    assert not _NOT_SIMULATED.keys() & Builtins.names()
 
 
 @pytest.mark.parametrize("name", ["modbus_add_signal", "path_offset_enable", "screw_driving"])
@@ -177,9 +177,9 @@ def page_table() -> str:
     for subject, examples in EXAMPLES.items():
         lines.append(f"| {subject} | {' '.join(f'`{name}`' for name in sorted(examples.keys() - NO_EFFECT))} |")
     lines.append(f"| accepted, without an effect | {' '.join(f'`{name}`' for name in sorted(NO_EFFECT))} |")
-    subjects = sorted(set(NOT_SIMULATED.values()))
+    subjects = sorted(set(_NOT_SIMULATED.values()))
     for subject in subjects:
-        names = sorted(name for name, of in NOT_SIMULATED.items() if of == subject)
+        names = sorted(name for name, of in _NOT_SIMULATED.items() if of == subject)
         lines.append(f"| refused by name: {subject} | {' '.join(f'`{name}`' for name in names)} |")
     return "\n".join(lines)
 

@@ -11,7 +11,7 @@ import pytest
 
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.script_socket import MAX_READS, MAX_UNREAD
+from coneskin.robot.sim.machine.script_socket import _MAX_READS, _MAX_UNREAD
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.urscript.translator import translate
 
@@ -149,7 +149,7 @@ def test_a_server_that_sends_without_end_fills_no_memory(peer: Peer) -> None:
         with contextlib.suppress(BlockingIOError):
             server.send(b"x" * 60_000)
         peer.step(1)
-        assert len(program.sockets["peer"].unread) <= MAX_UNREAD
+        assert len(program.sockets["peer"].unread) <= _MAX_UNREAD
     peer.controller.stop_program("test")
     assert not program.sockets
 
@@ -162,7 +162,7 @@ def test_a_program_that_is_sent_more_than_it_reads_gives_way_and_misses_nothing(
     )
     server.sendall(struct.pack(">1000i", *range(1000)))
     peer.step(5)
-    assert peer.controller.output_ints[0] <= 5 * MAX_READS
+    assert peer.controller.output_ints[0] <= 5 * _MAX_READS
     peer.step(200)
     assert peer.controller.output_ints[:2] == [1000, 999]
     assert peer.controller.program is not None

@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from coneskin.robot.sim.ports.program_file import program_information, read_program
+from coneskin.robot.sim.ports.program_file import _read_program, program_information
 from coneskin.robot.sim.ports.program_tree import EXTERNAL_CONTROL
 from coneskin.robot.sim.urscript.values import ScriptError
 from tests.robot.sim.ports.console import EXTERNAL, WAIT, packed
@@ -16,12 +16,12 @@ from tests.robot.sim.ports.console import EXTERNAL, WAIT, packed
 def test_the_nodes_that_are_simulated_become_lines() -> None:
     script = '<Script type="File"><cachedContents>x = 1\ny = 2</cachedContents></Script>'
     folder = f'<Folder name="f"><children>{WAIT}</children></Folder>'
-    text = read_program("my prog.urp", packed(script + folder + "<Comment/>" + EXTERNAL, once="true"))
+    text = _read_program("my prog.urp", packed(script + folder + "<Comment/>" + EXTERNAL, once="true"))
     assert text.splitlines() == ["def my_prog():", "x = 1", "y = 2", "sleep(0.01)", EXTERNAL_CONTROL, "end"]
 
 
 def test_a_program_that_does_not_run_once_is_a_loop_that_waits() -> None:
-    assert read_program("a.urp", packed("")).splitlines() == ["def a():", "while True:", "sync()", "end", "end"]
+    assert _read_program("a.urp", packed("")).splitlines() == ["def a():", "while True:", "sync()", "end", "end"]
 
 
 def test_variables_conditions_loops_moves_and_threads_become_lines() -> None:
@@ -48,7 +48,7 @@ def test_variables_conditions_loops_moves_and_threads_become_lines() -> None:
         f'<MainProgram runOnlyOnce="true"><children>{choice}{loop}</children></MainProgram>'
         f'<Thread name="T 1" runOnlyOnce="false"><children>{WAIT}</children></Thread>'
     )
-    text = read_program("a.urp", f"<URProgram><children>{nodes}</children></URProgram>".encode())
+    text = _read_program("a.urp", f"<URProgram><children>{nodes}</children></URProgram>".encode())
     assert text.splitlines() == [
         *("def a():", "global goal = p[0]"),
         *("thread T_1():", "while True:", "sleep(0.01)", "sync()", "end", "end", "T_1_handle = run T_1()"),
@@ -58,7 +58,7 @@ def test_variables_conditions_loops_moves_and_threads_become_lines() -> None:
 
 
 def test_a_suppressed_node_is_left_out() -> None:
-    assert "sleep" not in read_program("a.urp", packed(WAIT.replace("<Wait ", '<Wait suppressed="true" ')))
+    assert "sleep" not in _read_program("a.urp", packed(WAIT.replace("<Wait ", '<Wait suppressed="true" ')))
 
 
 @pytest.mark.parametrize(
@@ -80,26 +80,26 @@ def test_a_suppressed_node_is_left_out() -> None:
 )
 def test_what_is_not_simulated_is_refused_by_name(data: bytes, problem: str) -> None:
     with pytest.raises(ScriptError, match=problem):
-        read_program("a.urp", data)
+        _read_program("a.urp", data)
 
 
 def test_a_packed_file_is_unpacked_to_a_bound_only() -> None:
     with pytest.raises(ScriptError, match="is not a program"):
-        read_program("a.urp", gzip.compress(b"<URProgram>" + b" " * 20_000_000, 1, mtime=0))
+        _read_program("a.urp", gzip.compress(b"<URProgram>" + b" " * 20_000_000, 1, mtime=0))
 
 
 def test_a_script_is_taken_as_it_is_or_given_a_name() -> None:
-    assert read_program("a.script", b"# c\ndef p():\nend\n") == "# c\ndef p():\nend\n"
-    assert read_program("a.script", b"sleep(1)") == "def a():\nsleep(1)\nend\n"
+    assert _read_program("a.script", b"# c\ndef p():\nend\n") == "# c\ndef p():\nend\n"
+    assert _read_program("a.script", b"sleep(1)") == "def a():\nsleep(1)\nend\n"
 
 
 def test_a_program_of_polyscope_x_has_its_script_in_it() -> None:
     facts = {"programInformation": {"name": "n"}, "urscript": {"script": '$ 1 "x"\nsleep(1)'}}
     data = json.dumps({"program": facts}).encode()
-    assert read_program("n.urpx", data) == 'def n():\n$ 1 "x"\nsleep(1)\nend\n'
+    assert _read_program("n.urpx", data) == 'def n():\n$ 1 "x"\nsleep(1)\nend\n'
     assert program_information(data)["name"] == "n"
     for wrong in (b"{", b"[]", b'{"program": 1}', b"[" * 100_000):
         with pytest.raises(ScriptError, match=r"n\.urpx is not a program"):
-            read_program("n.urpx", wrong)
+            _read_program("n.urpx", wrong)
         with pytest.raises(ValueError, match=r".+"):
             program_information(wrong)

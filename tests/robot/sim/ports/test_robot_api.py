@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from coneskin.robot.sim.ports.robot_api import BASE, Request, RequestReader, RobotApi
+from coneskin.robot.sim.ports.robot_api import BASE_PATH, Request, RequestReader, RobotApi
 from tests.robot.sim.ports.console import WAIT, Console, packed
 
 
@@ -20,16 +20,16 @@ class Api:
         self.api = RobotApi(console.interface)
 
     def get(self, path: str) -> Any:
-        answer = self.api.answer(Request("GET", BASE + path, {}))
+        answer = self.api.answer(Request("GET", BASE_PATH + path, {}))
         return answer.content if answer.status == 200 else answer.status
 
     def put(self, path: str, **fields: str) -> int:
-        return self.api.answer(Request("PUT", BASE + path, {}, json.dumps(fields).encode())).status
+        return self.api.answer(Request("PUT", BASE_PATH + path, {}, json.dumps(fields).encode())).status
 
     def upload(self, method: str, data: bytes) -> tuple[int, Any]:
         body = b'--xx\r\nContent-Disposition: form-data; name="file"; filename="f"\r\n\r\n' + data + b"\r\n--xx--\r\n"
         headers = {"content-type": "multipart/form-data; boundary=xx"}
-        answer = self.api.answer(Request(method, f"{BASE}/programs/v1/", headers, body))
+        answer = self.api.answer(Request(method, f"{BASE_PATH}/programs/v1/", headers, body))
         return answer.status, answer.content
 
 
@@ -112,7 +112,7 @@ def test_a_web_page_of_any_origin_can_do_nothing(api: Api, tmp_path: Path) -> No
     """A browser sends a POST of plain text to any port, whatever page asks for it."""
     body = json.dumps({"program": {"programInformation": {"name": "foreign"}}}).encode()
     headers = {"origin": "http://example.com", "content-type": "text/plain"}
-    assert api.api.answer(Request("POST", f"{BASE}/programs/v1/", headers, body)).status == 403
+    assert api.api.answer(Request("POST", f"{BASE_PATH}/programs/v1/", headers, body)).status == 403
     assert not (tmp_path / "foreign.urpx").exists()
 
 
@@ -120,15 +120,15 @@ def test_what_is_not_there_is_refused(api: Api) -> None:
     assert api.get("/robotstate/v2/robotmode") == 404
     assert api.put("/robotstate/v1/robotmode") == 405
     assert api.api.answer(Request("GET", "/", {})).status == 404
-    assert api.api.answer(Request("PUT", f"{BASE}/program/v1/state", {}, b"{")).status == 400
-    assert api.api.answer(Request("PUT", f"{BASE}/program/v1/state", {}, b"[1]")).status == 400
+    assert api.api.answer(Request("PUT", f"{BASE_PATH}/program/v1/state", {}, b"{")).status == 400
+    assert api.api.answer(Request("PUT", f"{BASE_PATH}/program/v1/state", {}, b"[1]")).status == 400
 
 
 def test_requests_are_read_whole_however_they_come(api: Api) -> None:
     read = RequestReader(api.api.answer)
     body = b'{"action": "POWER_OFF"}'
-    asked = f"PUT {BASE}/robotstate/v1/state HTTP/1.1\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body
-    asked += f"GET {BASE}/robotstate/v1/robotmode?x=1 HTTP/1.1\r\nHost: a\r\n\r\n".encode()
+    asked = f"PUT {BASE_PATH}/robotstate/v1/state HTTP/1.1\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body
+    asked += f"GET {BASE_PATH}/robotstate/v1/robotmode?x=1 HTTP/1.1\r\nHost: a\r\n\r\n".encode()
     answers = b"".join(read(asked[i : i + 1]) for i in range(len(asked)))
     assert answers.count(b"HTTP/1.1 200 OK\r\n") == 2
     assert answers.endswith(b'{"mode": "POWER_OFF"}')
