@@ -14,7 +14,7 @@ from coneskin.core.version import __version__
 
 from .commands.shell_completion import SHELLS, complete, completed_words, shell_code
 from .core.errors import ConeSkinError
-from .core.terminal_text import printable
+from .core.text import printable
 
 __all__ = ["COMMANDS", "main"]
 

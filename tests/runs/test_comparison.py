@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.core.recording.defect import Defect, DefectKind
+from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.arm_command import ArmCommand, first_divergence, recorded_commands
 from coneskin.runs.comparison import compare_decisions

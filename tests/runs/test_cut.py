@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.recording.defect import Defect, DefectKind
+from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.version import running_version
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.cut import cut_run

@@ -13,8 +13,8 @@ from enum import IntEnum, StrEnum
 from typing import Any, NamedTuple
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import Block
+from coneskin.core.text import read_json
 
 __all__ = [
     "INPUTS",
@@ -67,7 +67,7 @@ class EventName(StrEnum):
 
     meaning: str
 
-    def __new__(cls, value: str, meaning: str) -> EventName:
+    def __new__(cls, value: str, meaning: str = "") -> EventName:
         """Make a name with its meaning."""
         name = str.__new__(cls, value)
         name._value_, name.meaning = value, meaning

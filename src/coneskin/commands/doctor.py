@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SceneError
-from coneskin.core.terminal_text import painted
+from coneskin.core.text import painted
 
 from .simulated_arm import simulated_arm
 from .terminal.hints import print_hint

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SkinTimeout
-from coneskin.core.time_argument import positive_seconds
+from coneskin.core.text import positive_seconds
 
 if TYPE_CHECKING:
     from coneskin.skin.sources.serial_port import PortFacts

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import Collision, ConeSkinError, RobotRefused
-from coneskin.core.time_argument import positive_seconds
+from coneskin.core.text import positive_seconds
 from coneskin.robot.guard.signals.journal import EventName
 from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
 

@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SkinConnectionError, SkinTimeout
-from coneskin.core.time_argument import positive_seconds
+from coneskin.core.text import positive_seconds
 
 if TYPE_CHECKING:
     from coneskin.commissioning.line.line import Line

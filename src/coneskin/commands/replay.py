@@ -131,7 +131,7 @@ def _replay_one(args: argparse.Namespace) -> int:
 
 
 def _report(result: Replay, start: float, listed: bool) -> None:
-    from coneskin.core.terminal_text import printable
+    from coneskin.core.text import printable
     from coneskin.runs.replay.event_text import describe
     from coneskin.runs.replay.replay import MOST_DIFFERENCES
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import RecordingError, SceneError
-from coneskin.core.terminal_text import printable
+from coneskin.core.text import printable
 
 __all__ = ["replay_many", "replay_with_settings"]
 

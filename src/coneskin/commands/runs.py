@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import ConeSkinError, RecordingError
-from coneskin.core.terminal_text import printable
+from coneskin.core.text import printable
 
 from .arguments.runs import INCOMPLETE, add_arguments
 

@@ -11,7 +11,7 @@ import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.core.time_argument import positive_seconds
+from coneskin.core.text import positive_seconds
 
 if TYPE_CHECKING:
     from coneskin.design.link import LinkMesh

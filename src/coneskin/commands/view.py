@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SceneError
-from coneskin.core.time_argument import positive_seconds
+from coneskin.core.text import positive_seconds
 
 if TYPE_CHECKING:
     from coneskin.view.live_run import LiveRun

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError
-from coneskin.core.terminal_text import printable
+from coneskin.core.text import printable
 from coneskin.geometry.drawing.cut_sheet import make_test_piece
 from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.nesting import nest_on_beds

@@ -10,8 +10,8 @@ from typing import Any
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import read_file
-from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import is_time
+from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName, GuardEvent
 
 __all__ = ["event_facts", "parse_events", "read_events", "write_events"]

@@ -121,7 +121,7 @@ class RecordedRunItem(pytest.Item):
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """Return the lines for a person; a traceback only where it is ours that fails."""
         from coneskin.core.errors import ConeSkinError
-        from coneskin.core.terminal_text import printable
+        from coneskin.core.text import printable
 
         if isinstance(excinfo.value, _RunDiffers | ConeSkinError):
             return printable(str(excinfo.value))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
 from coneskin.core.files import write_whole
-from coneskin.core.json_text import read_json
+from coneskin.core.text import read_json
 
 from .values.scene import Commissioning, round_facts, sensor_facts
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.json_text import read_json
+from coneskin.core.text import read_json
 
 if TYPE_CHECKING:
     import numpy as np

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from coneskin.core.recording.block import Block
-from coneskin.core.recording.defect import DefectKind
+from coneskin.core.recording.defects import DefectKind
 from coneskin.core.recording.reader import MAX_SIZE, parts_of, read_recording
-from coneskin.core.recording.recording_lock import hold_against_recorder
+from coneskin.core.recording.recorder import hold_against_recorder
 from coneskin.core.recording.retention import prune_file
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_event
 

@@ -15,7 +15,6 @@ from typing import Any, BinaryIO
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import open_file
-from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import END, Block
 from coneskin.core.recording.chunk import (
     CHUNK_HEAD_SIZE,
@@ -29,6 +28,7 @@ from coneskin.core.recording.chunk import (
 )
 from coneskin.core.recording.reader import MAX_SIZE
 from coneskin.core.recording.recorder import part_path
+from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.replay.run import Run
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.chunk import CHUNK_HEAD_SIZE, FILE_HEAD_SIZE, MAX_BODY, encode_chunk
-from coneskin.core.recording.defect import DefectKind
+from coneskin.core.recording.defects import DefectKind
 from coneskin.core.recording.reader import Recording, read_recording
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.recording.scan import Chunk, walk

@@ -8,7 +8,7 @@ import pytest
 from coneskin.cli import main
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block
-from coneskin.core.recording.defect import DefectKind
+from coneskin.core.recording.defects import DefectKind
 from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.recording.retention import prune_file

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from coneskin import __version__
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block
-from coneskin.core.recording.defect import Defect, DefectKind
+from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.version import code_commit, running_version
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.commands.terminal.hints import print_hint
-from coneskin.core.json_text import read_json
+from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, describe_way
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.commissioning.acceptance.marks import Mark
 from coneskin.core.errors import SceneError
 from coneskin.core.files import read_file
-from coneskin.core.json_text import read_json
+from coneskin.core.text import read_json
 from coneskin.scene.tables.sensor_keys import CONE_KEYS
 
 from .marks import place_words

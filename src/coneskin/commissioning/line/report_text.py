@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from coneskin.core.terminal_text import printable
+from coneskin.core.text import printable
 from coneskin.skin.diagnosis.measurements import MEASURED
 
 from .line_monitor import LineReport, SensorReport

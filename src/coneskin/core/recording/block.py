@@ -15,11 +15,29 @@ import zlib
 from collections.abc import Iterator
 from typing import NamedTuple, TypeGuard
 
-__all__ = ["END", "MAX_PAYLOAD", "Block", "decode_blocks", "encode_block", "is_time"]
+from coneskin.core.errors import RecordingError
+
+__all__ = [
+    "COPY",
+    "DROPPED",
+    "END",
+    "FILE_KINDS",
+    "MAX_PAYLOAD",
+    "Block",
+    "decode_blocks",
+    "decode_copy",
+    "encode_block",
+    "encode_copy",
+    "is_time",
+]
 
 END = 0  #: kind of the last block of a recording that was closed
+COPY = 255  #: kind: a block that stands elsewhere as well: u8 its kind, f64 its time, its payload
+DROPPED = 254  #: kind: JSON: what retention has dropped
+FILE_KINDS = frozenset({END, *range(240, 256)})  #: not for those who read a run
 _HEAD = struct.Struct("<IBd")
 _TAIL = struct.Struct("<I")
+_COPY = struct.Struct("<Bd")
 MAX_PAYLOAD = 1 << 24  #: bytes; a longer block is damage, not data
 
 
@@ -61,3 +79,22 @@ def decode_blocks(data: bytes) -> Iterator[tuple[int, Block]]:
         payload = data[at + _HEAD.size : end]
         at = end + _TAIL.size
         yield at, Block(kind, time, payload)
+
+
+def encode_copy(block: Block, time: float) -> Block:
+    """Return the copy of a block, to be written at a time [s, host clock]."""
+    return Block(COPY, time, _COPY.pack(block.kind, block.time) + block.payload)
+
+
+def decode_copy(copy: Block) -> Block:
+    """Return the block that a copy holds.
+
+    Raises:
+        RecordingError: it holds none.
+    """
+    if len(copy.payload) < _COPY.size:
+        raise RecordingError(f"a copy of {copy.time:.6f} s holds no block")
+    kind, time = _COPY.unpack_from(copy.payload)
+    if not is_time(time):
+        raise RecordingError(f"a copy of {copy.time:.6f} s holds a block of the time {time} s")
+    return Block(kind, time, copy.payload[_COPY.size :])

@@ -13,11 +13,9 @@ from typing import BinaryIO
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import open_file
 
-from .block import Block
+from .block import COPY, DROPPED, FILE_KINDS, Block, decode_copy
 from .chunk import FILE_HEAD_SIZE, MAGIC, bits, decode_body, decode_file_head, decode_payloads
-from .defect import Defect
-from .defects import find_defects
-from .own_block import COPY, DROPPED, FILE_KINDS, decode_copy, decode_drop
+from .defects import Defect, decode_drop, find_defects
 from .scan import Chunk, Damage, Extent, holds_chunk, scan_extents, walk
 
 __all__ = ["MAX_SIZE", "RecordedBlocks", "Recording", "parts_of", "read_recording"]

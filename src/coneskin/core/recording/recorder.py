@@ -1,22 +1,29 @@
-"""Recorder: it collects blocks into chunks, appends them to a file, and goes on in a new one where that is full."""
+"""Recorder: it collects blocks into chunks, appends them to a file, and goes on in a new one where that is full.
+
+It holds a lock on the file, so that nobody replaces the file under it: what comes after would be lost in a file without
+a name. The system forgets the lock when the recorder's process ends, however that ends. Reading needs no lock.
+"""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
 
 from coneskin.core.errors import RecordingError
+from coneskin.core.files import open_file
 
-from .block import END, Block
+from .block import END, Block, encode_copy
 from .chunk import FileHead, encode_chunk, encode_file_head
-from .own_block import encode_copy
-from .recording_lock import mark_recorded
 
-__all__ = ["FLUSH_PERIOD", "Recorder", "part_path"]
+__all__ = ["FLUSH_PERIOD", "Recorder", "hold_against_recorder", "part_path"]
+
+if sys.platform != "win32":
+    import fcntl
 
 FLUSH_PERIOD = 0.05  #: s of blocks in a chunk: what a killed recorder loses; shorter ones are compressed less
 _FLUSH_SIZE = 1 << 17  # bytes of blocks in a chunk
@@ -144,7 +151,7 @@ class Recorder:
                 )
                 raise RecordingError(f"{path} is there already, and a recording is never overwritten: {hint}") from None
             raise RecordingError(f"cannot make the recording {path}: {exc.strerror or exc}") from exc
-        mark_recorded(file)
+        _mark_recorded(file)
         try:
             self._close_part()
         except RecordingError:
@@ -191,3 +198,38 @@ def part_path(path: Path, number: int) -> Path:
 
 def _create(name: str, flags: int) -> int:
     return os.open(name, flags, _MODE)
+
+
+def _mark_recorded(file: BinaryIO) -> None:
+    """Hold the lock of a file until it is closed; a file system without locks has none."""
+    if sys.platform != "win32":
+        with suppress(OSError):
+            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@contextmanager
+def hold_against_recorder(path: Path, limit: int) -> Iterator[None]:
+    """Hold the lock of a file that no recorder writes.
+
+    Args:
+        path: the file.
+        limit: its largest length [bytes].
+
+    Raises:
+        RecordingError: it is being recorded now, or cannot be read.
+    """
+    try:
+        file = open_file(path, limit)
+    except OSError as exc:
+        raise RecordingError(f"cannot read the recording {path}: {exc.strerror or exc}") from exc
+    with file:
+        if sys.platform != "win32":
+            try:
+                fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise RecordingError(
+                    f"{path} is being recorded now, or pruned by somebody else: wait until that has ended"
+                ) from None
+            except OSError:
+                pass  # a file system without locks
+        yield

@@ -11,10 +11,9 @@ from typing import BinaryIO
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of, open_file
 
-from .block import Block
+from .block import FILE_KINDS, Block
 from .chunk import FILE_HEAD_SIZE, bits, decode_body, decode_file_head, encode_chunk
-from .defect import Defect, DefectKind
-from .own_block import FILE_KINDS, encode_drop
+from .defects import Defect, DefectKind, encode_drop
 from .reader import MAX_SIZE
 from .scan import Chunk, walk
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import ConeSkinError, MissingExtra
-from coneskin.core.terminal_text import printable
+from coneskin.core.text import printable
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import arm_model

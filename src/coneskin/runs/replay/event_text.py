@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from coneskin.core.terminal_text import printable
+from coneskin.core.text import printable
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent, describe_way
 
 __all__ = ["EventLines", "describe"]

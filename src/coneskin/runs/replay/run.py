@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import Block, is_time
-from coneskin.core.recording.defect import Defect, DefectKind
+from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.reader import RecordedBlocks, read_recording
+from coneskin.core.text import read_json
 from coneskin.core.version import recorded_version, running_version
 from coneskin.robot.guard.signals.journal import INPUTS, SESSION_EVENTS, BlockKind, EventName, GuardEvent, decode_event
 from coneskin.robot.guard.signals.outputs import Output

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import read_file
-from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import is_time
+from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, contact_force
 from coneskin.runs.decisions import Decisions
 

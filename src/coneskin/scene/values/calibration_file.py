@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import ConeSkinError, SceneError
 from coneskin.core.files import read_file, write_whole
-from coneskin.core.json_text import read_json
+from coneskin.core.text import read_json
 
 from .scene import round_facts, sensor_facts
 

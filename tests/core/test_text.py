@@ -1,5 +1,6 @@
 """JSON of strangers: what is wrong with it is a ValueError, and no number overflows where it meets a float."""
 
+import io
 import json
 import math
 from typing import Any
@@ -8,8 +9,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from coneskin.core.json_text import read_json
 from coneskin.core.recording.block import Block
+from coneskin.core.text import painted, read_json
 from coneskin.robot.guard.signals.journal import BlockKind, body_places, contact_force, decode_event
 
 ANY_TEXT = st.text(st.characters())  # half pairs of UTF-16 among them
@@ -61,3 +62,22 @@ def test_huge_numbers_of_a_recording_are_no_force_and_no_place() -> None:
 def test_an_event_with_a_huge_number_can_be_told() -> None:
     block = Block(BlockKind.EVENT, 1.0, b'["decelerating", {"speed": ' + b"1" * 400 + b"}]")
     assert f"{decode_event(block).details['speed']:.3f} rad/s" == "inf rad/s"
+
+
+class Terminal(io.StringIO):
+    """A stream that is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_gets_colours_and_a_file_gets_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert painted("bad", "red", Terminal()) == "\033[31mbad\033[0m"
+    assert painted("bad", "red", io.StringIO()) == "bad"
+
+
+@pytest.mark.parametrize(("value", "wanted"), [("1", "ok"), ("", "\033[32mok\033[0m")])
+def test_no_color_is_heeded_where_it_is_not_empty(value: str, wanted: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_COLOR", value)
+    assert painted("ok", "green", Terminal()) == wanted

@@ -1,0 +1,89 @@
+"""Text that anybody may have written, or reads: JSON of files, lines for a terminal, times on a command line.
+
+Whatever is wrong with a JSON is a ValueError. What came from a file must not move a terminal's cursor or change its
+title.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from typing import Any, TextIO
+
+__all__ = ["painted", "positive_seconds", "printable", "read_json"]
+
+_DIGITS = 100  # a longer whole number is none that anything counts; as int it would overflow where it meets a float
+_SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
+_COLORS = {"red": 31, "green": 32, "yellow": 33, "blue": 34}
+
+
+def read_json(data: bytes) -> Any:
+    r"""Return the value of a JSON text, in which each string can be written as UTF-8.
+
+    Half a pair of UTF-16, as in the name of a file that is no UTF-8, is written out: six letters such as ``\udcff``.
+    Whole numbers of over 100 digits are floats, infinite above 1.8e308.
+
+    Raises:
+        ValueError: it is no JSON, no UTF-8, or nested too deep.
+    """
+    try:
+        value = json.loads(data.decode("utf-8-sig"), parse_int=_whole)
+        return _encodable(value) if _SURROGATE.search(data) else value
+    except RecursionError as error:
+        raise ValueError("nested too deep") from error
+
+
+def _whole(digits: str) -> int | float:
+    return int(digits) if len(digits.lstrip("-")) <= _DIGITS else float(digits)
+
+
+def _encodable(value: Any) -> Any:
+    if isinstance(value, str):
+        return value.encode("utf-8", "backslashreplace").decode()
+    if isinstance(value, list):
+        return [_encodable(item) for item in value]
+    if isinstance(value, dict):
+        return {_encodable(name): _encodable(item) for name, item in value.items()}
+    return value
+
+
+def painted(text: str, color: str, stream: TextIO) -> str:
+    """Return a text in a colour where the stream is a terminal, and NO_COLOR (no-color.org) is empty or not set.
+
+    Args:
+        text: to be printed.
+        color: red, green, yellow or blue.
+        stream: on which it is printed.
+    """
+    if os.environ.get("NO_COLOR") or not stream.isatty():
+        return text
+    return f"\033[{_COLORS[color]}m{text}\033[0m"
+
+
+def printable(text: str) -> str:
+    """Return a text with its control characters written out; line feeds stay."""
+    if text.isprintable():
+        return text
+    return "".join(letter if letter.isprintable() or letter == "\n" else _written_out(letter) for letter in text)
+
+
+def _written_out(letter: str) -> str:
+    return letter.encode("unicode_escape").decode("ascii")
+
+
+def positive_seconds(text: str) -> float:
+    """Return the time in a word [s]; for ``type`` of an option.
+
+    Raises:
+        ArgumentTypeError: it is no number above 0; the message says so.
+    """
+    import argparse
+
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError(f"must be a number of seconds above 0, such as 2.5, got {text!r}")
+    return value
