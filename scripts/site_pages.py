@@ -1,21 +1,30 @@
-"""Pages of the site with another source: one for each folder, the public names, CONTRIBUTING, CHANGELOG.
+"""Pages of the site with another source: one for each folder, the options of the commands, CONTRIBUTING, CHANGELOG.
 
 A hook of mkdocs (mkdocs.yml). The module names come from the disk, so a new module is on its folder's page at once.
 """
 
 import importlib
 import inspect
-import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from mkdocs.structure.files import File, Files
 
+sys.path.insert(0, str(Path(__file__).parent))
+from reference import option_tables
+
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "coneskin"
 #: page -> file at the root
 COPIED = {"contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
+
+
+def on_config(config: Any) -> Any:
+    """Add the folders of code to the navigation (called by mkdocs)."""
+    config["nav"].append({"API by folder": [{folder: f"api/{folder}.md"} for folder in folders(PACKAGE)]})
+    return config
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -32,7 +41,7 @@ def generated_pages() -> Iterator[tuple[str, str]]:
         for other, name in COPIED.items():
             text = text.replace(f"]({name})", f"]({other})")
         yield page, text
-    yield "api/public-names.md", public_names()
+    yield "look-up/options.md", f"# Options of the commands\n\n{option_tables()}"
     for folder in folders(PACKAGE):
         yield f"api/{folder}.md", folder_page(folder)
 
@@ -61,20 +70,4 @@ def folder_page(folder: str) -> str:
     lines = [f"# `{package}`", "", opening.split("\n\n")[0], ""]
     for name in modules(path):
         lines += [f"::: {package}.{name}", ""]
-    return "\n".join(lines)
-
-
-def public_names() -> str:
-    """Return the page of the public names, grouped as in README, each with its first sentence and a link."""
-    face = importlib.import_module("coneskin")
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    table = readme.split("<!-- public names -->")[1].split("<!-- end of public names -->")[0]
-    lines = ["# Public names", "", "`import coneskin as cs` loads nothing; each name is loaded when it is used.", ""]
-    for group, names in re.findall(r"^\| ([a-z ]+) \| (.*) \|$", table, re.MULTILINE):
-        lines += [f"## {group.capitalize()}", "", "| name | meaning |", "|---|---|"]
-        for name in re.findall(r"`(\w+)`", names):
-            opening = (inspect.getdoc(getattr(face, name)) or "").split("\n\n")[0]
-            summary = " ".join(opening.split()).replace("|", "\\|")
-            lines.append(f"| [`{name}`][coneskin.{face._HOMES[name]}.{name}] | {summary} |")
-        lines.append("")
     return "\n".join(lines)

@@ -1,36 +1,16 @@
-"""docs/look-up/scene.md against the code: every key, and examples that load."""
+"""Examples of docs/look-up/scene.md load. Its tables are made by scripts/reference.py."""
 
 import re
 
 import pytest
 
-from coneskin.scene.reader import TABLES, parse_scene
-from coneskin.scene.tables.keys import scene_tables
+from coneskin.scene.reader import parse_scene
 from coneskin.skin.electronics import Polarity, Thresholds, match_electronics
 from coneskin.skin.sensor import Sensor
 from tests.support.paths import ROOT
 
 DOCUMENT = (ROOT / "docs" / "look-up" / "scene.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml.*?\n(.*?)```", DOCUMENT, re.DOTALL)
-
-
-def rows(section: str) -> list[str]:
-    """Rows of a section's table."""
-    body = DOCUMENT.split(f"\n## `{section}`\n", 1)[1].split("\n## ", 1)[0]
-    return [line for line in body.splitlines() if line.startswith("| `")]
-
-
-def test_the_document_has_a_section_for_each_table() -> None:
-    assert re.findall(r"^## `(.*)`$", DOCUMENT, re.MULTILINE) == list(scene_tables())
-    assert {name.strip("[]").split(".")[0] for name in scene_tables()} == set(TABLES)
-
-
-@pytest.mark.parametrize("section", scene_tables())
-def test_the_document_has_a_row_for_each_key_and_no_other(section: str) -> None:
-    assert rows(section) == [
-        f"| `{key.name}` | {key.unit} | {key.bounds} | {key.default_words} | {key.meaning} |"
-        for key in scene_tables()[section]
-    ]
 
 
 def test_the_defaults_of_a_sensor_are_those_of_its_parts() -> None:

@@ -1,0 +1,259 @@
+#!/usr/bin/env python3
+"""Write the tables of docs/look-up from the tables of the code.
+
+    python scripts/reference.py            write them
+    python scripts/reference.py --check    name the pages that are not what the code says; exit code 1
+
+A page keeps its own text; what stands between `<!-- generated: NAME -->` and `<!-- end -->` is made here.
+In docs/look-up/scene.md each section of a table of the scene has the table of its keys.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+PAGES = ROOT / "docs" / "look-up"
+#: first folder of a public name's module -> its group
+GROUPS = {
+    "design": "Design",
+    "geometry": "Design",
+    "session": "Guard and replay",
+    "scene": "Guard and replay",
+    "commissioning": "Guard and replay",
+    "runs": "Guard and replay",
+    "robot": "Guard and replay",
+    "skin": "Skin",
+    "core": "Errors",
+}
+
+
+# scene keys
+
+
+def scene_table(keys: Sequence[Any]) -> str:
+    """Return the table of the keys of one table of a scene."""
+    lines = ["| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
+    for key in keys:
+        row = (f"`{key.name}`", key.unit, key.bounds, key.default_words, key.meaning)
+        lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines) + "\n"
+
+
+# events, commands, names
+
+
+def event_table() -> str:
+    """Return the table of the names of events, by the comments beside them."""
+    from coneskin.robot.guard.signals import journal
+
+    source = inspect.getsource(journal.EventName)
+    rows = re.findall(r'= "(\w+)"  #: (.*)', source)
+    assert [name for name, _ in rows] == [event.value for event in journal.EventName], "an event lacks its comment"
+    lines = ["| event | means | in a replay |", "|---|---|---|"]
+    for name, meaning in rows:
+        lines.append(
+            f"| `{name}` | {meaning.replace('``', '`')} | {'no' if name in journal.SESSION_EVENTS else 'yes'} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def command_table() -> str:
+    """Return the table of the commands."""
+    from coneskin.cli import COMMANDS
+
+    lines = ["| command | what it does |", "|---|---|"]
+    lines += [f"| `coneskin {name}` | {row[1]} |" for name, row in COMMANDS.items()]
+    return "\n".join(lines) + "\n"
+
+
+def option_tables() -> str:
+    """Return the options of each command, by its parser. They are a page of the site alone: `--help` says the same."""
+    from coneskin.cli import COMMANDS
+
+    lines = []
+    for name, (module, *_) in COMMANDS.items():
+        parser = argparse.ArgumentParser(prog=f"coneskin {name}")
+        importlib.import_module(module).add_arguments(parser)
+        lines += _options(parser)
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _options(parser: argparse.ArgumentParser) -> Iterator[str]:
+    children: list[argparse.ArgumentParser] = []
+    rows = []
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            children = list(dict.fromkeys(action.choices.values()))
+        elif action.help is not argparse.SUPPRESS and not isinstance(action, argparse._HelpAction):
+            rows.append(f"| {_option(action)} | {_help(parser, action)} |")
+    yield from (f"## `{parser.prog}`", "")
+    if rows:
+        yield from ("| option | meaning |", "|---|---|", *rows, "")
+    for child in children:
+        yield from _options(child)
+
+
+def _option(action: argparse.Action) -> str:
+    name = next((name for name in action.option_strings if name.startswith("--")), (action.option_strings or [""])[0])
+    if action.nargs == 0:
+        return f"`{name}`"
+    value = action.metavar or (action.dest.upper() if name else action.dest)
+    value = " ".join(value) if isinstance(value, tuple) else value
+    return f"`{name} {value}`" if name else f"`{value}`"
+
+
+def _help(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
+    text = parser._get_formatter()._expand_help(action) if action.help else ""
+    return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
+
+
+def name_tables() -> str:
+    """Return the public names in groups, each with its first sentence."""
+    face = importlib.import_module("coneskin")
+    groups: dict[str, list[str]] = {group: [] for group in dict.fromkeys([*GROUPS.values(), "Simulation"])}
+    for name, home in face._HOMES.items():
+        if name.startswith("__"):
+            continue
+        group = "Simulation" if home.startswith(("skin.virtual", "robot.sim")) else GROUPS[home.split(".")[0]]
+        opening = (inspect.getdoc(getattr(face, name)) or "").split("\n\n")[0]
+        groups[group].append(f"| `{name}` | {' '.join(opening.split()).replace('|', chr(92) + '|')} |")
+    lines = []
+    for group, rows in groups.items():
+        lines += [f"## {group}", "", "| name | meaning |", "|---|---|", *rows, ""]
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+# ur_rtde
+
+
+def wheel_methods() -> dict[str, list[str]]:
+    """Return the interfaces of the ur_rtde wheel that is installed, and the public methods of each."""
+    import rtde_control
+    import rtde_io
+    import rtde_receive
+
+    interfaces = (rtde_control.RTDEControlInterface, rtde_receive.RTDEReceiveInterface, rtde_io.RTDEIOInterface)
+    return {
+        interface.__name__: [
+            name for name in dir(interface) if name[0].islower() and callable(getattr(interface, name))
+        ]
+        for interface in interfaces
+    }
+
+
+def method_table() -> str:
+    """Return the table of ur_rtde's methods; it needs the wheel."""
+    from coneskin.session.ur_rtde_names import NAMES
+    from coneskin.session.ur_rtde_refusals import REFUSALS
+
+    lines = []
+    for interface, names in wheel_methods().items():
+        rows: dict[tuple[str, str], list[str]] = {}  # methods that are answered alike stand in one row
+        for name in names:
+            if name in NAMES:
+                own = NAMES[name].own.replace(f'"{name}"', '"METHOD"')
+                rows.setdefault((f"`{own}`", NAMES[name].note), []).append(f"`{name}`")
+            else:
+                rows.setdefault(("refused", REFUSALS[name]), []).append(f"`{name}`")
+        lines += [f"## {interface}", "", "| method | own name | note |", "|---|---|---|"]
+        for (own, note), alike in rows.items():
+            lines.append(f"| {', '.join(alike)} | {own} | {note} |".replace("|  |", "| |"))
+        lines.append("")
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+# promises
+
+
+def promises() -> dict[str, str]:
+    """Return the promises of docs/safety.md: id -> sentence."""
+    return dict(re.findall(r"^\| (P\d\d) \| (.*) \|$", (ROOT / "docs" / "safety.md").read_text(encoding="utf-8"), re.M))
+
+
+def proofs() -> dict[str, list[str]]:
+    """Return the tests that carry ``@pytest.mark.promise(...)``: id -> file::test."""
+    found: dict[str, list[str]] = {}
+    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+        text = path.read_text(encoding="utf-8")
+        if "mark.promise(" not in text:
+            continue
+        for node in ast.walk(ast.parse(text)):
+            for mark in getattr(node, "decorator_list", []):
+                if isinstance(mark, ast.Call) and ast.unparse(mark.func) == "pytest.mark.promise":
+                    for argument in mark.args:
+                        test = f"{path.relative_to(ROOT / 'tests').as_posix()}::{node.name}"  # type: ignore[attr-defined]
+                        found.setdefault(ast.literal_eval(argument), []).append(test)
+    return found
+
+
+def proof_table() -> str:
+    """Return the table of the promises and the tests that show them."""
+    shown = proofs()
+    lines = ["| promise | shown by |", "|---|---|"]
+    lines += [f"| {number} | {'<br>'.join(f'`{test}`' for test in shown.get(number, []))} |" for number in promises()]
+    return "\n".join(lines) + "\n"
+
+
+#: page -> name of a generated part -> what makes it
+PARTS: dict[str, dict[str, Callable[[], str]]] = {
+    "scene.md": {},
+    "events.md": {"events": event_table},
+    "commands.md": {"commands": command_table},
+    "public-names.md": {"names": name_tables},
+    "ur-rtde.md": {"methods": method_table},
+    "promises.md": {"proofs": proof_table},
+}
+
+
+def page(name: str) -> str:
+    """Return what a page of docs/look-up must be."""
+    text = (PAGES / name).read_text(encoding="utf-8")
+    for part, make in PARTS[name].items():
+        begin, end = f"<!-- generated: {part} -->\n", "<!-- end -->\n"
+        before, rest = text.split(begin)
+        old, after = rest.split(end, 1)
+        text = (
+            before + begin + (old if name == "ur-rtde.md" and not find_spec("rtde_control") else make()) + end + after
+        )
+    if name == "scene.md":
+        from coneskin.scene.tables.keys import scene_tables
+
+        for section, keys in scene_tables().items():
+            head = f"\n## `{section}`\n"
+            assert head in text, f"docs/look-up/scene.md needs a section {section}"
+            start = text.index("| key | unit |", text.index(head))
+            stop = text.index("\n\n", start) + 1 if "\n\n" in text[start:] else len(text)
+            text = text[:start] + scene_table(keys) + text[stop:]
+    return text
+
+
+def main() -> int:
+    """Write the pages, or check them."""
+    parser = argparse.ArgumentParser(description="Write the tables of docs/look-up from those of the code.")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where a page differs")
+    check = parser.parse_args().check
+    stale = []
+    for name in PARTS:
+        made = page(name)
+        if made != (PAGES / name).read_text(encoding="utf-8"):
+            if check:
+                stale.append(f"{name}: run python scripts/reference.py")
+            else:
+                (PAGES / name).write_text(made, encoding="utf-8")
+    if stale:
+        print(*stale, sep="\n", file=sys.stderr)
+    return bool(stale)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
