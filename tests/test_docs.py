@@ -11,9 +11,7 @@ A command that ends with "&" runs until the end of its page. Loopback addresses 
 silences that a scene allows become as long as possible: a busy machine is no failure.
 """
 
-import ast
-import functools
-import itertools
+import importlib.util
 import math
 import os
 import re
@@ -28,7 +26,6 @@ from typing import NamedTuple
 
 import pytest
 
-from coneskin.cli import COMMANDS
 from coneskin.robot.sim.process import free_host
 from coneskin.scene.reader import parse_scene
 from tests.support.paths import ROOT
@@ -38,7 +35,7 @@ PAGES = {
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 }
 #: pages whose blocks start processes, or compute for seconds
-LONG = {"README.md", "docs/index.md", "docs/look-up/sim-ur.md", "docs/understand/field.md"}
+LONG = {"README.md", "docs/learn/first-collision.md", "docs/look-up/sim-ur.md", "docs/understand/field.md"}
 LONG |= {
     f"docs/do/{name}.md"
     for name in (
@@ -55,6 +52,12 @@ LONG |= {
 }
 #: blocks that no test runs, each with its reason in the page
 NOT_RUN = 3
+specification = importlib.util.spec_from_file_location("reference", ROOT / "scripts" / "reference.py")
+assert specification is not None
+assert specification.loader is not None
+reference = importlib.util.module_from_spec(specification)
+specification.loader.exec_module(reference)
+
 LANGUAGES = ("python", "sh", "toml", "text")
 TIMEOUT = 180.0  # s for one block; a busy machine takes ten times as long as an idle one
 SHELL = 'coneskin() { "$PYTHON" -m coneskin "$@"; }; python() { "$PYTHON" "$@"; };'
@@ -276,53 +279,58 @@ def test_the_links_of_a_page_at_the_root_lead_somewhere(page: str) -> None:
     assert sorted(name for name in targets if "://" not in name and not (ROOT / name).exists()) == []
 
 
-#: `test_core.py::test_nothing_moves`: a test by its file below tests/, with a folder where the name alone is not unique
-NAMED_TEST = re.compile(r"`(?:tests/)?([\w/]+\.py)::(\w+)`")
+def test_the_tables_to_look_up_are_what_the_script_makes() -> None:
+    done = subprocess.run(
+        [sys.executable, "scripts/reference.py", "--check"], cwd=ROOT, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
 
 
-@functools.cache
-def functions(path: Path) -> set[str]:
-    """Names of the functions of a file, which is read and not imported."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+def test_every_promise_has_a_test_and_every_id_is_a_promise() -> None:
+    promises, proofs = reference.promises(), reference.proofs()
+    print(f"{len(promises)} promises, {sum(map(len, proofs.values()))} proofs")
+    assert list(promises) == [f"P{number:02d}" for number in range(1, len(promises) + 1)]
+    assert promises.keys() >= proofs.keys()
 
 
-def test_every_promise_names_a_test_that_shows_it() -> None:
-    lines = PAGES["docs/safety.md"].read_text(encoding="utf-8").splitlines()
-    heads = [number for number, line in enumerate(lines) if line.endswith("| shown by |")]
-    rows = [line for head in heads for line in itertools.takewhile(lambda one: one.startswith("|"), lines[head + 2 :])]
-    print(f"{len(rows)} promises")
-    assert "| what happens | what coneskin does | shown by |" in lines
-    assert [row for row in rows if not NAMED_TEST.search(row.rsplit(" | ", 1)[1])] == []
+def plain(text: str) -> str:
+    """Prose of a page: neither blocks, nor code, nor tables."""
+    text = re.sub(r"```.*?```|<!--.*?-->", "\n\n", text, flags=re.DOTALL)
+    return re.sub(r"^\s*\|.*$|^#.*$", "\n\n", re.sub(r"`[^`\n]*`", "code", text), flags=re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_the_tests_that_a_page_names_exist(page: str) -> None:
-    text = PAGES[page].read_text(encoding="utf-8")
-    files = list((ROOT / "tests").rglob("test_*.py"))
-    missing = []
-    for file, name in set(NAMED_TEST.findall(text)):
-        found = [path for path in files if path.as_posix().endswith(f"/{file}")]
-        if len(found) != 1 or name not in functions(found[0]):
-            missing.append(f"{file}::{name}")
-    assert sorted(missing) == []
-    assert text.count(".py::") == len(NAMED_TEST.findall(text)), "one is broken over two lines, or not in code font"
+def sentences(text: str) -> list[str]:
+    """Sentences of a page's prose; an item of a list and what follows a colon count as one of their own."""
+    paragraphs = re.split(r"\n\s*\n|\n\s*(?:[*+-]|\d+\.) ", plain(text))
+    return [one for part in paragraphs for one in re.split(r"(?<=[.!?:])\s+(?=[A-Z`*\[(0-9])", part) if one.strip()]
 
 
-def test_readme_lists_every_command() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert re.findall(r"^\| `coneskin ([\w-]+)", text, re.MULTILINE) == list(COMMANDS)
+#: words of all pages but those of bench/, of README.md and of docs/safety.md
+MOST_WORDS = {"": 49_000, "README.md": 600, "docs/safety.md": 4000}
+#: expression -> how often it may and must stand in 10 000 words of prose
+RATES = {";": (0, 95), r"\byour?\b": (20, 1000), r"\b(anew|beside|nobody|somebody)\b": (0, 21)}
+LONG_SENTENCES = 0.3  # share of sentences of more than 25 words
 
 
-def test_readme_names_every_folder_of_code() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    table = text.split("| folder | imported as |", 1)[1].split("\n\n", 1)[0]
-    folders = {
-        path.parent.name
-        for top in ("geometry", "skin", "robot", "src/coneskin")
-        for path in (ROOT / top).glob("*/__init__.py")
-    }
-    assert folders - set(re.findall(r"`([\w/]+?)/?`", table)) == set()
+def test_the_pages_are_short() -> None:
+    known = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True).stdout.split()
+    if not known:
+        pytest.skip("no git repository")
+    words = {name: len((ROOT / name).read_text(encoding="utf-8").split()) for name in known}
+    words[""] = sum(count for name, count in words.items() if not name.startswith("bench/"))
+    assert {name: words[name] for name, most in MOST_WORDS.items() if words[name] > most} == {}
+
+
+def test_the_prose_is_plain() -> None:
+    text = "\n\n".join(
+        plain(path.read_text(encoding="utf-8")) for name, path in PAGES.items() if name != "CONTRIBUTING.md"
+    )
+    rates = {rate: 1e4 * len(re.findall(rate, text, re.IGNORECASE)) / len(text.split()) for rate in RATES}
+    assert {rate: value for rate, value in rates.items() if not RATES[rate][0] <= value <= RATES[rate][1]} == {}
+    found = [(name, one) for name, path in PAGES.items() for one in sentences(path.read_text(encoding="utf-8"))]
+    long = [f"{name}: {' '.join(one.split())}" for name, one in found if len(one.split()) > 25]
+    print(f"{len(long)} of {len(found)} sentences have more than 25 words:", *long, sep="\n")
+    assert len(long) <= LONG_SENTENCES * len(found)
 
 
 def test_the_drawing_is_what_its_script_draws() -> None:
