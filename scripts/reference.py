@@ -53,17 +53,11 @@ def scene_table(keys: Sequence[Any]) -> str:
 
 
 def event_table() -> str:
-    """Return the table of the names of events, by the comments beside them."""
-    from coneskin.robot.guard.signals import journal
+    """Return the table of the names of events."""
+    from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName
 
-    source = inspect.getsource(journal.EventName)
-    rows = re.findall(r'= "(\w+)"  #: (.*)', source)
-    assert [name for name, _ in rows] == [event.value for event in journal.EventName], "an event lacks its comment"
     lines = ["| event | means | in a replay |", "|---|---|---|"]
-    for name, meaning in rows:
-        lines.append(
-            f"| `{name}` | {meaning.replace('``', '`')} | {'no' if name in journal.SESSION_EVENTS else 'yes'} |"
-        )
+    lines += [f"| `{name}` | {name.meaning} | {'no' if name in SESSION_EVENTS else 'yes'} |" for name in EventName]
     return "\n".join(lines) + "\n"
 
 
