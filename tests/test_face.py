@@ -54,10 +54,9 @@ def test_no_public_name_hides_a_folder() -> None:
     assert not set(NAMES) & (folders | modules)
 
 
-def test_readme_lists_every_public_name_and_no_other() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    table = text.split("<!-- public names -->")[1].split("<!-- end of public names -->")[0]
-    assert sorted(re.findall(r"`(\w+)`", table)) == NAMES
+def test_the_page_lists_every_public_name_and_no_other() -> None:
+    text = (ROOT / "docs" / "look-up" / "public-names.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^\| `(\w+)`", text, re.MULTILINE)) == NAMES
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

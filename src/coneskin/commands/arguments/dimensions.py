@@ -33,7 +33,7 @@ def add_dimension_options(
     """
     for key in keys:
         default = (defaults or {}).get(key.plain)
-        text = key.meaning + (f" (default: {default})" if default else "")
+        text = key.meaning.replace("%", "%%") + (f" (default: {default})" if default else "")
         add(option_name(key), type=float, metavar=_metavar(key), required=key.plain in required, help=text)
 
 
@@ -45,7 +45,7 @@ def add_setting_option(add: Callable[..., Any], key: Key) -> None:
         key: a number with a default, or with None, which is chosen to match the rest.
     """
     default = None if key.default is None else key.kind(key.in_file_unit(key.default))
-    text = f"{key.meaning} ({'chosen to match' if default is None else f'default {default:g}'})"
+    text = f"{key.meaning.replace('%', '%%')} ({'chosen to match' if default is None else f'default {default:g}'})"
     add(option_name(key), type=key.kind, default=default, metavar=_metavar(key), help=text)
 
 
