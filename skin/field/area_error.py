@@ -1,4 +1,4 @@
-"""Closed-form law of the area error: the distance from a round contact's centre to its decoded place.
+"""Area error, from a round contact's centre to its decoded place: exact, over a grid of places, and as a law.
 
 Truncating the multipole solution at the dipole gives, for a disc of radius a and conductance g per area,
 
@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,13 +35,14 @@ from numpy.typing import ArrayLike
 from coneskin.core.arrays import Floats
 
 from .disc import bessel_ratios
+from .fourport import angular_phase, radial_phase
 from .green import Strip
 from .sheet import SectorSheet
 
 if TYPE_CHECKING:
     from .model import FieldModel
 
-__all__ = ["Robin", "area_error", "effective_area"]
+__all__ = ["ErrorMap", "Robin", "area_error", "decode_errors", "effective_area"]
 
 
 class Robin:
@@ -140,3 +142,50 @@ def area_error(
     stretch = sheet.stretch(u)
     factor = -math.pi * effective_area(radius, conductance, rs) / rs / stretch
     return factor * (along + rs / (2.0 * math.pi) * sheet.curvature), factor * across
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ErrorMap:
+    """Errors of the decoded place over a grid of round contacts; NaN where the disc would not fit.
+
+    Attributes:
+        u: slant distances of the contacts [m], shape (n,).
+        phi: azimuths of the contacts [rad], shape (m,).
+        u_error: decoded minus true slant distance [m], shape (n, m).
+        phi_error: decoded minus true azimuth [rad], shape (n, m).
+    """
+
+    u: Floats
+    phi: Floats
+    u_error: Floats
+    phi_error: Floats
+
+    @classmethod
+    def of(cls, model: FieldModel, radius: float, u: Floats, phi: Floats, conductance: float = math.inf) -> ErrorMap:
+        """Compute the errors over a grid of discs of a radius [m]; conductance per area [S/m^2]."""
+        at_u, at_phi = (values.ravel() for values in np.meshgrid(u, phi, indexing="ij"))
+        fits = model.sheet.edge_distances(at_u, at_phi).min(axis=1) >= radius * (1.0 - 1e-13)
+        out = np.full((2, at_u.size), math.nan)
+        if fits.any():
+            out[:, fits] = decode_errors(model, at_u[fits], at_phi[fits], radius, conductance)
+        return cls(u, phi, *out.reshape(2, u.size, phi.size))
+
+
+def decode_errors(
+    model: FieldModel, u: ArrayLike, phi: ArrayLike, radius: ArrayLike, conductance: ArrayLike = math.inf
+) -> tuple[Floats, Floats]:
+    """Return decoded minus true (u [m], phi [rad]) by the paper's equations 20 and 24 from each guide pair's mean.
+
+    Args:
+        model: the sensor.
+        u: slant distance of the centres from end 1 [m].
+        phi: azimuth of the centres [rad].
+        radius: of the discs [m].
+        conductance: per area [S/m^2]; inf is a perfect bond.
+    """
+    sheet = model.sheet
+    coupling = model.contacts(u, phi, radius, conductance)
+    radial = model.read(coupling, radial_phase()).terminals[:, 2:].mean(axis=1)
+    angular = model.read(coupling, angular_phase()).terminals[:, :2].mean(axis=1)
+    seen_u, seen_phi = sheet.locate((1.0 - radial) * sheet.length, angular * sheet.breadth)
+    return seen_u - u, seen_phi - phi

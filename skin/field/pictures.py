@@ -1,11 +1,10 @@
-"""Pictures of the field: potentials with their lines, error maps, error over contact size. Needs matplotlib."""
+"""Pictures of the field on the flat sheet: potentials with their lines, and error maps. Needs matplotlib."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,26 +12,11 @@ from coneskin.core.arrays import Floats
 from coneskin.core.errors import MissingExtra
 
 from .maps import FieldMap
-from .paper_tables import ErrorMap
 from .sheet import SectorSheet
 
-__all__ = ["PlotArea", "draw_curves", "draw_error", "draw_potential", "make_figure"]
+__all__ = ["draw_potential", "make_figure", "paint_error"]
 
-
-class PlotArea(NamedTuple):
-    """A part of a sheet in an error map.
-
-    Attributes:
-        label: what it is.
-        margin_mm: its distance from the arcs [mm].
-        margin_deg: its distance from the straight edges [deg].
-        largest: error in it, in the unit of the map.
-    """
-
-    label: str
-    margin_mm: float
-    margin_deg: float
-    largest: float
+_MIN_ANGLE = 0.1  # rad of the sector; one of less is drawn as the rectangle that it nearly is
 
 
 def make_figure(width: float, height: float, columns: int = 1) -> tuple[Any, list[Any]]:
@@ -52,7 +36,10 @@ def make_figure(width: float, height: float, columns: int = 1) -> tuple[Any, lis
 
 
 def _plane(sheet: SectorSheet, u: Floats, phi: Floats) -> tuple[Floats, Floats]:
-    """Return flat coordinates with the apex at the origin [mm]."""
+    """Return flat coordinates [mm] from the apex; from the middle of end 1 where the sheet is nearly a rectangle."""
+    if sheet.angle < _MIN_ANGLE:
+        flat = sheet.flat(u, phi, (0.0, 0.5 * sheet.wrap))
+        return flat.imag * 1e3, flat.real * 1e3
     r, theta = sheet.polar(u, phi)
     return r * np.cos(theta) * 1e3, r * np.sin(theta) * 1e3
 
@@ -74,12 +61,11 @@ def _outline(axes: Any, sheet: SectorSheet, names: dict[str, str]) -> None:
             inside = {"B": (0.0, -1.0), "A": (0.0, 1.0), "D": (-1.0, 0.0), "C": (1.0, 0.0)}[name]
             middle_u = sheet.width * 0.5 * (1.0 + inside[1])
             middle_phi = sheet.wrap * 0.5 * (1.0 + inside[0])
-            r, theta = (float(v) for v in sheet.polar(middle_u, middle_phi))
-            gap = 0.05 * (float(sheet.polar(sheet.width, 0.0)[0]))
-            r, along = r + inside[1] * gap, inside[0] * gap
-            x0 = (r * math.cos(theta) - along * math.sin(theta)) * 1e3
-            y0 = (r * math.sin(theta) + along * math.cos(theta)) * 1e3
-            axes.text(x0, y0, names[name], ha="center", va="center", fontsize=9)
+            near = np.array([0.0, 1e-3])  # on the edge, and a little inside of it
+            x, y = _plane(sheet, middle_u - inside[1] * near * sheet.width, middle_phi - inside[0] * near * sheet.wrap)
+            gap = 0.05 * sheet.width * 1e3 / math.hypot(x[1] - x[0], y[1] - y[0])
+            at = float(x[0] + gap * (x[0] - x[1])), float(y[0] + gap * (y[0] - y[1]))
+            axes.text(*at, names[name], ha="center", va="center", fontsize=9)
     axes.set_aspect("equal")
     axes.set_xlabel("x [mm]")
     axes.set_ylabel("y [mm]")
@@ -159,95 +145,29 @@ def _cell_edges(middles: Floats) -> Floats:
     return np.concatenate([middles[:1], 0.5 * (middles[1:] + middles[:-1]), middles[-1:]])
 
 
-def _frame(sheet: SectorSheet, area: PlotArea) -> tuple[Floats, Floats]:
-    """Return the line around an area, in flat coordinates [mm]."""
-    r = np.array([float(sheet.polar(u, 0.0)[0]) * 1e3 for u in (0.0, sheet.width)])
-    inner, outer = float(r.min()) + area.margin_mm, float(r.max()) - area.margin_mm
-    start, end = math.radians(area.margin_deg), sheet.angle - math.radians(area.margin_deg)
-    along = np.linspace(start, end, 100)
-    theta = np.concatenate([along, along[::-1], along[:1]])
-    radius = np.concatenate([np.full(100, inner), np.full(100, outer), [inner]])
-    return radius * np.cos(theta), radius * np.sin(theta)
-
-
-def draw_error(
-    path: Path,
-    model_sheet: SectorSheet,
-    grid: ErrorMap,
-    radial: bool,
-    title: str,
-    areas: Sequence[PlotArea] = (),
-    paper: float = math.nan,
-) -> None:
-    """Draw an error map on the sector; blank where the disc would not fit.
+def paint_error(
+    sheet: SectorSheet, u: Floats, phi: Floats, error: Floats, label: str, reach: float = 0.0
+) -> tuple[Any, Any, Any]:
+    """Paint an error map on the flat sheet; blank where it is NaN.
 
     Args:
-        path: of the PNG.
-        model_sheet: the sheet.
-        grid: what to draw.
-        radial: the error of r; otherwise that of theta.
-        title: of the picture; the largest error that is drawn is put after it.
-        areas: parts of the sheet to frame.
-        paper: largest error in the paper, in the unit of the map: marked on the scale, and a line where the map has it.
+        sheet: the sheet.
+        u: slant distances of the grid [m], increasing, shape (n,).
+        phi: azimuths of the grid [rad], increasing, shape (m,).
+        error: values, shape (n, m).
+        label: of the scale.
+        reach: value that the scale reaches at least, in the unit of the error.
+
+    Returns:
+        figure, axes and scale, to add to and to save.
 
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    theta, r = np.meshgrid(np.radians(_cell_edges(grid.theta_deg)), _cell_edges(grid.r_mm))
-    error = grid.r_error_mm if radial else grid.theta_error_deg
     figure, (axes,) = make_figure(5.6, 4.9)
-    limit = float(np.nanmax(np.abs(error)))
-    x, y = r * np.cos(theta), r * np.sin(theta)
-    reach = max(limit, 1.03 * paper) if math.isfinite(paper) else limit
-    picture = axes.pcolormesh(x, y, error, cmap="RdBu_r", vmin=-reach, vmax=reach)
-    label = "decoded minus true " + ("r [mm]" if radial else "theta [deg]")
+    reach = max(float(np.nanmax(np.abs(error))), reach)
+    edges = np.meshgrid(_cell_edges(u), _cell_edges(phi), indexing="ij")
+    picture = axes.pcolormesh(*_plane(sheet, *edges), error, cmap="RdBu_r", vmin=-reach, vmax=reach)
     scale = figure.colorbar(picture, ax=axes, label=label, shrink=0.85)
-    _outline(axes, model_sheet, {})
-    unit = "mm" if radial else "deg"
-    if math.isfinite(paper):
-        for level in (-paper, paper):
-            scale.ax.axhline(level, color="tab:green", lw=2.0)
-        middle = np.meshgrid(np.radians(grid.theta_deg), grid.r_mm)
-        flat = middle[1] * np.cos(middle[0]), middle[1] * np.sin(middle[0])
-        if limit > paper:
-            axes.contour(
-                *flat, np.nan_to_num(error), [-paper, paper], colors="tab:green", linewidths=1.6, linestyles="-"
-            )
-        axes.plot([], [], color="tab:green", lw=1.6, label=f"the paper's largest error: {paper:g} {unit}")
-    for area, style in zip(areas, ("-", "--", ":"), strict=False):
-        frame = _frame(model_sheet, area)
-        axes.plot(*frame, style, color="black", lw=1.0, label=f"{area.label}: largest {area.largest:.4f} {unit}")
-    if areas:
-        figure.legend(loc="outside lower center", fontsize=8, frameon=False)
-    axes.set_title(f"{title}: largest {limit:.3g} {unit}", fontsize=10)
-    figure.savefig(path, dpi=130)
-
-
-def draw_curves(
-    path: Path, x: Floats, panels: Sequence[Sequence[tuple[str, Floats, str]]], labels: tuple[str, str], title: str
-) -> None:
-    """Draw curves over one axis.
-
-    Args:
-        path: of the PNG.
-        x: abscissa.
-        panels: one above the other, each with a scale of its own; their curves as (label, ordinate, matplotlib format).
-        labels: of the axes.
-        title: of the picture.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-    """
-    figure, (axes,) = make_figure(5.6, 4.0 if len(panels) == 1 else 2.7 * len(panels))
-    axes.remove()
-    for number, curves in enumerate(panels):
-        axes = figure.add_subplot(len(panels), 1, number + 1)
-        for label, y, style in curves:
-            axes.plot(x, y, style, label=label, lw=1.4)
-        axes.set_ylabel(labels[1])
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)
-        if number == 0:
-            axes.set_title(title, fontsize=10)
-    axes.set_xlabel(labels[0])
-    figure.savefig(path, dpi=130)
+    _outline(axes, sheet, {})
+    return figure, axes, scale

@@ -27,7 +27,7 @@ COMMANDS = {
     "init": ("coneskin.commands.init", "write the scene for a design, and say the next command"),
     "firmware": ("coneskin.commands.firmware", "the sketch of a board that reads a sensor, its wiring and its parts"),
     "doctor": ("coneskin.commands.doctor", "examine skin, wires and arm of a scene; each finding with its remedy"),
-    "field": ("coneskin.commands.field", "the electric field of a sensor, and the paper's figures from it"),
+    "field": ("coneskin.commands.field", "draw the electric field of a sensor"),
     "calibrate": ("coneskin.commands.calibrate", "touch known places of a skin, and take off what it reads wrongly"),
     "commission": ("coneskin.commands.commission", "touch marks on a skin, so that its arm may move away from touches"),
     "find-port": ("coneskin.commands.find_port", "find the port of a device: unplug it, and plug it in again"),

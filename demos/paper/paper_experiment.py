@@ -20,25 +20,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from paper_tables import TABLE_2, TABLE_2_RADIUS_MM, decode_errors, largest_errors, paper_model
 
 from coneskin.core.arrays import Floats
-
-from .fourport import Terminal, angular_phase, radial_phase
-from .model import FieldModel
-from .paper_tables import TABLE_2, TABLE_2_RADIUS_MM, decode_errors, largest_errors, paper_model
-
-__all__ = [
-    "POINT_CONTACT",
-    "Assumption",
-    "Effects",
-    "Experiment",
-    "Sensitivity",
-    "assumptions",
-    "experiment",
-    "lead_errors",
-    "sensitivities",
-]
-
+from coneskin.skin.field.fourport import Terminal, angular_phase, radial_phase
+from coneskin.skin.field.model import FieldModel
 
 #: Largest errors of the point contact of figure 16 [mm], [deg]; its points are not published.
 POINT_CONTACT = (1.6, 0.5)

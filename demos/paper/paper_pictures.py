@@ -1,22 +1,21 @@
-"""Pictures of the paper's experiment beside the model: figures 16 and 17, Table 2, and what hangs on inference."""
+"""Pictures of the paper beside the model: figures 11, 12, 16 and 17, Table 2, and what hangs on inference."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from paper_experiment import POINT_CONTACT, Experiment, Sensitivity, lead_errors
+from paper_tables import TABLE_2_RADIUS_MM, decode_errors
 
 from coneskin.core.arrays import Floats
-
-from .model import FieldModel
-from .paper_experiment import POINT_CONTACT, Experiment, Sensitivity, lead_errors
-from .paper_tables import TABLE_2_RADIUS_MM, decode_errors
-from .pictures import make_figure
-
-__all__ = ["draw_experiment", "draw_places", "draw_point_contacts", "draw_sensitivities"]
-
+from coneskin.skin.field.area_error import ErrorMap
+from coneskin.skin.field.model import FieldModel
+from coneskin.skin.field.pictures import make_figure, paint_error
+from coneskin.skin.field.sheet import SectorSheet
 
 _PAPER, _OURS, _LEFT = "tab:green", "tab:blue", "tab:red"
 
@@ -152,3 +151,98 @@ def _flat(places: Floats) -> tuple[Any, Any]:
     """Return (x, y) [mm] of places (r [mm], theta [deg]), shape (n, 2)."""
     r, theta = places[:, 0], np.radians(places[:, 1])
     return r * np.cos(theta), r * np.sin(theta)
+
+
+class PlotArea(NamedTuple):
+    """A part of a sheet in an error map.
+
+    Attributes:
+        label: what it is.
+        margin_mm: its distance from the arcs [mm].
+        margin_deg: its distance from the straight edges [deg].
+        largest: error in it, in the unit of the map.
+    """
+
+    label: str
+    margin_mm: float
+    margin_deg: float
+    largest: float
+
+
+def _frame(sheet: SectorSheet, area: PlotArea) -> tuple[Floats, Floats]:
+    """Return the line around an area, in flat coordinates [mm]."""
+    r = np.array([float(sheet.polar(u, 0.0)[0]) * 1e3 for u in (0.0, sheet.width)])
+    inner, outer = float(r.min()) + area.margin_mm, float(r.max()) - area.margin_mm
+    start, end = math.radians(area.margin_deg), sheet.angle - math.radians(area.margin_deg)
+    along = np.linspace(start, end, 100)
+    theta = np.concatenate([along, along[::-1], along[:1]])
+    radius = np.concatenate([np.full(100, inner), np.full(100, outer), [inner]])
+    return radius * np.cos(theta), radius * np.sin(theta)
+
+
+def draw_error(
+    path: Path, sheet: SectorSheet, grid: ErrorMap, radial: bool, title: str, areas: Sequence[PlotArea], paper: float
+) -> None:
+    """Draw figure 11 or 12: an error map, the areas of the table, and the paper's largest error.
+
+    Args:
+        path: of the PNG.
+        sheet: the paper's sector.
+        grid: what to draw.
+        radial: the error of r [mm]; otherwise that of theta [deg].
+        title: of the picture; the largest error that is drawn is put after it.
+        areas: parts of the sheet to frame.
+        paper: largest error in the paper: marked on the scale, and a line where the map has it; NaN for none.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    error = grid.u_error * 1e3 if radial else np.degrees(grid.phi_error)
+    limit, unit = float(np.nanmax(np.abs(error))), "mm" if radial else "deg"
+    label = "decoded minus true " + ("r [mm]" if radial else "theta [deg]")
+    marked = math.isfinite(paper)
+    figure, axes, scale = paint_error(sheet, grid.u, grid.phi, error, label, 1.03 * paper if marked else 0.0)
+    if marked:
+        for level in (-paper, paper):
+            scale.ax.axhline(level, color="tab:green", lw=2.0)
+        if limit > paper:
+            r, theta = sheet.polar(*np.meshgrid(grid.u, grid.phi, indexing="ij"))
+            flat, levels = (r * np.cos(theta) * 1e3, r * np.sin(theta) * 1e3), [-paper, paper]
+            axes.contour(*flat, np.nan_to_num(error), levels, colors="tab:green", linewidths=1.6, linestyles="-")
+        axes.plot([], [], color="tab:green", lw=1.6, label=f"the paper's largest error: {paper:g} {unit}")
+    for area, style in zip(areas, ("-", "--", ":"), strict=False):
+        frame = _frame(sheet, area)
+        axes.plot(*frame, style, color="black", lw=1.0, label=f"{area.label}: largest {area.largest:.4f} {unit}")
+    figure.legend(loc="outside lower center", fontsize=8, frameon=False)
+    axes.set_title(f"{title}: largest {limit:.3g} {unit}", fontsize=10)
+    figure.savefig(path, dpi=130)
+
+
+def draw_curves(
+    path: Path, x: Floats, panels: Sequence[Sequence[tuple[str, Floats, str]]], labels: tuple[str, str], title: str
+) -> None:
+    """Draw curves over one axis.
+
+    Args:
+        path: of the PNG.
+        x: abscissa.
+        panels: one above the other, each with a scale of its own; their curves as (label, ordinate, matplotlib format).
+        labels: of the axes.
+        title: of the picture.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    figure, (axes,) = make_figure(5.6, 4.0 if len(panels) == 1 else 2.7 * len(panels))
+    axes.remove()
+    for number, curves in enumerate(panels):
+        axes = figure.add_subplot(len(panels), 1, number + 1)
+        for label, y, style in curves:
+            axes.plot(x, y, style, label=label, lw=1.4)
+        axes.set_ylabel(labels[1])
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8)
+        if number == 0:
+            axes.set_title(title, fontsize=10)
+    axes.set_xlabel(labels[0])
+    figure.savefig(path, dpi=130)

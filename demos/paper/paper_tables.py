@@ -15,23 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from coneskin.core.arrays import Floats
-
-from .fourport import angular_phase, radial_phase
-from .model import FieldModel
-from .sheet import SectorSheet
-
-__all__ = [
-    "FIGURES",
-    "ErrorMap",
-    "TableRow",
-    "decode_errors",
-    "error_map",
-    "influence_of_area",
-    "largest_errors",
-    "paper_model",
-    "rows",
-]
-
+from coneskin.skin.field import area_error
+from coneskin.skin.field.area_error import ErrorMap
+from coneskin.skin.field.model import FieldModel
+from coneskin.skin.field.sheet import SectorSheet
 
 _UNEXPLAINED = "not reproduced: see the residuals"
 _GRID = "depends on the paper's grid of places, which is not published"
@@ -53,25 +40,6 @@ TABLE_2 = (
     (160.0, 35.0, -1.9, -0.985),
     (160.0, 55.0, -2.1, -1.09),
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ErrorMap:
-    """Errors of the decoded place over a grid of contacts; NaN where the disc would not fit.
-
-    Attributes:
-        r_mm: polar radii of the contacts [mm], shape (n,).
-        theta_deg: polar angles of the contacts [deg], shape (m,).
-        r_error_mm: decoded minus true radius [mm], shape (n, m).
-        theta_error_deg: decoded minus true angle [deg], shape (n, m).
-        radius_mm: of the contacts [mm].
-    """
-
-    r_mm: Floats
-    theta_deg: Floats
-    r_error_mm: Floats
-    theta_error_deg: Floats
-    radius_mm: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,30 +75,16 @@ def paper_model(r1_mm: float = 100.0, r2_mm: float = 200.0, theta0_deg: float = 
 def decode_errors(
     model: FieldModel, r: Floats, theta: Floats, radius: float, conductance: float = math.inf
 ) -> tuple[Floats, Floats]:
-    """Return decoded minus true (r [m], theta [rad]) by the paper's equations 20 and 24 from each guide pair's mean."""
-    sheet = model.sheet
-    u, phi = sheet.from_polar(r, theta)
-    coupling = model.contacts(u, phi, radius, conductance)
-    radial = model.read(coupling, radial_phase()).terminals[:, 2:].mean(axis=1)
-    angular = model.read(coupling, angular_phase()).terminals[:, :2].mean(axis=1)
-    seen_u, seen_phi = sheet.locate((1.0 - radial) * sheet.length, angular * sheet.breadth)
-    seen_r, seen_theta = sheet.polar(seen_u, seen_phi)
-    return seen_r - r, seen_theta - theta
+    """Decoded minus true (r [m], theta [rad])."""
+    return area_error.decode_errors(model, *model.sheet.from_polar(r, theta), radius, conductance)
 
 
 def error_map(
     model: FieldModel, radius_mm: float, r_mm: Floats, theta_deg: Floats, conductance: float = math.inf
 ) -> ErrorMap:
-    """Compute the errors over a grid of discs; conductance per area [S/m^2]."""
-    r, theta = (v.ravel() for v in np.meshgrid(r_mm * 1e-3, np.radians(theta_deg), indexing="ij"))
-    a = radius_mm * 1e-3
-    u, phi = model.sheet.from_polar(r, theta)
-    fits = model.sheet.edge_distances(u, phi).min(axis=1) >= a * (1.0 - 1e-13)
-    out = np.full((2, r.size), math.nan)
-    if fits.any():
-        out[0, fits], out[1, fits] = decode_errors(model, r[fits], theta[fits], a, conductance)
-    shape = (r_mm.size, theta_deg.size)
-    return ErrorMap(r_mm, theta_deg, out[0].reshape(shape) * 1e3, np.degrees(out[1]).reshape(shape), radius_mm)
+    """The errors over a grid of discs; conductance per area [S/m^2]. Its u is r - r1, its phi is theta."""
+    u, phi = model.sheet.from_polar(r_mm * 1e-3, 0.0)[0], np.radians(theta_deg)
+    return ErrorMap.of(model, radius_mm * 1e-3, u, phi, conductance)
 
 
 def influence_of_area(model: FieldModel, radii_mm: Floats, r_mm: float, theta_deg: float) -> tuple[Floats, Floats]:
@@ -167,8 +121,9 @@ def largest_errors(
         np.linspace(margin_deg, edges[2] - margin_deg, side),
         conductance,
     )
-    smaller = float((grid.r_error_mm < 0.0).mean())
-    return float(np.nanmax(np.abs(grid.r_error_mm))), float(np.nanmax(np.abs(grid.theta_error_deg))), smaller
+    smaller = float((grid.u_error < 0.0).mean())
+    largest = [float(np.nanmax(np.abs(error))) for error in (grid.u_error, grid.phi_error)]
+    return largest[0] * 1e3, math.degrees(largest[1]), smaller
 
 
 def rows(model: FieldModel) -> list[TableRow]:
