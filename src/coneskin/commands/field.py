@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import FieldError
-from coneskin.scene.tables.cone_keys import LINK_CONE_KEYS
+from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
 from .arguments.dimensions import add_dimension_options, given_dimensions
 
