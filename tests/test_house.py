@@ -32,11 +32,12 @@ FLOORS = (
     "design robot.guard",
     "robot.sim scene",
     "impact.permissible_speed runs.replay session view.stage",
-    "commissioning.acceptance commissioning.line impact.simulation runs view",
-    "commands.terminal commissioning.calibration commissioning.examination design.studio runs.export",
+    "commissioning commissioning.line impact.simulation runs view",
+    "commands.terminal commissioning.acceptance commissioning.calibration commissioning.examination design.studio "
+    "runs.export",
     "commands.demonstration runs.what_if",
     "commands",
-    "commissioning impact robot testing",
+    "impact robot testing",
 )
 #: the only files that may import each heavy dependency, as globs
 HOMES = {

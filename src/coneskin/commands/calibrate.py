@@ -87,8 +87,8 @@ def _check_names(scene: Scene, built: Scene) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate the skin of a scene, or list its marks."""
-    from coneskin.commissioning.acceptance.commission import check_touchable
     from coneskin.commissioning.calibration.calibrate import Calibrator
+    from coneskin.commissioning.skin_watch import check_touchable
     from coneskin.core.errors import SceneError
     from coneskin.scene.reader import load_scene
     from coneskin.scene.tables.sensor_tables import sensor_files
@@ -106,15 +106,15 @@ def run(args: argparse.Namespace) -> int:
     person = None if args.simulated or args.list else Person()
     calibrator = Calibrator(
         scene,
-        args.marks,
-        1e-3 * args.mark_error_mm,
         live.notice,
         live.reading,
         person.refuses if person else lambda: False,
-        simulated=simulated,
-        forces=args.forces,
-        files=sensor_files(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder),
-        wired_as=built,
+        simulated,
+        built,
+        args.marks,
+        1e-3 * args.mark_error_mm,
+        args.forces,
+        sensor_files(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder),
     )
     if args.list:
         _list(calibrator, args.json)

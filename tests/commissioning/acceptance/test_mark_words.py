@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coneskin.commissioning.acceptance.mark_words import offer_marks, place_sensors
-from coneskin.commissioning.acceptance.marks import Mark, plan_marks
-from coneskin.commissioning.acceptance.misreadings import RIGHT, Place, misfit
+from coneskin.commissioning.acceptance.marks import plan_marks
+from coneskin.commissioning.misreadings import RIGHT, Place, misfit
+from coneskin.commissioning.touching import Mark
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import link_pose, link_poses

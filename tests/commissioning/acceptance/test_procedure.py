@@ -6,8 +6,9 @@ from collections.abc import Callable
 import pytest
 
 from coneskin.commissioning.acceptance.commission import prepare
-from coneskin.commissioning.acceptance.misreadings import WRONG, Place, misread
-from coneskin.commissioning.acceptance.procedure import Notice, Procedure
+from coneskin.commissioning.acceptance.procedure import Procedure
+from coneskin.commissioning.misreadings import WRONG, Place, misread
+from coneskin.commissioning.touching import Notice, Touching
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.skin.detection.frame.touch_reading import TouchReading
@@ -26,7 +27,7 @@ class Person:
     """A person who touches what is asked for; the skin reads it in some way."""
 
     def __init__(self, procedure: Procedure, reads: Callable[[Place], Place] = lambda place: place) -> None:
-        self.procedure, self.reads = procedure, reads
+        self.procedure, self.reads, self.touching = procedure, reads, Touching(procedure)
         self.now, self.notices = 100.0, list[Notice]()
 
     def let(self, seconds: float, valid: bool = True, doubt: str = "", **places: Place) -> "Person":
@@ -35,7 +36,7 @@ class Person:
             self.now += STEP
             seen = {name: TouchReading(self.now, 0.7, *place, valid, doubt, 0, 0) for name, place in places.items()}
             names = [item.sensor.name for item in self.procedure.sensors]
-            self.notices += self.procedure.look(self.now, {name: seen.get(name) for name in names})
+            self.notices += self.touching.update(self.now, {name: seen.get(name) for name in names})
         return self
 
     def touch(self, seconds: float = 0.5) -> "Person":
@@ -168,16 +169,16 @@ def test_two_sensors_one_after_the_other() -> None:
 def test_a_mark_out_of_reach_is_replaced_until_too_few_are_left() -> None:
     someone = person().let(0.2)
     refused = someone.procedure.mark
-    someone.notices += someone.procedure.refuse()
+    someone.notices += someone.touching.refuse()
     assert someone.procedure.mark not in (None, refused)
     assert someone.kinds == ["mark", "mark"]
     assert someone.carry_out().procedure.passed
     someone = person().let(0.2)
     while not someone.procedure.incomplete:
-        someone.procedure.refuse()
+        someone.touching.refuse()
     assert "cannot show every wrong wiring and mounting" in someone.procedure.incomplete
     assert not someone.procedure.passed
-    assert someone.procedure.look(someone.now, {"one": None}) == []
+    assert someone.touching.update(someone.now, {"one": None}) == []
 
 
 def test_it_waits_until_the_skin_is_let_go() -> None:

@@ -8,6 +8,7 @@ import pytest
 from coneskin.commissioning.calibration.force_fit import KnownPress, fit_forces
 from coneskin.commissioning.calibration.force_sequence import ForceSequence, SensorPresses
 from coneskin.commissioning.calibration.marks import calibration_marks
+from coneskin.commissioning.touching import Touching
 from coneskin.core.errors import SceneError, SensorError, SkinError
 from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
 from coneskin.scene.reader import parse_scene
@@ -99,7 +100,7 @@ def test_each_mark_is_pressed_with_each_force_until_the_level_rests() -> None:
     sensor = parse_scene(forearm_scene()).sensors[0].sensor
     item = SensorPresses(sensor, calibration_marks(sensor)[:2])
     sequence, now, said = ForceSequence([item], (5.0, 1.0)), 0.0, []
-    pressed = 0.0
+    touching, pressed = Touching(sequence), 0.0
     while not sequence.over and now < 60.0:
         now += 0.01
         if sequence.mark is None:
@@ -108,7 +109,7 @@ def test_each_mark_is_pressed_with_each_force_until_the_level_rests() -> None:
             pressed += 0.01
             rising = level(sequence.force) * (1.0 - 0.5 * math.exp(-pressed / 0.3))  # it creeps
             reading = TouchReading(now, rising, 0.1, 1.0, True, "", 0, 0)
-        said += sequence.look(now, {sensor.name: reading})
+        said += touching.update(now, {sensor.name: reading})
     assert [(press.place, press.force) for press in item.presses] == [(0, 1.0), (0, 5.0), (1, 1.0), (1, 5.0)]
     assert [press.level for press in item.presses] == pytest.approx([level(1.0), level(5.0)] * 2, abs=0.004)
     assert said[0].text.startswith(f"1 of 4: press {sensor.name} with 1 N (the weight of 102 g), ")

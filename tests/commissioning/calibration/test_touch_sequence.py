@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from coneskin.commissioning.acceptance.misreadings import Place
-from coneskin.commissioning.acceptance.procedure import Notice
 from coneskin.commissioning.calibration.marks import calibration_marks
 from coneskin.commissioning.calibration.touch_sequence import SensorTouches, TouchSequence
+from coneskin.commissioning.misreadings import Place
+from coneskin.commissioning.touching import Notice, Touching
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.frame.touch_reading import TouchReading
 from coneskin.skin.sensor import Sensor
@@ -24,6 +24,7 @@ class Person:
 
     def __init__(self, sensors: list[Sensor], count: int, reads: Callable[[int, Place], Place]) -> None:
         self.sequence = TouchSequence([SensorTouches(one, calibration_marks(one, count)) for one in sensors], 0.3e-3)
+        self.touching = Touching(self.sequence)
         self.reads, self.rng = reads, random.Random(1)
         self.now, self.touches = 100.0, 0
         self.notices: list[Notice] = []
@@ -37,7 +38,7 @@ class Person:
                 for name, (u, phi) in places.items()
             }
             names = [item.sensor.name for item in self.sequence.sensors]
-            self.notices += self.sequence.look(self.now, {name: seen.get(name) for name in names})
+            self.notices += self.touching.update(self.now, {name: seen.get(name) for name in names})
 
     def touch(self, seconds: float = 0.6, noise: float = 0.05e-3) -> None:
         """Touch the mark that is asked for."""
@@ -131,8 +132,8 @@ def test_a_mark_out_of_reach_is_left_out_until_too_few_are_left() -> None:
     person = Person([ONE], 9, plainly)
     person.let(0.2)
     for _ in range(5):
-        person.notices += person.sequence.refuse()
+        person.notices += person.touching.refuse()
     assert not person.sequence.incomplete
-    person.notices += person.sequence.refuse()
+    person.notices += person.touching.refuse()
     assert "fewer than 4 marks are left" in person.sequence.incomplete
     assert person.kinds == [*["mark"] * 6, "failed"]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from .typed_lines import typed_lines
 
 if TYPE_CHECKING:
-    from coneskin.commissioning.acceptance.procedure import Notice
+    from coneskin.commissioning.touching import Notice
     from coneskin.skin.detection.frame.touch_reading import TouchReading
 
 __all__ = ["LiveReading", "Person"]

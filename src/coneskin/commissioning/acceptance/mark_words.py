@@ -12,9 +12,10 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from coneskin.commissioning.touching import Mark
 from coneskin.scene.build import place_on_arm
 
-from .marks import Mark, azimuth_margin, slant_places
+from .marks import azimuth_margin, slant_places
 
 if TYPE_CHECKING:
     from coneskin.geometry.pose import Pose, Vector

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .misreadings import Place, power, shifts
+from coneskin.commissioning.misreadings import power, shifts
 
 if TYPE_CHECKING:
+    from coneskin.commissioning.touching import Mark
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["LEAST_MARKS", "LEAST_POWER", "Mark", "azimuth_margin", "plan_marks", "slant_places"]
+__all__ = ["LEAST_MARKS", "LEAST_POWER", "azimuth_margin", "plan_marks", "slant_places"]
 
 LEAST_MARKS = 5  #: marks on each sensor
 LEAST_POWER = 2.0  #: tolerances by which each misreading must miss one of the marks
@@ -20,26 +20,6 @@ _MOST_MARKS = 9
 _ALONG = (0.2, 0.5, 0.8)  # parts of the slant at which there are marks
 _EDGE = 0.1  # part of the wrap beside each edge without marks
 _FINGER = 0.015  # m from an edge that a finger needs
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """Place on a sensor, and words by which a person finds it on the arm.
-
-    Attributes:
-        u: slant distance from end 1 [m].
-        phi: azimuth [rad].
-        where: the words; they do not depend on the sensor's own coordinates.
-    """
-
-    u: float
-    phi: float
-    where: str
-
-    @property
-    def place(self) -> Place:
-        """Place alone."""
-        return Place(self.u, self.phi)
 
 
 def slant_places(sensor: Sensor) -> list[float]:

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coneskin.commissioning.sheet_picture import draw_sheet
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
 
 from .mark_words import place_sensors
-from .sheet_picture import draw_sheet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
 
-    from .procedure import Procedure
-    from .sensor_marks import SensorMarks
+    from .procedure import Procedure, SensorMarks
 
 __all__ = ["draw_marks"]
 

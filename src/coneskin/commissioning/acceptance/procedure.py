@@ -1,76 +1,76 @@
-"""Procedure of a commissioning: readings and time go in, notices for the person and results come out. Pure."""
+"""Procedure of a commissioning: marks are touched on each sensor in turn, and each must be read where it is. Pure."""
 
 from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
+from coneskin.commissioning.misreadings import RIGHT, Place, explain, misfit, miss, tolerance
+from coneskin.commissioning.touching import Doubt, Held, Mark, Notice, TouchJudge
 from coneskin.scene.commissioning_record import MarkResult
 
-from .marks import Mark, plan_marks
-from .misreadings import RIGHT, Place, explain, misfit, tolerance
-from .sensor_marks import SensorMarks
+from .marks import plan_marks
 
 if TYPE_CHECKING:
     from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.sensor import Sensor
 
-__all__ = ["Notice", "Procedure"]
+__all__ = ["Procedure", "SensorMarks"]
 
-_HOLD = 0.3  # s for which a touch must rest at a certain place
-_STILL = 0.008  # m; a place that moves farther does not rest
-_QUIET = 0.1  # s without a touch before the next mark
-_UNCERTAIN = 2.0  # s of touch without a certain place, after which the person is told
-_ATTEMPTS = 2  # at a mark; once the sensor has failed at one, 1
-_SYSTEMATIC = 0.5  # tolerances; an offset that all marks have together may not be larger
+_HOLD_TIME = 0.3  # s for which a touch must rest at a certain place
+_REST_RADIUS = 0.008  # m; a place that moves farther does not rest
+_OTHER_TIME = 0.4  # s of a touch elsewhere, after which it counts
+_DOUBT_TIME = 2.0  # s of touch without a certain place, after which the person is told
+_MAX_ATTEMPTS = 2  # at a mark; once the sensor has failed at one, 1
+_SYSTEMATIC_PART = 0.5  # tolerances; an offset that all marks have together may not be larger
 
 
-class Notice(NamedTuple):
-    """What the person is told.
+@dataclass
+class SensorMarks:
+    """Marks of one sensor, and what has become of them.
 
     Attributes:
-        kind: "mark" (touch this), "again" (the same once more), "passed", "failed", "remark", "sensor" (it is over).
-        text: for people.
-        details: for programs.
+        sensor: the sensor.
+        link: on which it is.
+        offered: all places that can be described.
+        plan: places to touch, those touched already first.
+        refused: places that a person cannot reach.
+        results: of those touched.
+        read: places that it read there.
+        cause: why it has failed; empty where it has not.
     """
 
-    kind: str
-    text: str
-    details: Mapping[str, Any] = MappingProxyType({})
+    sensor: Sensor
+    link: str
+    offered: Sequence[Mark]
+    plan: tuple[Mark, ...] = ()
+    refused: list[Mark] = field(default_factory=list)
+    results: list[MarkResult] = field(default_factory=list)
+    read: list[Place] = field(default_factory=list)
+    cause: str = ""
+
+    @property
+    def failed(self) -> bool:
+        """True once a mark was not read where it is."""
+        return any(not result.passed for result in self.results)
 
 
-class _Sample(NamedTuple):
-    time: float
-    u: float
-    phi: float
-    level: float
-
-
-class Procedure:
+class Procedure(TouchJudge["TouchReading"]):
     """Procedure over the sensors of a scene, one mark after the other.
 
     Args:
         sensors: with the places that can be described; in the order in which they are touched.
-
-    Attributes:
-        mark: the mark that is waited for; None once it is over.
-        over: there is nothing more to touch.
-        incomplete: why it cannot be carried out; empty where it can.
     """
 
+    too_short = "{} s is too short, or the place was not certain: touch it and hold it"
+
     def __init__(self, sensors: Sequence[SensorMarks]) -> None:
+        super().__init__(_HOLD_TIME + 1e-9)
         self.sensors = tuple(sensors)
-        self.mark: Mark | None = None
-        self.over = False
-        self.incomplete = ""
-        self._number = 0
-        self._quiet_since: float | None = None
-        self._touched_since: float | None = None
-        self._wait_clear, self._told, self._attempts = True, False, 0
-        self._samples: list[_Sample] = []
-        self._wrong_sensor = ""
+        self._number = self._attempts = 0
         for item in self.sensors:
             self._plan(item)
 
@@ -89,134 +89,61 @@ class Procedure:
         """Sensor whose marks are touched now."""
         return self.sensors[min(self._number, len(self.sensors) - 1)]
 
-    def look(self, now: float, readings: Mapping[str, TouchReading | None]) -> list[Notice]:
-        """Take what the sensors read now.
+    def ask(self) -> Notice:
+        """Ask for the next mark, or once more for the same."""
+        item = self.current
+        self.mark = item.plan[len(item.results)]
+        total = sum(len(other.plan) for other in self.sensors)
+        number = 1 + sum(len(other.results) for other in self.sensors)
+        return self.mark.request(item.sensor, number, total, again=self._attempts > 0)
 
-        Args:
-            now: [s], monotonic.
-            readings: sensor's name -> its reading; None where it is not touched.
-        """
-        if self.over or self.incomplete:
+    def hold(self, touch: Held[TouchReading]) -> list[Notice] | Doubt:
+        """Judge the place of a touch once it rests; a touch of another sheet counts as a miss."""
+        name = self.current.sensor.name
+        touched = [one for one, seen in touch.readings.items() if seen is not None]
+        reading, others = touch.readings.get(name), [one for one in touched if one != name]
+        if reading is None or not reading.location_valid or others:
+            self.samples.clear()
+        if reading is not None and others:
+            return Doubt(f"{', '.join(touched)} are touched at once: touch one place only", _OTHER_TIME)
+        if reading is None:
+            wrong = f"{others[0]} reads this touch: their id are exchanged, or the wrong sheet was touched"
+            nowhere = Place(math.nan, math.nan)
+            return [] if touch.told or touch.duration < _OTHER_TIME else self._judge(nowhere, 0.0, False, wrong)
+        if not reading.location_valid:
+            why = f": {reading.doubt}" if reading.doubt else ""
+            return Doubt(f"the place is not certain{why}; touch it firmly with one finger", _DOUBT_TIME)
+        self.samples.feed(touch.now, reading.u, reading.phi, reading.level)
+        if not self._rests():
             return []
-        touched = {name: reading for name, reading in readings.items() if reading is not None}
-        if self._wait_clear:
-            return self._await_clear(now, bool(touched))
-        if not touched:
-            return self._released(now)
-        self._quiet_since = None
-        if self._touched_since is None:
-            self._touched_since = now
-        return self._held(now, touched)
+        read = Place(statistics.median(self.samples.values(0)), statistics.median(self.samples.values(1)))
+        assert self.mark is not None
+        passed = misfit(self.current.sensor, RIGHT, [self.mark.place], [read]).largest <= 1.0
+        return self._judge(read, statistics.median(self.samples.values(2)), passed, "")
 
     def refuse(self) -> list[Notice]:
-        """Take the mark that is waited for as one that the person cannot reach; another is offered."""
-        if self.mark is None or self.over or self.incomplete:
-            return []
-        item = self.current
-        item.refused.append(self.mark)
-        self._plan(item)
-        if self.incomplete:
-            return [Notice("failed", self.incomplete)]
-        return self._next()
+        """Leave out the mark; another one is offered."""
+        assert self.mark is not None
+        self.current.refused.append(self.mark)
+        self._plan(self.current)
+        return [Notice("failed", self.incomplete)] if self.incomplete else []
 
     # ---- one mark
 
-    def _await_clear(self, now: float, touched: bool) -> list[Notice]:
-        if touched:
-            self._quiet_since = None
-        elif self._quiet_since is None:
-            self._quiet_since = now
-        elif now - self._quiet_since >= _QUIET:
-            self._wait_clear = False
-            return self._next()
-        return []
-
-    def _next(self) -> list[Notice]:
-        item, done = self.current, len(self.current.results)
-        again = self.mark is not None and self._attempts > 0
-        self.mark = item.plan[done]
-        self._samples, self._touched_since, self._told, self._wrong_sensor = [], None, False, ""
-        total = sum(len(other.plan) for other in self.sensors)
-        number = 1 + sum(len(other.results) for other in self.sensors)
-        text = f"{number} of {total}: touch {item.sensor.name} {self.mark.where}"
-        u_mm, phi_deg = _in_file_units(self.mark.place)
-        details = {
-            "number": number,
-            "of": total,
-            "sensor": item.sensor.name,
-            "where": self.mark.where,
-            "u_mm": u_mm,
-            "phi_deg": phi_deg,
-        }
-        return [Notice("again", f"once more, {text}", details) if again else Notice("mark", text, details)]
-
-    def _released(self, now: float) -> list[Notice]:
-        if self._touched_since is None:
-            return []
-        short = now - self._touched_since
-        self._samples, self._touched_since, self._told, self._wrong_sensor = [], None, False, ""
-        return [Notice("remark", f"{short:.1f} s is too short, or the place was not certain: touch it and hold it")]
-
-    def _held(self, now: float, touched: Mapping[str, TouchReading]) -> list[Notice]:
-        assert self._touched_since is not None
-        name = self.current.sensor.name
-        reading = touched.get(name)
-        others = [other for other in touched if other != name]
-        if reading is None or others:
-            self._samples = []
-            if now - self._touched_since < _HOLD + _QUIET or self._told:
-                return []
-            if reading is not None:
-                self._told = True
-                return [Notice("remark", f"{', '.join(touched)} are touched at once: touch one place only")]
-            return self._judge_other(others[0])
-        if reading.location_valid:
-            self._samples.append(_Sample(now, reading.u, reading.phi, reading.level))
-        else:
-            self._samples = []
-        self._samples = [sample for sample in self._samples if now - sample.time <= _HOLD + 1e-9]
-        if self._rests(now):
-            return self._judge()
-        if now - self._touched_since >= _UNCERTAIN and not self._told and not reading.location_valid:
-            self._told = True
-            why = f": {reading.doubt}" if reading.doubt else ""
-            return [Notice("remark", f"the place is not certain{why}; touch it firmly with one finger")]
-        return []
-
-    def _rests(self, now: float) -> bool:
-        samples = self._samples
-        if not samples or now - samples[0].time < 0.9 * _HOLD:
+    def _rests(self) -> bool:
+        if self.samples.duration < 0.9 * _HOLD_TIME:
             return False
-        radius = self.current.sensor.frustum.radius_at(samples[0].u)
-        along = max(s.u for s in samples) - min(s.u for s in samples)
-        around = radius * (max(s.phi for s in samples) - min(s.phi for s in samples))
-        return math.hypot(along, around) <= _STILL
+        along, around = self.samples.values(0), self.samples.values(1)
+        radius = self.current.sensor.frustum.radius_at(along[0])
+        return math.hypot(max(along) - min(along), radius * (max(around) - min(around))) <= _REST_RADIUS
 
-    def _judge(self) -> list[Notice]:
-        item, mark = self.current, self.mark
-        assert mark is not None
-        read = Place(
-            statistics.median(sample.u for sample in self._samples),
-            statistics.median(sample.phi for sample in self._samples),
-        )
-        level = statistics.median(sample.level for sample in self._samples)
-        passed = misfit(item.sensor, RIGHT, [mark.place], [read]).largest <= 1.0
-        return self._note(read, level, passed, "")
-
-    def _judge_other(self, other: str) -> list[Notice]:
-        wrong = f"{other} reads this touch: their id are exchanged, or the wrong sheet was touched"
-        return self._note(Place(math.nan, math.nan), 0.0, False, wrong)
-
-    def _note(self, read: Place, level: float, passed: bool, wrong: str) -> list[Notice]:
+    def _judge(self, read: Place, level: float, passed: bool, wrong: str) -> list[Notice]:
         item, mark = self.current, self.mark
         assert mark is not None
         self._attempts += 1
-        self._wait_clear, self._quiet_since = True, None
-        cone = item.sensor.frustum
-        around = cone.radius_at(mark.u) * math.remainder(read.phi - mark.phi, 2.0 * math.pi) if not wrong else math.nan
-        distance = 1e3 * math.hypot(read.u - mark.u, around)
+        distance = 0.0 if wrong else 1e3 * math.hypot(*miss(item.sensor, mark.place, read))
         said = wrong or f"it reads {_text(read)}, {distance:.0f} mm from the mark at {_text(mark.place)}"
-        if not passed and self._attempts < _ATTEMPTS and not item.failed:
+        if not passed and self._attempts < _MAX_ATTEMPTS and not item.failed:
             return [Notice("remark", f"{said}; touch the same mark once more")]
         u_mm, phi_deg = _in_file_units(mark.place)
         read_u, read_phi = (0.0, 0.0) if wrong else _in_file_units(read)
@@ -227,14 +154,14 @@ class Procedure:
             phi_deg,
             read_u,
             read_phi,
-            0.0 if wrong else round(distance, 1),
+            round(distance, 1),
             round(level, 3),
             self._attempts,
             passed,
         )
         item.results.append(result)
         item.read.append(read)
-        self._attempts = 0
+        self._attempts, self.mark = 0, None
         marks = [place.place for place in item.plan[: len(item.results)]]
         if wrong:
             item.cause = wrong
@@ -255,13 +182,12 @@ class Procedure:
         if not item.failed:
             allowed = tolerance(item.sensor)
             fit = misfit(item.sensor, RIGHT, marks, item.read)
-            if abs(fit.u) > _SYSTEMATIC * allowed.u or abs(fit.phi) > _SYSTEMATIC * allowed.phi:
+            if abs(fit.u) > _SYSTEMATIC_PART * allowed.u or abs(fit.phi) > _SYSTEMATIC_PART * allowed.phi:
                 item.cause = explain(item.sensor, marks, item.read)
         elif len(seen) == len(item.read):
             item.cause = explain(item.sensor, marks, item.read)
         self._number += 1
         self.over = self._number == len(self.sensors)
-        self.mark = None
         details = {"sensor": item.sensor.name, "passed": not item.cause, "cause": item.cause}
         if item.cause:
             return Notice("sensor", f"{item.sensor.name} has NOT passed: {item.cause}", details)

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.commissioning.acceptance.commission import VIRTUAL_FORCE, check_touchable, start_skin
-from coneskin.commissioning.acceptance.mark_touching import touch_marks
-from coneskin.commissioning.acceptance.skin_watch import SkinWatch
+from coneskin.commissioning.skin_watch import SkinWatch, TouchSession
 from coneskin.core.errors import SkinError
 from coneskin.core.version import __version__
 from coneskin.scene.values.calibration_file import CalibrationRecord, TouchResult, sensor_fingerprint
@@ -26,18 +22,15 @@ from .printed_marks import find_design, printed_marks
 from .touch_sequence import SensorTouches, TouchSequence
 
 if TYPE_CHECKING:
-    from coneskin.commissioning.acceptance.marks import Mark
-    from coneskin.commissioning.acceptance.procedure import Notice
+    from coneskin.commissioning.touching import Mark, Notice
     from coneskin.scene.values.scene import Scene
-    from coneskin.session.skin_client import SkinClient
     from coneskin.skin.detection.frame.touch_reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["CalibrationResult", "Calibrator"]
 
-_VIRTUAL_PRESS = 4.0  # s of a press with a known force, likewise
-_ASKS = ("mark", "again", "press")  # kinds of notice on which the person touches the skin
 _VIRTUAL_DURATION = 1.5  # s of a touch of a virtual skin; it ends by itself
+_VIRTUAL_PRESS = 4.0  # s of a press with a known force, likewise
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,45 +52,37 @@ class CalibrationResult:
     refusal: str = ""
 
 
-class Calibrator:
+class Calibrator(TouchSession):
     """One calibration of all sensors of a scene.
 
     Args:
-        scene: with a source, read without calibrations.
+        scene: with a source, read without calibrations; as of ``TouchSession``, as all others down to ``wired_as``.
+        notice: called with what the person is told.
+        reading: called with what the sensors read now.
+        refused: tells whether the person has said that a mark cannot be reached.
+        simulated: touch the scene's virtual skin at the marks.
+        wired_as: scene from which the virtual skin is made, where it is another.
         marks: on each sensor, one of MARK_COUNTS; 0: those that its design has printed, else 9.
         mark_error: standard deviation with which marks are placed and found, at least [m].
-        notice: called with what the person is told.
-        reading: called some 50 times a second with what the sensors read now.
-        refused: tells whether the person has said since the last call that a mark cannot be reached.
-        simulated: touch the scene's virtual skin at the marks.
         forces: known ones to press with after the marks [N]; none: no table of forces.
         files: sensor file of each sensor, whose design may have printed marks; none where it has none.
-        wired_as: scene from which the virtual skin is made, where it is another.
-
-    Raises:
-        SceneError: the scene has no source, or no sensor.
-        SkinConnectionError: it is to be simulated, and its skin is not virtual, or the other way round.
     """
 
     def __init__(
         self,
         scene: Scene,
-        marks: int = 0,
-        mark_error: float = 0.3e-3,
         notice: Callable[[Notice], None] = lambda _: None,
         reading: Callable[[dict[str, TouchReading | None]], None] = lambda _: None,
         refused: Callable[[], bool] = lambda: False,
         simulated: bool = False,
+        wired_as: Scene | None = None,
+        marks: int = 0,
+        mark_error: float = 0.3e-3,
         forces: Sequence[float] = (),
         files: Sequence[Path | None] = (),
-        wired_as: Scene | None = None,
     ) -> None:
-        check_touchable(scene, simulated)
-        self.scene = scene
-        self._notice, self._reading, self._refused = notice, reading, refused
+        super().__init__(scene, notice, reading, refused, simulated, wired_as)
         self._mark_error = mark_error
-        self._simulated, self._wired_as = simulated, wired_as or scene
-        self._client: SkinClient | None = None
         self.sensors = [
             SensorTouches(item.sensor, _marks(item.sensor, marks, files[n] if files else None))
             for n, item in enumerate(scene.sensors)
@@ -117,37 +102,18 @@ class Calibrator:
         Raises:
             SkinError: the skin has a fault, cannot be read, or too few marks can be reached.
         """
-        with ExitStack() as stack:
-            port = ""
-            if self._simulated:
-                self._client = start_skin(self._wired_as, stack)
-                port = self._client.port()
-            watch = stack.enter_context(SkinWatch(self.scene, port))
-            watch.await_ready()
+        with self.watch() as watch:
             ohms = [watch.untouched_ohms(item.sensor) for item in self.sensors]
-            self._carry_out(TouchSequence(self.sensors, self._mark_error), watch)
+            self._touch(TouchSequence(self.sensors, self._mark_error), watch, _VIRTUAL_DURATION)
             if self._forces:
-                self._carry_out(ForceSequence(self._pressed, self._forces), watch)
+                self._touch(ForceSequence(self._pressed, self._forces), watch, _VIRTUAL_PRESS)
         results = [self._result(item, found, by) for item, found in zip(self.sensors, ohms, strict=True)]
         return [_judged(result, watch.contradiction(result.touches.sensor.name)) for result in results]
 
-    def _carry_out(self, sequence: TouchSequence | ForceSequence, watch: SkinWatch) -> None:
-        touch_marks(sequence, watch, partial(self._tell, sequence), self._reading, self._refused)
+    def _touch(self, sequence: TouchSequence | ForceSequence, watch: SkinWatch, duration: float) -> None:
+        self.carry_out(sequence, watch, duration)
         if sequence.incomplete:
             raise SkinError(sequence.incomplete)
-
-    def _tell(self, sequence: TouchSequence | ForceSequence, notices: list[Notice]) -> None:
-        """Tell the person; a virtual skin is touched in the person's place."""
-        if isinstance(sequence, ForceSequence):
-            force, duration = sequence.force, _VIRTUAL_PRESS
-        else:
-            force, duration = VIRTUAL_FORCE, _VIRTUAL_DURATION
-        for notice in notices:
-            self._notice(notice)
-            if self._client is not None and notice.kind in _ASKS and sequence.mark is not None:
-                self._client.touch(*sequence.mark.place, force, duration, sequence.current.sensor.name)
-            elif self._client is not None and notice.kind == "read":
-                self._client.release()
 
     def _result(self, item: SensorTouches, ohms: tuple[float, float], by: str) -> CalibrationResult:
         sensor, valid = item.sensor, item.valid
@@ -174,7 +140,7 @@ class Calibrator:
             date=datetime.now(UTC).isoformat(timespec="seconds"),
             coneskin=__version__,
             by=by,
-            simulated=self._simulated,
+            simulated=self.simulated,
             fingerprint=sensor_fingerprint(sensor),
             map_along=fit.place_map.along,
             map_around=fit.place_map.around,

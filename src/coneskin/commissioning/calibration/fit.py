@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from coneskin.commissioning.acceptance.misreadings import Place
+from coneskin.commissioning.misreadings import Place
 from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
 
 from .refusals import KnownTouch, check_bends, check_offsets_and_gains, check_touches

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from coneskin.commissioning.acceptance.marks import Mark
+from coneskin.commissioning.touching import Mark
 from coneskin.geometry.drawing.touch_marks import mark_parts
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.commissioning.acceptance.marks import Mark
+from coneskin.commissioning.touching import Mark
 from coneskin.core.errors import SceneError
 from coneskin.core.files import read_file
 from coneskin.core.text import read_json

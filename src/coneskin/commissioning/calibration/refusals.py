@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from coneskin.commissioning.acceptance.misreadings import RIGHT, Place, explain, misfit
+from coneskin.commissioning.misreadings import RIGHT, Place, explain, misfit
 from coneskin.core.errors import SkinError
 from coneskin.skin.calibration import MAP_LIMITS
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.commissioning.acceptance.sheet_picture import OUTLINE, draw_sheet
+from coneskin.commissioning.misreadings import miss
+from coneskin.commissioning.sheet_picture import OUTLINE, draw_sheet
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
 
@@ -52,7 +53,7 @@ def _draw(axes: Any, result: CalibrationResult) -> None:
     cone = item.sensor.frustum
     draw_sheet(axes, cone)
     touches = [item.touches[number] for number in item.valid]
-    before = [_off(item.sensor.frustum, touch) for touch in touches]
+    before = [miss(item.sensor, *touch) for touch in touches]
     largest = max(math.hypot(*step) for step in before)
     scale = max((value for value in _SCALES if value * largest <= _LONGEST * cone.slant), default=1)
     for number, (touch, step) in enumerate(zip(touches, before, strict=True)):
@@ -68,12 +69,6 @@ def _draw(axes: Any, result: CalibrationResult) -> None:
     said = "refused" if fit is None else f"{1e3 * fit.before.rms:.2f} mm became {1e3 * fit.after.rms:.2f} mm (rms)"
     axes.set_title(f"{item.sensor.name}: {said}; arrows {scale} times as long as the errors", fontsize=10)
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), ncols=2, fontsize=8, frameon=False)
-
-
-def _off(cone: Any, touch: KnownTouch) -> tuple[float, float]:
-    """Return by how much a touch is read off its mark, along and around [m]."""
-    turned = math.remainder(touch.read.phi - touch.mark.phi, 2.0 * math.pi)
-    return touch.read.u - touch.mark.u, cone.radius_at(touch.mark.u) * turned
 
 
 def _arrow(axes: Any, cone: Any, touch: KnownTouch, step: Sequence[float], scale: int, color: str, label: str) -> None:

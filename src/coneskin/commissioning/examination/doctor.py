@@ -9,21 +9,21 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from coneskin.commissioning.acceptance.commission import start_skin
-from coneskin.core.errors import ConeSkinError, SkinConnectionError
+from coneskin.commissioning.skin_watch import start_skin
+from coneskin.core.errors import ConeSkinError, SkinConnectionError, SkinTimeout
 from coneskin.core.finding import Finding
 from coneskin.scene.required_packages import missing_packages, required_packages
 from coneskin.scene.summary import missing_parts
 from coneskin.scene.suspicions import suspicions
 from coneskin.skin.sources.kinds import is_simulated, open_source
 
+from .guided_touches import examine_touches, guided_touches
 from .skin_examination import examine_line, examine_sensor
-from .skin_session import collect, guided_touches
-from .touch_examination import examine_touches
+from .skin_statistics import SkinStatistics
 from .wire_examination import WirePatch, examine_wires
-from .wire_order import touch_places
 
 if TYPE_CHECKING:
+    from coneskin.commissioning.touching import Mark, Notice
     from coneskin.scene.values.scene import ArmScene, Scene, SourceScene
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.sources.source import Source
@@ -33,10 +33,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Doctor", "Toucher"]
 
-_LISTEN = 2.0  # s of an untouched skin
-_PATIENCE = 60.0  # s for a person to touch
-_START = 1.0  # s for the first bytes, after which the port counts as silent
-_FORCE, _DURATION = 5.0, 3.0  # N and s, of the touches of a virtual skin
+_LISTEN_TIME = 2.0  # s of an untouched skin
+_READ_TIMEOUT = 0.05  # s
+_START_TIME = 1.0  # s for the first bytes, after which the port counts as silent
+_TOUCH_TIMEOUT = 60.0  # s for a person to touch
+_TOUCH_FORCE, _TOUCH_TIME = 5.0, 3.0  # N and s, of the touches of a virtual skin
 
 
 class Toucher(Protocol):
@@ -136,8 +137,8 @@ class Doctor:
         """
         sensors = [item.sensor for item in self.scene.sensors]
         self._ask("do not touch the skin")
-        collect(source, _START, self._clock)  # a device that starts with its port, and what has piled up
-        seen = collect(source, _LISTEN, self._clock)
+        _collect(source, _START_TIME, self._clock)  # a device that starts with its port, and what has piled up
+        seen = _collect(source, _LISTEN_TIME, self._clock)
         self._note(*examine_line(seen, sensors, settings, self._clock()))
         limits = self.scene.monitoring_limits
         for sensor in sensors:
@@ -154,19 +155,18 @@ class Doctor:
         if not self._touches:
             self._note(Finding(f"{sensor.name}, wires", "not tried", "no touches were asked for"))
             return
-        places = touch_places(sensor)
 
-        def ask(electrode: str, words: str) -> None:
-            self._ask(f"touch {words}, firmly, and hold it" if electrode else words)
-            if toucher is not None and electrode:
-                toucher.touch(*places[electrode], _FORCE, _DURATION, sensor.name)
+        def tell(notice: Notice, mark: Mark | None) -> None:
+            self._ask(notice.text)
+            if toucher is not None and mark is not None:
+                toucher.touch(*mark.place, _TOUCH_FORCE, _TOUCH_TIME, sensor.name)
             elif toucher is not None:
                 toucher.release()
 
         kept: list[Frame] = []
-        touched = guided_touches(source, sensor, ask, _PATIENCE, self._clock, kept.append)
+        touched = guided_touches(source, sensor, tell, _TOUCH_TIMEOUT, self._clock, kept.append)
         if touched is None:
-            why = f"no touch that rests came within {_PATIENCE:g} s"
+            why = f"no touch that rests came within {_TOUCH_TIMEOUT:g} s"
             self._note(
                 Finding(f"{sensor.name}, wires", "not tried", why, "", "a touch must change its readings by 4 %")
             )
@@ -241,3 +241,19 @@ def _arm(scene: Scene, arm: ArmScene) -> list[Finding]:
     scope = ExaminationScope(internal, arm.slider_stop or slows, moves, not internal)
     model = arm_model(arm.model)
     return load_driver(model.family).examine(model, arm.host, scope)
+
+
+def _collect(source: Source, duration: float, clock: Callable[[], float]) -> SkinStatistics:
+    """Take what an open source sends for a time [s].
+
+    Raises:
+        SkinConnectionError: the source is gone.
+    """
+    start = clock()
+    seen, end = SkinStatistics(start), start + duration
+    while (now := clock()) < end:
+        try:
+            seen.add(clock(), source.read(min(_READ_TIMEOUT, end - now)))
+        except SkinTimeout:
+            continue
+    return seen

@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.commissioning.acceptance import skin_watch
+from coneskin.commissioning import skin_watch
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from coneskin.commissioning.acceptance.marks import (
     LEAST_MARKS,
     LEAST_POWER,
-    Mark,
     azimuth_margin,
     plan_marks,
     slant_places,
 )
-from coneskin.commissioning.acceptance.misreadings import (
+from coneskin.commissioning.misreadings import (
     RIGHT,
     WRONG,
     Place,
@@ -26,6 +25,7 @@ from coneskin.commissioning.acceptance.misreadings import (
     shifts,
     tolerance,
 )
+from coneskin.commissioning.touching import Mark
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.electronics import Electronics, Polarity
 from coneskin.skin.sensor import Sensor

@@ -23,6 +23,7 @@ __all__ = [
     "explain",
     "misfit",
     "misread",
+    "miss",
     "power",
     "shifts",
     "tolerance",
@@ -100,6 +101,12 @@ def misread(sensor: Sensor, wrong: Misreading, place: Place) -> Place:
             1.0 - radial if wrong.mirror_radial else radial, 1.0 - angular if wrong.mirror_angular else angular
         )
     )
+
+
+def miss(sensor: Sensor, mark: Place, read: Place) -> tuple[float, float]:
+    """Return by how much a touch of a mark is read off it, along and around [m]."""
+    around = sensor.frustum.radius_at(mark.u) * math.remainder(read.phi - mark.phi, _TURN)
+    return read.u - mark.u, around
 
 
 def misfit(sensor: Sensor, wrong: Misreading, marks: Sequence[Place], read: Sequence[Place]) -> Misfit:

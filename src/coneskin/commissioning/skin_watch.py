@@ -1,0 +1,260 @@
+"""Live touching: what the sensors of a scene read now, and who touches them. Nothing is guarded, and nothing moves."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from coneskin.core.errors import SceneError, SkinConnectionError, SkinError, SkinTimeout
+from coneskin.scene.summary import missing_parts
+from coneskin.skin.detection.events import SkinFault
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.frame.timing import TimingLimits
+from coneskin.skin.detection.stream import TouchStream
+from coneskin.skin.sources.kinds import is_simulated, open_source
+from coneskin.skin.wire import FrameDecoder
+
+from .touching import REQUESTS, Notice, Touching, TouchJudge
+
+if TYPE_CHECKING:
+    from coneskin.scene.values.scene import Scene
+    from coneskin.session.skin_client import SkinClient
+    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.sensor import Sensor
+
+__all__ = ["SkinWatch", "TouchSession", "check_touchable", "start_skin"]
+
+_FRAME_TIMEOUT = 30.0  # s that frames may be late or missing: nothing is guarded, and a late place is as good
+_READY_TIMEOUT = 10.0  # s for every sensor to send a run of good frames
+_POLL_PERIOD = 0.02  # s between two looks at what is not skin
+
+
+class SkinWatch:
+    """Readings of a scene's sensors, judged as the guard judges them but for their age; opened in a ``with``.
+
+    Args:
+        scene: with a source.
+        port: of a virtual skin; empty for a real one.
+    """
+
+    def __init__(self, scene: Scene, port: str = "") -> None:
+        assert scene.source is not None
+        limits = scene.monitoring_limits
+        timing = TimingLimits(late=_FRAME_TIMEOUT, clock_drift=limits.clock_drift)
+        settings = DetectorSettings(stuck_frames=limits.stuck_frames, self_test=False, timing=timing)
+        sensors = [item.sensor for item in scene.sensors]
+        self._stream = TouchStream(sensors, settings)
+        # wires that are exchanged contradict themselves too; their places name them first, and this has the last word
+        self._judge = TouchStream(sensors, replace(settings, self_test=True))
+        self._contradictions: dict[str, str] = {}
+        self._source = open_source(scene.source.kind, scene.source.settings, port)
+        self._faults: list[str] = []
+        self._frames = FrameDecoder()
+        self._drawn: dict[tuple[int, int], tuple[int, float, float]] = {}
+
+    def __enter__(self) -> SkinWatch:
+        self._source.__enter__()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None) -> None:
+        self._source.close()
+
+    def await_ready(self) -> None:
+        """Wait until every sensor has sent a run of good untouched frames.
+
+        Raises:
+            SkinError: one does not in time; what was wrong is listed.
+        """
+        end = time.monotonic() + _READY_TIMEOUT
+        while not self._stream.ready:
+            self._read(0.05)
+            if time.monotonic() > end:
+                late = [detector.sensor.name for detector in self._stream.detectors if not detector.ready]
+                why = "; ".join(dict.fromkeys(self._faults)) or "it is touched, or nothing arrives"
+                raise SkinError(f"{', '.join(late)}: no run of good untouched frames in {_READY_TIMEOUT:g} s: {why}")
+        self._faults.clear()
+
+    def untouched_ohms(self, sensor: Sensor) -> tuple[float, float]:
+        """Return what the untouched sheets of a sensor have per square [ohm], upper and lower, as its currents say.
+
+        It is the mean since the watch was opened, up to now; the leads are taken to be those of the scene.
+        """
+        count, radial, angular = self._drawn[sensor.device_id, sensor.sensor_id]
+        parts = sensor.electronics
+        siemens = parts.current_full_scale / parts.adc_volts / count  # of a current over the supply, both in counts
+        a, b, c, d = parts.lead_ohms
+        upper = (1.0 / (radial * siemens) - a - b) * sensor.upper_sheet_ohms / sensor.radial_ohms
+        lower = (1.0 / (angular * siemens) - c - d) * sensor.lower_sheet_ohms / sensor.angular_ohms
+        return upper, lower
+
+    def contradiction(self, sensor: str) -> str:
+        """Return why a sensor's places must not be believed although they look right; empty where they may be.
+
+        The inputs contradict each other while it is touched: a gain is off, and a fit would take that for leads.
+        """
+        said = self._contradictions.get(sensor, "")
+        return said and f"{said}: the inputs contradict each other while it is touched; check their gains and wires"
+
+    def read(self, timeout: float) -> dict[str, TouchReading | None]:
+        """Wait for bytes, and return what each sensor reads, by its name; None where it is not touched.
+
+        Args:
+            timeout: longest time to wait [s].
+
+        Raises:
+            SkinError: a sensor has a fault, or is silent; a place that it read would say nothing.
+        """
+        self._read(timeout)
+        if self._faults:
+            raise SkinError("; ".join(dict.fromkeys(self._faults)))
+        return {detector.sensor.name: detector.reading_now for detector in self._stream.detectors}
+
+    def _read(self, timeout: float) -> None:
+        try:
+            data = self._source.read(timeout)
+        except SkinTimeout:
+            data = b""
+        now = time.monotonic()
+        events = self._stream.feed(data, now) if data else []
+        for event in self._judge.feed(data, now) if data else ():
+            if isinstance(event, SkinFault) and event.fault is Fault.GUIDES_DISAGREE:
+                self._contradictions[event.sensor] = event.message
+        events += self._stream.silence(now, _FRAME_TIMEOUT)
+        if not self._stream.touched:
+            self._add_currents(data)
+        self._faults += [event.message for event in events if isinstance(event, SkinFault)]
+
+    def _add_currents(self, data: bytes) -> None:
+        for frame in self._frames.feed(data):
+            number = frame.device, frame.sensor
+            count, radial, angular = self._drawn.get(number, (0, 0.0, 0.0))
+            if frame.radial_supply and frame.angular_supply:
+                radial += frame.radial_current / frame.radial_supply
+                angular += frame.angular_current / frame.angular_supply
+                self._drawn[number] = count + 1, radial, angular
+
+
+def check_touchable(scene: Scene, simulated: bool) -> None:
+    """Refuse a scene whose marks nobody can touch.
+
+    Args:
+        scene: whose skin is to be touched.
+        simulated: its virtual skin is touched by this program, not by a person.
+
+    Raises:
+        SceneError: the scene has no source, or no sensor.
+        SkinConnectionError: it is to be simulated, and its skin is not virtual, or the other way round.
+    """
+    if missing := missing_parts(scene):
+        raise SceneError(missing, scene.name)
+    assert scene.source is not None
+    if simulated and not is_simulated(scene.source.kind):
+        raise SkinConnectionError(
+            f"the skin of {scene.name} is not virtual: only a person can touch it, so leave --simulated out"
+        )
+    if not simulated and is_simulated(scene.source.kind):
+        raise SkinConnectionError(f"the skin of {scene.name} is virtual, and nobody can touch it: use --simulated")
+
+
+def start_skin(scene: Scene, stack: ExitStack) -> SkinClient:
+    """Start the process of a scene's virtual skin, without its script of touches; it ends with the stack."""
+    from coneskin.session.skin_client import SkinClient
+
+    start = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve()), "script": False}
+    client = SkinClient(start, [item.sensor for item in scene.sensors])
+    stack.callback(client.process.wait, 10.0)
+    stack.callback(client.channel.close)
+    return client
+
+
+class TouchSession:
+    """Session with the skin of a scene, and the person, or this program, who touches it.
+
+    Args:
+        scene: with a source.
+        notice: called with what the person is told.
+        reading: called some 50 times a second with what the sensors read now.
+        refused: tells whether the person has said since the last call that a mark cannot be reached.
+        simulated: touch the scene's virtual skin at the marks.
+        wired_as: scene from which the virtual skin is made, where it is another.
+
+    Raises:
+        SceneError: the scene has no source, or no sensor.
+        SkinConnectionError: it is to be simulated, and its skin is not virtual, or the other way round.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        notice: Callable[[Notice], None] = lambda _: None,
+        reading: Callable[[dict[str, TouchReading | None]], None] = lambda _: None,
+        refused: Callable[[], bool] = lambda: False,
+        simulated: bool = False,
+        wired_as: Scene | None = None,
+    ) -> None:
+        check_touchable(scene, simulated)
+        self.scene = scene
+        self.simulated = simulated
+        self._notice, self._reading, self._refused = notice, reading, refused
+        self._wired_as = wired_as or scene
+        self._client: SkinClient | None = None
+
+    @contextmanager
+    def watch(self) -> Iterator[SkinWatch]:
+        """Open the skin, and yield its watch once every sensor is ready.
+
+        Raises:
+            SkinError: the skin has a fault, or cannot be read.
+        """
+        with ExitStack() as stack:
+            port = ""
+            if self.simulated:
+                self._client = start_skin(self._wired_as, stack)
+                port = self._client.port()
+            watch = stack.enter_context(SkinWatch(self.scene, port))
+            watch.await_ready()
+            yield watch
+
+    def carry_out(
+        self,
+        judge: TouchJudge[TouchReading],
+        watch: SkinWatch,
+        duration: float = 0.0,
+        check: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Have all marks of a judge touched, until it is over or cannot be carried out.
+
+        Args:
+            judge: of the touches.
+            watch: of the sensors, ready.
+            duration: of each touch of a virtual skin [s].
+            check: called some 50 times a second; raises what ends it.
+
+        Raises:
+            SkinError: a sensor has a fault, or is silent.
+        """
+        touching, polled = Touching(judge), 0.0
+        while not touching.over:
+            readings = watch.read(_POLL_PERIOD)
+            now = time.monotonic()
+            self._tell(judge, touching.update(now, readings), duration)
+            if now - polled >= _POLL_PERIOD:
+                polled = now
+                check()
+                self._reading(readings)
+                if self._refused():
+                    self._tell(judge, touching.refuse(), duration)
+
+    def _tell(self, judge: TouchJudge[TouchReading], notices: list[Notice], duration: float) -> None:
+        """Tell the person; a virtual skin is touched in the person's place."""
+        for notice in notices:
+            self._notice(notice)
+            if self._client is not None and notice.kind in REQUESTS and judge.mark is not None:
+                self._client.touch(*judge.mark.place, judge.force, duration, judge.current.sensor.name)
+            elif self._client is not None and notice.kind == "read":
+                self._client.release()
