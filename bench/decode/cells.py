@@ -11,7 +11,7 @@ from tests.support.field.converter_plant import ConverterPlant
 
 from .bound import bound, varied
 from .plants import RADII, SHEETS, STIFFNESSES, SolvedPlants, disc_cases, radius_at, solve_bare
-from .runs import LEARNED, Decoder, Sitting
+from .runs import LEARNED, Sitting, decode
 
 MATCHED = 2.2  # of the larger untouched drive current
 BASELINES = (0.0, 3e-3, 1e-2)  # ratio; standard deviation of the drift of each sheet since it was learned
@@ -27,10 +27,10 @@ class Cell:
     Attributes:
         sheet, electronics, radius, ka, baseline: of the cell.
         bound: square root of the mean of the bounds' traces [m].
-        rms: by decoder [m].
-        inside: part of the truths in the 95 % ellipse, by decoder; NaN where it gives none.
-        interval: 95 % interval of that part, by decoder; the frames of a place are no independent draws of it.
-        frames: that were decoded, by decoder, of ``of``.
+        rms: of the errors [m].
+        inside: part of the truths in the 95 % ellipse; NaN where there is none.
+        interval: 95 % interval of that part; the frames of a place are no independent draws of it.
+        frames: that were decoded, of ``of``.
     """
 
     sheet: str
@@ -39,10 +39,10 @@ class Cell:
     ka: float
     baseline: float
     bound: float
-    rms: dict[str, float]
-    inside: dict[str, float]
-    interval: dict[str, tuple[float, float]]
-    frames: dict[str, int]
+    rms: float
+    inside: float
+    interval: tuple[float, float]
+    frames: int
     of: int
 
 
@@ -63,7 +63,6 @@ def electronics(sheet: str) -> dict[str, ConverterPlant]:
 
 def measure(
     plants: SolvedPlants,
-    decoders: list[Decoder],
     sheet: str,
     name: str,
     baselines: tuple[float, ...],
@@ -96,41 +95,37 @@ def measure(
                         learned = circuit.counts(untouched, LEARNED, rng)
                         sittings.append(Sitting(plant, circuit, learned, touches, baseline))
                         keys.append((radius, ka, baseline, least, (patch.u, patch.phi)))
-    answers = {decoder.name: decoder.decode(sittings) for decoder in decoders}
+    answers = [decode(sitting) for sitting in sittings]
     return _gather(sheet, name, keys, answers)
 
 
-def _gather(sheet: str, name: str, keys: list, answers: dict[str, list[dict[str, np.ndarray]]]) -> list[Cell]:
+def _gather(sheet: str, name: str, keys: list, answers: list[dict[str, np.ndarray]]) -> list[Cell]:
     cells: dict[tuple[float, float, float], list[int]] = {}
     for number, key in enumerate(keys):
         cells.setdefault(key[:3], []).append(number)
     found = []
     for (radius, ka, baseline), numbers in cells.items():
         trace = math.sqrt(np.mean([np.trace(keys[n][3]) for n in numbers]))
-        rms, inside, interval, frames = {}, {}, {}, {}
-        for decoder, said in answers.items():
-            errors, held, count = [], [], 0
-            places: dict[tuple[float, float], list[np.ndarray]] = {}
-            for n in numbers:
-                u, phi = keys[n][4]
-                answer = {k: v[:, -1] for k, v in said[n].items() if v.ndim == 2}
-                seen = answer["touched"]
-                du = answer["u"][seen] - u
-                ds = radius_at(SHEETS[sheet], u) * (answer["phi"][seen] - phi)
-                errors.append(du**2 + ds**2)
-                count += du.size
-                uu, us, ss = (answer[k][seen] for k in ("uu", "us", "ss"))
-                determinant = uu * ss - us * us
-                with np.errstate(invalid="ignore", divide="ignore"):
-                    held.append((ss * du**2 - 2 * us * du * ds + uu * ds**2) / determinant)
-                places.setdefault((u, phi), []).append(held[-1] < ELLIPSE)
-            squares, distances = np.concatenate(errors), np.concatenate(held)
-            rms[decoder] = math.sqrt(squares.mean()) if squares.size else math.nan
-            inside[decoder] = float(np.mean(distances < ELLIPSE)) if np.isfinite(distances).any() else math.nan
-            interval[decoder] = spread_of([np.concatenate(part) for part in places.values()])
-            frames[decoder] = count
-        of = sum(answers[next(iter(answers))][n]["touched"].shape[0] for n in numbers)
-        found.append(Cell(sheet, name, radius, ka, baseline, trace, rms, inside, interval, frames, of))
+        errors, held = [], []
+        places: dict[tuple[float, float], list[np.ndarray]] = {}
+        for n in numbers:
+            u, phi = keys[n][4]
+            answer = {k: v[:, -1] for k, v in answers[n].items() if v.ndim == 2}
+            seen = answer["touched"]
+            du = answer["u"][seen] - u
+            ds = radius_at(SHEETS[sheet], u) * (answer["phi"][seen] - phi)
+            errors.append(du**2 + ds**2)
+            uu, us, ss = (answer[k][seen] for k in ("uu", "us", "ss"))
+            determinant = uu * ss - us * us
+            with np.errstate(invalid="ignore", divide="ignore"):
+                held.append((ss * du**2 - 2 * us * du * ds + uu * ds**2) / determinant)
+            places.setdefault((u, phi), []).append(held[-1] < ELLIPSE)
+        squares, distances = np.concatenate(errors), np.concatenate(held)
+        rms = math.sqrt(squares.mean()) if squares.size else math.nan
+        inside = float(np.mean(distances < ELLIPSE)) if np.isfinite(distances).any() else math.nan
+        interval = spread_of([np.concatenate(part) for part in places.values()])
+        of = sum(answers[n]["touched"].shape[0] for n in numbers)
+        found.append(Cell(sheet, name, radius, ka, baseline, trace, rms, inside, interval, squares.size, of))
     return found
 
 

@@ -11,7 +11,7 @@ from tests.support.field.converter_plant import leak_admittance
 
 from .cells import electronics
 from .plants import RADII, SHEETS, Case, SolvedPlants, disc_cases, radius_at, shape_cases
-from .runs import LEARNED, Decoder, Sitting
+from .runs import LEARNED, Sitting, decode
 
 BITS = "16 bit, matched"  # so that noise hides nothing
 
@@ -22,32 +22,31 @@ class Errors:
 
     Attributes:
         what: the disturbance, or the outline.
-        median, most: of the errors, and what 95 % stay below [m], by decoder.
-        valid: part of the touches whose place is certain within the frames, by decoder.
+        median, most: of the errors, and what 95 % stay below [m].
+        valid: part of the touches whose place is certain within the frames.
         of: touches.
     """
 
     what: str
-    median: dict[str, float]
-    most: dict[str, float]
-    valid: dict[str, float]
+    median: float
+    most: float
+    valid: float
     of: int
 
 
-def measure(plants: SolvedPlants, decoders: list[Decoder], places: int) -> list[Errors]:
+def measure(plants: SolvedPlants, places: int) -> list[Errors]:
     """Measure each disturbance on discs all over the forearm, then contacts that are no whole discs."""
     circuit = electronics("UR5e")[BITS]
     discs = [case for radius in RADII[1:3] for ka in (1.0, 3.0) for case in disc_cases("UR5e", radius, ka, places)]
     rng = np.random.default_rng(8)
     unequal = [replace(circuit, leads=tuple(rng.uniform(3.0, 12.0, 4).tolist())) for _ in range(4)]
     found = [
-        _errors("none", plants, decoders, discs, [circuit], 0.0),
-        _errors("leak of 100 kohm between the layers", plants, decoders, discs, [circuit], 1e-5),
-        _errors("leads of 3 to 12 ohm, told as 1 ohm, not calibrated", plants, decoders, discs, unequal, 0.0),
+        _errors("none", plants, discs, [circuit], 0.0),
+        _errors("leak of 100 kohm between the layers", plants, discs, [circuit], 1e-5),
+        _errors("leads of 3 to 12 ohm, told as 1 ohm, not calibrated", plants, discs, unequal, 0.0),
         _errors(
             "supply 1 % lower in the radial phase, one supply sent",
             plants,
-            decoders,
             discs,
             [replace(circuit, phase_supply=(1.0, 0.99, 1.0))],
             0.0,
@@ -55,7 +54,7 @@ def measure(plants: SolvedPlants, decoders: list[Decoder], places: int) -> list[
     ]
     shapes = shape_cases("UR5e", 4 * places)
     for kind in dict.fromkeys(case.kind for case in shapes):
-        found.append(_errors(kind, plants, decoders, [case for case in shapes if case.kind == kind], [circuit], 0.0))
+        found.append(_errors(kind, plants, [case for case in shapes if case.kind == kind], [circuit], 0.0))
     return found
 
 
@@ -72,31 +71,24 @@ def centroid(case: Case) -> tuple[float, float]:
     return float(u[on].mean()), float(phi[on].mean())
 
 
-def _errors(
-    what: str, plants: SolvedPlants, decoders: list[Decoder], cases: list[Case], circuits: list, leak: float
-) -> Errors:
+def _errors(what: str, plants: SolvedPlants, cases: list[Case], circuits: list, leak: float) -> Errors:
     plant, rng = SHEETS["UR5e"], np.random.default_rng(9)
     y = np.array([plants.of(case) for case in cases]) + leak_admittance(leak)
     still = plants.admittance(plant, ()) + leak_admittance(leak)
-    sittings = [
-        Sitting(plant, c, c.counts(c.exact(still), LEARNED, rng), c.counts(c.exact(y), 20, rng)) for c in circuits
-    ]
     places = np.array([centroid(case) for case in cases])
-    median, most, valid = {}, {}, {}
-    for decoder in decoders:
-        answers = decoder.decode(sittings)
-        errors, certain = [], []
-        for answer in answers:
-            du = answer["u"] - places[:, :1]
-            ds = plant.radius1 * (answer["phi"] - places[:, 1:])
-            errors += np.hypot(du, ds)[:, 1].tolist()
-            certain += answer["valid"].any(axis=1).tolist()
-        median[decoder.name], most[decoder.name] = quantile(errors, 0.5), quantile(errors, 0.95)
-        valid[decoder.name] = float(np.mean(certain))
-    return Errors(what, median, most, valid, len(cases) * len(circuits))
+    errors, certain = [], []
+    for c in circuits:
+        untouched, touches = c.counts(c.exact(still), LEARNED, rng), c.counts(c.exact(y), 20, rng)
+        answer = decode(Sitting(plant, c, untouched, touches))
+        du = answer["u"] - places[:, :1]
+        ds = plant.radius1 * (answer["phi"] - places[:, 1:])
+        errors += np.hypot(du, ds)[:, 1].tolist()
+        certain += answer["valid"].any(axis=1).tolist()
+    valid = float(np.mean(certain))
+    return Errors(what, quantile(errors, 0.5), quantile(errors, 0.95), valid, len(cases) * len(circuits))
 
 
-def run_time(plants: SolvedPlants, decoders: list[Decoder], rounds: int) -> dict[str, tuple[float, ...]]:
+def run_time(plants: SolvedPlants, rounds: int) -> tuple[float, ...]:
     """Return the median time of a frame of a touch, bytes to event, of the first and of the second one [s].
 
     Each frame counts with the quickest of the rounds: what else the computer does only adds to it.
@@ -110,13 +102,5 @@ def run_time(plants: SolvedPlants, decoders: list[Decoder], rounds: int) -> dict
         circuit.counts(circuit.exact(plants.admittance(plant, ())), LEARNED, rng),
         circuit.counts(exact, 200, rng),
     )
-    quickest = {d.name: np.inf for d in decoders}
-    for _ in range(rounds):
-        for decoder in decoders:
-            (answer,) = decoder.decode([sitting])
-            quickest[decoder.name] = np.minimum(quickest[decoder.name], answer["seconds"])
-    found = {}
-    for name, seconds in quickest.items():
-        parts = seconds[:, 1:], seconds[:, 0], seconds[:, 1]
-        found[name] = tuple(float(np.median(part)) for part in parts)
-    return found
+    seconds = np.min([decode(sitting)["seconds"] for _ in range(rounds)], axis=0)
+    return tuple(float(np.median(part)) for part in (seconds[:, 1:], seconds[:, 0], seconds[:, 1]))

@@ -1,7 +1,6 @@
 """Faults of the virtual skin: is each named correctly, and is none taken for "no touch"?
 
-    python -m bench decode-faults COUNT ANSWERS.json [FIRST]
-    python -m bench decode-fault-table ANSWERS.json... --write     # into bench/RESULTS-decode.md
+    python -m bench decode-faults --cases 500 [--first 0]
 
 A case is a sensor with its electronics, a fault, the frame at which it begins, and a touch that begins before, with or
 after it, or none. The last name counts: the first frame that shows something stops the arm, the name may follow. Right
@@ -10,13 +9,12 @@ is a name that docs/look-up/wire-format.md has for the fault, or, where that pag
 
 from __future__ import annotations
 
-import json
+import argparse
 import math
 import random
-import sys
 from dataclasses import dataclass, replace
-from pathlib import Path
 
+from bench.report import head, show
 from coneskin.core.errors import SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import SkinFault, TouchBegan
@@ -30,6 +28,8 @@ from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 
 from .fault_kinds import FaultCase, draw_kind
+
+Answers = dict[str, dict[str, int]]  # fault -> verdict and last name, or what was counted -> how often
 
 BEGINS = 70, 90  # frame
 NAMED = 230  # frames after fault and touch, in which the name comes
@@ -154,10 +154,10 @@ def play(number: int) -> Outcome:
     return outcome
 
 
-def main() -> None:
-    found: dict[str, dict[str, int]] = {}
-    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
-    for number in range(first, first + int(sys.argv[1])):
+def count(cases: range) -> Answers:
+    """Play cases; return what was said of each kind of fault."""
+    found: Answers = {}
+    for number in cases:
         try:
             outcome = play(number)
         except ArithmeticError as error:  # a decoder that crashes is a finding, not the end of the run
@@ -178,6 +178,39 @@ def main() -> None:
         if said.first != said.last:
             row["renamed"] = row.get("renamed", 0) + 1
             row["frames"] = max(row.get("frames", 0), said.named_frame - said.first_frame)
-        if number % 100 == 0:
-            Path(sys.argv[2]).write_text(json.dumps(found, indent=1))
-    Path(sys.argv[2]).write_text(json.dumps(found, indent=1))
+    return found
+
+
+def show_answers(found: Answers) -> bool:
+    """Show the goals and a row for each kind of fault; return whether all goals are met."""
+    rows, right, done, silent, late, timed = [], 0, 0, 0, 0, 0
+    for fault, row in sorted(found.items()):
+        verdicts = {k: v for k, v in row.items() if ": " in k and not k.startswith("first")}
+        good = {k.removeprefix("right: "): v for k, v in verdicts.items() if k.startswith("right")}
+        names = ", ".join(f"{k} {v}" for k, v in sorted(good.items(), key=lambda each: -each[1]))
+        bad = {k: v for k, v in verdicts.items() if not k.startswith("right")}
+        other = ", ".join(f"{k} ({v}, e.g. case {row['first ' + k]})" for k, v in bad.items())
+        renamed = f"{row['renamed']}, in up to {row['frames']}" if "renamed" in row else ""
+        behind = f"{row['late']} of {row['timed']}, by up to {row['latest']}" if "late" in row else ""
+        rows.append([fault, sum(verdicts.values()), sum(good.values()), names, renamed, behind, other])
+        right, done = right + sum(good.values()), done + sum(verdicts.values())
+        silent += sum(v for k, v in bad.items() if k.startswith("silent"))
+        late, timed = late + row.get("late", 0), timed + row.get("timed", 0)
+    goals = (
+        ("named correctly: 99.9 %", f"{100.0 * right / done:.2f} % of {done}", right >= 0.999 * done),
+        ('none taken for "no touch"', f"{silent} of {done}", not silent),
+        ("a touch shows on the frame on which a healthy sensor shows it", f"{timed - late} of {timed}", not late),
+    )
+    show("goals", ["goal", "measured", "met"], [[*goal, "yes" if met else "no"] for *goal, met in goals])
+    columns = ["fault", "cases", "right", "last names", "renamed, frames", "touch late, frames", "otherwise"]
+    show("faults, and the last name of each", columns, rows)
+    return all(met for *_, met in goals)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=500, help="random cases (%(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="number of the first (%(default)s)")
+    args = parser.parse_args()
+    print(head())
+    return int(not show_answers(count(range(args.first, args.first + args.cases))))

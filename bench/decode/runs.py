@@ -1,21 +1,32 @@
-"""Runs of decoders for bench `decode`: sittings of frames to a file, a child process, its answers back."""
+"""Runs of the decoder for bench `decode`: sittings of frames go in as bytes, and what it says of each touch comes out.
+
+The bytes are packed here, so that the frames share no code with the decoder. Each sitting learns its untouched frames,
+then each of its touches begins from there.
+"""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-import tempfile
+import copy
+import gc
+import struct
+import time
+from binascii import crc_hqx
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from coneskin.geometry.frustum import Frustum
+from coneskin.skin.detection.events import SkinFault
+from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.stream import TouchStream
+from coneskin.skin.electronics import Electronics
+from coneskin.skin.sensor import Sensor
 from tests.support.field.converter_plant import ConverterPlant
 from tests.support.field.flat_plant import FlatPlant
 
-ROOT = Path(__file__).parents[2]
 LEARNED = 300  # frames of each sitting without a touch
+FRAME_PERIOD = 1e-3  # s
+_BODY = struct.Struct("<HBBHBBHI10H")
 
 
 @dataclass
@@ -37,68 +48,69 @@ class Sitting:
     touches: np.ndarray
     drift: float = 0.0
 
-    def sensor(self) -> dict[str, float]:
-        """Return what a decoder is told."""
+    def sensor(self) -> Sensor:
+        """Return what the decoder is told; leads are 1 ohm by default."""
         plant, circuit = self.plant, self.circuit
-        return {
-            "radius1": plant.radius1,
-            "radius2": plant.radius2,
-            "slant": plant.slant,
-            "wrap": plant.wrap,
-            "upper": plant.upper,
-            "lower": plant.lower,
-            "supply": circuit.supply,
-            "adc": circuit.adc,
-            "bits": circuit.bits,
-            "pulldown": circuit.pulldown,
-            "input": circuit.input,
-            "full_scale": circuit.full_scale,
-            "drift": self.drift,
-        }
+        parts = Electronics(
+            supply_volts=circuit.supply,
+            adc_volts=circuit.adc,
+            adc_bits=circuit.bits,
+            pulldown_ohms=circuit.pulldown,
+            input_ohms=circuit.input,
+            current_full_scale=circuit.full_scale,
+        )
+        height = (plant.slant**2 - (plant.radius2 - plant.radius1) ** 2) ** 0.5
+        cone = Frustum(plant.radius1, plant.radius2, height, plant.wrap)
+        return Sensor(cone, electronics=parts, upper_sheet_ohms=plant.upper, lower_sheet_ohms=plant.lower)
+
+    def settings(self) -> DetectorSettings:
+        """Return the settings of its detector."""
+        return DetectorSettings(current_drift=self.drift / FRAME_PERIOD) if self.drift else DetectorSettings()
 
 
-class Decoder:
-    """A version of coneskin that decodes.
+def packet(sequence: int, counts: list[int]) -> bytes:
+    """Return the bytes of a frame of version 1, device 0, sensor 0."""
+    head = (0x3AC5, 1, 36, 0, 0, 0, sequence & 0xFFFF, round(1e6 * FRAME_PERIOD * sequence) & 0xFFFFFFFF)
+    body = _BODY.pack(*head, *counts)
+    return body + crc_hqx(body, 0).to_bytes(2, "big")
 
-    Args:
-        name: for the tables.
-        tree: of its files.
+
+def decode(sitting: Sitting) -> dict[str, np.ndarray]:
+    """Decode the touches of one sitting.
+
+    Returns:
+        u [m] and phi [rad], valid, touched, covariance (uu, us, ss) [m^2] or NaN, and seconds, each of shape (touches,
+        frames); notone, whether a touch is told as not one disc; faults, whether any was reported.
     """
-
-    def __init__(self, name: str, tree: Path) -> None:
-        self.name = name
-        self.tree = tree
-
-    @classmethod
-    def of_commit(cls, commit: str, where: Path) -> Decoder:
-        """Return the decoder of a commit, checked out beside its frames."""
-        tree = where / commit
-        if not tree.exists():
-            tree.mkdir()
-            archive = subprocess.run(["git", "-C", ROOT, "archive", commit], capture_output=True, check=True).stdout
-            subprocess.run(["tar", "-x", "-C", tree], input=archive, check=True)
-        return cls(commit, tree)
-
-    def decode(self, sittings: list[Sitting]) -> list[dict[str, np.ndarray]]:
-        """Return what it says of each sitting; names as in decode_child.py."""
-        data: dict[str, object] = {"sittings": len(sittings)}
-        for number, sitting in enumerate(sittings):
-            sensor = sitting.sensor()
-            data[f"sensor names {number}"] = np.array(list(sensor))
-            data[f"sensor {number}"] = np.array(list(sensor.values()), float)
-            data[f"untouched {number}"] = sitting.untouched
-            data[f"touches {number}"] = sitting.touches
-        with tempfile.TemporaryDirectory() as folder:
-            frames, answers = Path(folder) / "frames.npz", Path(folder) / "answers.npz"
-            with frames.open("wb") as file:
-                np.savez(file, **data)  # type: ignore[arg-type]
-            environment = os.environ | {"PYTHONPATH": str(self.tree / "src")}
-            subprocess.run(
-                [sys.executable, "-m", "bench.decode.child", frames, answers], env=environment, cwd=ROOT, check=True
-            )
-            found = np.load(answers)
-            out: list[dict[str, np.ndarray]] = [{} for _ in sittings]
-            for key in found.files:
-                name, _, number = key.rpartition(" ")
-                out[int(number)][name] = found[key]
-        return out
+    sensor, untouched, touches = sitting.sensor(), sitting.untouched, sitting.touches
+    learned = TouchStream([sensor], sitting.settings())
+    for number, counts in enumerate(untouched.tolist()):
+        learned.feed(packet(number, counts), FRAME_PERIOD * number)
+    if not learned.ready:
+        raise RuntimeError(f"the sensor is not ready after {len(untouched)} frames: {learned.detectors[0].fault}")
+    shape = touches.shape[:2]
+    out = {name: np.full(shape, np.nan) for name in ("u", "phi", "uu", "us", "ss")}
+    out |= {name: np.zeros(shape, bool) for name in ("valid", "touched")}
+    out |= {"seconds": np.full(shape, np.nan), "faults": np.zeros(shape[0], bool), "notone": np.zeros(shape, bool)}
+    clock = time.perf_counter
+    gc.disable()
+    for k, frames in enumerate(touches.tolist()):
+        stream = copy.deepcopy(learned, {id(sensor): sensor})
+        detector = stream.detectors[0]
+        for n, counts in enumerate(frames):
+            number = len(untouched) + n
+            data = packet(number, counts)
+            began = clock()
+            events = stream.feed(data, FRAME_PERIOD * number)
+            out["seconds"][k, n] = clock() - began
+            out["faults"][k] |= any(isinstance(event, SkinFault) for event in events)
+            reading = detector.reading_now
+            if reading is None:
+                continue
+            out["u"][k, n], out["phi"][k, n] = reading.u, reading.phi
+            out["valid"][k, n], out["touched"][k, n] = reading.location_valid, True
+            out["notone"][k, n] = reading.elongation is not None
+            if reading.covariance is not None:
+                out["uu"][k, n], out["us"][k, n], out["ss"][k, n] = reading.covariance
+    gc.enable()
+    return out

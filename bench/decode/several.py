@@ -12,16 +12,16 @@ from tests.support.field.flat_plant import FlatPlant, PressedPatch
 
 from .cells import electronics
 from .plants import SEVERAL, SHEETS, Case, SolvedPlants, disc_cases, several_cases
-from .runs import LEARNED, Decoder, Sitting
+from .runs import LEARNED, Sitting, decode
 
 FRAMES = 20
 DANGEROUS = math.radians(20.0)
-_AT_ONCE = 500  # sittings in one file
+_AT_ONCE = 500  # presses that are decoded together
 
 
 @dataclass
 class Several:
-    """Presses of one kind, by one decoder.
+    """Presses of one kind.
 
     Attributes:
         kind: of the press.
@@ -51,12 +51,10 @@ def off_normals(plant: FlatPlant, phi: np.ndarray, patches: tuple[PressedPatch, 
     return np.arccos(np.clip(part + (1.0 - part) * np.cos(turns), -1.0, 1.0))
 
 
-def measure(plants: SolvedPlants, decoders: list[Decoder], count: int, electric: str) -> dict[str, list[Several]]:
+def measure(plants: SolvedPlants, count: int, electric: str) -> list[Several]:
     """Measure so many presses, of every kind on every sensor in turn."""
     rng = np.random.default_rng(5)
-    found: dict[str, dict[str, Several]] = {
-        d.name: {k: Several(k, 0, 0, 0, 0, 0, []) for k in SEVERAL} for d in decoders
-    }
+    found = {k: Several(k, 0, 0, 0, 0, 0, []) for k in SEVERAL}
     learned = {}
     for name, plant in SHEETS.items():
         circuit = electronics(name)[electric]
@@ -67,19 +65,13 @@ def measure(plants: SolvedPlants, decoders: list[Decoder], count: int, electric:
         by_sheet: dict[str, list[int]] = {}
         for number, case in enumerate(part):
             by_sheet.setdefault(case.sheet, []).append(number)
-        sittings = []
         for name, numbers in by_sheet.items():
             circuit, untouched = learned[name]
             exact = np.array([circuit.exact(plants.of(part[n])) for n in numbers])
-            sittings.append(Sitting(SHEETS[name], circuit, untouched, circuit.counts(exact, FRAMES, rng)))
-        for decoder in decoders:
-            answers = decoder.decode(sittings)
-            for numbers, answer in zip(by_sheet.values(), answers, strict=True):
-                for row, n in enumerate(numbers):
-                    _count(
-                        found[decoder.name][part[n].kind], part[n], {k: v[row] for k, v in answer.items()}, start + n
-                    )
-    return {name: list(kinds.values()) for name, kinds in found.items()}
+            answer = decode(Sitting(SHEETS[name], circuit, untouched, circuit.counts(exact, FRAMES, rng)))
+            for row, n in enumerate(numbers):
+                _count(found[part[n].kind], part[n], {k: v[row] for k, v in answer.items()}, start + n)
+    return list(found.values())
 
 
 def _count(into: Several, case: Case, said: dict[str, np.ndarray], number: int) -> None:
@@ -102,20 +94,20 @@ class Power:
         what: the contacts.
         electronics: of the sensor.
         frames: that were averaged.
-        share: of the touches that are called not one disc, by decoder.
-        valid: of the touches whose place is certain, by decoder.
+        share: of the touches that are called not one disc.
+        valid: of the touches whose place is certain.
         of: touches.
     """
 
     what: str
     electronics: str
     frames: int
-    share: dict[str, float]
-    valid: dict[str, float]
+    share: float
+    valid: float
     of: int
 
 
-def power(plants: SolvedPlants, decoders: list[Decoder], places: int, draws: int) -> list[Power]:
+def power(plants: SolvedPlants, places: int, draws: int) -> list[Power]:
     """Measure the power against two fingers 20 mm apart, the false alarms of one disc, and ellipses."""
     plant, found = SHEETS["UR5e"], []
     rng = np.random.default_rng(6)
@@ -137,12 +129,8 @@ def power(plants: SolvedPlants, decoders: list[Decoder], places: int, draws: int
         for what, cases in groups.items():
             exact = np.repeat(np.array([circuit.exact(plants.of(case)) for case in cases]), draws, axis=0)
             untouched = circuit.counts(circuit.exact(still), LEARNED, rng)
-            sitting = Sitting(plant, circuit, untouched, circuit.counts(exact, frames, rng))
-            share, valid = {}, {}
-            for decoder in decoders:
-                (answer,) = decoder.decode([sitting])
-                share[decoder.name] = float(answer["notone"][:, -1].mean())
-                valid[decoder.name] = float(answer["valid"][:, -1].mean())
+            answer = decode(Sitting(plant, circuit, untouched, circuit.counts(exact, frames, rng)))
+            share, valid = (float(answer[word][:, -1].mean()) for word in ("notone", "valid"))
             found.append(Power(what, electric, frames, share, valid, len(exact)))
     return found
 

@@ -4,9 +4,11 @@
     python -m bench mutations --count 4 --keep FILE --short
 
 A mutant is a file of geometry, skin, robot or src/coneskin with one comparison, operator, condition or number changed
-(mutants.py). It runs against the tests of its room, in a copy of the tree: test_<module>.py, the files that import the
-module, and the folder that mirrors its own. First the short tests; where it survives these, the long ones.
-A mutant that the tests do not end in time counts as noticed. Each selection of tests first runs on the copy as it is.
+(mutants.py). It runs against the tests of its room, in a copy of the tree: test_<module>.py, the other tests of the
+folder that mirrors its own, and those that import the module. First the short tests; where it survives these, the
+long ones.
+A mutant that the tests do not end in time counts as noticed. Each selection of tests first runs on the copy as it is,
+which gives its time; a test that fails there is left out.
 The exit code is 1 where more than --most percent survive.
 """
 
@@ -24,6 +26,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from pathlib import Path
@@ -44,7 +47,7 @@ _FIRST_TIMEOUT = 1800.0  # s, for the unchanged copy
 def product(root: Path) -> list[str]:
     """Return the files that are changed: all of the product but what users test with."""
     files = _listed(root, *(f"{room}/*.py" for room in _ROOMS))
-    return [file for file in files if not file.startswith("src/coneskin/testing/")]
+    return [file for file in files if not file.startswith("src/coneskin/testing/") and "__main__" not in file]
 
 
 def imports_of(root: Path) -> dict[str, set[str]]:
@@ -68,9 +71,10 @@ def tests_of(root: Path, file: str, importers: dict[str, set[str]]) -> list[str]
     while not any((root / folder).glob("**/test_*.py")):
         folder = folder.parent
     near = folder / f"test_{path.stem}.py"
-    room = [] if folder == Path("tests") else [str(folder)]
-    others = sorted(each for each in importers.get(module, ()) if not (room and Path(each).is_relative_to(folder)))
-    return [*([str(near)] if (root / near).exists() else []), *room, *others]
+    room = [] if folder == Path("tests") else sorted((root / folder).glob("test_*.py")) or [root / folder]
+    nearest = [str(each.relative_to(root)) for each in sorted(room, key=lambda each: each.name != near.name)]
+    nearest = nearest or ([str(near)] if (root / near).exists() else [])
+    return [*nearest, *sorted(importers.get(module, set()) - set(nearest))]
 
 
 class Tree:
@@ -93,9 +97,9 @@ class Tree:
         (self.folder / file).write_bytes(source)
         os.utime(self.folder / file, (self._clock, self._clock))
 
-    def run(self, tests: list[str], marker: str, timeout: float) -> tuple[str, str, float]:
-        """Run tests until one fails; return "passed", "failed" or "timeout", the last words, and the time [s]."""
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", marker, *tests]
+    def run(self, tests: Sequence[str], marker: str, timeout: float) -> tuple[str, list[str], float]:
+        """Run tests; return "passed", "failed" or "timeout", the names of those that failed, and the time [s]."""
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", marker, *tests]
         environment = {**os.environ, "PYTHONPATH": str(self.folder / "src")}
         began = time.monotonic()
         with tempfile.TemporaryFile("w+") as said:
@@ -109,9 +113,9 @@ class Tree:
             finally:
                 _end_group(child)
             said.seek(0)
-            lines = [line.strip() for line in said if line.startswith(("FAILED", "ERROR"))]
+            failed = [line.split()[1] for line in said if line.startswith(("FAILED ", "ERROR "))]
         verdict = "timeout" if code is None else "passed" if code in (0, _NO_TESTS) else "failed"
-        return verdict, (lines or [""])[0][:200], time.monotonic() - began
+        return verdict, failed, time.monotonic() - began
 
 
 class Campaign:
@@ -126,7 +130,8 @@ class Campaign:
         self._trees = trees
         self._markers = markers
         self._importers = imports_of(_ROOT)
-        self._times: dict[tuple[str, ...], tuple[str, float]] = {}  # (marker, *tests) -> verdict and time of no change
+        #: of the copy as it is: (marker, *tests) -> tests that fail, and the time that a mutant has
+        self._unchanged: dict[tuple[str, ...], tuple[list[str], float]] = {}
         self._lock = threading.Lock()
 
     def judge(self, number: int, mutant: Mutant) -> dict[str, Any]:
@@ -134,33 +139,32 @@ class Campaign:
         tests = tests_of(_ROOT, mutant.file, self._importers)
         row = {"number": number, "file": mutant.file, "line": mutant.line, "kind": mutant.kind}
         row |= {"before": mutant.before, "after": mutant.after, "tests": tests, "verdict": "survived", "by": ""}
-        source = (_ROOT / mutant.file).read_bytes()
         tree = self._trees.get()
+        source = (tree.folder / mutant.file).read_bytes()
         try:
             for marker in self._markers:
-                verdict, allowed = self._unchanged(tree, tests, marker)
-                if verdict != "passed":
-                    return row | {"verdict": "not tried", "by": f"unchanged, the {marker} tests have {verdict}"}
+                failing, timeout = self._try_unchanged(tree, tests, marker)
+                options = ["-x", *(f"--deselect={name}" for name in failing)]
                 tree.write(mutant.file, mutant.apply(source))
-                verdict, said, _ = tree.run(tests, marker, allowed)
+                verdict, failed, _ = tree.run([*options, *tests], marker, timeout)
                 tree.write(mutant.file, source)
                 if verdict != "passed":
-                    return row | {"verdict": f"{verdict}, {marker}", "by": said}
+                    return row | {"verdict": f"{verdict}, {marker}", "by": " ".join(failed)}
             return row
         finally:
             tree.write(mutant.file, source)
             self._trees.put(tree)
 
-    def _unchanged(self, tree: Tree, tests: list[str], marker: str) -> tuple[str, float]:
-        """Return what the tests say of the copy as it is, and the time that a mutant has."""
+    def _try_unchanged(self, tree: Tree, tests: list[str], marker: str) -> tuple[list[str], float]:
+        """Return which tests fail on the copy as it is, and the time that a mutant has [s]."""
         key = (marker, *tests)
         with self._lock:
-            known = self._times.get(key)
+            known = self._unchanged.get(key)
         if known is None:
-            verdict, _, seconds = tree.run(tests, marker, _FIRST_TIMEOUT)
-            known = verdict, _TIME_FACTOR * seconds + _TIME_MARGIN
+            _, failed, seconds = tree.run(tests, marker, _FIRST_TIMEOUT)
+            known = failed, _TIME_FACTOR * seconds + _TIME_MARGIN
             with self._lock:
-                self._times[key] = known
+                self._unchanged[key] = known
         return known
 
 
@@ -225,20 +229,15 @@ def _kept(file: Path | None, mutants: dict[int, Mutant]) -> dict[int, dict[str, 
 def _report(seed: int, rows: list[dict[str, Any]], most: float) -> int:
     print(f"{head()}\nseed {seed}")
     survivors = [row for row in rows if row["verdict"] == "survived"]
-    tried = [row for row in rows if row["verdict"] != "not tried"]
-    share = 100.0 * len(survivors) / max(1, len(tried))
-    columns = ["mutants", "tried", "survived", "share"]
-    show(f"mutants of seed {seed}", columns, [[len(rows), len(tried), len(survivors), f"{share:.1f} %"]])
+    share = 100.0 * len(survivors) / max(1, len(rows))
+    show(f"mutants of seed {seed}", ["mutants", "survived", "share"], [[len(rows), len(survivors), f"{share:.1f} %"]])
     verdicts = sorted(Counter(row["verdict"] for row in rows).items())
     show("verdicts: by which tests a mutant was noticed", ["verdict", "mutants"], [list(each) for each in verdicts])
-    kinds = sorted({row["kind"] for row in tried})
-    counts = [[k, sum(r["kind"] == k for r in tried), sum(r["kind"] == k for r in survivors)] for k in kinds]
-    show("kinds", ["kind", "tried", "survived"], counts)
+    kinds = sorted({row["kind"] for row in rows})
+    counts = [[k, sum(r["kind"] == k for r in rows), sum(r["kind"] == k for r in survivors)] for k in kinds]
+    show("kinds", ["kind", "mutants", "survived"], counts)
     places = [[f"{r['file']}:{r['line']}", _word(r["before"]), _word(r["after"])] for r in survivors]
     show("survivors", ["place", "before", "after"], sorted(places))
-    others = [[f"{r['file']}:{r['line']}", r["by"]] for r in rows if r["verdict"] == "not tried"]
-    if others:
-        show("not tried", ["place", "why"], others)
     return int(share > most)
 
 
