@@ -54,7 +54,7 @@ HOMES = {
     "ezdxf": ("geometry/drawing/dxf.py",),
     "rpack": ("geometry/drawing/nesting.py",),
     "pyarrow": ("src/coneskin/runs/export/parquet_file.py",),
-    "distributed": ("src/coneskin/runs/what_if/dask_cluster.py",),
+    "distributed": ("src/coneskin/runs/what_if/batch.py",),
     "argcomplete": ("src/coneskin/commands/shell_completion.py",),
     "mujoco": ("src/coneskin/impact/simulation/mujoco_*.py",),
     "mcap": ("src/coneskin/runs/export/mcap_file.py",),

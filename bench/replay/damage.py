@@ -17,8 +17,7 @@ from coneskin.core.recording.block import Block
 from coneskin.core.recording.chunk import FILE_HEAD_SIZE, decode_body
 from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.scan import Chunk, walk
-from coneskin.runs.replay.replay import Verdict
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import Verdict, read_run, replay
 
 __all__ = ["damage", "kill"]
 

@@ -8,8 +8,7 @@ from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.overflow import RecordingOverflowFilter
 from coneskin.robot.guard.signals.journal import BlockKind
-from coneskin.runs.replay.replay import Verdict
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import Verdict, read_run, replay
 
 from ..scene.scenes import record
 

@@ -7,8 +7,7 @@ import pytest
 
 from coneskin.robot.guard.signals.journal import EventName
 from coneskin.runs.replay.run import read_run
-from coneskin.runs.what_if.touch_labels import true_touches
-from coneskin.runs.what_if.what_if import judge_run
+from coneskin.runs.what_if.what_if import judge_run, true_touches
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 

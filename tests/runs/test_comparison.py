@@ -8,12 +8,17 @@ import pytest
 
 from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
-from coneskin.runs.arm_command import ArmCommand, first_divergence, recorded_commands
-from coneskin.runs.comparison import compare_decisions
-from coneskin.runs.comparison_text import comparison_facts, comparison_lines
+from coneskin.runs.comparison import compare_decisions, comparison_facts, comparison_lines
 from coneskin.runs.cut import CUT_TOLERANCES, cut_run
-from coneskin.runs.decisions import Decisions, decide_again, recorded_decisions
-from coneskin.runs.replay.quantities import Tolerances
+from coneskin.runs.decisions import (
+    ArmCommand,
+    Decisions,
+    decide_again,
+    first_divergence,
+    recorded_commands,
+    recorded_decisions,
+)
+from coneskin.runs.replay.event_details import Tolerances
 from coneskin.runs.replay.run import Run, read_run
 
 

@@ -10,9 +10,9 @@ from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.version import running_version
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.cut import cut_run
-from coneskin.runs.replay.quantities import Tolerances
+from coneskin.runs.replay.event_details import Tolerances
 from coneskin.runs.replay.run import Run, read_run, replay
-from coneskin.runs.run_summary import summarise_run
+from coneskin.runs.run_files import summarise_run
 
 
 def test_a_cut_replays_to_the_same_contact_and_reaction(collision: Run, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from coneskin.runs.replay.replay import Replay
+    from coneskin.runs.replay.run import Replay
 
 __all__ = ["add_arguments", "run"]
 
@@ -100,7 +100,7 @@ def _list_runs(folder: Path) -> int:
 
 
 def _replay_one(args: argparse.Namespace) -> int:
-    from coneskin.runs.progress_bar import ProgressBar
+    from coneskin.runs.progress import ProgressBar
     from coneskin.runs.replay.run import read_run, replay
 
     recorded = read_run(args.runs[0], ProgressBar("read"))
@@ -133,7 +133,7 @@ def _replay_one(args: argparse.Namespace) -> int:
 def _report(result: Replay, start: float, listed: bool) -> None:
     from coneskin.core.text import printable
     from coneskin.runs.replay.event_text import describe
-    from coneskin.runs.replay.replay import MOST_DIFFERENCES
+    from coneskin.runs.replay.run import MOST_DIFFERENCES
 
     if listed:
         for event in result.events:

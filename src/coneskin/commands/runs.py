@@ -15,9 +15,9 @@ from .arguments.runs import INCOMPLETE, add_arguments
 
 if TYPE_CHECKING:
     from coneskin.runs.decisions import Decisions
-    from coneskin.runs.progress_bar import ProgressBar
+    from coneskin.runs.progress import ProgressBar
     from coneskin.runs.replay.run import Run
-    from coneskin.runs.run_summary import RunSummary
+    from coneskin.runs.run_files import RunSummary
 
 __all__ = ["add_arguments", "run"]
 
@@ -57,7 +57,7 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _summary(path: Path) -> RunSummary:
-    from coneskin.runs.run_summary import summarise_run
+    from coneskin.runs.run_files import summarise_run
 
     return summarise_run(path, _read(path), _bar(f"{path}"))
 
@@ -69,13 +69,13 @@ def _read(path: Path) -> Run:
 
 
 def _bar(what: str) -> ProgressBar:
-    from coneskin.runs.progress_bar import ProgressBar
+    from coneskin.runs.progress import ProgressBar
 
     return ProgressBar(what)
 
 
 def _info(args: argparse.Namespace) -> int:
-    from coneskin.runs.run_summary import summarise_run
+    from coneskin.runs.run_files import summarise_run
 
     recorded = _read(args.run)
     summary = summarise_run(args.run, recorded, _bar(f"{args.run}"))
@@ -151,9 +151,8 @@ def _cut(args: argparse.Namespace) -> int:
 
 
 def _diff(args: argparse.Namespace) -> int:
-    from coneskin.runs.comparison import compare_decisions
-    from coneskin.runs.comparison_text import comparison_facts, comparison_lines
-    from coneskin.runs.replay.quantities import Tolerances
+    from coneskin.runs.comparison import compare_decisions, comparison_facts, comparison_lines
+    from coneskin.runs.replay.event_details import Tolerances
 
     one, other = _sides(args)
     tolerances = Tolerances.from_words(args.tolerance)
@@ -179,7 +178,7 @@ def _sides(args: argparse.Namespace) -> tuple[Decisions, Decisions]:
     first = _read(args.one)
     second = first if args.other is None else _read(args.other)
     if args.python is not None:
-        from coneskin.runs.other_code import decide_with
+        from coneskin.runs.event_file import decide_with
 
         if args.other is not None:
             raise RecordingError("--python compares two versions of the code on one run: leave B out")

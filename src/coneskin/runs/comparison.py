@@ -8,24 +8,94 @@ compared. The skin's contacts still are, and so is the first reaction on each si
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
-from .arm_command import first_divergence
-from .decisions import Decisions
-from .event_pairs import SKIN_EVENTS, EventPair, pair_events
-from .event_subjects import either_event, event_words, pair_subjects, touched_sensor
-from .replay.detail_differences import describe_differences, distance, milliseconds
-from .replay.quantities import Tolerances
+from .decisions import SKIN_EVENTS, Decisions, EventPair, first_divergence, pair_events
+from .replay.event_details import Tolerances, describe_differences, distance, milliseconds
 
-__all__ = ["Comparison", "Difference", "compare_decisions", "without_invented"]
+__all__ = [
+    "Comparison",
+    "Difference",
+    "compare_decisions",
+    "comparison_facts",
+    "comparison_lines",
+    "without_invented",
+]
 
-_REACTIONS = (EventName.STOPPING, EventName.SPEED_REDUCED, EventName.RETREATING)
-_STARTS = frozenset({EventName.WAITING, EventName.ACTIVATED, EventName.NOT_COMMISSIONED})
+_STOP_WINDOW = 0.5  # s between a contact and the stop that is made for it
+_EVENT_WORDS: Mapping[str, str] = {
+    EventName.CONTACT: "touch",
+    EventName.CONTACT_LOCATED: "located",
+    EventName.CONTACT_EXTENDED: "extent",
+    EventName.TOUCH_ENDED: "end",
+    EventName.STOPPING: "stop",
+    EventName.RETREATING: "retreat",
+    EventName.SPEED_REDUCED: "slow-down",
+    EventName.RETREATED: "end of the retreat",
+    EventName.DECELERATING: "deceleration",
+}
+
+
+def _pair_subjects(pairs: Sequence[EventPair]) -> list[str]:
+    """Return what each pair is about. Contacts have numbers, in the order in which they began."""
+    counts = {False: 0, True: 0}
+    contacts: list[tuple[str, float, str]] = []  # sensor, time, subject
+    for pair in pairs:
+        if (event := _either_event(pair)).name == EventName.CONTACT:
+            new = pair[0] is None
+            counts[new] += 1
+            contacts.append(
+                (_touched_sensor(event), event.time, f"{'new contact' if new else 'contact'} {counts[new]}")
+            )
+    subjects = [_subject(_either_event(pair), contacts) for pair in pairs]
+    often, seen = Counter(subjects), Counter[str]()
+    for at, pair in enumerate(pairs):  # the first and the second standstill, and so on
+        subject = subjects[at]
+        if subject == _event_words(_either_event(pair)) and often[subject] > 1:
+            seen[subject] += 1
+            subjects[at] = f"{subject} {seen[subject]}"
+    return subjects
+
+
+def _subject(event: GuardEvent, contacts: Sequence[tuple[str, float, str]]) -> str:
+    here = [(time, subject) for sensor, time, subject in contacts if sensor == _touched_sensor(event)]
+    if event.name in SKIN_EVENTS:
+        begun = [item for item in here if item[0] <= event.time]
+        return max(begun)[1] if begun else f"touch on {_touched_sensor(event)}"
+    if event.name == EventName.STOPPING and (
+        near := [item for item in here if abs(item[0] - event.time) < _STOP_WINDOW]
+    ):
+        return min(near, key=lambda item: abs(item[0] - event.time))[1]
+    return _event_words(event)
+
+
+def _event_words(event: GuardEvent) -> str:
+    """Return what an event is called in a difference."""
+    return _EVENT_WORDS.get(event.name, str(event.name).replace("_", " "))
+
+
+def _touched_sensor(event: GuardEvent) -> str:
+    """Return the name of the sensor that an event is about; empty for none."""
+    contact = event.details.get("contact")
+    return str((contact if isinstance(contact, Mapping) else event.details).get("sensor", ""))
+
+
+def _either_event(pair: EventPair) -> GuardEvent:
+    """Return the event of a pair, the first one where it has both."""
+    event = pair[0] if pair[0] is not None else pair[1]
+    assert event is not None
+    return event
+
+
+_REACTION_EVENTS = (EventName.STOPPING, EventName.SPEED_REDUCED, EventName.RETREATING)
+_START_EVENTS = frozenset({EventName.WAITING, EventName.ACTIVATED, EventName.NOT_COMMISSIONED})
 #: from the noise, of which a guard knows more the longer it has watched an untouched skin
-_LEARNED = frozenset({"covariance", "ellipse", "radius_deviation"})
+_LEARNED_DETAILS = frozenset({"covariance", "ellipse", "radius_deviation"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,13 +240,15 @@ def _without_beginning(
     active = [next((e.time for e in side if e.name == EventName.ACTIVATED), -math.inf) for side in (ones, others)]
     until = max(active[0], active[1] + shift)
     return (
-        [_unlearned(event) for event in ones if event.name not in _STARTS or event.time > until],
-        [_unlearned(event) for event in others if event.name not in _STARTS or event.time + shift > until],
+        [_unlearned(event) for event in ones if event.name not in _START_EVENTS or event.time > until],
+        [_unlearned(event) for event in others if event.name not in _START_EVENTS or event.time + shift > until],
     )
 
 
 def _unlearned(event: GuardEvent) -> GuardEvent:
-    return event._replace(details={name: value for name, value in event.details.items() if name not in _LEARNED})
+    return event._replace(
+        details={name: value for name, value in event.details.items() if name not in _LEARNED_DETAILS}
+    )
 
 
 def _comparable(events: Sequence[GuardEvent], diverged: float) -> list[GuardEvent]:
@@ -185,7 +257,7 @@ def _comparable(events: Sequence[GuardEvent], diverged: float) -> list[GuardEven
     for event in events:
         if event.name in SKIN_EVENTS or event.time < diverged:
             kept.append(event)
-        elif event.name in _REACTIONS and not reacted and (event.time <= diverged or _of_skin(event)):
+        elif event.name in _REACTION_EVENTS and not reacted and (event.time <= diverged or _of_skin(event)):
             reacted = True
             kept.append(event)
     return kept
@@ -197,7 +269,7 @@ def _of_skin(reaction: GuardEvent) -> bool:
 
 
 def _differences(pairs: Sequence[EventPair], tolerances: Tolerances, shift: float) -> list[Difference]:
-    subjects = pair_subjects([_on_one_clock(pair, shift) for pair in pairs])
+    subjects = _pair_subjects([_on_one_clock(pair, shift) for pair in pairs])
     found: dict[str, Difference] = {}
     # a stop is told after its contact, whose event follows it
     for (a, b), subject in sorted(zip(pairs, subjects, strict=True), key=lambda item: _is_stop(item[0])):
@@ -208,7 +280,7 @@ def _differences(pairs: Sequence[EventPair], tolerances: Tolerances, shift: floa
             words = [
                 word for word in words if not word.startswith(("located is ", "extent is ", "end is "))
             ]  # of course
-        if (name := event_words(either_event((a, b)))) == subject.rstrip(
+        if (name := _event_words(_either_event((a, b)))) == subject.rstrip(
             " 0123456789"
         ):  # "retreat: missing", said once
             words = [word.removeprefix(f"{name} ").removeprefix("is ") for word in words]
@@ -225,7 +297,7 @@ def _on_one_clock(pair: EventPair, shift: float) -> EventPair:
 
 
 def _is_stop(pair: EventPair) -> bool:
-    return either_event(pair).name == EventName.STOPPING
+    return _either_event(pair).name == EventName.STOPPING
 
 
 def _words(
@@ -233,7 +305,7 @@ def _words(
 ) -> tuple[list[str], float | None, float | None]:
     event = a if a is not None else b
     assert event is not None
-    name = event_words(event)
+    name = _event_words(event)
     if a is None or b is None:
         place = _place(event) if event.name == EventName.CONTACT else ""
         return [f"{name} is {'missing' if b is None else 'new'}{place}"], None, None
@@ -253,4 +325,74 @@ def _place(event: GuardEvent) -> str:
     u, phi = event.details.get("u"), event.details.get("phi")
     if not (isinstance(u, float) and isinstance(phi, float)):
         return ""
-    return f" on {touched_sensor(event)}, u {1e3 * u:.1f} mm, phi {math.degrees(phi):.1f} deg"
+    return f" on {_touched_sensor(event)}, u {1e3 * u:.1f} mm, phi {math.degrees(phi):.1f} deg"
+
+
+def comparison_lines(comparison: Comparison, most: int = 40) -> list[str]:
+    """Return a comparison in lines; at most so many differences are listed."""
+    one, other = comparison.labels
+    lines = [f"{one} -> {other}", *(f"  {what}" for what in comparison.other_code)]
+    lines += [f"  {difference}" for difference in comparison.differences[:most]]
+    if (more := len(comparison.differences) - most) > 0:
+        lines.append(f"  ... and {more} more")
+    if comparison.diverged is not None:
+        left_out = _count(comparison.not_compared, "event")
+        lines.append(
+            f"  from {comparison.diverged:.4f} s on the arm is commanded otherwise: its motion in the recording is no "
+            f"longer that of {other}; {left_out} about the arm not compared"
+        )
+    if comparison.until is not None:
+        lines.append(f"  compared up to {comparison.until:.4f} s only: {comparison.lost}")
+    elif comparison.lost:
+        lines.append(f"  the recording is not whole: {comparison.lost}")
+    return [*lines, f"  {_verdict(comparison)}"]
+
+
+def comparison_facts(comparison: Comparison) -> dict[str, Any]:
+    """Return a comparison as values for JSON, with units in the names."""
+    return {
+        "labels": list(comparison.labels),
+        "same": comparison.same,
+        "paired": comparison.paired,
+        "new": comparison.new,
+        "missing": comparison.missing,
+        "moved_mm": 1e3 * comparison.farthest,
+        "diverged_s": comparison.diverged,
+        "not_compared": comparison.not_compared,
+        "compared_until_s": comparison.until,
+        "lost": comparison.lost or None,
+        "other_code": list(comparison.other_code),
+        "differences": [
+            {
+                "subject": difference.subject,
+                "words": list(difference.words),
+                "moved_mm": None if difference.moved is None else 1e3 * difference.moved,
+                "delay_ms": None if difference.delay is None else 1e3 * difference.delay,
+            }
+            for difference in comparison.differences
+        ],
+    }
+
+
+def _verdict(comparison: Comparison) -> str:
+    if comparison.same:
+        return f"the same within the tolerances: {_count(comparison.paired, 'event')}"
+    if not (comparison.paired or comparison.differences):
+        return "there is nothing to compare: no event on either side"
+    parts = [f"{_count(comparison.paired, 'event')} in pairs"]
+    parts += [f"{count} {word}" for count, word in ((comparison.new, "new"), (comparison.missing, "missing")) if count]
+    if comparison.farthest:
+        parts.append(f"contacts moved by up to {1e3 * comparison.farthest:.2f} mm")
+    delays = [d.delay for d in comparison.differences if d.delay is not None]
+    if delays:
+        parts.append(_delays(delays))
+    return ("NOT the same: " if comparison.differences else "") + ", ".join(parts)
+
+
+def _delays(delays: Sequence[float]) -> str:
+    worst = max(delays, key=abs)
+    return f"up to {1e3 * abs(worst):.1f} ms {'later' if worst > 0.0 else 'earlier'}"
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"

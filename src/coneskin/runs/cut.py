@@ -24,36 +24,34 @@ from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, EventName, G
 from coneskin.robot.guard.signals.outputs import Command, Output
 from coneskin.scene.settings import resolved_settings
 
-from .arm_command import command_block
-from .block_progress import Progress, silent
 from .comparison import Comparison, compare_decisions
-from .decisions import Decisions, decide_again, recorded_decisions
-from .event_pairs import SKIN_EVENTS
-from .replay.quantities import Tolerances
+from .decisions import SKIN_EVENTS, Decisions, command_block, decide_again, recorded_decisions
+from .progress import Progress, silent
+from .replay.event_details import Tolerances
 
 if TYPE_CHECKING:
     from .replay.run import Run
 
-__all__ = ["CUT_TOLERANCES", "CutRun", "cut_run", "first_touch"]
+__all__ = ["CUT_TOLERANCES", "cut_run", "first_touch"]
 
 #: s before the settling of the guard that the skin needs: 50 untouched frames at 200 Hz, and as much again
 _SKIN_SETTLE = 0.5
 #: s of a cut whose duration nobody names
-_KEPT = 1.0
+_KEPT_TIME = 1.0
 #: what a start in the middle may change: the zero of the skin is learned from other frames
 CUT_TOLERANCES = Tolerances(place=5e-4, angle=0.02, level=0.02, speed=0.01, time=5e-3, relative=0.01)
 _SURFACES, _TRUTH, _ABSENT = (frozenset({kind}) for kind in (BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.ABSENT))
-_REACTIONS = frozenset(
+_REACTION_EVENTS = frozenset(
     {
         *(EventName.STOPPING, EventName.RETREATING, EventName.RETREATED, EventName.SPEED_REDUCED, EventName.LATCHED),
         *(EventName.ESCALATED, EventName.STOP_FAILED),
     }
 )
-_CONTACTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED})
+_CONTACT_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED})
 
 
 @dataclass(frozen=True, slots=True)
-class CutRun:
+class _CutRun:
     """Result of a cut.
 
     Attributes:
@@ -93,7 +91,7 @@ def first_touch(run: Run) -> float:
 
 def cut_run(
     run: Run, target: Path, around: float, keep: float | None = None, name: str = "", progress: Progress = silent
-) -> CutRun:
+) -> _CutRun:
     """Write the part of a run around a moment as a recording of its own.
 
     Args:
@@ -109,7 +107,7 @@ def cut_run(
         RecordingError: there is nothing at that moment, no contact, or the contacts would be others than in the whole
             run; or the file is there already.
     """
-    length = _KEPT if keep is None else keep
+    length = _KEPT_TIME if keep is None else keep
     if not (math.isfinite(around) and math.isfinite(length) and length > 0.0):
         raise RecordingError(f"a cut needs a moment [s] and a duration above 0 s, got {around!r} s and {length!r} s")
     start = run.start
@@ -148,7 +146,7 @@ def cut_run(
     there, here = (_reaction(item.events, contacts[0].time, until) for item in (all_of_it, all_of_part))
     differs = active and there != here
     _record(target, Block(BlockKind.HEADER, since, json.dumps(header).encode()), blocks)
-    return CutRun(
+    return _CutRun(
         target,
         target.stat().st_size,
         inputs[0].time - start,
@@ -166,7 +164,7 @@ def _reaction(events: Sequence[GuardEvent], since: float, until: float) -> list[
     return [
         str(event.name) + (" incomplete"[: 11 * (event.details.get("complete") is False)])
         for event in window
-        if event.name in _REACTIONS
+        if event.name in _REACTION_EVENTS
     ]
 
 

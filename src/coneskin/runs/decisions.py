@@ -1,25 +1,217 @@
-"""Decisions of a guard in one run: events and commands, as they were recorded or as a replay makes them."""
+"""Decisions of a guard in one run: events and commands to the arm, recorded or made again by a replay.
+
+Events of two runs that stand for each other are paired here too.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.robot.driver.messages import Release
-from coneskin.robot.guard.signals.journal import INPUTS, SESSION_EVENTS, BlockKind, GuardEvent
-from coneskin.robot.guard.signals.outputs import Output
+from coneskin.core.recording.block import Block
+from coneskin.robot.driver.messages import Release, SetJointVelocity, decode_command
+from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
+from coneskin.robot.driver.stop_path import UseStopPath
+from coneskin.robot.guard.signals.journal import INPUTS, SESSION_EVENTS, BlockKind, EventName, GuardEvent
+from coneskin.robot.guard.signals.outputs import Command, Output
 
-from .arm_command import ArmCommand, command_of, recorded_commands
-from .block_progress import Progress, silent, watch
+from .progress import Progress, silent, watch
+from .replay.event_details import Tolerances
 
 if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
 
     from .replay.run import Run
 
-__all__ = ["Decisions", "decide_again", "recorded_decisions", "scene_with"]
+__all__ = [
+    "SKIN_EVENTS",
+    "ArmCommand",
+    "Decisions",
+    "EventPair",
+    "command_block",
+    "decide_again",
+    "first_divergence",
+    "pair_events",
+    "recorded_commands",
+    "recorded_decisions",
+]
+
+_NUMBER_PATTERN = re.compile(r"[-+]?(?:\d+\.?\d*(?:[eE][-+]?\d+)?|inf|nan)")
+_SLIDER_WORD = "slider"
+_OWN_NAMES = {JointVelocitySetpoint: "setpoint", SetpointProgram: "follow", SetSpeedSlider: _SLIDER_WORD}
+_SPEED_COMMANDS = frozenset({"setpoint", SetJointVelocity.__name__})  # commands of joint speeds
+_ABSOLUTE_TOLERANCE = 1e-12  # rad/s and the like, for numbers near zero
+
+
+class ArmCommand(NamedTuple):
+    """Command of a guard.
+
+    Attributes:
+        time: of the input that led to it, host clock [s].
+        what: such as "StopProgram", or the stop path that was used.
+        numbers: what it carries, in SI.
+    """
+
+    time: float
+    what: str
+    numbers: tuple[float, ...]
+
+    def equals(self, other: ArmCommand, tolerances: Tolerances) -> bool:
+        """Tell whether the other does the same to the arm at the same time, within tolerances."""
+        absolute = _ABSOLUTE_TOLERANCE
+        if self.what in _SPEED_COMMANDS:
+            absolute = max(absolute, tolerances.speed)
+        elif self.what == _SLIDER_WORD:
+            absolute = max(absolute, tolerances.level)
+        return (
+            (self.what, len(self.numbers)) == (other.what, len(other.numbers))
+            and math.isclose(self.time, other.time, rel_tol=0.0, abs_tol=tolerances.time)
+            and all(
+                math.isclose(a, b, rel_tol=tolerances.relative, abs_tol=absolute)
+                for a, b in zip(self.numbers, other.numbers, strict=True)
+            )
+        )
+
+
+def _command_of(output: Command, time: float) -> ArmCommand:
+    """Return the command that a guard's core puts out at a time [s]."""
+    if isinstance(output, UseStopPath):
+        return ArmCommand(time, output.path.value, ())  # a recording does not tell with which deceleration
+    if isinstance(output, JointVelocitySetpoint | SetpointProgram | SetSpeedSlider):
+        return ArmCommand(time, _OWN_NAMES[type(output)], _numbers(str(tuple(output))))
+    return _of_message(time, output.encode())
+
+
+def command_block(output: Command, time: float, process: str) -> Block:
+    """Return the block that records a command as the guard's loop does.
+
+    Args:
+        output: of a guard's core.
+        time: host clock [s].
+        process: that takes what goes over no connection of the guard's own: "driver" or "watchdog".
+    """
+    if isinstance(output, UseStopPath):
+        payload = f"{output.path.value}\nsent".encode()
+    elif isinstance(output, JointVelocitySetpoint | SetpointProgram | SetSpeedSlider):
+        payload = f"{_OWN_NAMES[type(output)]}\n{tuple(output)}".encode()
+    else:
+        payload = process.encode() + b"\n" + output.encode()
+    return Block(BlockKind.COMMAND, time, payload)
+
+
+def recorded_commands(blocks: Iterable[Block]) -> Iterator[ArmCommand]:
+    """Yield the commands of a recording, each with the time of the input before it."""
+    time = math.nan
+    for block in blocks:
+        if block.kind in INPUTS:
+            time = block.time
+        elif block.kind == BlockKind.COMMAND:
+            head, _, body = block.payload.partition(b"\n")
+            name = head.decode("utf-8", "replace").removesuffix(", not sent")
+            if body in (b"sent", b"not sent"):
+                yield ArmCommand(time, name, ())
+            elif name in ("driver", "watchdog"):
+                yield _of_message(time, body)
+            else:
+                yield ArmCommand(time, name, _numbers(body.decode("utf-8", "replace")))
+
+
+def first_divergence(
+    one: Sequence[ArmCommand], other: Sequence[ArmCommand], tolerances: Tolerances | None = None
+) -> float:
+    """Return from when on two guards command otherwise [s]; infinite where they do not.
+
+    Args:
+        one: commands of a guard.
+        other: of another that was given the same inputs, or the same guard in a replay.
+        tolerances: what does not count.
+    """
+    tolerances = tolerances or Tolerances()
+    for a, b in zip(one, other, strict=False):
+        if not a.equals(b, tolerances):
+            return min(a.time, b.time)
+    shared = min(len(one), len(other))
+    rest = [*one[shared:], *other[shared:]]
+    return rest[0].time if rest else math.inf
+
+
+def _of_message(time: float, message: bytes) -> ArmCommand:
+    try:
+        command = decode_command(message)
+    except ValueError:
+        return ArmCommand(time, repr(message), ())
+    return ArmCommand(time, type(command).__name__, _numbers(str(tuple(command))))
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(map(float, _NUMBER_PATTERN.findall(text)))
+
+
+#: what the skin alone decides
+SKIN_EVENTS = frozenset(
+    {EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED, EventName.TOUCH_ENDED}
+)
+
+EventPair = tuple[GuardEvent | None, GuardEvent | None]
+
+_PAIR_WINDOW = 0.5  # s that an event may move and still be the same one
+
+
+def pair_events(one: Sequence[GuardEvent], other: Sequence[GuardEvent], shift: float = 0.0) -> list[EventPair]:
+    """Return the events of two runs in pairs, in the order of their times; None stands for one that is not there.
+
+    At one time the skin's events come before the arm's. Two events pair where they have the same name and sensor and
+    are nearest to each other, at most 0.5 s apart. What each guard says of the arm only once pairs at any time.
+
+    Args:
+        one: events of a run.
+        other: of the other run.
+        shift: is added to its times [s], where the clocks of the two are not one.
+    """
+    ours, theirs = _grouped(one), _grouped(other)
+    pairs: list[EventPair] = []
+    for key in dict.fromkeys([*ours, *theirs]):
+        one_group, other_group = ours.get(key, []), theirs.get(key, [])
+        if len(one_group) == len(other_group) == 1 and key[0] not in SKIN_EVENTS:
+            pairs.append((one_group[0], other_group[0]))
+        else:
+            pairs += _pair_group(one_group, other_group, shift)
+    return sorted(pairs, key=lambda pair: _order(pair, shift))
+
+
+def _order(pair: EventPair, shift: float) -> tuple[float, bool]:
+    event = pair[0] or pair[1]
+    assert event is not None
+    return event.time + (0.0 if pair[0] else shift), event.name not in SKIN_EVENTS
+
+
+def _grouped(events: Sequence[GuardEvent]) -> dict[tuple[str, str], list[GuardEvent]]:
+    groups: dict[tuple[str, str], list[GuardEvent]] = {}
+    for event in events:
+        groups.setdefault((event.name, str(event.details.get("sensor", ""))), []).append(event)
+    return groups
+
+
+def _pair_group(one: list[GuardEvent], other: list[GuardEvent], shift: float) -> list[EventPair]:
+    pairs: list[EventPair] = []
+    i = j = 0
+    while i < len(one) and j < len(other):
+        apart = other[j].time + shift - one[i].time
+        next_other = abs(other[j + 1].time + shift - one[i].time) if j + 1 < len(other) else float("inf")
+        next_one = abs(other[j].time + shift - one[i + 1].time) if i + 1 < len(one) else float("inf")
+        if apart < -_PAIR_WINDOW or (next_other < abs(apart) and len(other) - j > len(one) - i):
+            pairs.append((None, other[j]))
+            j += 1
+        elif apart > _PAIR_WINDOW or (next_one < abs(apart) and len(one) - i > len(other) - j):
+            pairs.append((one[i], None))
+            i += 1
+        else:
+            pairs.append((one[i], other[j]))
+            i, j = i + 1, j + 1
+    return [*pairs, *((event, None) for event in one[i:]), *((None, event) for event in other[j:])]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +270,7 @@ def decide_again(
     from coneskin.scene.surface_record import decode_surfaces
 
     if scene is None:
-        scene = scene_with(run, settings or {})
+        scene = _scene_with(run, settings or {})
         surfaces = frozenset({BlockKind.SURFACE})
         carried = (block for block in (*run.copies, *run.select(kinds=surfaces)) if block.kind in surfaces)
         placed = place_on_arm(scene, decode_surfaces(carried))
@@ -95,7 +287,7 @@ def decide_again(
     return replace(_decisions(run, label, tuple(sink.events), tuple(sink.commands)), other_code=run.other_code())
 
 
-def scene_with(run: Run, settings: Mapping[str, Any]) -> Scene:
+def _scene_with(run: Run, settings: Mapping[str, Any]) -> Scene:
     """Return the scene of a run with other settings. No file that it names is opened.
 
     Raises:
@@ -143,4 +335,4 @@ class _Sink:
         if isinstance(output, GuardEvent):
             self.events.append(output)
         else:
-            self.commands.append(command_of(output, self.now))
+            self.commands.append(_command_of(output, self.now))

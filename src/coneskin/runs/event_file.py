@@ -1,10 +1,16 @@
-"""Events in a JSON file: those of ``coneskin replay --json``, of another version of the code, or reviewed ones."""
+"""Events in a JSON file: of ``coneskin replay --json``, of another version of coneskin, or golden ones.
+
+Golden events are those that a person has reviewed, in a file beside the run. Without one, the recorded events count.
+Another version of coneskin runs in an interpreter of its own.
+"""
 
 from __future__ import annotations
 
 import json
+import subprocess
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +20,21 @@ from coneskin.core.recording.block import is_time
 from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName, GuardEvent
 
-__all__ = ["event_facts", "parse_events", "read_events", "write_events"]
+from .comparison import Comparison, compare_decisions, comparison_lines, without_invented
+from .decisions import Decisions, decide_again, recorded_decisions
+from .replay.event_details import Tolerances
+from .replay.run import read_run
+
+__all__ = [
+    "check_golden",
+    "decide_with",
+    "describe_failure",
+    "event_facts",
+    "golden_path",
+    "read_events",
+    "update_golden",
+    "write_events",
+]
 
 _MAX_SIZE = 1 << 28  # bytes
 
@@ -29,7 +49,7 @@ def event_facts(events: Iterable[GuardEvent], start: float) -> list[dict[str, An
     return [{"t": event.time - start, "name": event.name.value, **event.details} for event in events]
 
 
-def parse_events(facts: Any, start: float, where: str) -> list[GuardEvent]:
+def _parse_events(facts: Any, start: float, where: str) -> list[GuardEvent]:
     """Return the events of a guard in values from JSON; those of the session around it are left out.
 
     Args:
@@ -62,7 +82,7 @@ def read_events(path: Path, start: float) -> list[GuardEvent]:
         raise RecordingError(f"cannot read the events {path}: {exc.strerror or exc}") from exc
     except ValueError as exc:
         raise RecordingError(f"{path} is no JSON: {exc}") from exc
-    return parse_events(facts, start, str(path))
+    return _parse_events(facts, start, str(path))
 
 
 def write_events(path: Path, events: Iterable[GuardEvent], start: float) -> None:
@@ -80,3 +100,81 @@ def write_events(path: Path, events: Iterable[GuardEvent], start: float) -> None
         with suppress(OSError):
             draft.unlink()
         raise RecordingError(f"cannot write the events {path}: {exc.strerror or exc}") from exc
+
+
+def golden_path(recording: Path) -> Path:
+    """Return the file of a recording's golden events: ``run.events.json`` of ``run.rec``."""
+    return recording.with_suffix(".events.json")
+
+
+def check_golden(recording: Path, tolerances: Tolerances) -> Comparison:
+    """Compare what today's guard makes of a recording with its golden events.
+
+    Raises:
+        RecordingError: the recording cannot be read, is incomplete, or has no events; or the golden file is no such.
+        SceneError: its scene cannot be read.
+    """
+    recorded, again = _decide(recording)
+    golden = golden_path(recording)
+    if not golden.is_file():
+        return compare_decisions(recorded, again, tolerances)
+    events = read_events(golden, recorded.start)
+    reviewed = replace(recorded, label=golden.name, events=tuple(events), commands=None)
+    return compare_decisions(reviewed, without_invented(again, recorded), tolerances)
+
+
+def update_golden(recording: Path, tolerances: Tolerances) -> bool:
+    """Write today's events as the golden ones where they differ, and tell whether they did; errors as of the check."""
+    if check_golden(recording, tolerances).same:
+        return False
+    recorded, again = _decide(recording)
+    write_events(golden_path(recording), without_invented(again, recorded).events, recorded.start)
+    return True
+
+
+def describe_failure(recording: Path, comparison: Comparison) -> str:
+    """Return the lines of a failed comparison, and what to do."""
+    first, *lines = comparison_lines(comparison)
+    return "\n".join(
+        [f"{recording}: {first}", *lines, "  if that is meant: review it, then run again with --coneskin-update"]
+    )
+
+
+def _decide(recording: Path) -> tuple[Decisions, Decisions]:
+    run = read_run(recording)
+    if not run.complete:
+        raise RecordingError(f"{recording} is incomplete, so it proves nothing: {run.missing}")
+    recorded = recorded_decisions(run)
+    if not recorded.events:
+        raise RecordingError(f"{recording} has no events, so it proves nothing")
+    return recorded, decide_again(run, label="today's code")
+
+
+_REPLAY_TIMEOUT = 3600.0  # s
+
+
+def decide_with(python: Path, recording: Path, reference: Decisions) -> Decisions:
+    """Return what another version of coneskin makes of a run; its commands are not known.
+
+    Args:
+        python: the interpreter of an environment in which that version is installed.
+        recording: the run.
+        reference: decisions in the same run, for its start and for what it has lost.
+
+    Raises:
+        RecordingError: the interpreter cannot be started, or its coneskin cannot replay the run.
+    """
+    command = [str(python), "-m", "coneskin", "replay", str(recording), "--json"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_REPLAY_TIMEOUT, check=False)
+    except (OSError, subprocess.TimeoutExpired) as exc:
+        raise RecordingError(f"{python} does not replay {recording}: {exc}") from exc
+    try:
+        facts = json.loads(done.stdout.splitlines()[-1])
+    except (ValueError, IndexError) as exc:
+        said = done.stderr.strip().splitlines()
+        raise RecordingError(
+            f"{python} does not replay {recording}: {said[-1] if said else 'it says nothing'}"
+        ) from exc
+    events = _parse_events(facts, reference.start, str(python))
+    return Decisions(str(python), tuple(events), None, reference.start, reference.until, reference.missing)

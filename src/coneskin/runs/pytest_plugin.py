@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from coneskin.skin.virtual.skin import VirtualSkin
 
     from .decisions import Decisions
-    from .replay.quantities import Tolerances
+    from .replay.event_details import Tolerances
 
 __all__ = [
     "RecordedRunFile",
@@ -37,8 +37,8 @@ __all__ = [
     "virtual_skin",
 ]
 
-_UPDATED = pytest.StashKey[list[str]]()
-_FOLDERS = pytest.StashKey[tuple[Path, ...]]()
+_UPDATED_FILES = pytest.StashKey[list[str]]()
+_RUN_FOLDERS = pytest.StashKey[tuple[Path, ...]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -63,11 +63,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Add the folders of runs to what is collected (called by pytest)."""
-    config.stash[_UPDATED] = []
+    config.stash[_UPDATED_FILES] = []
     _check_tolerances(config)
     named = [config.invocation_params.dir / name for name in config.getoption("--coneskin-runs")]
     folders = tuple(path.resolve() for path in (*named, *config.getini("coneskin_runs")))
-    config.stash[_FOLDERS] = folders
+    config.stash[_RUN_FOLDERS] = folders
     for folder in folders:
         if not folder.exists():
             raise pytest.UsageError(f"--coneskin-runs: there is no folder {folder}")
@@ -80,7 +80,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     """Return the collector of a recording in one of the folders (called by pytest)."""
     if file_path.suffix != ".rec":
         return None
-    folders = parent.config.stash[_FOLDERS]
+    folders = parent.config.stash[_RUN_FOLDERS]
     if not any(file_path.resolve().is_relative_to(folder) for folder in folders):
         return None
     from .run_files import is_further_part
@@ -90,7 +90,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """List what was written (called by pytest)."""
-    for name in config.stash.get(_UPDATED, []):
+    for name in config.stash.get(_UPDATED_FILES, []):
         terminalreporter.write_line(f"coneskin: golden events written: {name}; review the difference before you commit")
 
 
@@ -107,12 +107,12 @@ class RecordedRunItem(pytest.Item):
 
     def runtest(self) -> None:
         """Replay the run and compare."""
-        from .golden_events import check_golden, describe_failure, golden_path, update_golden
+        from .event_file import check_golden, describe_failure, golden_path, update_golden
 
         tolerances = _tolerances(self.config)
         if self.config.getoption("--coneskin-update"):
             if update_golden(self.path, tolerances):
-                self.config.stash[_UPDATED].append(str(golden_path(self.path)))
+                self.config.stash[_UPDATED_FILES].append(str(golden_path(self.path)))
             return
         comparison = check_golden(self.path, tolerances)
         if not comparison.same:
@@ -153,7 +153,7 @@ def _tolerance_words(config: pytest.Config) -> list[str]:
 
 
 def _tolerances(config: pytest.Config) -> Tolerances:
-    from .replay.quantities import Tolerances
+    from .replay.event_details import Tolerances
 
     return Tolerances.from_words(_tolerance_words(config))
 

@@ -1,18 +1,29 @@
-"""Files of recorded runs: those that a path stands for."""
+"""Files of recorded runs: which ones a path stands for, and what is in each of them."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError
+from coneskin.core.recording.block import is_time
+from coneskin.robot.guard.signals.journal import BlockKind, EventName
 
-__all__ = ["find_recordings", "is_further_part", "is_run", "run_name"]
+from .progress import Progress, silent, watch
+
+if TYPE_CHECKING:
+    from .replay.run import Run
+
+__all__ = ["RunSummary", "find_recordings", "is_further_part", "is_run", "run_name", "summarise_run"]
 
 _IN_FOLDER = "run.rec"
-_SUFFIX = ".rec"
-_PART = re.compile(r"(.+)\.\d{4}\.rec")
+_FILE_SUFFIX = ".rec"
+_PART_PATTERN = re.compile(r"(.+)\.\d{4}\.rec")
 
 
 def is_run(path: Path) -> bool:
@@ -40,7 +51,7 @@ def find_recordings(paths: Iterable[Path], beside: bool = False) -> list[Path]:
         if not path.exists():
             raise RecordingError(f"there is no run {path}: name a recording, or a folder with recordings in it")
         if not (below := dict.fromkeys(_recordings(path, beside))):
-            raise RecordingError(f"there is no recording (*{_SUFFIX}) in {path} or below it")
+            raise RecordingError(f"there is no recording (*{_FILE_SUFFIX}) in {path} or below it")
         found.update(below)
     return list(found)
 
@@ -51,10 +62,126 @@ def _recordings(path: Path, beside: bool) -> Iterator[Path]:
     elif (path / _IN_FOLDER).is_file() and not beside:
         yield path / _IN_FOLDER
     elif path.is_dir():
-        yield from sorted(item for item in path.rglob(f"*{_SUFFIX}") if item.is_file() and not is_further_part(item))
+        yield from sorted(
+            item for item in path.rglob(f"*{_FILE_SUFFIX}") if item.is_file() and not is_further_part(item)
+        )
 
 
 def is_further_part(path: Path) -> bool:
     """Tell whether a file is a further part of a recording: ``run.0001.rec`` of ``run.rec``."""
-    match = _PART.fullmatch(path.name)
-    return match is not None and path.with_name(match[1] + _SUFFIX).is_file()
+    match = _PART_PATTERN.fullmatch(path.name)
+    return match is not None and path.with_name(match[1] + _FILE_SUFFIX).is_file()
+
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """Summary of one run.
+
+    Attributes:
+        path: of its recording.
+        size: of that file [bytes].
+        began: when it was recorded, in local time; empty where it does not say.
+        first: when its first block came [s since the start of the run].
+        duration: from that to its last [s].
+        contacts: touches that were reported.
+        stops: that were sent.
+        faults: that were reported.
+        missing: what the recording has lost, in a sentence; empty where nothing.
+        arm: model, or empty.
+        sensors: their names, with their links.
+        reaction: its kind; empty without an arm.
+        coneskin: version that recorded it, with its commit where that is known.
+        commissioned: why the arm may move away, or why it only stops.
+        blocks: number of blocks by their kind.
+        cut: what it was cut from, or None.
+    """
+
+    path: Path
+    size: int
+    began: str
+    first: float
+    duration: float
+    contacts: int
+    stops: int
+    faults: int
+    missing: str
+    arm: str
+    sensors: tuple[str, ...]
+    reaction: str
+    coneskin: str
+    commissioned: str
+    blocks: Mapping[str, int]
+    cut: Mapping[str, Any] | None
+
+    @property
+    def name(self) -> str:
+        """Name of the run."""
+        return run_name(self.path)
+
+    def facts(self) -> dict[str, Any]:
+        """Return the summary as values for JSON."""
+        return {
+            "run": self.name,
+            "path": str(self.path),
+            "size_bytes": self.size,
+            "began": self.began or None,
+            "first_s": self.first,
+            "duration_s": self.duration,
+            "contacts": self.contacts,
+            "stops": self.stops,
+            "faults": self.faults,
+            "missing": self.missing or None,
+            "arm": self.arm or None,
+            "sensors": list(self.sensors),
+            "reaction": self.reaction or None,
+            "coneskin": self.coneskin or None,
+            "commissioned": self.commissioned or None,
+            "blocks": dict(self.blocks),
+            "cut": None if self.cut is None else dict(self.cut),
+        }
+
+
+def summarise_run(path: Path, run: Run, progress: Progress = silent) -> RunSummary:
+    """Return the summary of a run.
+
+    Args:
+        path: of its recording, or its folder.
+        run: as it was read.
+        progress: called now and then with the fraction that is done.
+
+    Raises:
+        SceneError: this version of coneskin cannot read its scene.
+        RecordingError: an event cannot be read.
+    """
+    scene, header, kinds = run.scene(), run.header, Counter[int]()
+    first = last = None
+    for block in watch(run, run.blocks, progress):
+        kinds[block.kind] += 1
+        first = block.time if first is None else first
+        last = block.time
+    names = Counter(event.name for event in run.events)
+    unix = header["clocks"].get("unix")
+    began = ""
+    if is_time(unix) and 0.0 <= unix < 1e11:
+        began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(unix))
+    cut = header.get("cut")
+    file = path / "run.rec" if path.is_dir() else path
+    known = {kind.value: kind.name.lower() for kind in BlockKind}
+    return RunSummary(
+        path=file,
+        size=file.stat().st_size,
+        began=began,
+        first=0.0 if first is None else first - run.start,
+        duration=0.0 if first is None or last is None else last - first,
+        contacts=names[EventName.CONTACT],
+        stops=names[EventName.STOPPING],
+        faults=names[EventName.FAULT],
+        missing=run.missing,
+        arm=scene.arm.model if scene.arm else "",
+        sensors=tuple(f"{item.sensor.name} ({link.name})" for link in scene.links for item in link.sensors),
+        reaction=scene.default_reaction.kind if scene.arm else "",
+        coneskin=run.recorded_by,
+        commissioned=run.commissioning.note if run.commissioning and scene.arm else "",
+        blocks={known.get(kind, f"kind {kind}"): count for kind, count in sorted(kinds.items())},
+        cut=cut if isinstance(cut, dict) else None,
+    )

@@ -179,7 +179,7 @@ def test_a_table_in_pieces_is_the_table(
 ) -> None:
     export_run(collision, tmp_path / "large.npz", "npz")
     export_run(collision, tmp_path / "large", "csv")
-    monkeypatch.setattr("coneskin.runs.export.tables._PIECE", 100)
+    monkeypatch.setattr("coneskin.runs.export.tables._PIECE_ROWS", 100)
     assert len(list(table_pieces(collision)["frames"]())) == math.ceil(len(tables["frames"]["time_s"]) / 100)
     assert run_tables(collision) == tables
     written = export_run(collision, tmp_path / "small.npz", "npz")

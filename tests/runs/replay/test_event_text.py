@@ -129,11 +129,11 @@ def test_what_is_no_retreat_is_not_called_one(name: str, details: dict[str, Any]
 
 
 def test_the_words_are_those_of_the_robot() -> None:
-    assert timeline._ENDED in (ROOT / "robot" / "guard" / "loop.py").read_text(encoding="utf-8")
+    assert timeline._END_CAUSE in (ROOT / "robot" / "guard" / "loop.py").read_text(encoding="utf-8")
     comply = (ROOT / "robot" / "reaction" / "admittance.py").read_text(encoding="utf-8")
-    assert all(f'"{word}"' in comply for word in (timeline._RELEASED, *timeline._PUSH))
+    assert all(f'"{word}"' in comply for word in (timeline._RELEASE_CAUSE, *timeline._PUSH))
     others = [path for path in (ROOT / "robot").rglob("*.py") if path.name != "admittance.py"]
-    assert not [path.name for path in others if timeline._RELEASED in path.read_text(encoding="utf-8")]
+    assert not [path.name for path in others if timeline._RELEASE_CAUSE in path.read_text(encoding="utf-8")]
 
 
 ELLIPSE = {"ellipse": ((0.0, 3e-4, 4e-4), (0.0, 1e-5, 0.0))}

@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace as changed
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -15,12 +16,10 @@ from coneskin.core.recording.block import Block
 from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.version import code_commit, running_version
-from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
-from coneskin.runs.comparison import compare_decisions
-from coneskin.runs.comparison_text import comparison_lines
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
+from coneskin.runs.comparison import compare_decisions, comparison_lines
 from coneskin.runs.decisions import decide_again, recorded_decisions
-from coneskin.runs.replay.replay import Verdict
-from coneskin.runs.replay.run import Run, read_run, replay
+from coneskin.runs.replay.run import Run, Verdict, event_differences, read_run, replay
 from coneskin.scene.settings import resolved_settings
 from tests.scene.scenes import FULL, SKIN_ONLY, record
 from tests.support.sweep import sweep
@@ -213,3 +212,36 @@ def test_other_code_and_other_filled_in_values_are_named_before_any_difference(r
     assert replay(then).other_code == (line,)
     comparison = compare_decisions(recorded_decisions(then), decide_again(then))
     assert comparison_lines(comparison)[1] == f"  {line}"
+
+
+STANDING = GuardEvent(EventName.STANDSTILL, 102.0, {"speed": 0.001, "paths": ["driver"], "clock_us": 5})
+
+
+@pytest.mark.parametrize(
+    ("time", "details", "line"),
+    [
+        (102.0022, {}, "2.0000 s, standstill: 2.2 ms later"),
+        (101.9999999, {}, "2.0000 s, standstill: 0.0001 ms earlier"),
+        (102.0, {"speed": 0.0017}, "2.0000 s, standstill: speed 0.0010 -> 0.0017 rad/s"),
+        (102.0, {"speed": 0.0010000000000000002}, "2.0000 s, standstill: speed 0.001 rad/s, by +2.2e-19 rad/s"),
+        (102.0, {"clock_us": 6}, "2.0000 s, standstill: clock_us 5 -> 6"),
+        (102.0, {"paths": ["x"]}, "2.0000 s, standstill: paths 'driver' -> 'x'"),
+        (102.0, {"more": 1}, "2.0000 s, standstill: more is new"),
+        (102.0, {"speed": None}, "2.0000 s, standstill: speed is not known any more"),
+    ],
+)
+def test_what_differs_is_told_with_its_unit(time: float, details: dict[str, Any], line: str) -> None:
+    other = GuardEvent(EventName.STANDSTILL, time, {**STANDING.details, **details})
+    assert list(event_differences([STANDING], [other], 100.0)) == [line]
+
+
+def test_an_event_without_a_partner_does_not_move_the_others() -> None:
+    ended = GuardEvent(EventName.ENDING, 103.0, {"what": "the guard was told to end"})
+    both = [STANDING, ended]
+    assert list(event_differences(both, both, 100.0)) == []
+    (line,) = event_differences([ended], both, 100.0)
+    assert line == "2.0000 s  standstill: 0.0010 rad/s, by the path driver: is new"
+    assert list(event_differences([STANDING], [ended], 100.0)) == [
+        "2.0000 s  standstill: 0.0010 rad/s, by the path driver: "
+        "replayed as 3.0000 s  ending: the guard was told to end"
+    ]

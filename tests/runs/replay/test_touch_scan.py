@@ -26,7 +26,7 @@ def exact(run: Run) -> list[tuple[str, float, float]]:
 
 @pytest.mark.parametrize("batch", [1 << 22, 700, 5000])
 def test_it_finds_what_a_replay_finds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, batch: int) -> None:
-    monkeypatch.setattr(touch_scan, "_BATCH", batch)
+    monkeypatch.setattr(touch_scan, "_BATCH_SIZE", batch)
     record(tmp_path / "run.rec")
     for path in (tmp_path, COLLISION):
         run = read_run(path)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from coneskin.core.errors import RecordingError
-from coneskin.runs.comparison_text import comparison_lines
+from coneskin.runs.comparison import comparison_lines
 from coneskin.runs.replay.run import Run
 from coneskin.runs.what_if.batch import judge_runs
 from coneskin.runs.what_if.variant_table import score_variants, variant_lines, write_rows

@@ -1,24 +1,102 @@
-"""Export of a run to other programs: CSV, Parquet and NumPy tables, or one MCAP file."""
+"""Export of a run to other programs: CSV, Parquet and NumPy tables, or one MCAP file.
+
+A NumPy file is written column by column from the disk, so that a long run is never in memory.
+"""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Mapping
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of
-from coneskin.runs.block_progress import Progress, silent
+from coneskin.runs.progress import Progress, silent
 
 from .tables import Pieces, Table, table_pieces
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from coneskin.runs.replay.run import Run
 
-__all__ = ["FORMATS", "export_run"]
+__all__ = [
+    "FORMATS",
+    "export_run",
+]
+
+
+def _write_npz(path: Path, tables: Mapping[str, Pieces]) -> int:
+    """Write each column as an array "table.column" and return the number of rows of all tables.
+
+    A missing number is NaN, a missing text empty.
+    """
+    rows = 0
+    with TemporaryDirectory(dir=path.parent) as folder, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target:
+        for name, pieces in tables.items():
+            columns: dict[str, _Column] = {}
+            for piece in pieces():
+                for column, values in piece.items():
+                    if column not in columns:
+                        columns[column] = _Column(Path(folder) / str(len(columns)))
+                    columns[column].add(values)
+            for column, written in columns.items():
+                with target.open(f"{name}.{column}.npy", "w", force_zip64=True) as file:
+                    written.copy_to(file)  # type: ignore[arg-type]
+            rows += next(iter(columns.values())).rows if columns else 0
+    return rows
+
+
+class _Column:
+    """Values of one column, kept in a file."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._parts: list[tuple[np.dtype[Any], int]] = []
+        path.write_bytes(b"")
+
+    @property
+    def rows(self) -> int:
+        return sum(count for _, count in self._parts)
+
+    def add(self, values: Sequence[Any]) -> None:
+        array = _array(values)
+        self._parts.append((array.dtype, len(array)))
+        with self._path.open("ab") as file:
+            file.write(array.tobytes())
+
+    def copy_to(self, file: BinaryIO) -> None:
+        import numpy as np
+
+        final = np.result_type(*(dtype for dtype, _ in self._parts))
+        head = {"descr": np.lib.format.dtype_to_descr(final), "fortran_order": False, "shape": (self.rows,)}
+        np.lib.format.write_array_header_1_0(file, head)
+        for array in self._stored():
+            file.write(array.astype(final).tobytes())
+
+    def _stored(self) -> Iterator[NDArray[Any]]:
+        import numpy as np
+
+        with self._path.open("rb") as file:
+            for dtype, count in self._parts:
+                yield np.frombuffer(file.read(dtype.itemsize * count), dtype)
+
+
+def _array(values: Sequence[Any]) -> NDArray[Any]:
+    import numpy as np
+
+    known = [value for value in values if value is not None]
+    if len(known) < len(values):
+        text = bool(known) and isinstance(known[0], str)
+        values = [("" if text else np.nan) if value is None else value for value in values]
+    return np.array(values)
+
 
 FORMATS = ("csv", "parquet", "npz", "mcap")
 
@@ -53,9 +131,7 @@ def export_run(run: Run, target: Path, form: str, progress: Progress = silent) -
         target.parent.mkdir(parents=True, exist_ok=True)
         with draft_of(target) as draft:
             if form == "npz":
-                from .npz_file import write_npz
-
-                return {target: write_npz(draft, table_pieces(run, progress))}
+                return {target: _write_npz(draft, table_pieces(run, progress))}
             from .mcap_file import write_mcap
 
             return {target: write_mcap(run, draft, progress)}

@@ -1,13 +1,15 @@
 """MCAP file of a run, which Foxglove draws: events as a log, joints and touch level as plots, the arm as a 3D scene.
 
 The messages are JSON with the schemas of Foxglove (foxglove.Log, foxglove.SceneUpdate) and two of our own for plots.
+
+Source: the message schemas of Foxglove, https://docs.foxglove.dev/docs/sdk/schemas (Log, SceneUpdate).
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import merge
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,11 +20,10 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
-from coneskin.runs.arm_command import recorded_commands
-from coneskin.runs.block_progress import Progress, silent
+from coneskin.runs.decisions import recorded_commands
+from coneskin.runs.progress import Progress, silent
 from coneskin.skin.detection.frame.reading import read
 
-from .foxglove_schemas import SCHEMAS
 from .tables import arm_states, skin_frames, slider_positions, wall_clock
 
 if TYPE_CHECKING:
@@ -30,14 +31,92 @@ if TYPE_CHECKING:
     from coneskin.runs.replay.run import Run
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["write_mcap"]
+__all__ = ["SCHEMAS", "write_mcap"]
 
-_NEAR = 1.0  # s between a contact and the state of the arm in which it is drawn
+_Schema = dict[str, Any]
+
+
+def _object(title: str = "", **properties: _Schema) -> _Schema:
+    named = {"title": title} if title else {}
+    return {**named, "type": "object", "properties": properties, "required": list(properties)}
+
+
+def _list(items: _Schema) -> _Schema:
+    return {"type": "array", "items": items}
+
+
+_TEXT, _NUMBER, _WHOLE, _FLAG = ({"type": name} for name in ("string", "number", "integer", "boolean"))
+_UNSIGNED_TYPE = {"type": "integer", "minimum": 0}
+_NANOSECONDS_TYPE = {"type": "integer", "minimum": 0, "maximum": 999_999_999}
+_TIME_TYPE = _object("time", sec=_UNSIGNED_TYPE, nsec=_NANOSECONDS_TYPE)
+_DURATION_TYPE = _object("duration", sec=_WHOLE, nsec=_NANOSECONDS_TYPE)
+_VECTOR_TYPE = _object("foxglove.Vector3", x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_POINT_TYPE = _object("foxglove.Point3", x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_QUATERNION_TYPE = _object("foxglove.Quaternion", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_POSE_TYPE = _object("foxglove.Pose", position=_VECTOR_TYPE, orientation=_QUATERNION_TYPE)
+_COLOR_TYPE = _object("foxglove.Color", r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+_LINE_TYPE = _object(
+    "foxglove.LinePrimitive",
+    type={"enum": [0, 1, 2]},
+    pose=_POSE_TYPE,
+    thickness=_NUMBER,
+    scale_invariant=_FLAG,
+    points=_list(_POINT_TYPE),
+    color=_COLOR_TYPE,
+    colors=_list(_COLOR_TYPE),
+    indices=_list(_UNSIGNED_TYPE),
+)
+_SPHERE_TYPE = _object("foxglove.SpherePrimitive", pose=_POSE_TYPE, size=_VECTOR_TYPE, color=_COLOR_TYPE)
+_UNUSED_LIST = _list({"type": "object"})
+_ENTITY_TYPE = _object(
+    "foxglove.SceneEntity",
+    timestamp=_TIME_TYPE,
+    frame_id=_TEXT,
+    id=_TEXT,
+    lifetime=_DURATION_TYPE,
+    frame_locked=_FLAG,
+    metadata=_list(_object("foxglove.KeyValuePair", key=_TEXT, value=_TEXT)),
+    arrows=_UNUSED_LIST,
+    cubes=_UNUSED_LIST,
+    spheres=_list(_SPHERE_TYPE),
+    cylinders=_UNUSED_LIST,
+    lines=_list(_LINE_TYPE),
+    triangles=_UNUSED_LIST,
+    texts=_UNUSED_LIST,
+    models=_UNUSED_LIST,
+)
+_LOG_SCHEMA = _object(
+    "foxglove.Log",
+    timestamp=_TIME_TYPE,
+    level={"enum": [0, 1, 2, 3, 4, 5]},
+    message=_TEXT,
+    name=_TEXT,
+    file=_TEXT,
+    line=_UNSIGNED_TYPE,
+)
+_JOINT_FIELDS = {
+    f"{name}{joint}_{unit}": _NUMBER for name, unit in (("q", "rad"), ("qd", "rad_s")) for joint in range(1, 7)
+}
+
+#: name -> JSON schema
+SCHEMAS: Mapping[str, _Schema] = {
+    "foxglove.Log": _LOG_SCHEMA,
+    "foxglove.SceneUpdate": _object("foxglove.SceneUpdate", deletions=_UNUSED_LIST, entities=_list(_ENTITY_TYPE)),
+    "coneskin.ArmState": _object("coneskin.ArmState", **_JOINT_FIELDS),
+    "coneskin.SpeedSlider": _object("coneskin.SpeedSlider", fraction=_NUMBER),
+    "coneskin.Command": _object("coneskin.Command", command=_TEXT, numbers=_list(_NUMBER)),
+    "coneskin.TouchLevel": _object("coneskin.TouchLevel", sensor=_TEXT, level=_NUMBER, clock_us=_UNSIGNED_TYPE),
+}
+
+
+_STATE_WINDOW = 1.0  # s between a contact and the state of the arm in which it is drawn
 _DRAWN_EVERY = 0.02  # s between two drawings of the arm
-_FRAME = "base"
-_ERRORS = frozenset({EventName.FAULT, EventName.STOP_FAILED, EventName.GUARD_UNRESPONSIVE, EventName.GUARD_EXITED})
-_CONTACTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})
-_WARNINGS = frozenset({EventName.CONTACT, EventName.STOPPING, EventName.ESCALATED, EventName.NOT_COMMISSIONED})
+_FRAME_ID = "base"
+_ERROR_EVENTS = frozenset(
+    {EventName.FAULT, EventName.STOP_FAILED, EventName.GUARD_UNRESPONSIVE, EventName.GUARD_EXITED}
+)
+_CONTACT_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})
+_WARNING_EVENTS = frozenset({EventName.CONTACT, EventName.STOPPING, EventName.ESCALATED, EventName.NOT_COMMISSIONED})
 _INFO, _WARNING, _ERROR = 2, 3, 4  # levels of foxglove.Log
 
 
@@ -123,7 +202,7 @@ def _joints(state: ControllerState) -> dict[str, float]:
 
 def _log(event: GuardEvent, run: Run, unix: float) -> dict[str, Any]:
     (line,) = run.timeline([event])
-    level = _ERROR if event.name in _ERRORS else _WARNING if event.name in _WARNINGS else _INFO
+    level = _ERROR if event.name in _ERROR_EVENTS else _WARNING if event.name in _WARNING_EVENTS else _INFO
     text = printable(line.split(" s  ", 1)[-1])
     return {
         "timestamp": _stamp(event.time + unix),
@@ -160,9 +239,9 @@ def _drawn_contacts(run: Run, events: Sequence[GuardEvent], unix: float) -> Iter
     by_name = {item.name: item for item in placed}
     for number, event in enumerate(events):
         touched = by_name.get(str(event.details.get("sensor")))
-        if event.name not in _CONTACTS or touched is None:
+        if event.name not in _CONTACT_EVENTS or touched is None:
             continue
-        near = arm_states(run, event.time - _NEAR, event.time + _NEAR)
+        near = arm_states(run, event.time - _STATE_WINDOW, event.time + _STATE_WINDOW)
         state = min(near, key=lambda one: abs(one.time - event.time), default=None)
         if state is None:
             continue
@@ -222,7 +301,7 @@ def _update(
 ) -> dict[str, Any]:
     entity = {
         "timestamp": _stamp(unix),
-        "frame_id": _FRAME,
+        "frame_id": _FRAME_ID,
         "id": ident,
         "lifetime": {"sec": 0, "nsec": 0},
         "frame_locked": False,

@@ -17,9 +17,9 @@ from coneskin.core.recording.block import is_time
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind
-from coneskin.runs.arm_command import recorded_commands
-from coneskin.runs.block_progress import Progress, silent, watch
-from coneskin.runs.replay.quantities import QUANTITIES
+from coneskin.runs.decisions import recorded_commands
+from coneskin.runs.progress import Progress, silent, watch
+from coneskin.runs.replay.event_details import QUANTITIES
 from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame, FrameDecoder
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ __all__ = [
 Table = Mapping[str, list[Any]]
 #: begins a table anew and yields its pieces, each with the same columns; nothing where it has no rows
 Pieces = Callable[[], Iterator[Table]]
-_PIECE = 1 << 14  # rows
-_IDENTIFIERS = frozenset({"version", "device", "sensor", "status", "clock_us", "sequence"})  # the rest are counts
+_PIECE_ROWS = 1 << 14  # rows
+_IDENTIFIER_FIELDS = frozenset({"version", "device", "sensor", "status", "clock_us", "sequence"})  # the rest are counts
 
 
 def run_tables(run: Run, progress: Progress = silent) -> dict[str, Table]:
@@ -81,7 +81,7 @@ def table_pieces(run: Run, progress: Progress = silent) -> dict[str, Pieces]:
 def _pieces(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[Table]:
     """Yield rows as tables of some thousand each."""
     source = iter(rows)
-    while piece := list(islice(source, _PIECE)):
+    while piece := list(islice(source, _PIECE_ROWS)):
         yield dict(zip(columns, map(list, zip(*piece, strict=True)), strict=True))
 
 
@@ -160,7 +160,7 @@ def _numeric(values: Sequence[Any]) -> bool:
 
 def _frames(run: Run, start: float, progress: Progress) -> Iterator[Table]:
     skin = frozenset({BlockKind.SKIN})
-    names = [name if name in _IDENTIFIERS else f"{name}_counts" for name in Frame._fields[:-1]]
+    names = [name if name in _IDENTIFIER_FIELDS else f"{name}_counts" for name in Frame._fields[:-1]]
     driven: tuple[None, ...] = ()  # potentials of driven electrodes: only where a frame has them
     if any(DRIVEN_HEAD in block.payload for block in run.select(kinds=skin)):
         driven = (None,) * len(DrivenPotentials._fields)

@@ -12,16 +12,16 @@ from coneskin.robot.guard.signals.journal import EventName, GuardEvent, describe
 
 __all__ = ["EventLines", "describe"]
 
-_ENDED = "the guard was told to end"  # on purpose: no reset is needed
-_RELEASED = "the touch is over"  # ends only the motion of an arm that gives way
-_TOUCH = {
+_END_CAUSE = "the guard was told to end"  # on purpose: no reset is needed
+_RELEASE_CAUSE = "the touch is over"  # ends only the motion of an arm that gives way
+_TOUCH_WORDS = {
     EventName.CONTACT: "touch",
     EventName.CONTACT_LOCATED: "touch located",
     EventName.CONTACT_EXTENDED: "touch is not one disc",
 }
-_LONG = 30  # characters; a cause that is longer is said in full once
-_STILL = 5e-4  # rad/s; a speed below it reads as 0.000
-_PUSH = {"level", "damping", "place"}  # limits of an arm that gives way, and of no other
+_LONG_CAUSE = 30  # characters; a cause that is longer is said in full once
+_STANDSTILL_SPEED = 5e-4  # rad/s; a speed below it reads as 0.000
+_PUSH_LIMITS = {"level", "damping", "place"}  # limits of an arm that gives way, and of no other
 
 
 def describe(event: GuardEvent, start: float) -> str:
@@ -53,7 +53,7 @@ class EventLines:
         cause, then, rest = said.partition("; then ")
         if event.name == EventName.STOPPING:
             self._cause = cause
-        elif cause == self._cause and len(cause) > _LONG:
+        elif cause == self._cause and len(cause) > _LONG_CAUSE:
             short = "that has stopped the arm" if event.name == EventName.FAULT else "as said above"
             return describe(event._replace(details={**event.details, key: short + then + rest}), start)
         return describe(event, start)
@@ -64,7 +64,7 @@ def _words(event: GuardEvent) -> str:
     text: str
     match event.name:
         case EventName.CONTACT | EventName.CONTACT_LOCATED | EventName.CONTACT_EXTENDED:
-            what = _TOUCH[event.name]
+            what = _TOUCH_WORDS[event.name]
             place = f"u = {1e3 * d['u']:.1f} mm, phi = {math.degrees(d['phi']):.1f} deg{_certainty(d)}"
             text = f"{what} on {d['sensor']} ({d['link']}) at {place}; level {d['level']:.2f}{_force(d)}"
         case EventName.TOUCH_ENDED:
@@ -72,13 +72,15 @@ def _words(event: GuardEvent) -> str:
         case EventName.STOPPING:
             text = f"stop: {d['why']}"
         case EventName.DECELERATING:
-            text = f"decelerating: {d['speed']:.3f} rad/s" if d["speed"] >= _STILL else "the arm moves no more"
+            text = (
+                f"decelerating: {d['speed']:.3f} rad/s" if d["speed"] >= _STANDSTILL_SPEED else "the arm moves no more"
+            )
         case EventName.STANDSTILL:
             text = f"standstill: {d['speed']:.4f} rad/s, by {_paths(d['paths'])}"
         case EventName.RETREATED:
-            gave_way = d.get("how") == "push" or d["why"] == _RELEASED
+            gave_way = d.get("how") == "push" or d["why"] == _RELEASE_CAUSE
             text = f"{describe_way({**d, 'how': 'push'} if gave_way else d)}: {d['why']}"
-        case EventName.LATCHED if d["why"].startswith(_ENDED):
+        case EventName.LATCHED if d["why"].startswith(_END_CAUSE):
             text = f"the arm stands and the guard ends: {d['why']}"
         case EventName.LATCHED:
             text = f"latched until a manual reset: {d['why']}"
@@ -89,7 +91,7 @@ def _words(event: GuardEvent) -> str:
             often = "once" if d["rounds"] == 1 else f"{d['rounds']} times"
             text = f"standstill NOT confirmed, {speed}: all stop paths used {often}; use the emergency stop"
         case EventName.MOTION_LIMITED:
-            what = "giving way" if _PUSH & set(d["by"]) else "retreat"
+            what = "giving way" if _PUSH_LIMITS & set(d["by"]) else "retreat"
             text = f"{what} slower than set, because of {', '.join(d['by'])}"
         case EventName.SPEED_LIMITED:
             slider = f"slider from {100.0 * d['before']:.0f} % to {100.0 * d['slider']:.0f} %"

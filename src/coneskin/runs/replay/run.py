@@ -1,12 +1,18 @@
-"""Recorded run: its blocks, events and scene, what it lacks, and how it is replayed."""
+"""Recorded run: its blocks, events and scene, what it lacks, and its replay.
+
+The same bytes through the same guard must give the same events, bit by bit. Differences are told in units for people.
+"""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from difflib import SequenceMatcher
+from enum import StrEnum
 from functools import partial
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,16 +26,110 @@ from coneskin.robot.guard.signals.journal import INPUTS, SESSION_EVENTS, BlockKi
 from coneskin.robot.guard.signals.outputs import Output
 from coneskin.scene.values.scene import Commissioning, Scene
 
-from .event_differences import event_differences
-from .replay import MOST_DIFFERENCES, Replay
+from .event_details import EXACT, describe_differences, milliseconds
+from .event_text import describe
 
 if TYPE_CHECKING:
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["Run", "read_run", "replay"]
+__all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "event_differences", "read_run", "replay"]
 
-_TOLD = 1.0  # s of a run between two words on how far it is
-_HEADER = {"scene": str, "name": str, "folder": str, "clocks": dict}
+
+def event_differences(recorded: Sequence[GuardEvent], replayed: Sequence[GuardEvent], start: float) -> Iterator[str]:
+    """Yield a line for each event that is not the same, bit by bit, or has no partner.
+
+    Args:
+        recorded: events of the recording.
+        replayed: of the replay, in the same order.
+        start: host time that counts as 0 [s].
+    """
+    bits = [_bits(event) for event in recorded], [_bits(event) for event in replayed]
+    if bits[0] == bits[1]:
+        return
+    for same, i, end, j, other_end in SequenceMatcher(None, *bits, autojunk=False).get_opcodes():
+        if same != "equal":
+            for old, new in zip_longest(recorded[i:end], replayed[j:other_end]):
+                yield _describe(old, new, start)
+
+
+def _bits(event: GuardEvent) -> tuple[str, str, str]:
+    """Return an event as text with every bit of its floats."""
+    return event.time.hex(), event.name, json.dumps(event.details)
+
+
+def _describe(old: GuardEvent | None, new: GuardEvent | None, start: float) -> str:
+    if old is None or new is None:
+        event, word = (old, "was recorded, and is not replayed") if new is None else (new, "is new")
+        assert event is not None
+        return f"{describe(event, start).strip()}: {word}"
+    if old.name != new.name:
+        return f"{describe(old, start).strip()}: replayed as {describe(new, start).strip()}"
+    words = describe_differences(old.details, new.details, EXACT, all_of_them=True)
+    if new.time != old.time:
+        words.append(f"{milliseconds(abs(new.time - old.time))} {'later' if new.time > old.time else 'earlier'}")
+    said = "; ".join(words) or "other words for the same"  # the order of its details
+    return f"{old.time - start:.4f} s, {old.name}: {said}"
+
+
+if TYPE_CHECKING:
+    pass
+
+
+MOST_DIFFERENCES = 5  #: that a replay describes
+
+
+class Verdict(StrEnum):
+    """What a replay shows."""
+
+    SAME = "same"  #: the recording is whole and was closed, and each event, of which there are some, is the same
+    DIFFERENT = "different"  #: an event differs
+    INCOMPLETE = "incomplete"  #: nothing differs as far as it can be compared; the rest, or all, is missing
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """Result of a replay.
+
+    Attributes:
+        events: of the replay, up to the first gap, where inputs are missing.
+        recorded: events of the recording, all of them.
+        compared: number of recorded events that could be compared.
+        differences: the first events that differ, with units for people; at most ``MOST_DIFFERENCES``.
+        frames: bytes of the skin's stream that were replayed.
+        duration: of the recording [s].
+        missing: what the recording lacks, in a sentence.
+        other_code: in what today's code differs from what recorded the run, as of ``Run.other_code``.
+        verdict: of all that.
+    """
+
+    events: list[GuardEvent]
+    recorded: list[GuardEvent]
+    compared: int
+    differences: list[str]
+    frames: int
+    duration: float
+    missing: str
+    other_code: tuple[str, ...] = ()
+    verdict: Verdict = field(init=False)
+
+    def __post_init__(self) -> None:
+        whole = not self.missing and self.compared
+        verdict = Verdict.DIFFERENT if self.differences else Verdict.SAME if whole else Verdict.INCOMPLETE
+        object.__setattr__(self, "verdict", verdict)
+
+    @property
+    def same(self) -> bool:
+        """True where the whole run is there, has events, and each of them is the same, bit by bit."""
+        return self.verdict is Verdict.SAME
+
+    @property
+    def agrees(self) -> bool:
+        """True where nothing differs as far as it can be compared; a run of which all is missing agrees, too."""
+        return not self.differences
+
+
+_PROGRESS_PERIOD = 1.0  # s of a run between two words on how far it is
+_HEADER_TYPES = {"scene": str, "name": str, "folder": str, "clocks": dict}
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +285,7 @@ def read_run(path: Path | str, progress: Callable[[float], None] | None = None) 
         raise RecordingError(f"{path} has no header: the run ended before it began")
     try:
         header = read_json(first.payload)
-        if wrong := [key for key, kind in _HEADER.items() if not isinstance(header[key], kind)]:
+        if wrong := [key for key, kind in _HEADER_TYPES.items() if not isinstance(header[key], kind)]:
             raise ValueError(f"{', '.join(wrong)} of another kind")
         if not is_time(header["clocks"]["monotonic"]):
             raise ValueError("clocks.monotonic is no time in seconds")
@@ -228,7 +328,7 @@ def replay(run: Run, scene: Scene | None = None, progress: Callable[[float], Non
     told = begin
     inputs: list[Block] = []
     for block in run.blocks:
-        if block.time - told > _TOLD:
+        if block.time - told > _PROGRESS_PERIOD:
             told = block.time
             progress((told - begin) / (end - begin))
         first, last = block.time if first is None else first, block.time

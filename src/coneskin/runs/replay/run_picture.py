@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_run"]
 
-_MARKS = {"speed_reduced": "slows", "resumed": "goes on", "standstill": "stands", "latched": "latched"}
+_EVENT_MARKS = {"speed_reduced": "slows", "resumed": "goes on", "standstill": "stands", "latched": "latched"}
 _MAX_GAP = 0.05  # s between two states, from which on nothing is drawn between them: nobody has measured it
 _MIN_SPACING = 0.08  # of the width; marks that are closer share a label
-_JOINTS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:cyan")  # red is the touch
+_JOINT_COLORS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:cyan")  # red is the touch
 
 
 def draw_run(run: Run, path: Path) -> None:
@@ -92,7 +92,9 @@ def _last(events: list[GuardEvent], zero: float) -> float:
 
 def _marks(events: list[GuardEvent], zero: float, window: tuple[float, float]) -> list[tuple[float, str]]:
     """Return the moments after the touch [s] in the window and their labels; moments close together share one."""
-    found = [(event.time, words) for name, words in _MARKS.items() if (event := _first(events, name, zero)) is not None]
+    found = [
+        (event.time, words) for name, words in _EVENT_MARKS.items() if (event := _first(events, name, zero)) is not None
+    ]
     marks: list[tuple[float, str]] = []
     for time, words in sorted((item for item in found if item[0] <= window[1]), key=lambda item: item[0]):
         if marks and time - marks[-1][0] < _MIN_SPACING * (window[1] - window[0]):
@@ -151,7 +153,7 @@ def _draw_speeds(
         measured.append(state.qd)
     for joint in range(6):
         speeds = [qd[joint] for qd in measured]
-        axes.plot(times, speeds, lw=1.3, color=_JOINTS[joint], label=f"joint {joint + 1}")
+        axes.plot(times, speeds, lw=1.3, color=_JOINT_COLORS[joint], label=f"joint {joint + 1}")
     axes.axvline(0.0, color="tab:red", lw=1.0)
     style = {"transform": axes.get_xaxis_transform(), "fontsize": 8}
     axes.text(0.0, 1.01, f"{word} ", color="tab:red", ha="right", **style)

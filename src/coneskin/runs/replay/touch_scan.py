@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["ScannedTouch", "scan_touches"]
+__all__ = ["scan_touches"]
 
-_BATCH = 1 << 22  # bytes that are looked at together
+_BATCH_SIZE = 1 << 22  # bytes that are looked at together
 _LONGEST_FRAME = 64  # bytes
 
 
 @dataclass(frozen=True, slots=True)
-class ScannedTouch:
+class _ScannedTouch:
     """Touch that a scan has found.
 
     Attributes:
@@ -48,7 +48,7 @@ class ScannedTouch:
     peak: float
 
 
-def scan_touches(run: Run) -> list[ScannedTouch]:
+def scan_touches(run: Run) -> list[_ScannedTouch]:
     """Return the touches of a run, in the order of their beginnings.
 
     Args:
@@ -85,7 +85,7 @@ def _batches(run: Run) -> Iterator[tuple[bytes, NDArray[np.int64], NDArray[np.fl
         parts.append(payload)
         times.append(time)
         size += len(payload)
-        if size >= _BATCH:
+        if size >= _BATCH_SIZE:
             yield b"".join(parts), np.cumsum([len(part) for part in parts]), np.array(times)
             parts, times, size = [], [], 0
     if parts:
@@ -111,7 +111,7 @@ class _SensorState:
         self._above = self._below = 0  # frames in a row, at the end of the batch before
         self._began = math.nan
         self._peak = 0.0
-        self._touches: list[ScannedTouch] = []
+        self._touches: list[_ScannedTouch] = []
 
     def take(self, batch: FrameBatch, times: NDArray[np.float64]) -> None:
         import numpy as np
@@ -139,13 +139,13 @@ class _SensorState:
             self._peak = max(self._peak, float(level[at : stop + 1].max(initial=0.0)))
             if stop == len(level):
                 break
-            self._touches.append(ScannedTouch(sensor.name, self._began, float(times[stop]), self._peak))
+            self._touches.append(_ScannedTouch(sensor.name, self._began, float(times[stop]), self._peak))
             self._began, at = math.nan, stop + 1
         self._above, self._below = int(above[-1]), int(below[-1])
 
-    def touches(self) -> list[ScannedTouch]:
+    def touches(self) -> list[_ScannedTouch]:
         if not math.isnan(self._began):
-            return [*self._touches, ScannedTouch(self._sensor.name, self._began, math.inf, self._peak)]
+            return [*self._touches, _ScannedTouch(self._sensor.name, self._began, math.inf, self._peak)]
         return self._touches
 
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_variants"]
 
-_LINE = 0.19  # inch of a line of the key
-_LEAST = 1.0  # ms that the scale of the delays shows at least, to either side
+_LINE_HEIGHT = 0.19  # inch of a line of the key
+_MIN_DELAY_SCALE = 1.0  # ms that the scale of the delays shows at least, to either side
 
 
 def draw_variants(scores: Sequence[VariantScore], path: Path) -> None:
@@ -37,7 +37,7 @@ def _compose(scores: Sequence[VariantScore]) -> Figure:
     from matplotlib.ticker import MaxNLocator
 
     shared, names = shared_settings([score.variant for score in scores])
-    figure = Figure(figsize=(8.0, 4.6 + _LINE * len(scores)), layout="constrained")
+    figure = Figure(figsize=(8.0, 4.6 + _LINE_HEIGHT * len(scores)), layout="constrained")
     axes = figure.add_subplot()
     drawn = [score for score in scores if not math.isnan(score.delay)]
     axes.plot([s.false_alarms for s in drawn], [1e3 * s.delay for s in drawn], color="0.7", lw=1.0, zorder=1)
@@ -66,7 +66,7 @@ def _compose(scores: Sequence[VariantScore]) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set_xlim(-0.5, max((s.false_alarms for s in drawn), default=0) + 0.5 + 0.05 * len(drawn))
     delays = [1e3 * s.delay for s in drawn] or [0.0]
-    pad = max(_LEAST, 0.15 * (max(delays) - min(delays)))
+    pad = max(_MIN_DELAY_SCALE, 0.15 * (max(delays) - min(delays)))
     axes.set_ylim(min(delays) - pad, max(delays) + pad)
     axes.grid(alpha=0.3)
     return figure

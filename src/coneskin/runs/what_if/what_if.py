@@ -1,29 +1,196 @@
-"""What if: what today's code, or other parameters, would have made of runs that were recorded."""
+"""What if: what today's code, or other parameters, would have made of runs that were recorded.
+
+A score counts touches missed, false alarms and delays. The true touches are those that a person labeled, those that a
+virtual skin was given, or, without either, the recorded ones.
+"""
 
 from __future__ import annotations
 
+import math
+import statistics
+import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.core.errors import ConeSkinError
-from coneskin.robot.guard.signals.journal import EventName
-from coneskin.runs.block_progress import Progress, silent
+from coneskin.core.errors import ConeSkinError, RecordingError
+from coneskin.core.files import read_file
+from coneskin.core.recording.block import is_time
+from coneskin.core.text import read_json
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, contact_force
 from coneskin.runs.comparison import Comparison, compare_decisions
 from coneskin.runs.decisions import Decisions, decide_again, recorded_decisions
-from coneskin.runs.replay.quantities import Tolerances
+from coneskin.runs.progress import Progress, silent
+from coneskin.runs.replay.event_details import Tolerances
 from coneskin.runs.replay.run import read_run
 from coneskin.runs.run_files import run_name
-
-from .detection_score import score_detection
-from .touch_labels import TouchLabel, label_path, read_labels, recorded_labels, true_touches
 
 if TYPE_CHECKING:
     from coneskin.runs.replay.run import Run
 
-__all__ = ["AS_RECORDED", "broken_rows", "judge_run", "variant_name", "what_if"]
+__all__ = [
+    "AS_RECORDED",
+    "TouchLabel",
+    "broken_rows",
+    "judge_run",
+    "read_labels",
+    "recorded_labels",
+    "score_detection",
+    "true_touches",
+    "what_if",
+]
 
-_SEEN = 0.1  # s that a touch may take to be seen: one that begins later before the end of a run is none of it
+_MAX_SIZE = 1 << 24  # bytes
+_TRUTH_KINDS = frozenset({BlockKind.TRUTH})
+_TRUTH_FIELDS = {"touches", "pressed", "released"}  # of what touched the skin
+_EARLY_TIME = 0.25  # s before a recorded contact in which a more sensitive guard may see the same touch
+
+
+class TouchLabel(NamedTuple):
+    """One touch that there was.
+
+    Attributes:
+        start: when it begins [s since the start of the run].
+        end: when it is over.
+        sensor: name of the touched sensor; empty for any.
+        early: how long before the start a contact still counts as this touch [s].
+    """
+
+    start: float
+    end: float
+    sensor: str = ""
+    early: float = 0.0
+
+
+def _label_path(recording: Path) -> Path:
+    """Return the file of a recording's labels: ``run.touches.toml`` of ``run.rec``."""
+    return recording.with_suffix(".touches.toml")
+
+
+def read_labels(path: Path) -> list[TouchLabel]:
+    """Return the touches in a TOML file: tables ``[[touch]]`` with ``start_s``, ``end_s`` and, if wanted, ``sensor``.
+
+    Raises:
+        RecordingError: the file cannot be read, or a touch has no beginning before its end.
+    """
+    try:
+        tables = tomllib.loads(read_file(path, _MAX_SIZE).decode("utf-8-sig")).get("touch", [])
+        labels = [TouchLabel(item["start_s"], item["end_s"], str(item.get("sensor", ""))) for item in tables]
+    except OSError as exc:
+        raise RecordingError(f"cannot read the labels {path}: {exc.strerror or exc}") from exc
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as exc:
+        raise RecordingError(f"{path} has no [[touch]] with start_s and end_s: {type(exc).__name__}: {exc}") from exc
+    for label in labels:
+        if not (is_time(label.start) and is_time(label.end) and label.start < label.end):
+            raise RecordingError(f"{path}: start_s must be before end_s, got {label.start!r} s and {label.end!r} s")
+    return sorted(labels)
+
+
+def true_touches(run: Run) -> list[TouchLabel] | None:
+    """Return with what the virtual skin of a run was touched, by a script or by bodies; None where nothing tells.
+
+    Raises:
+        RecordingError: what the recording tells is damaged.
+    """
+    told = [block for block in run.select(kinds=_TRUTH_KINDS) if contact_force(block.payload) is None]
+    if not told:
+        return None
+    labels: list[TouchLabel] = []
+    by_bodies: dict[tuple[str, float], TouchLabel] = {}  # each told as it begins, and again once it is over
+    for block in told:
+        try:
+            facts = read_json(block.payload)
+            if not _TRUTH_FIELDS & facts.keys():
+                raise ValueError(f"none of {', '.join(sorted(_TRUTH_FIELDS))} in it")
+            labels += [_label(touch, run.start) for touch in facts.get("touches", ())]
+            for one in (_label(touch, run.start) for touch in facts.get("pressed", ())):
+                by_bodies[one.sensor, one.start] = one
+            if "released" in facts:  # all that touches at that moment
+                if not is_time(facts["released"]):
+                    raise ValueError(f"released at {facts['released']} s")
+                time = facts["released"] - run.start
+                labels = [one._replace(end=time) if one.start < time < one.end else one for one in labels]
+        except (ValueError, TypeError, KeyError, AttributeError) as exc:
+            raise RecordingError(f"a block of {block.time:.6f} s does not say what touched the skin: {exc}") from exc
+    return sorted([*labels, *by_bodies.values()])
+
+
+def _label(touch: dict[str, Any], began: float) -> TouchLabel:
+    start, end = touch["start"], math.inf if touch["end"] is None else touch["end"]
+    if not (is_time(start) and isinstance(end, int | float) and start <= end):
+        raise ValueError(f"a touch from {start} to {end} s")
+    return TouchLabel(start - began, end - began, str(touch["sensor"]))
+
+
+def recorded_labels(recorded: Decisions) -> list[TouchLabel]:
+    """Return the contacts that the guard saw when the run was recorded, as if they were all that there was."""
+    labels: list[TouchLabel] = []
+    open_since: dict[str, float] = {}
+    for event in recorded.events:
+        sensor, time = str(event.details.get("sensor", "")), event.time - recorded.start
+        if event.name == EventName.CONTACT:
+            open_since.setdefault(sensor, time)
+        elif event.name == EventName.TOUCH_ENDED and sensor in open_since:
+            labels.append(TouchLabel(open_since.pop(sensor), time, sensor, _EARLY_TIME))
+    labels += [TouchLabel(start, math.inf, sensor, _EARLY_TIME) for sensor, start in open_since.items()]
+    return sorted(labels)
+
+
+_LATE_TIME = 0.1  # s after the end of a touch in which the skin still relaxes
+
+
+@dataclass(frozen=True, slots=True)
+class _DetectionScore:
+    """Score of one run.
+
+    Attributes:
+        touches: that there were.
+        missed: of them, those without a contact.
+        false_alarms: contacts without a touch.
+        delays: from the beginning of each other touch to its first contact [s]; negative where it was seen before.
+    """
+
+    touches: int
+    missed: int
+    false_alarms: int
+    delays: tuple[float, ...]
+
+    @property
+    def median_delay(self) -> float | None:
+        """Median of the delays [s], or None."""
+        return statistics.median(self.delays) if self.delays else None
+
+
+def score_detection(decisions: Decisions, labels: Sequence[TouchLabel]) -> _DetectionScore:
+    """Compare the contacts that a guard sees with the touches that there were.
+
+    A contact belongs to the touch of its sensor in whose time it begins; a second one in the same touch is no false
+    alarm. A touch that begins where inputs are missing is left out.
+    """
+    known = decisions.until - decisions.start
+    counted = [label for label in labels if label.start < known]
+    first: dict[TouchLabel, float] = {}
+    false_alarms = 0
+    for event in decisions.events:
+        if event.name != EventName.CONTACT:
+            continue
+        time, sensor = event.time - decisions.start, str(event.details.get("sensor", ""))
+        own = [
+            label
+            for label in counted
+            if label.sensor in ("", sensor) and label.start - label.early <= time <= label.end + _LATE_TIME
+        ]
+        if not own:
+            false_alarms += 1
+            continue
+        label = min(own, key=lambda one: abs(one.start - time))
+        first.setdefault(label, time)
+    delays = tuple(time - label.start for label, time in first.items())
+    return _DetectionScore(len(counted), len(counted) - len(first), false_alarms, delays)
+
+
+_SEEING_TIME = 0.1  # s that a touch may take to be seen: one that begins later before the end of a run is none of it
 AS_RECORDED = "as recorded"  #: name of the variant without other settings
 
 
@@ -46,7 +213,7 @@ def what_if(
     return compare_decisions(before, after, tolerances)
 
 
-def variant_name(settings: Mapping[str, Any]) -> str:
+def _variant_name(settings: Mapping[str, Any]) -> str:
     """Return the name of a variant: its settings in words."""
     return ", ".join(f"{name}={value}" for name, value in settings.items()) or AS_RECORDED
 
@@ -75,7 +242,7 @@ def judge_run(
     duration = span[1] - span[0]
     rows = []
     for number, settings in enumerate(variants):
-        name = variant_name(settings)
+        name = _variant_name(settings)
 
         def tell(done: float, before: int = number) -> None:
             progress((before + done) / len(variants))
@@ -92,19 +259,19 @@ def judge_run(
 
 def broken_rows(path: Path, variants: Sequence[Mapping[str, Any]], why: str) -> list[dict[str, Any]]:
     """Return the rows of a run that cannot be judged, with the reason."""
-    return [_row(run=run_name(path), path=str(path), variant=variant_name(one), error=why) for one in variants]
+    return [_row(run=run_name(path), path=str(path), variant=_variant_name(one), error=why) for one in variants]
 
 
 def _truth(path: Path, run: Run, recorded: Decisions, span: tuple[float, float]) -> tuple[list[TouchLabel], str]:
     """Return the touches that there were between two times [s, host clock], and who says so."""
-    labels = label_path(path)
+    labels = _label_path(path)
     if labels.is_file():
         return read_labels(labels), "labels"
     touches = true_touches(run)
     if touches is None:
         return recorded_labels(recorded), "recorded"
     since, until = (time - run.start for time in span)
-    return [touch for touch in touches if touch.end > since and touch.start < until - _SEEN], "virtual skin"
+    return [touch for touch in touches if touch.end > since and touch.start < until - _SEEING_TIME], "virtual skin"
 
 
 def _judge(recorded: Decisions, again: Decisions, labels: Sequence[TouchLabel]) -> dict[str, Any]:
@@ -126,12 +293,12 @@ def _judge(recorded: Decisions, again: Decisions, labels: Sequence[TouchLabel]) 
     }
 
 
-_COLUMNS = (
+_TABLE_COLUMNS = (
     *("run", "path", "variant", "error", "complete", "same", "first_difference", "contacts", "stops", "diverged_s"),
     *("moved_mm", "truth", "touches", "missed", "false_alarms", "delay_median_ms", "delay_max_ms", "duration_s"),
 )
 
 
 def _row(**values: Any) -> dict[str, Any]:
-    assert not values.keys() - set(_COLUMNS)
-    return {name: values.get(name) for name in _COLUMNS}
+    assert not values.keys() - set(_TABLE_COLUMNS)
+    return {name: values.get(name) for name in _TABLE_COLUMNS}
