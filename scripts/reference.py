@@ -147,8 +147,7 @@ def wheel_methods() -> dict[str, list[str]]:
 
 def method_table() -> str:
     """Return the table of ur_rtde's methods; it needs the wheel."""
-    from coneskin.session.ur_rtde_names import NAMES
-    from coneskin.session.ur_rtde_refusals import REFUSALS
+    from coneskin.session.ur_rtde_names import NAMES, REFUSALS
 
     lines = []
     for interface, names in wheel_methods().items():

@@ -19,7 +19,7 @@ def _calls(path: Path) -> set[str]:
     return (names & _OPENS_A_PORT) | (imported & servers)
 
 
-_NAMES = {"src/coneskin/session/arm_lock.py": {"bind"}}  # a name on this computer: it is bound, and never listens
+_NAMES = {"src/coneskin/session/guard_run.py": {"bind"}}  # a name on this computer: it is bound, and never listens
 _PAGES = {"src/coneskin/view/page_server.py": {"bind"}}  # viser listens: of a page to look at, or of the designer's
 
 

@@ -10,8 +10,8 @@ from coneskin.cli import main
 from coneskin.core.errors import Collision, RobotConnectionError
 from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene.reader import parse_scene
-from coneskin.session.deferred_interrupt import defer_interrupts
 from coneskin.session.outcome import exit_code, stands
+from coneskin.session.session import defer_interrupts
 
 from ..scene.scenes import SERIAL_RETREAT, SKIN_ONLY
 

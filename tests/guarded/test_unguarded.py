@@ -9,7 +9,7 @@ from contextlib import suppress
 import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused, SensorError
-from coneskin.session.fallback_stop import FallbackStop
+from coneskin.session.guard_monitor import FallbackStop
 from coneskin.session.session import guard
 from coneskin.testing.forearm import START
 
@@ -162,11 +162,11 @@ def test_a_stop_goes_out_by_whatever_port_opens(numbers):
     resort = FallbackStop(scene_for(type("Host", (), {"host": host}), PATIENT, "external"))
     try:
         port, word = (30003, b"stopj(10.000)") if 30003 in numbers else (29999, b"stop\n")
-        resort.look(lambda: word in ports.got[port])
+        resort.poll(lambda: word in ports.got[port])
         until(lambda: word in ports.got[port])
         assert resort.stands is False  # nobody has seen it
         seen = len(ports.got[port])
-        until(lambda: resort.look(lambda: False) or len(ports.got[port]) > seen)  # and again, now and then
+        until(lambda: resort.poll(lambda: False) or len(ports.got[port]) > seen)  # and again, now and then
     finally:
         resort.end()
         ports.close()

@@ -3,6 +3,8 @@
 import logging
 import os
 import threading
+import time
+from collections.abc import Callable
 
 import pytest
 
@@ -10,9 +12,13 @@ from coneskin.core.channel import Channel, pair
 from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.runs.replay.run import read_run
+from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import RecordingScene
-from coneskin.session.event_log import EventLog, new_recording
+from coneskin.session.event_log import EventDelivery, EventLog, HeardLine, new_recording
 from coneskin.session.guard_monitor import GuardMonitor
+from coneskin.session.outcome import activation_error
+from coneskin.skin.virtual.skin import VirtualSkin
+from tests.scene.scenes import SERIAL_RETREAT
 
 
 @pytest.fixture
@@ -186,3 +192,114 @@ def test_what_touches_a_virtual_skin_is_recorded_by_the_thread_that_writes(tmp_p
     assert run.start == log.began
     told = [block.payload for block in run.blocks if block.kind == BlockKind.TRUTH]
     assert told == [b'{"touches": []}', b'{"released": 5.0}']
+
+
+def numbered(*numbers):
+    return [GuardEvent("contact", float(number), {"number": number}) for number in numbers]
+
+
+def test_every_event_comes_in_order_and_the_rest_at_the_end():
+    seen = []
+    delivery = EventDelivery(seen.append)
+    for number in range(500):
+        delivery.put(numbered(number))
+    delivery.close()
+    assert seen == numbered(*range(500))
+    delivery.close()
+
+
+def test_a_function_that_blocks_delays_nobody_and_is_told_what_it_has_missed(caplog):
+    free, took, seen = threading.Event(), threading.Event(), []
+
+    def block(event):
+        took.set()
+        free.wait(20.0)
+        seen.append(event)
+
+    delivery = EventDelivery(block, bound=5)
+    delivery.put(numbered(0))
+    assert took.wait(20.0)
+    delivery.put(numbered(*range(1, 20)))  # returns, though nobody takes them
+    with caplog.at_level(logging.WARNING, "coneskin"):
+        free.set()
+        delivery.close()
+    assert seen[:6] == numbered(*range(6))
+    (gap,) = seen[6:]
+    assert "14 events were not delivered" in gap.details["what"]
+    assert "14 events" in caplog.text
+
+
+def test_one_that_raises_is_not_called_again_and_the_log_goes_on(caplog):
+    seen = []
+
+    def fail(event):
+        seen.append(event)
+        raise KeyError("mine")
+
+    log = EventLog(on_event=fail)
+    with caplog.at_level(logging.ERROR, "coneskin"):
+        for event in numbered(1, 2, 3):
+            log._write([event.block()])
+        log.close()
+    assert seen == numbered(1)
+    assert [event.details["number"] for event in log.events] == [1, 2, 3]
+    assert "is not called any more" in caplog.text
+
+
+def test_the_function_itself_may_end_the_session():
+    done = threading.Event()
+
+    def close(event):
+        delivery.close()
+        done.set()
+
+    delivery = EventDelivery(close)
+    delivery.put(numbered(1))
+    assert done.wait(20.0)
+
+
+@pytest.mark.parametrize("request_", [3, 4])
+def test_an_answer_is_known_by_its_number(request_):
+    log = EventLog()
+    log._write([GuardEvent("refused", 1.0, {"request": number}).block() for number in (3, 4)])
+    log._write([GuardEvent("message", 1.0, {"what": "something else"}).block()])
+    answer = log.wait_for(("activated", "refused"), 0.0, 0, lambda event: event.details.get("request") == request_)
+    assert answer is not None
+    assert answer.details["request"] == request_
+
+
+SCENE = parse_scene(SERIAL_RETREAT)
+SENSOR = SCENE.sensors[0].sensor
+WAITS = [f"{SENSOR.name}: no valid frame"]
+
+
+def heard(change: Callable[[bytes], bytes]) -> HeardLine:
+    """Half a second of a skin, until now."""
+    line, end = HeardLine(), time.monotonic()
+    packets = list(VirtualSkin(SENSOR, model="ladder", duration=0.5, seed=1).packets())
+    line.feed([Block(BlockKind.SKIN, end - 0.5 + at, change(data)) for at, data in packets])
+    return line
+
+
+def test_the_refusal_names_the_mistake_in_the_firmware() -> None:
+    line = heard(lambda data: data[:-2] + data[-1:] + data[-2:-1])
+    error = activation_error([GuardEvent("waiting", 1.0, {"reasons": WAITS})], lambda why: line.describe(SCENE, why))
+    assert str(error).splitlines() == [
+        "the guard did not become active:",
+        "  on serial hwgrep://0403:6001, the checksum is another CRC: its low byte goes first: append the CRC with its "
+        "high byte first",
+        f"  {WAITS[0]}",
+    ]
+
+
+def test_a_silent_line_is_named_too() -> None:
+    assert HeardLine().describe(SCENE, WAITS).startswith("no byte has come from serial hwgrep://0403:6001: check power")
+
+
+@pytest.mark.parametrize("reasons", [[], ["the arm is not powered"]])
+def test_reasons_of_the_arm_get_no_words_about_the_skin(reasons: list[str]) -> None:
+    assert heard(lambda _: b"nonsense").describe(SCENE, reasons) == ""
+
+
+def test_a_line_on_which_all_is_right_gets_none_either() -> None:
+    assert heard(lambda data: data).describe(SCENE, WAITS) == ""

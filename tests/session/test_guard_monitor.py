@@ -41,7 +41,7 @@ class Standing:
         self.moves = threading.Event()
         self.moves.set()
 
-    def look(self, over):
+    def poll(self, over):
         moved = self.moves.is_set()
         self.moves.clear()
         self.stops += moved
@@ -116,7 +116,7 @@ def test_the_end_is_set_whatever_happens_in_the_thread(channel, monkeypatch, cap
     ours, theirs = channel
 
     class Broken(Standing):
-        def look(self, over):
+        def poll(self, over):
             raise OSError("no descriptor is left")
 
     log, monitor = monitored(ours, Broken())
@@ -144,7 +144,7 @@ def test_a_guard_is_missed_whatever_a_program_does_with_the_events(channel):
 
 @pytest.mark.parametrize(("names", "said"), [(["waiting"], 1), (["waiting", "activated"], 0), (["activated"], 0)])
 def test_what_is_wrong_with_the_skins_line_is_said_while_the_guard_waits(channel, monkeypatch, names, said):
-    monkeypatch.setattr("coneskin.session.guard_monitor._PATIENCE", 0.0)
+    monkeypatch.setattr("coneskin.session.guard_monitor._ACTIVATION_TIME", 0.0)
     ours, theirs = channel
     log = EventLog()
     monitor = GuardMonitor(log, ours, None, lambda why: f"the checksum, because {why[0]}")

@@ -10,8 +10,7 @@ from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.ur.ur_rtde import QUESTIONS
 from coneskin.session import ur_rtde_names
-from coneskin.session.ur_rtde_names import NAMES, UrRtdeArm
-from coneskin.session.ur_rtde_refusals import REFUSALS
+from coneskin.session.ur_rtde_names import NAMES, REFUSALS, UrRtdeArm
 from tests.support.paths import ROOT
 
 ELSEWHERE = {"unlockProtectiveStop"}  # of the dashboard client
@@ -70,7 +69,7 @@ def test_a_name_that_neither_has_is_an_attribute_error(arm) -> None:
 
 
 def test_the_questions_are_those_of_the_driver() -> None:
-    assert ur_rtde_names._QUESTIONS == QUESTIONS
+    assert ur_rtde_names._ASKED_NAMES == QUESTIONS
 
 
 def test_what_a_method_is_called_here_exists(arm) -> None:

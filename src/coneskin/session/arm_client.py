@@ -3,24 +3,161 @@
 from __future__ import annotations
 
 import math
+import threading
+import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.channel import Channel
-from coneskin.core.errors import KinematicsError
+from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
+from coneskin.core.errors import KinematicsError, RobotConnectionError, RobotRefused
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.driver.waypoint import Waypoint
 
-from .arm_requests import ArmRequests
-
 if TYPE_CHECKING:
-    from coneskin.robot.driver.protocol import VariableReader
+    from coneskin.robot.driver.protocol import OutputWriter, VariableReader
 
-    from .arm_outputs import ArmOutputs
+__all__ = ["ArmClient", "ArmOutputs", "ArmRequests"]
 
-__all__ = ["ArmClient"]
+_ANSWER_PERIOD = 0.05  # s between two looks at what else may have ended a wait
+
+
+class ArmRequests:
+    """Requests to one driver process.
+
+    Args:
+        channel: to the driver process.
+        check: raises what has stopped the arm, if anything has; its argument is True where something certainly has.
+    """
+
+    def __init__(self, channel: Channel, check: Callable[[bool], None]) -> None:
+        self.channel = channel
+        self.check = check
+        self._number = 0  # of the newest request
+        self._asked: set[int] = set()  # whose answers are waited for
+        self._answers: dict[int, dict[str, Any]] = {}
+        self._state = threading.Condition()
+        self._reading = threading.Lock()  # one thread reads for all
+
+    def do(self, **request: Any) -> dict[str, Any]:
+        """Send a request, wait for its answer and return it.
+
+        Raises:
+            Collision: the skin was touched.
+            RobotRefused: the guard, the controller or the driver process does not do it.
+            RobotConnectionError: the driver process is gone.
+        """
+        self.check(False)
+        with self._state:
+            self._number += 1
+            number = self._number
+            self._asked.add(number)
+        try:
+            message = encode_json({**request, "number": number, "sent": time.monotonic()})
+            dropped = self.channel.dropped
+            if not self.channel.send(message) and self.channel.dropped > dropped:  # nobody would ever answer it
+                raise RobotRefused(f"{request['do']}: the driver process does not take {len(message)} bytes")
+            answer = self._await(number)
+        finally:
+            with self._state:
+                self._asked.discard(number)
+                self._answers.pop(number, None)
+        if not answer["ok"]:
+            if answer["stopped"]:
+                self.check(True)
+            raise RobotRefused(f"{request['do']}: {answer['why']}")
+        self.check(False)
+        return answer
+
+    def _await(self, number: int) -> dict[str, Any]:
+        while True:
+            with self._state:
+                for known in (number, 0):  # 0: of a driver process that could not start
+                    if known in self._answers:
+                        return self._answers[known]
+            if self._reading.acquire(blocking=False):
+                try:
+                    self._read()
+                finally:
+                    self._reading.release()
+                    with self._state:
+                        self._state.notify_all()
+            else:
+                with self._state:
+                    if number not in self._answers:
+                        self._state.wait(_ANSWER_PERIOD)
+            self.check(False)
+            if self.channel.closed and number not in self._answers:
+                raise RobotConnectionError("the driver process has ended")
+
+    def _read(self) -> None:
+        """Wait a while for answers, and keep those that somebody waits for."""
+        if self.channel.closed:
+            return
+        wait_readable([self.channel], _ANSWER_PERIOD)
+        for message in self.channel.receive():
+            answer = decode_json(message)
+            with self._state:
+                if answer["number"] == 0 or answer["number"] in self._asked:
+                    self._answers[answer["number"]] = answer
+
+
+class ArmOutputs:
+    """Digital and analog outputs, and the registers for users.
+
+    After a touch a gripper must not go on either: whatever is set here is refused until a person has reset the guard.
+
+    Args:
+        writer: to the controller, open.
+        check: raises what has stopped the arm, if anything has.
+    """
+
+    def __init__(self, writer: OutputWriter, check: Callable[[bool], None]) -> None:
+        self._writer = writer
+        self._check = check
+
+    def set_digital(self, number: int, on: bool, group: str = "standard") -> None:
+        """Switch a digital output.
+
+        Args:
+            number: from 0.
+            on: True for high.
+            group: "standard", "configurable" or "tool".
+
+        Raises:
+            Collision: the skin was touched.
+            RobotRefused: the guard has stopped the arm, or another client has taken the outputs.
+            RobotConnectionError, RobotTimeout: the controller is gone.
+            ValueError: there is no such output.
+        """
+        self._check(False)
+        self._writer.set_digital(group, number, on)
+
+    def set_analog(self, number: int, ratio: float, kind: str = "voltage") -> None:
+        """Set an analog output, 0 or 1, to a ratio of its range, 0 to 1; all else as ``set_digital``.
+
+        Args:
+            number: 0 or 1.
+            ratio: of its range, 0 to 1.
+            kind: "voltage" or "current".
+        """
+        self._check(False)
+        self._writer.set_analog(number, ratio, kind)
+
+    def set_register(self, number: int, value: int | float) -> None:
+        """Write an input register that programs on the controller read; all else as ``set_digital``.
+
+        Args:
+            number: 18 to 22 or 42 to 46.
+            value: an int for the register of integers, a float for that of floats.
+        """
+        self._check(False)
+        self._writer.set_register(number, value)
+
+    def close(self) -> None:
+        """Close the connection; may be called again."""
+        self._writer.close()
 
 
 class ArmClient:
@@ -54,8 +191,6 @@ class ArmClient:
         Raises:
             RobotConnectionError, RobotTimeout: it cannot be opened.
         """
-        from .arm_outputs import ArmOutputs
-
         return ArmOutputs(load_driver(self._model.family).output_writer(self._host).__enter__(), self._requests.check)
 
     @property

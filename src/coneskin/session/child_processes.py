@@ -6,16 +6,18 @@ Each is on a channel. A child ends when its channel does, so that none outlives 
 from __future__ import annotations
 
 import subprocess
+import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, encode_json, pair
 from coneskin.core.child_process import spawn
 from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.messages import REPORT_PERIOD, Heartbeat
 from coneskin.robot.driver.registry import load_driver
 from coneskin.skin.sources.kinds import is_simulated
 
-from .fallback_stop import stop_settings
+from .guard_monitor import stop_settings
 
 if TYPE_CHECKING:
     import socket
@@ -50,6 +52,7 @@ class ChildProcesses:
         self.guard: Channel | None = None
         self.program: Channel | None = None
         self.skin: SkinClient | None = None
+        self._heartbeat: _ProgramHeartbeat | None = None
         self._lifelines: list[Channel] = []  # to the children besides the guard, which end with them
 
     def start(
@@ -98,6 +101,8 @@ class ChildProcesses:
         self.children["guard"] = spawn("coneskin.session.guard_process", *ends)
         port = "" if self.skin is None else self.skin.port()  # the others start meanwhile
         self.guard.send(encode_json({**start, "port": port}))
+        self._heartbeat = _ProgramHeartbeat(self.guard)
+        self._heartbeat.start()
         return self.guard
 
     def note_script(self) -> None:
@@ -133,8 +138,36 @@ class ChildProcesses:
                 child.wait()
 
     def close(self) -> None:
-        """Close the lines to guard and physics; may be called again."""
+        """End the heartbeat, and close the lines to guard and physics; may be called again."""
+        if self._heartbeat is not None:
+            self._heartbeat.stop()
         if self.skin is not None:
             self.skin.close()
         if self.guard is not None:
             self.guard.close()
+
+
+class _ProgramHeartbeat:
+    """Heartbeat of this process on the guard's channel, from ``start`` to ``stop``.
+
+    Args:
+        channel: the guard's.
+    """
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="coneskin heartbeat", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread; may be called again."""
+        self._stopped.set()
+
+    def _run(self) -> None:
+        message = Heartbeat().encode()
+        while self._channel.send(message) and not self._stopped.wait(REPORT_PERIOD):
+            pass

@@ -1,4 +1,8 @@
-"""Event log of a run: it records blocks as they come, and keeps the events for callers that wait for one."""
+"""Event log of a run: it records blocks as they come, and keeps the events for callers that wait for one.
+
+A program's own function is called for each event from a thread in which it may take its time. What waits for it has a
+bound, so a function that blocks delays neither the recording nor the monitoring of the guard.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +13,9 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import ConeSkinError, RecordingError
 from coneskin.core.recording.block import Block, decode_blocks
@@ -21,21 +25,22 @@ from coneskin.core.version import __version__, code_commit
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, decode_event
 from coneskin.scene.values.scene import RecordingScene
 
-from .event_delivery import EventDelivery
-from .heard_line import HeardLine
 from .retention import prune_part
 
-__all__ = ["EventLog", "discard_recording", "new_recording"]
+if TYPE_CHECKING:
+    from coneskin.scene.values.scene import Scene
+    from coneskin.skin.diagnosis.capture import CaptureWindow
 
+__all__ = ["EventDelivery", "EventLog", "HeardLine", "discard_recording", "new_recording"]
 
 #: kinds of block without which nothing can be replayed
-_COPIED = frozenset({BlockKind.HEADER, BlockKind.SURFACE})
+_COPIED_KINDS = frozenset({BlockKind.HEADER, BlockKind.SURFACE})
 
 
 #: where a program's own logging gets every event; without a handler of its own nothing is printed
-_LOGGER = logging.getLogger("coneskin.events")
-_LOGGER.addHandler(logging.NullHandler())
-_GRAVE = frozenset({EventName.STOPPING, EventName.FAULT, EventName.GUARD_EXITED, EventName.FALLBACK_STOP})
+_EVENT_LOGGER = logging.getLogger("coneskin.events")
+_EVENT_LOGGER.addHandler(logging.NullHandler())
+_GRAVE_EVENTS = frozenset({EventName.STOPPING, EventName.FAULT, EventName.GUARD_EXITED, EventName.FALLBACK_STOP})
 
 
 class EventLog:
@@ -86,7 +91,7 @@ class EventLog:
         full = {**header, **versions, "clocks": clocks}
         self._recorder.write(Block(BlockKind.HEADER, clocks["monotonic"], json.dumps(full).encode()))
 
-    def take(self, data: bytes) -> None:
+    def feed(self, data: bytes) -> None:
         """Take encoded blocks from the guard; whatever they are, the log goes on."""
         try:
             self._write([block for _, block in decode_blocks(data)])
@@ -140,7 +145,7 @@ class EventLog:
 
     def _write(self, blocks: list[Block]) -> None:
         events = []
-        self.line.take(blocks)
+        self.line.feed(blocks)
         blocks += self.physics()
         while self._truths:
             blocks.append(self._truths.popleft())
@@ -165,7 +170,9 @@ class EventLog:
     def _tell(self, events: list[GuardEvent]) -> None:
         """Keep events, and give them to whoever waits for them."""
         for event in events:
-            _LOGGER.log(logging.WARNING if event.name in _GRAVE else logging.INFO, "%s %s", event.name, event.details)
+            _EVENT_LOGGER.log(
+                logging.WARNING if event.name in _GRAVE_EVENTS else logging.INFO, "%s %s", event.name, event.details
+            )
         names = {event.name for event in events}
         self.activated |= EventName.ACTIVATED in names
         self.ending |= EventName.ENDING in names
@@ -182,8 +189,8 @@ def _recording_ended(now: float, why: ConeSkinError) -> GuardEvent:
 
 def _recorder(path: Path, limits: RecordingScene | None) -> Recorder:
     if limits is None:
-        return Recorder(path, copied=_COPIED)
-    return Recorder(path, limits.max_size, _COPIED, limits.keep, prune_part)
+        return Recorder(path, copied=_COPIED_KINDS)
+    return Recorder(path, limits.max_size, _COPIED_KINDS, limits.keep, prune_part)
 
 
 def discard_recording(path: Path) -> None:
@@ -218,3 +225,120 @@ def new_recording(folder: Path) -> Path:
         raise RecordingError(
             f"cannot make the folder {made} for the recording: {exc.strerror or exc}; see recording.folder"
         ) from exc
+
+
+_MAX_WAITING = 1000  # events that wait
+_CLOSE_TIMEOUT = 2.0  # s for the function to take what still waits
+
+
+class EventDelivery:
+    """Delivery of events to one function, in order, until ``close``.
+
+    Args:
+        on_event: the program's function; one that has raised is not called any more.
+        bound: number of events that may wait; what comes beyond it is dropped, and the function is told how many.
+    """
+
+    def __init__(self, on_event: Callable[[GuardEvent], None], bound: int = _MAX_WAITING) -> None:
+        self._on_event = on_event
+        self._bound = bound
+        self._waiting: deque[GuardEvent] = deque()
+        self._dropped = 0
+        self._closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._run, name="coneskin events", daemon=True)
+        self._thread.start()
+
+    def put(self, events: Iterable[GuardEvent]) -> None:
+        """Take events without waiting."""
+        with self._changed:
+            for event in events:
+                if len(self._waiting) >= self._bound:
+                    self._dropped += 1
+                    continue
+                if self._dropped:
+                    self._waiting.append(self._gap(event.time))
+                self._waiting.append(event)
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Deliver what waits, for 2 s at most, and end; may be called again, and by the function itself."""
+        with self._changed:
+            if self._dropped and not self._closed:
+                self._waiting.append(self._gap(time.monotonic()))
+            self._closed = True
+            self._changed.notify()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(_CLOSE_TIMEOUT)
+
+    def _gap(self, now: float) -> GuardEvent:
+        what = f"on_event was busy: {self._dropped} events were not delivered to it; the recording has them"
+        self._dropped = 0
+        logging.getLogger("coneskin").warning(what)
+        return GuardEvent(EventName.MESSAGE, now, {"what": what})
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                while not self._waiting and not self._closed:
+                    self._changed.wait()
+                if not self._waiting:
+                    return
+                event = self._waiting.popleft()
+            try:
+                self._on_event(event)
+            except Exception:
+                logging.getLogger("coneskin").exception("on_event has failed and is not called any more")
+                return
+
+
+class HeardLine:
+    """The newest bytes of the skin; whoever writes them and whoever asks may be different threads."""
+
+    def __init__(self) -> None:
+        self._window: CaptureWindow | None = None
+
+    def feed(self, blocks: Sequence[Block]) -> None:
+        """Keep the skin's bytes among these blocks, for some seconds."""
+        for block in blocks:
+            if block.kind == BlockKind.SKIN:
+                self._add(block)
+
+    def _add(self, block: Block) -> None:
+        if self._window is None:
+            from coneskin.skin.diagnosis.capture import CaptureWindow
+
+            self._window = CaptureWindow(block.time)
+        self._window.add(block.payload, block.time)
+
+    def describe(self, scene: Scene, reasons: Sequence[str]) -> str:
+        """Return what is wrong with the line, where a guard waits for its skin.
+
+        Args:
+            scene: with the sensors and their source.
+            reasons: why the guard waits or refuses; those of a sensor begin with its name.
+
+        Returns:
+            a sentence; empty where the reasons are others, and where frames come as they should.
+        """
+        names = tuple(f"{item.sensor.name}: " for item in scene.sensors)
+        if scene.source is None or not any(reason.startswith(names) for reason in reasons):
+            return ""
+        from coneskin.skin.diagnosis.capture import Capture
+        from coneskin.skin.diagnosis.diagnose import diagnose
+
+        now = time.monotonic()
+        capture = Capture((), now, since=now) if self._window is None else self._window.capture(now)
+        found = diagnose(capture, [item.sensor for item in scene.sensors], scene.source.settings.get("baud"))
+        if found.good:
+            return ""
+        if not capture.pieces:
+            return f"no byte has come from {_source_name(scene)}: {found.cause.value}"
+        return f"on {_source_name(scene)}, {found.line}"
+
+
+def _source_name(scene: Scene) -> str:
+    from coneskin.scene.tables.source_tables import source_label
+
+    assert scene.source is not None
+    return source_label(scene.source)

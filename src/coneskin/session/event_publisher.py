@@ -19,15 +19,15 @@ from coneskin.robot.guard.signals.journal import GuardEvent
 
 __all__ = ["EventPublisher", "event_message"]
 
-_MOST = 8000  # bytes of a datagram; loopback and most networks carry them
-_EXAMPLE = "write udp://127.0.0.1:9870"
+_MAX_DATAGRAM = 8000  # bytes of a datagram; loopback and most networks carry them
+_URL_EXAMPLE = "write udp://127.0.0.1:9870"
 
 
 def event_message(event: GuardEvent, began: float) -> bytes:
     """Return an event as JSON: ``t`` [s] since the run began, ``name``, and its details; what is not finite is null."""
     message = {"t": round(event.time - began, 6), "name": str(event.name), **_finite(event.details)}
     data = json.dumps(message, separators=(",", ":")).encode()
-    if len(data) > _MOST:
+    if len(data) > _MAX_DATAGRAM:
         data = json.dumps({"t": message["t"], "name": message["name"], "cut": len(data)}).encode()
     return data
 
@@ -64,14 +64,14 @@ class EventPublisher:
         except ValueError:  # a port of words, half a bracket
             host, port, known = None, None, False
         if not known or not host or not port:
-            raise SceneError([f"an address to publish to is udp://HOST:PORT, got {url!r}; {_EXAMPLE}"], "--publish")
+            raise SceneError([f"an address to publish to is udp://HOST:PORT, got {url!r}; {_URL_EXAMPLE}"], "--publish")
         try:
             family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         except (OSError, UnicodeError) as exc:  # a name that no network can have
             why = exc.strerror if isinstance(exc, OSError) else "that is no name of a computer"
             raise SceneError([f"{host} cannot be found: {why or exc}"], "--publish") from exc
         if not beyond and not ipaddress.ip_address(address[0]).is_loopback:
-            why = f"{host} is not this computer, and whoever is on its network could read the events; {_EXAMPLE}"
+            why = f"{host} is not this computer, and whoever is on its network could read the events; {_URL_EXAMPLE}"
             raise SceneError([f"{why}, or allow it with --publish-beyond"], "--publish")
         self._address = address
         self._socket = socket.socket(family, socket.SOCK_DGRAM)

@@ -11,22 +11,26 @@ import math
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, wait_readable
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.signals.journal import EventName
 
 from .event_log import EventLog
 from .outcome import NOT_CONFIRMED, STANDS, reasons
 
 if TYPE_CHECKING:
-    from .fallback_stop import FallbackStop
+    from coneskin.robot.stop.standstill_hold import StandstillHold
+    from coneskin.scene.values.scene import Scene
 
-__all__ = ["GuardMonitor"]
+__all__ = ["FallbackStop", "GuardMonitor", "stop_settings"]
 
 _SESSION_HEARTBEAT_TIMEOUT = 1.0  # s; by then the driver process, or the guard watchdog, has acted, if it can
-_PATIENCE = 2.0  # s in which a guard mostly becomes active; later it is said what is wrong with the skin's line
-_LOOK_PERIOD = 0.01  # s between two looks at an arm without a guard
+_ACTIVATION_TIME = 2.0  # s in which a guard mostly becomes active; later it is said what is wrong with the skin's line
+_POLL_PERIOD = 0.01  # s between two looks at an arm without a guard
 _CLOSE_TIMEOUT = 3.0  # s that a stop may still take after ``close``
 
 
@@ -87,17 +91,17 @@ class GuardMonitor:
     def _listen(self) -> None:
         """Take what the guard sends until its channel ends."""
         channel, heard_at = self._channel, time.monotonic()
-        look_at = heard_at + _PATIENCE
+        look_at = heard_at + _ACTIVATION_TIME
 
         def over() -> bool:
             return bool(wait_readable([channel], 0.0))
 
         while not channel.closed:
-            wait_readable([channel], _LOOK_PERIOD if self.lost and self._fallback else _SESSION_HEARTBEAT_TIMEOUT)
+            wait_readable([channel], _POLL_PERIOD if self.lost and self._fallback else _SESSION_HEARTBEAT_TIMEOUT)
             if data := b"".join(channel.receive()):
                 heard_at = time.monotonic()
                 self._note_heartbeat()
-                self._log.take(data)
+                self._log.feed(data)
                 if heard_at >= look_at:
                     look_at = math.inf
                     self._look_at_line()
@@ -143,11 +147,77 @@ class GuardMonitor:
             self._hold(over)
             if self._closing_since is not None and (self._fallback.stands or over()):
                 return
-            time.sleep(_LOOK_PERIOD)
+            time.sleep(_POLL_PERIOD)
 
     def _hold(self, over: Callable[[], bool]) -> None:
-        if self._fallback is None or not self._fallback.look(over):
+        if self._fallback is None or not self._fallback.poll(over):
             return
         stands = self._fallback.stands
         what = f"stopped by the session, without the guard: {STANDS if stands else NOT_CONFIRMED}"
         self._log.report(EventName.FALLBACK_STOP, what=what, stands=stands)
+
+
+_CONNECT_TIMEOUT = 0.5  # s for each port; a controller that takes longer is tried again
+
+
+def stop_settings(scene: Scene) -> dict[str, Any]:
+    """Return the settings with which a process can stop the arm of a scene."""
+    assert scene.arm is not None
+    return {
+        "family": arm_model(scene.arm.model).family,
+        "host": scene.arm.host,
+        "monitoring": asdict(scene.monitoring_limits),
+        "deceleration": scene.default_reaction.deceleration,
+    }
+
+
+class FallbackStop:
+    """Standstill hold from this process: the guard is gone, and its watchdog may be gone too.
+
+    A stop from two processes at once does no harm, so the watchdog is not asked. Connections are opened when they are
+    needed; a port that does not answer does not prevent the use of another.
+
+    Args:
+        scene: whose arm it is.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._settings = stop_settings(scene)
+        self._driver = load_driver(self._settings["family"])  # now, and not when it is needed
+        self._hold: StandstillHold | None = None
+        self._close: Callable[[], None] = lambda: None
+
+    def poll(self, over: Callable[[], bool]) -> bool:
+        """Stop the arm at the first call, and whenever something moves it. To be called continuously.
+
+        Args:
+            over: asked while a stop is under way; True ends it as it is.
+
+        Returns:
+            whether there is an outcome to report, which is ``stands``.
+        """
+        return self._open().look(over)
+
+    @property
+    def stands(self) -> bool:
+        """True where the arm was seen standing for a whole watch after the newest stop, and ever since."""
+        return self._hold is not None and self._hold.stands
+
+    def end(self) -> None:
+        """Close the connections; ``look`` opens new ones. For when the guard lives again, or nothing is left to do."""
+        self._close()
+        self._hold = None
+
+    def _open(self) -> StandstillHold:
+        if self._hold is None:
+            from coneskin.robot.stop.backup_stop import BackupStop
+            from coneskin.robot.stop.limits import MonitoringLimits
+            from coneskin.robot.stop.standstill_hold import StandstillHold
+
+            settings = self._settings
+            limits = MonitoringLimits(**settings["monitoring"])
+            connections = self._driver.stop_connections(settings["host"], _CONNECT_TIMEOUT)
+            stop = BackupStop(self._driver, connections, limits, settings["deceleration"])
+            self._close = stop.close
+            self._hold = StandstillHold(stop, limits.standstill)
+        return self._hold

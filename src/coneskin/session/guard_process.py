@@ -16,8 +16,8 @@ from coneskin.core.time_slice import shorten_time_slice
 
 __all__ = ["main"]
 
-_PRECEDENCE = -15  # nice value; more would be in the way of the kernel's own threads
-_AUTOGROUP = Path("/proc/self/autogroup")  # of sched(7): nice values only count among the processes of one session
+_NICE_VALUE = -15  # nice value; more would be in the way of the kernel's own threads
+_AUTOGROUP_FILE = Path("/proc/self/autogroup")  # of sched(7): nice values only count among the processes of one session
 
 
 def main(arguments: list[str]) -> int:
@@ -40,9 +40,9 @@ def main(arguments: list[str]) -> int:
         return 1
     start = decode_json(hello[0])
     with contextlib.suppress(OSError):
-        os.nice(_PRECEDENCE)  # allowed for root, and where the user's limits say so
+        os.nice(_NICE_VALUE)  # allowed for root, and where the user's limits say so
         if os.getsid(0) == os.getpid():  # Linux may first divide its time among sessions; this one is the guard's own
-            _AUTOGROUP.write_text(str(_PRECEDENCE))
+            _AUTOGROUP_FILE.write_text(str(_NICE_VALUE))
     try:
         known = Commissioning.from_message(start["commissioning"])
         scene = parse_scene(start["scene"], start["name"], Path(start["folder"]), commissioning=known)

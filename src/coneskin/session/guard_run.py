@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import signal
+import socket
+import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 from coneskin.core.channel import Channel
@@ -19,7 +23,70 @@ from coneskin.scene.values.scene import Scene
 from coneskin.skin.sources.kinds import is_simulated, open_source
 from coneskin.skin.sources.source import SourceReopening
 
-__all__ = ["run_guard"]
+__all__ = ["ArmLock", "run_guard"]
+
+_LOCK_TIMEOUT = 3.0  # s for the guard of a program that was killed to stop its arm and end
+_LOCK_PERIOD = 0.05  # s
+
+
+class ArmLock:
+    """Lock on the arm of one controller, held in a ``with``; on Linux alone.
+
+    Args:
+        host: the controller.
+        timeout: how long another guard may take to end [s].
+        wait: waits for this time [s].
+        clock: monotonic seconds.
+
+    Raises:
+        RobotRefused: on entering, where another guard of this computer has the arm.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        timeout: float = _LOCK_TIMEOUT,
+        wait: Callable[[float], None] = time.sleep,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._host = host
+        self._timeout = timeout
+        self._wait = wait
+        self._clock = clock
+        self._sock: socket.socket | None = None
+
+    def __enter__(self) -> ArmLock:
+        if sys.platform != "linux":
+            return self
+        name = f"\0coneskin guard of {_address(self._host)}"
+        self._sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        end = self._clock() + self._timeout
+        while True:
+            try:
+                self._sock.bind(name)
+                return self
+            except OSError as exc:
+                if exc.errno != errno.EADDRINUSE:  # a system without such names has no lock
+                    return self
+            if self._clock() >= end:
+                self._sock.close()
+                raise RobotRefused(
+                    f"another guard on this computer has the arm at {self._host}: end that program, or that "
+                    "coneskin guard, first"
+                )
+            self._wait(_LOCK_PERIOD)
+
+    def __exit__(self, *_: object) -> None:
+        if self._sock is not None:
+            self._sock.close()
+
+
+def _address(host: str) -> str:
+    """Return the address of a host, so that two names of one controller are one arm."""
+    try:
+        return socket.gethostbyname(host)
+    except OSError:
+        return host  # the driver says what is wrong with it
 
 
 def run_guard(
@@ -53,8 +120,6 @@ def run_guard(
     if scene.arm is not None:
         from coneskin.robot.arm.ur_models import arm_model
         from coneskin.robot.driver.registry import load_driver
-
-        from .arm_lock import ArmLock
 
         if scene.arm.control == "internal":
             ports.driver = other

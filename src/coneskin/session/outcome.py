@@ -35,9 +35,15 @@ __all__ = [
 STANDS = "the arm stands"
 STILL_RETREATING = "the arm has stood and still moves away from the touch"
 NOT_CONFIRMED = "standstill of the arm NOT confirmed"
-_MOVING = (EventName.ACTIVATED, EventName.SPEED_REDUCED, EventName.RESUMED, EventName.STOPPING, EventName.RETREATING)
+_MOVING_EVENTS = (
+    EventName.ACTIVATED,
+    EventName.SPEED_REDUCED,
+    EventName.RESUMED,
+    EventName.STOPPING,
+    EventName.RETREATING,
+)
 _REACTION_TIMEOUT = 6.0  # s beyond the braking time in which a reaction ends
-_MARGIN = 0.5  # s for the events to come, on a busy machine
+_EVENT_MARGIN = 0.5  # s for the events to come, on a busy machine
 
 
 def braking_time(scene: Scene) -> float:
@@ -48,21 +54,21 @@ def braking_time(scene: Scene) -> float:
     reactions = [scene.default_reaction, *(rule.reaction for rule in scene.rules)]
     slowest = min(reaction.deceleration for reaction in reactions)
     fastest = max(arm_model(scene.arm.model).joint_speed)
-    return scene.monitoring_limits.stop_budget(fastest, slowest) + _MARGIN
+    return scene.monitoring_limits.stop_budget(fastest, slowest) + _EVENT_MARGIN
 
 
-def await_outcome(log: EventLog, since: int, patience: float) -> str:
+def await_outcome(log: EventLog, since: int, standstill_time: float) -> str:
     """Return the outcome of the newest stop, as far as it is known in time.
 
     Args:
         log: of the run, with a stop in it.
         since: position of the first event that counts.
-        patience: time in which the arm comes to a confirmed standstill [s].
+        standstill_time: time in which the arm comes to a confirmed standstill [s].
     """
-    end = time.monotonic() + patience + _REACTION_TIMEOUT
+    end = time.monotonic() + standstill_time + _REACTION_TIMEOUT
     while True:
         newest = max(i for i, event in enumerate(log.events) if i >= since and event.name == EventName.STOPPING)
-        if log.wait_for((EventName.STANDSTILL, EventName.LATCHED), patience, newest) is None:
+        if log.wait_for((EventName.STANDSTILL, EventName.LATCHED), standstill_time, newest) is None:
             return NOT_CONFIRMED
         latched = log.wait_for((EventName.LATCHED,), max(end - time.monotonic(), 0.0), newest)
         if not any(event.name == EventName.STOPPING for event in log.events[newest + 1 :]):
@@ -135,7 +141,7 @@ def stands(events: Sequence[GuardEvent]) -> bool:
             return True
         if event.name == EventName.FALLBACK_STOP:
             return bool(event.details["stands"])
-        if event.name in _MOVING:
+        if event.name in _MOVING_EVENTS:
             return False
     return False
 

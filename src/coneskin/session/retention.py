@@ -15,10 +15,10 @@ from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_ev
 __all__ = ["AROUND", "prune_part", "prune_run"]
 
 AROUND = 5.0  #: s before and after an event in which all stays
-_KEPT = frozenset({BlockKind.HEADER, BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.EVENT, BlockKind.OVERRUN})
-_EVENTS = frozenset({BlockKind.EVENT})
+_KEPT_KINDS = frozenset({BlockKind.HEADER, BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.EVENT, BlockKind.OVERRUN})
+_EVENT_KINDS = frozenset({BlockKind.EVENT})
 #: events that are no reason to keep what led to them
-_ORDINARY = frozenset(
+_ORDINARY_EVENTS = frozenset(
     {
         EventName.WAITING,
         EventName.ACTIVATED,
@@ -50,12 +50,12 @@ def prune_run(path: Path, around: float = AROUND, progress: Callable[[float], No
     recording = read_recording(path, progress)
     parts = parts_of(path)
     with hold_against_recorder(parts[-1], MAX_SIZE):
-        windows = list(_windows(recording.select(kinds=_EVENTS), around))
+        windows = list(_windows(recording.select(kinds=_EVENT_KINDS), around))
         # a touch may be in what is lost
         lost = [defect for defect in recording.defects if defect.kind is not DefectKind.DROPPED]
         windows += [(defect.since - around, defect.until + around) for defect in lost]
         for part in parts:
-            for _ in prune_file(part, windows, _KEPT):
+            for _ in prune_file(part, windows, _KEPT_KINDS):
                 pass
     return recording.size, sum(part.stat().st_size for part in parts)
 
@@ -66,14 +66,14 @@ def prune_part(path: Path, around: float = AROUND) -> Iterator[None]:
     Raises:
         RecordingError: it cannot be read.
     """
-    yield from prune_file(path, list(_windows(read_recording(path).select(kinds=_EVENTS), around)), _KEPT)
+    yield from prune_file(path, list(_windows(read_recording(path).select(kinds=_EVENT_KINDS), around)), _KEPT_KINDS)
 
 
 def _windows(blocks: Iterable[Block], around: float) -> Iterator[tuple[float, float]]:
     """Yield the times around what is no ordinary event; those that overlap are one."""
     since = until = None
     for block in blocks:
-        if decode_event(block).name in _ORDINARY:
+        if decode_event(block).name in _ORDINARY_EVENTS:
             continue
         if since is None or until is None or block.time - around > until:
             if since is not None and until is not None:

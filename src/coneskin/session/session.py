@@ -9,6 +9,8 @@ channel. The death of a child shows as the end of its channel, and ends in a sto
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -26,25 +28,14 @@ from coneskin.scene.values.scene import Scene
 
 from .arm_client import ArmClient
 from .child_processes import ChildProcesses
-from .deferred_interrupt import defer_interrupts
 from .event_log import EventLog, discard_recording, new_recording
-from .fallback_stop import FallbackStop
-from .guard_monitor import GuardMonitor
-from .manual_reset import ManualReset, latched_stop
-from .outcome import (
-    activation_error,
-    await_outcome,
-    braking_time,
-    exit_error,
-    stands,
-    stop_error,
-)
-from .program_heartbeat import ProgramHeartbeat
+from .guard_monitor import FallbackStop, GuardMonitor
+from .outcome import activation_error, await_outcome, braking_time, exit_error, reasons, stands, stop_error
 
 if TYPE_CHECKING:
     import socket
 
-__all__ = ["Session", "guard"]
+__all__ = ["Session", "defer_interrupts", "guard"]
 
 _START_TIMEOUT = 20.0  # s for the children to start and the guard to become active
 _REASON_TIMEOUT = 5.0  # s for the guard to report why the driver process ended
@@ -109,10 +100,9 @@ class Session:
         self.pressed_by = pressed_by
         self._log = EventLog()
         self._monitor: GuardMonitor | None = None
-        self._heartbeat: ProgramHeartbeat | None = None
         self._processes = ChildProcesses()
         self._arm: ArmClient | None = None
-        self._reset = ManualReset(self._send_guard)
+        self._resets = 0  # asked for so far
 
     @property
     def events(self) -> list[GuardEvent]:
@@ -179,8 +169,6 @@ class Session:
         if self._monitor is not None:
             self._monitor.close()
         self._log.close()
-        if self._heartbeat is not None:
-            self._heartbeat.stop()
         self._processes.close()
 
     def reset(self, timeout: float = 5.0, stop: int | None = None) -> None:
@@ -197,12 +185,23 @@ class Session:
         """
         self.check_guard()
         stop = self.latched_stop if stop is None else stop
-        self._reset.request(self._log, stop, timeout, self._describe_line)
+        if stop == 0:
+            raise RobotRefused("reset refused: no stop that has latched the arm was reported to this program")
+        self._resets += 1
+        request, seen = self._resets, len(self._log.events)
+        self._send_guard(b"reset %d %d" % (stop, request))
+        answers = (EventName.ACTIVATED, EventName.REFUSED)
+        event = self._log.wait_for(answers, timeout, seen, lambda event: event.details.get("request") == request)
+        if event is None or event.name != EventName.ACTIVATED:
+            listed = ["the guard did not become active in time"] if event is None else reasons(event)
+            line = self._describe_line(listed)
+            raise RobotRefused(f"reset refused: {'; '.join([*([line] if line else []), *listed])}")
 
     @property
     def latched_stop(self) -> int:
         """Number of the newest stop that has latched the arm and was reported to this program; 0 before the first."""
-        return latched_stop(self._log.events)
+        events = reversed(self._log.events)
+        return next((int(event.details["stop"]) for event in events if event.name == EventName.LATCHED), 0)
 
     def touch(self, u: float, phi: float, force: float = 5.0, duration: float = 0.3, sensor: str | int = "") -> float:
         """Touch the scene's virtual skin now.
@@ -310,8 +309,6 @@ class Session:
             fallback = FallbackStop(scene)
         self._monitor = GuardMonitor(self._log, channel, fallback, self._describe_line)
         self._monitor.start()
-        self._heartbeat = ProgramHeartbeat(channel)
-        self._heartbeat.start()
 
     def _await_activation(self) -> None:
         end = time.monotonic() + self._start_timeout
@@ -326,3 +323,27 @@ class Session:
                 break
         self.check_guard()
         raise activation_error(self._log.events, self._describe_line)
+
+
+def defer_interrupts(job: Callable[[], None]) -> None:
+    """Do a job to its end, and raise an interrupt only then; the job must have an end.
+
+    Raises:
+        KeyboardInterrupt: a person, or SIGTERM, has interrupted meanwhile; the job is done nevertheless.
+    """
+    noted: list[int] = []
+    before = {}
+    if (
+        threading.current_thread() is threading.main_thread()
+    ):  # interrupts are raised, and can be caught, in this thread only
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if callable(handler := signal.getsignal(number)):  # the default of the system is left alone
+                before[number] = handler
+                signal.signal(number, lambda number, _: noted.append(number))
+    try:
+        job()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if noted:
+        raise KeyboardInterrupt

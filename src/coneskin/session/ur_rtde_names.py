@@ -1,27 +1,33 @@
 """Methods of ur_rtde on the arm of a guarded program, by their names and arguments there, or why one is refused.
 
 A program that was written for RTDEControlInterface, RTDEReceiveInterface and RTDEIOInterface uses the arm in their
-place.
+place. What moves raises ``Collision`` after a touch, where the wheel's method returned False or nothing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
+from datetime import timedelta
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import RobotRefused
+from coneskin.robot.driver.waypoint import Waypoint
 
-from . import ur_rtde_calls as calls
 from .arm_client import ArmClient
-from .ur_rtde_calls import UrRtdeMethod
-from .ur_rtde_refusals import REFUSALS
 
-__all__ = ["NAMES", "UrRtdeArm"]
+__all__ = ["NAMES", "REFUSALS", "UrRtdeArm"]
 
-_PROTECTIVE, _EMERGENCY = 1 << 2, 1 << 7  # bits of safety_status_bits
+_SPEED_HOLD_TIME = (
+    0.5  # s for which a speed holds at least; a program of ur_rtde may rely on its lasting until speedStop
+)
+_SERVO_HOLD_TIME = 0.1  # s for which a position holds at least
+_STEADY_SPEED = 1e-3  # rad/s
+_CYCLE_TIME = 0.002  # s, of the controller
+_PROTECTIVE_BIT, _EMERGENCY_BIT = 1 << 2, 1 << 7  # bits of safety_status_bits
 
 
 class UrRtdeArm(ArmClient):
@@ -46,7 +52,218 @@ class UrRtdeArm(ArmClient):
             return refuse
 
 
-_GETTERS = {
+class _Method(NamedTuple):
+    """One method of ur_rtde on the arm.
+
+    Attributes:
+        call: takes the arm and then the method's own arguments.
+        own: what coneskin calls it, for programs that are written anew.
+        note: how it differs; empty where it does not.
+    """
+
+    call: Callable[..., Any]
+    own: str
+    note: str = ""
+
+
+# ---- moves
+
+
+def _move_j(
+    arm: ArmClient, q: Sequence[Any], speed: float = 1.05, acceleration: float = 1.4, asynchronous: bool = False
+) -> bool:
+    """Move in joint space to positions [rad], in rad/s and rad/s2, or along a path of them."""
+    if _is_path(q):
+        return _path(arm, [Waypoint.move_j(p[:6], *p[6:]) for p in q], asynchronous or speed is True)
+    arm.move_j(q, speed, acceleration, wait=not asynchronous)
+    return True
+
+
+def _move_l(
+    arm: ArmClient, pose: Sequence[Any], speed: float = 0.25, acceleration: float = 1.2, asynchronous: bool = False
+) -> bool:
+    """Move the tool straight to a pose [m, rad], in m/s and m/s2, or along a path of them."""
+    if _is_path(pose):
+        return _path(arm, [Waypoint.move_l(p[:6], *p[6:]) for p in pose], asynchronous or speed is True)
+    arm.move_l(pose, speed, acceleration, wait=not asynchronous)
+    return True
+
+
+def _move_j_ik(
+    arm: ArmClient, pose: Sequence[float], speed: float = 1.05, acceleration: float = 1.4, asynchronous: bool = False
+) -> bool:
+    """Move in joint space to a pose of the tool [m, rad]; speed and acceleration as of ``move_j``."""
+    arm.move_j_ik(pose, speed, acceleration, wait=not asynchronous)
+    return True
+
+
+def _move_l_fk(
+    arm: ArmClient, q: Sequence[float], speed: float = 0.25, acceleration: float = 1.2, asynchronous: bool = False
+) -> bool:
+    """Move the tool straight to where it is at joint positions [rad]; speed and acceleration as of ``move_l``."""
+    arm.move_l_fk(q, speed, acceleration, wait=not asynchronous)
+    return True
+
+
+def _is_path(values: Sequence[Any]) -> bool:
+    return len(values) > 0 and isinstance(values[0], Sequence)
+
+
+def _path(arm: ArmClient, waypoints: Sequence[Waypoint], asynchronous: bool = False) -> bool:
+    arm.move_path(waypoints, wait=not asynchronous)
+    return True
+
+
+def _speed_j(arm: ArmClient, qd: Sequence[float], acceleration: float = 0.5, time: float = 0.0) -> bool:
+    """Move the joints at these speeds [rad/s] for the time [s], or for ``_SPEED_HOLD_TIME`` if that is longer."""
+    arm.speed_j(qd, acceleration, max(time, _SPEED_HOLD_TIME))
+    return True
+
+
+def _speed_l(arm: ArmClient, xd: Sequence[float], acceleration: float = 0.25, time: float = 0.0) -> bool:
+    """Move the tool at this velocity [m/s, rad/s] for the time [s], or for ``_SPEED_HOLD_TIME`` if that is longer."""
+    arm.speed_l(xd, acceleration, max(time, _SPEED_HOLD_TIME))
+    return True
+
+
+def _servo_j(
+    arm: ArmClient, q: Sequence[float], _speed: float, _acceleration: float, time: float, lookahead: float, gain: float
+) -> bool:
+    """Follow joint positions [rad] for the time [s], or for ``_SERVO_HOLD_TIME`` if that is longer."""
+    arm.servo_j(q, max(time, _SERVO_HOLD_TIME), lookahead, gain)
+    return True
+
+
+def _servo_l(
+    arm: ArmClient,
+    pose: Sequence[float],
+    _speed: float,
+    _acceleration: float,
+    time: float,
+    lookahead: float,
+    gain: float,
+) -> bool:
+    """Follow poses of the tool [m, rad] for the time [s], or for ``_SERVO_HOLD_TIME`` if that is longer."""
+    arm.servo_l(pose, max(time, _SERVO_HOLD_TIME), lookahead, gain)
+    return True
+
+
+def _stop(arm: ArmClient, a: float = 10.0, asynchronous: bool = False) -> bool:  # noqa: ARG001
+    """Stop the arm with a deceleration [rad/s2, or m/s2 of the tool]."""
+    arm.stop(a)
+    return True
+
+
+def _stop_j(arm: ArmClient, a: float = 2.0, asynchronous: bool = False) -> None:  # noqa: ARG001
+    """Stop the arm with a deceleration [rad/s2]; this method of ur_rtde returns nothing."""
+    arm.stop(a)
+
+
+def _progress(arm: ArmClient) -> int:
+    """Return the number of the way point to which a move goes, from 0; -1 where none runs."""
+    waypoint = arm.progress()
+    return -1 if waypoint is None else waypoint
+
+
+class _AsyncOperationStatus(NamedTuple):
+    """Answer of getAsyncOperationProgressEx: the way point to which a move goes; None where no move runs."""
+
+    waypoint: int | None
+
+    def isAsyncOperationRunning(self) -> bool:
+        """Tell whether a move runs."""
+        return self.waypoint is not None
+
+    def progress(self) -> int:
+        """Return the number of the way point, from 0."""
+        return self.waypoint or 0
+
+
+# ---- set, ask, read
+
+
+def _set_tcp(arm: ArmClient, pose: Sequence[float]) -> bool:
+    """Set the pose of the tool in the flange's frame [m, rad]."""
+    arm.set_tcp(pose)
+    return True
+
+
+def _set_payload(arm: ArmClient, mass: float, cog: Sequence[float] = (0.0, 0.0, 0.0)) -> bool:
+    """Set what the arm carries: mass [kg] and its centre in the flange's frame [m]."""
+    arm.set_payload(mass, cog)
+    return True
+
+
+def _ask(name: str) -> _Method:
+    """Return the method that asks the controller a question which moves nothing."""
+    return _Method(lambda arm, *values: arm.ask(name, *values), f'ask("{name}", ...)', "while the arm stands")
+
+
+def _read(variable: str) -> _Method:
+    """Return the method that reads a variable of the controller's states."""
+
+    def read(arm: ArmClient) -> Any:
+        value = arm.states.value(variable)
+        return list(value) if isinstance(value, tuple) else value
+
+    return _Method(read, f'states.value("{variable}")')
+
+
+def _is_steady(arm: ArmClient) -> bool:
+    """Tell whether no joint is faster than ``_STEADY_SPEED``."""
+    return arm.states.reading().speed < _STEADY_SPEED
+
+
+def _bit(variable: str) -> Callable[[ArmClient, int], bool]:
+    """Return a function that tells whether a bit of a variable is set."""
+    return lambda arm, n: bool(arm.states.value(variable) >> n & 1)
+
+
+def _set_digital(group: str) -> _Method:
+    """Return the method that switches the digital outputs of a group."""
+
+    def switch(arm: ArmClient, number: int, on: bool) -> bool:
+        arm.outputs.set_digital(number, on, group)
+        return True
+
+    return _Method(switch, f'outputs.set_digital(..., "{group}")')
+
+
+def _set_analog(kind: str) -> _Method:
+    """Return the method that sets analog outputs of a kind, as ratios from 0 to 1."""
+
+    def set_ratio(arm: ArmClient, number: int, ratio: float) -> bool:
+        arm.outputs.set_analog(number, ratio, kind)
+        return True
+
+    return _Method(set_ratio, f'outputs.set_analog(..., "{kind}")')
+
+
+def _set_register(arm: ArmClient, number: int, value: int) -> bool:
+    """Write a whole number into an input register."""
+    arm.outputs.set_register(number, int(value))
+    return True
+
+
+def _set_double(arm: ArmClient, number: int, value: float) -> bool:
+    """Write a number into an input register."""
+    arm.outputs.set_register(number, float(value))
+    return True
+
+
+def _init_period(_: ArmClient) -> timedelta:
+    """Return when a period begins, for ``wait_period``."""
+    return timedelta(seconds=time.monotonic())
+
+
+def _wait_period(_: ArmClient, t_cycle_start: timedelta) -> None:
+    """Wait until a control cycle of 2 ms is over since its beginning."""
+    time.sleep(max(0.0, t_cycle_start.total_seconds() + _CYCLE_TIME - time.monotonic()))
+
+
+# ---- by name
+
+_GETTER_VARIABLES = {
     **{"getTimestamp": "timestamp", "getActualExecutionTime": "actual_execution_time"},
     **{"getActualQ": "actual_q", "getActualQd": "actual_qd", "getActualCurrent": "actual_current"},
     **{"getTargetQ": "target_q", "getTargetQd": "target_qd", "getTargetQdd": "target_qdd"},
@@ -68,76 +285,142 @@ _GETTERS = {
     **{"getStandardAnalogOutput0": "standard_analog_output0", "getStandardAnalogOutput1": "standard_analog_output1"},
     **{"getPayload": "payload", "getPayloadCog": "payload_cog", "getPayloadInertia": "payload_inertia"},
 }
-_QUESTIONS = (  # of robot/ur/ur_rtde.py; a test compares
+_ASKED_NAMES = (  # of robot/ur/ur_rtde.py; a test compares
     *("getForwardKinematics", "getInverseKinematics", "getInverseKinematicsHasSolution", "poseTrans"),
     *("isPoseWithinSafetyLimits", "isJointsWithinSafetyLimits", "getTCPOffset", "getStepTime", "getJointTorques"),
     *("getTargetWaypoint", "getActualJointPositionsHistory", "getActualToolFlangePose", "getTargetJointAccelerations"),
     *("getJacobian", "getJacobianTimeDerivative", "getMassMatrix", "getCoriolisAndCentrifugalTorques"),
 )
-_SILENT = f"the arm is stopped where the next call does not come within {calls.HOLD:g} s, or `time` if that is longer"
-_SILENT_SERVO = f"the arm is stopped where the next call does not come within {calls.SERVO_HOLD:g} s, or `time`"
-_BOTH_STOPS = "each kind of motion has its own stop, whichever is called"
+_SPEED_NOTE = (
+    f"the arm is stopped where the next call does not come within {_SPEED_HOLD_TIME:g} s, or `time` if that is longer"
+)
+_SERVO_NOTE = f"the arm is stopped where the next call does not come within {_SERVO_HOLD_TIME:g} s, or `time`"
+_STOP_NOTE = "each kind of motion has its own stop, whichever is called"
 
 #: name in ur_rtde -> what answers it
-NAMES: Mapping[str, UrRtdeMethod] = MappingProxyType(
+NAMES: Mapping[str, _Method] = MappingProxyType(
     {
-        "moveJ": UrRtdeMethod(calls.move_j, "move_j, move_path"),
-        "moveJ_IK": UrRtdeMethod(calls.move_j_ik, "move_j_ik"),
-        "moveL": UrRtdeMethod(calls.move_l, "move_l, move_path"),
-        "moveL_FK": UrRtdeMethod(calls.move_l_fk, "move_l_fk"),
-        "speedJ": UrRtdeMethod(calls.speed_j, "speed_j", _SILENT),
-        "speedL": UrRtdeMethod(calls.speed_l, "speed_l", _SILENT),
-        "servoJ": UrRtdeMethod(calls.servo_j, "servo_j", _SILENT_SERVO),
-        "servoL": UrRtdeMethod(calls.servo_l, "servo_l", _SILENT_SERVO),
-        "speedStop": UrRtdeMethod(calls.stop, "stop", _BOTH_STOPS),
-        "servoStop": UrRtdeMethod(calls.stop, "stop", _BOTH_STOPS),
-        "stopJ": UrRtdeMethod(calls.stop_j, "stop", f"never asynchronous; {_BOTH_STOPS}"),
-        "stopL": UrRtdeMethod(calls.stop, "stop", f"never asynchronous; {_BOTH_STOPS}"),
-        "stopScript": UrRtdeMethod(calls.stop, "stop", "stops the arm; the session ends the program on the controller"),
-        "getAsyncOperationProgress": UrRtdeMethod(calls.progress, "progress"),
-        "getAsyncOperationProgressEx": UrRtdeMethod(
-            lambda arm: calls.AsyncOperationStatus(arm.progress()),
+        "moveJ": _Method(_move_j, "move_j, move_path"),
+        "moveJ_IK": _Method(_move_j_ik, "move_j_ik"),
+        "moveL": _Method(_move_l, "move_l, move_path"),
+        "moveL_FK": _Method(_move_l_fk, "move_l_fk"),
+        "speedJ": _Method(_speed_j, "speed_j", _SPEED_NOTE),
+        "speedL": _Method(_speed_l, "speed_l", _SPEED_NOTE),
+        "servoJ": _Method(_servo_j, "servo_j", _SERVO_NOTE),
+        "servoL": _Method(_servo_l, "servo_l", _SERVO_NOTE),
+        "speedStop": _Method(_stop, "stop", _STOP_NOTE),
+        "servoStop": _Method(_stop, "stop", _STOP_NOTE),
+        "stopJ": _Method(_stop_j, "stop", f"never asynchronous; {_STOP_NOTE}"),
+        "stopL": _Method(_stop, "stop", f"never asynchronous; {_STOP_NOTE}"),
+        "stopScript": _Method(_stop, "stop", "stops the arm; the session ends the program on the controller"),
+        "getAsyncOperationProgress": _Method(_progress, "progress"),
+        "getAsyncOperationProgressEx": _Method(
+            lambda arm: _AsyncOperationStatus(arm.progress()),
             "progress",
             "isAsyncOperationRunning and progress alone",
         ),
-        "setTcp": UrRtdeMethod(calls.set_tcp, "set_tcp", "while the arm stands"),
-        "setPayload": UrRtdeMethod(calls.set_payload, "set_payload", "while the arm stands"),
-        **{name: calls.ask(name) for name in _QUESTIONS},
-        "isSteady": UrRtdeMethod(
-            calls.is_steady, "states.reading().speed", f"no joint faster than {calls.STEADY:g} rad/s"
-        ),
-        "isProgramRunning": UrRtdeMethod(
+        "setTcp": _Method(_set_tcp, "set_tcp", "while the arm stands"),
+        "setPayload": _Method(_set_payload, "set_payload", "while the arm stands"),
+        **{name: _ask(name) for name in _ASKED_NAMES},
+        "isSteady": _Method(_is_steady, "states.reading().speed", f"no joint faster than {_STEADY_SPEED:g} rad/s"),
+        "isProgramRunning": _Method(
             lambda arm: arm.states.reading().program_running, "states.reading().program_running"
         ),
-        "isProtectiveStopped": UrRtdeMethod(
-            lambda arm: bool(arm.states.value("safety_status_bits") & _PROTECTIVE), "states.reading().safety_mode"
+        "isProtectiveStopped": _Method(
+            lambda arm: bool(arm.states.value("safety_status_bits") & _PROTECTIVE_BIT), "states.reading().safety_mode"
         ),
-        "isEmergencyStopped": UrRtdeMethod(
-            lambda arm: bool(arm.states.value("safety_status_bits") & _EMERGENCY), "states.reading().safety_mode"
+        "isEmergencyStopped": _Method(
+            lambda arm: bool(arm.states.value("safety_status_bits") & _EMERGENCY_BIT), "states.reading().safety_mode"
         ),
-        **{name: calls.read(variable) for name, variable in _GETTERS.items()},
-        "getSpeedScalingCombined": UrRtdeMethod(
+        **{name: _read(variable) for name, variable in _GETTER_VARIABLES.items()},
+        "getSpeedScalingCombined": _Method(
             lambda arm: math.prod(map(arm.states.value, ("speed_scaling", "target_speed_fraction"))),
             'states.value("speed_scaling")',
         ),
-        "getDigitalInState": UrRtdeMethod(calls.bit("actual_digital_input_bits"), "states.reading().digital_input"),
-        "getDigitalOutState": UrRtdeMethod(calls.bit("actual_digital_output_bits"), "states.reading().digital_output"),
-        "getOutputIntRegister": UrRtdeMethod(
+        "getDigitalInState": _Method(_bit("actual_digital_input_bits"), "states.reading().digital_input"),
+        "getDigitalOutState": _Method(_bit("actual_digital_output_bits"), "states.reading().digital_output"),
+        "getOutputIntRegister": _Method(
             lambda arm, n: arm.states.value(f"output_int_register_{n}"), 'states.value("output_int_register_...")'
         ),
-        "getOutputDoubleRegister": UrRtdeMethod(
+        "getOutputDoubleRegister": _Method(
             lambda arm, n: arm.states.value(f"output_double_register_{n}"), 'states.value("output_double_register_...")'
         ),
-        "setStandardDigitalOut": calls.set_digital("standard"),
-        "setConfigurableDigitalOut": calls.set_digital("configurable"),
-        "setToolDigitalOut": calls.set_digital("tool"),
-        "setAnalogOutputVoltage": calls.set_analog("voltage"),
-        "setAnalogOutputCurrent": calls.set_analog("current"),
-        "setInputIntRegister": UrRtdeMethod(calls.set_register, "outputs.set_register"),
-        "setInputDoubleRegister": UrRtdeMethod(calls.set_double, "outputs.set_register"),
-        "initPeriod": UrRtdeMethod(calls.init_period, "time.monotonic"),
-        "waitPeriod": UrRtdeMethod(calls.wait_period, "time.sleep", "periods of 2 ms"),
-        "isConnected": UrRtdeMethod(lambda arm: arm.connected, "connected"),
-        "disconnect": UrRtdeMethod(lambda arm: arm.close(), "close", "the arm stays guarded until the session ends"),
+        "setStandardDigitalOut": _set_digital("standard"),
+        "setConfigurableDigitalOut": _set_digital("configurable"),
+        "setToolDigitalOut": _set_digital("tool"),
+        "setAnalogOutputVoltage": _set_analog("voltage"),
+        "setAnalogOutputCurrent": _set_analog("current"),
+        "setInputIntRegister": _Method(_set_register, "outputs.set_register"),
+        "setInputDoubleRegister": _Method(_set_double, "outputs.set_register"),
+        "initPeriod": _Method(_init_period, "time.monotonic"),
+        "waitPeriod": _Method(_wait_period, "time.sleep", "periods of 2 ms"),
+        "isConnected": _Method(lambda arm: arm.connected, "connected"),
+        "disconnect": _Method(lambda arm: arm.close(), "close", "the arm stays guarded until the session ends"),
+    }
+)
+
+# ---- refused
+
+_BY_HAND = "use it in a program without the guard, or guard a program on the controller with control = external"
+_FORCE_REASON = (
+    "in it the arm moves with what pushes it, so that a stop of the guard cannot be told from it by measured speed; "
+    + _BY_HAND
+)
+_PROGRAM_REASON = (
+    "a program on the controller would replace the one that the guard stops; run it with control = external, where the "
+    "guard stops whatever runs"
+)
+_WATCHDOG_REASON = "the driver process keeps the controller's watchdog (arm.watchdog_hz); leave the call out"
+_CONTACT_REASON = (
+    "a touch that the controller notices by its motors' currents comes long after the skin's; leave the call out"
+)
+_RESTART_REASON = (
+    "a connection that is gone has stopped the arm, and a person has to look: end the session and start a new one"
+)
+_RECORDING_REASON = (
+    "the session records all that it hears; for more, use an RTDEReceiveInterface beside the guard: it only reads"
+)
+
+#: name in ur_rtde -> why it is refused, and what to do
+REFUSALS: Mapping[str, str] = MappingProxyType(
+    {
+        "movePath": "its Path is an object of the wheel that cannot be read: call move_path with a list of cs.Waypoint",
+        "servoC": "the wheel's own program loses what follows it, a stop included: use servoL, or moveL with blends",
+        "moveUntilContact": "it moves until something is hit: call speedL in a loop, and read getActualTCPForce",
+        "jogStart": "it moves on without an end if the program hangs: call speedL in a loop",
+        "jogStop": "there is no jogging to stop: call stop",
+        "directTorque": f"it moves the arm by torques alone; {_FORCE_REASON}",
+        "forceMode": _FORCE_REASON,
+        "forceModeStop": "there is no force mode to stop: leave the call out",
+        "forceModeSetDamping": "there is no force mode to set up: leave the call out",
+        "forceModeSetGainScaling": "there is no force mode to set up: leave the call out",
+        "freedriveMode": _FORCE_REASON,
+        "endFreedriveMode": "there is no freedrive to end: leave the call out",
+        "getFreedriveStatus": "there is no freedrive: leave the call out",
+        "teachMode": _FORCE_REASON,
+        "endTeachMode": "there is no teach mode to end: leave the call out",
+        "startContactDetection": _CONTACT_REASON,
+        "stopContactDetection": _CONTACT_REASON,
+        "readContactDetection": _CONTACT_REASON,
+        "toolContact": _CONTACT_REASON,
+        "zeroFtSensor": f"it changes what the controller's own safety system may rely on; {_BY_HAND}",
+        "enableExternalFtSensor": f"it changes what the controller's own safety system may rely on; {_BY_HAND}",
+        "ftRtdeInputEnable": f"it changes what the controller's own safety system may rely on; {_BY_HAND}",
+        "setExternalForceTorque": f"it changes what the controller's own safety system may rely on; {_BY_HAND}",
+        "setGravity": "it follows from how the arm is mounted: set it in the controller's installation",
+        "setTargetPayload": "it changes the payload while the arm moves: call setPayload while it stands",
+        "setSpeedSlider": "the slider is a stop path of the guard: scale the speeds of the program",
+        "setWatchdog": _WATCHDOG_REASON,
+        "kickWatchdog": _WATCHDOG_REASON,
+        "triggerProtectiveStop": "only a person can unlock one: call stop, or end the session",
+        "sendCustomScript": _PROGRAM_REASON,
+        "sendCustomScriptFile": _PROGRAM_REASON,
+        "sendCustomScriptFunction": _PROGRAM_REASON,
+        "setCustomScriptFile": _PROGRAM_REASON,
+        "reuploadScript": f"after a stop session.reset() starts it, because a person has looked; {_PROGRAM_REASON}",
+        "reconnect": _RESTART_REASON,
+        "startFileRecording": _RECORDING_REASON,
+        "stopFileRecording": _RECORDING_REASON,
+        "unlockProtectiveStop": "no protective stop is ever unlocked by a program: a person does it on the pendant",
     }
 )

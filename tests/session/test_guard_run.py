@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from coneskin.core.errors import RobotRefused
-from coneskin.session.arm_lock import ArmLock
+from coneskin.session.guard_run import ArmLock
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names of sockets that need no file")
 

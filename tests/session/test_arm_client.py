@@ -8,8 +8,7 @@ from coneskin.core.channel import Channel, decode_json, encode_json, pair, wait_
 from coneskin.core.errors import Collision, KinematicsError, RobotConnectionError, RobotRefused
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.waypoint import Waypoint
-from coneskin.session.arm_client import ArmClient
-from coneskin.session.arm_requests import ArmRequests
+from coneskin.session.arm_client import ArmClient, ArmRequests
 
 
 @pytest.fixture
