@@ -47,7 +47,7 @@ def main() -> None:
     for halvings in arguments.halvings or (1, 3):
         with tempfile.TemporaryDirectory() as folder:
             faces = write_fine(arguments.link, halvings, Path(folder, "link.stl"))
-            for words in ([], ["--round-only"]):
+            for words in ([], ["--set", "search.round_only=true"]):
                 out = Path(folder, f"out{len(words)}")
                 command = [sys.executable, "-m", "coneskin", "design", str(Path(folder, "link.stl")), "-o", str(out)]
                 start = time.perf_counter()

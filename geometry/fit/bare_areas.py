@@ -54,7 +54,7 @@ def hull_note(mesh: Mesh, samples: SurfaceSamples, visual: bool = False) -> str:
     )
     if visual:
         return f"{found} lost the tubes; it is called visual, and taken for the link: hold the test piece against that"
-    asked = "use the visual mesh of the link, or allow_hull (--allow-hull) if this is the visual mesh"
+    asked = "use the visual mesh of the link, or allow_hull (--set search.allow_hull=true) if this is the visual mesh"
     return f"{found} lost the tubes; {asked}"
 
 

@@ -138,7 +138,7 @@ def _reason(
     several = " and " in names
     whose = f"the seams of sheets {names} face" if several else f"the seam of sheet {names} faces"
     where = f"{whose} ({x}, {y}, {z}) of the link's frame"
-    other = "--seam or --touch-side put it elsewhere"
+    other = "--seam puts it elsewhere"
     if flattest:
         return f"{where}, where the link is flattest, because a seam over a sharp bend peels; {other}"
     if shielded - least < _SHIELDED:

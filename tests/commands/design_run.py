@@ -8,6 +8,11 @@ def design(*words):
     return main(["design", *words, "--no-pictures"])
 
 
+def sets(*settings):
+    """Return the words that set some options."""
+    return [word for setting in settings for word in ("--set", setting)]
+
+
 def sensor_of(folder):
     problems = []
     table = merge_sensor_file({"file": "sensor.toml"}, "sensor", folder, problems)

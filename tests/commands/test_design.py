@@ -9,10 +9,10 @@ import tomllib
 import pytest
 
 from coneskin.cli import main
-from coneskin.commands.arguments.design import EXAMPLES
+from coneskin.commands.design import EXAMPLES
 from coneskin.design import files as design_files
 
-from .design_run import design, sensor_of
+from .design_run import design, sensor_of, sets
 
 CYLINDER = ["--radius1-mm", "54", "--height-mm", "200"]
 BALL = ["--radius1-mm", "40", "--radius2-mm", "70", "--height-mm", "150", "--radius3-mm", "40", "--height2-mm", "150"]
@@ -76,7 +76,7 @@ def test_sensor_file_loads_and_its_corners_are_the_inner_corners_of_the_electrod
 
 
 def test_two_sheets_of_a_rugby_ball_keep_the_gap_and_lead_their_wires_away(tmp_path, capsys):
-    assert design(*BALL, "--sheet-gap-mm", "2", "--json", "-o", str(tmp_path / "out")) == 0
+    assert design(*BALL, *sets("sheet.sheet_gap_mm=2"), "--json", "-o", str(tmp_path / "out")) == 0
     data = json.loads(capsys.readouterr().out)
     first, second = data["sheets"]
     end = first["link_cone"]["xyz_mm"][2] + first["link_cone"]["height_mm"]
@@ -101,7 +101,7 @@ def test_two_sheets_of_a_waist_are_trimmed_until_their_outer_faces_clear(tmp_pat
         "--height2-mm",
         "150",
     ]
-    assert design(*waist, "--sheet-gap-mm", "1", "-o", str(tmp_path / "out")) == 0
+    assert design(*waist, *sets("sheet.sheet_gap_mm=1"), "-o", str(tmp_path / "out")) == 0
     data = json.loads((tmp_path / "out" / "design.json").read_text())
     assert data["sheets"][0]["gap_to_next_mm"]["outer"] == pytest.approx(1.0, abs=1e-3)
     assert data["sheets"][0]["gap_to_next_mm"]["inner"] == pytest.approx(
@@ -110,7 +110,7 @@ def test_two_sheets_of_a_waist_are_trimmed_until_their_outer_faces_clear(tmp_pat
 
 
 def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
-    assert design(*CYLINDER, "--seam-gap-mm", "1.5", "-o", str(tmp_path / "out")) == 0
+    assert design(*CYLINDER, *sets("sheet.seam_gap_mm=1.5"), "-o", str(tmp_path / "out")) == 0
     cone = json.loads((tmp_path / "out" / "design.json").read_text())["sheets"][0]["link_cone"]
     assert math.radians(360.0 - cone["wrap_deg"]) * 54.0 == pytest.approx(1.5, abs=1e-4)
     assert cone["rpy_deg"][2] == pytest.approx((360.0 - cone["wrap_deg"]) / 2, abs=1e-4)
@@ -122,8 +122,6 @@ def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
         (["--height-mm", "100"], "name a mesh file, or give --radius1-mm and --height-mm"),
         ([*CYLINDER, "--wrap-deg", "361"], "--wrap-deg must be above 0 to 360 deg, got 361.0"),
         ([*CYLINDER, "--wrap-deg", "nan"], "--wrap-deg must be above 0 to 360 deg, got nan"),
-        ([*CYLINDER, "--margin-mm", "150"], "the sheet measures 200 mm from end to end; margins of 150 mm"),
-        ([*CYLINDER, "--margin-mm", "94"], "of 94 mm and electrodes of 6 mm on both sides leave less than 1 mm active"),
         ([*CYLINDER, "--radius1-mm", "-5"], "--radius1-mm must be 0 or from 1 to 5000 mm, got -5.0 mm"),
         ([*CYLINDER, "--radius1-mm", "nan"], "--radius1-mm must be 0 or from 1 to 5000 mm, got nan mm"),
         ([*CYLINDER, "--radius1-mm", "1e300"], "--radius1-mm must be 0 or from 1 to 5000 mm, got 1e+300 mm"),
@@ -132,39 +130,8 @@ def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
         ([*CYLINDER, "--radius2-mm", "0"], "sheet 1: a sheet cannot reach an apex"),
         ([*CYLINDER, "--height-mm", "0"], "height must be above 0 where both radii are equal"),
         ([*CYLINDER, "--radius3-mm", "30"], "a second cone needs both --radius3-mm and --height2-mm"),
-        ([*CYLINDER, "--thickness-mm", "1", "1", "0", "1", "1"], "thickness of isolation must be above 0 and at most"),
-        ([*CYLINDER, "--neutral", "0", "0", "2", "0", "0"], "neutral factor of isolation must be in [0, 1], got 2.0"),
-        ([*CYLINDER, "--kerf-mm", "-1"], "kerf must be finite and not negative, got -1 mm"),
-        ([*CYLINDER, "--kerf-mm", "20"], "is larger than a detail"),
-        ([*CYLINDER, "--seam-gap-mm", "-1"], "seam gap must be finite and not negative, got -1 mm; for a flap use"),
-        ([*CYLINDER, "--seam-gap-mm", "400"], "seam gap of 400 mm takes the whole narrow end, 339.3 mm"),
-        ([*CYLINDER, "--sheet-gap-mm", "inf"], "sheet gap must be finite and not negative, got inf mm"),
-        ([*BALL, "--sheet-gap-mm", "400"], "sheet 1: the gap to its neighbours takes"),
-        ([*CYLINDER, "--cut-tolerance-mm", "0"], "the tolerance of the cut must be from 0.0001 to 1 mm, got 0 mm"),
-        ([*CYLINDER, "--arcs", "flattened", "--cut-tolerance-mm", "1e-9"], "from 0.0001 to 1 mm, got 1e-09 mm"),
-        ([*CYLINDER, "--cut-tolerance-mm", "nan"], "from 0.0001 to 1 mm, got nan mm"),
-        ([*CYLINDER, "--overlap-mm", "400"], "an overlap must be at most 25% of the narrow end, 84.82 mm, got 400 mm"),
-        ([*CYLINDER, "--wrap-deg", "300", "--overlap-mm", "5"], "an overlap closes the seam of a full wrap"),
-        ([*CYLINDER, "--thickness-mm", "100", "1", "1", "1", "1"], "lower substrate must be above 0 and at most 20 mm"),
-        ([*CYLINDER, "--radius1-mm", "10", "--thickness-mm", "20", "1", "1", "1", "1"], "is strained by -50% at the"),
-        ([*CYLINDER, "--adc-bits", "0"], "sheet 1: adc_bits must be a whole number from 8 to 16, got 0"),
-        ([*CYLINDER, "--adc-bits", "20"], "sheet 1: adc_bits must be a whole number from 8 to 16, got 20"),
-        (
-            [*CYLINDER, "--upper-sheet-ohm", "1", "--current-full-scale-ma", "20"],
-            "current_full_scale_ma must suit the normal drive current",
-        ),
-        ([*CYLINDER, "--supply-v", "3.3"], "supply_v must be at most 95 % of adc_v"),
-        ([*CYLINDER, "--overlap-mm", "5", "--wires", "edge1"], "an overlap at edge1 would cover the tabs"),
         (["nowhere.stl"], "nowhere.stl"),
         ([*CYLINDER, "--seam", "0", "0", "0"], "--seam is for a mesh: by its dimensions a link has no directions"),
-        ([*CYLINDER, "--touch-side", "1", "0", "0"], "--touch-side is for a mesh"),
-        ([*CYLINDER, "--cover-seam", "--wrap-deg", "180"], "no sheet has a seam to cover: the widest wraps 180 deg"),
-        (
-            [*CYLINDER, "--bed-mm", "1e-9", "1e-9"],
-            "a bed is from 50 to 10000 mm wide and deep, with gaps from 0 to 100",
-        ),
-        ([*CYLINDER, "--bed-mm", "600", "nan"], "a bed is from 50 to 10000 mm wide and deep"),
-        ([*CYLINDER, "--tab-mm", "nan"], "tab must be 0 or finite and at least 0.1 mm, got nan mm"),
         (["nowhere.stl", "--radius1-mm", "5"], "a mesh and --radius1-mm cannot go together"),
     ],
 )
@@ -173,6 +140,82 @@ def test_a_mistake_is_one_clear_line_and_leaves_nothing(words, line, tmp_path, c
     errors = [row for row in capsys.readouterr().err.splitlines() if row.startswith("coneskin design:")]
     assert len(errors) == 1
     assert line in errors[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "settings", "line"),
+    [
+        (CYLINDER, "electrodes.margin_mm=150", "the sheet measures 200 mm from end to end; margins of 150 mm"),
+        (
+            CYLINDER,
+            "electrodes.margin_mm=94",
+            "of 94 mm and electrodes of 6 mm on both sides leave less than 1 mm active",
+        ),
+        (
+            CYLINDER,
+            "layers.thickness_mm=[1, 1, 0, 1, 1]",
+            "thickness_mm[2] must be above 0 to 20 mm, got 0.0 mm",
+        ),
+        (
+            CYLINDER,
+            "layers.neutral_factor=[0, 0, 2, 0, 0]",
+            "neutral_factor[2] must be from 0 to 1, got 2",
+        ),
+        (CYLINDER, "drawings.kerf_mm=-1", "kerf_mm must be at least 0 mm, got -1.0 mm"),
+        (CYLINDER, "drawings.kerf_mm=20", "is larger than a detail"),
+        (CYLINDER, "sheet.seam_gap_mm=-1", "seam_gap_mm must be at least 0 mm, got -1.0 mm"),
+        (CYLINDER, "sheet.seam_gap_mm=400", "seam gap of 400 mm takes the whole narrow end, 339.3 mm"),
+        (CYLINDER, "sheet.sheet_gap_mm=inf", "sheet_gap_mm must be at least 0 mm, got inf mm"),
+        (BALL, "sheet.sheet_gap_mm=400", "sheet 1: the gap to its neighbours takes"),
+        (
+            CYLINDER,
+            "drawings.tolerance_mm=0",
+            "tolerance_mm must be from 0.0001 to 1 mm, got 0.0 mm",
+        ),
+        (CYLINDER, "drawings.arcs=flattened; drawings.tolerance_mm=1e-9", "from 0.0001 to 1 mm, got 1e-09 mm"),
+        (CYLINDER, "drawings.tolerance_mm=nan", "from 0.0001 to 1 mm, got nan mm"),
+        (CYLINDER, "sheet.overlap_mm=400", "an overlap must be at most 25% of the narrow end, 84.82 mm, got 400 mm"),
+        ([*CYLINDER, "--wrap-deg", "300"], "sheet.overlap_mm=5", "an overlap closes the seam of a full wrap"),
+        (
+            CYLINDER,
+            "layers.thickness_mm=[100, 1, 1, 1, 1]",
+            "thickness_mm[0] must be above 0 to 20 mm, got 100.0 mm",
+        ),
+        ([*CYLINDER, "--radius1-mm", "10"], "layers.thickness_mm=[20, 1, 1, 1, 1]", "is strained by -50% at the"),
+        (CYLINDER, "electronics.adc_bits=0", "adc_bits must be a whole number from 8 to 16, got 0"),
+        (CYLINDER, "electronics.adc_bits=20", "adc_bits must be a whole number from 8 to 16, got 20"),
+        (
+            CYLINDER,
+            "electronics.upper_sheet_ohm=1; electronics.current_full_scale_ma=20",
+            "current_full_scale_ma must suit the normal drive current",
+        ),
+        (CYLINDER, "electronics.supply_v=3.3", "supply_v must be at most 95 % of adc_v"),
+        (CYLINDER, "sheet.overlap_mm=5; sheet.wires=edge1", "an overlap at edge1 would cover the tabs"),
+        (CYLINDER, "search.touch_side=[1, 0, 0]", "search.touch_side is for a mesh"),
+        (
+            [*CYLINDER, "--wrap-deg", "180"],
+            "sheet.cover_seam=true",
+            "no sheet has a seam to cover: the widest wraps 180 deg",
+        ),
+        (
+            CYLINDER,
+            "drawings.bed_mm=[1e-9, 1e-9]",
+            "bed_mm[0] must be from 50 to 10000 mm, got 1e-09 mm",
+        ),
+        (CYLINDER, "drawings.bed_mm=[600, nan]", "bed_mm[1] must be from 50 to 10000 mm, got nan mm"),
+        (CYLINDER, "electrodes.tab_mm=nan", "tab_mm must be at least 0 mm, got nan mm"),
+        (CYLINDER, "kerf_mm=0.2", "write TABLE.KEY=VALUE, as in --set drawings.kerf_mm=0.2; got --set kerf_mm=0.2"),
+        (CYLINDER, "drawing.kerf_mm=0.2", "--set drawing: unknown table; did you mean drawings?"),
+        (CYLINDER, "drawings.kerf=0.2", "--set drawings: unknown key kerf; did you mean kerf_mm?"),
+        (CYLINDER, "drawings.page=A5", "page must be one of A4, A3, Letter, got 'A5'"),
+        (CYLINDER, "drawings.kerf_mm=wide", "kerf_mm must be a number [mm], got 'wide'"),
+    ],
+)
+def test_a_wrong_setting_is_one_clear_line_and_leaves_nothing(words, settings, line, tmp_path, capsys):
+    assert design(*words, *sets(*settings.split("; ")), "-o", str(tmp_path / "out")) == 1
+    (error,) = (row for row in capsys.readouterr().err.splitlines() if row.startswith("coneskin design:"))
+    assert line in error
     assert list(tmp_path.iterdir()) == []
 
 
@@ -197,11 +240,11 @@ def test_a_folder_is_replaced_only_by_force_and_only_if_it_is_a_design(tmp_path,
     out = tmp_path / "out"
     assert design(*CYLINDER, "-o", str(out)) == 0
     before = (out / "sensor.toml").read_text()
-    assert design(*CYLINDER, "--margin-mm", "8", "-o", str(out)) == 1
+    assert design(*CYLINDER, *sets("electrodes.margin_mm=8"), "-o", str(out)) == 1
     assert "exists already: choose another folder, or replace the design there (--force" in capsys.readouterr().err
     assert (out / "sensor.toml").read_text() == before
     (out / "old.txt").write_text("old")
-    assert design(*CYLINDER, "--margin-mm", "8", "--force", "-o", str(out)) == 0
+    assert design(*CYLINDER, *sets("electrodes.margin_mm=8"), "--force", "-o", str(out)) == 0
     assert (out / "sensor.toml").read_text() != before
     assert (out / "old.txt").read_text() == "old"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
@@ -244,8 +287,9 @@ def test_missing_packages_are_named(tmp_path, monkeypatch, capsys):
 
 
 def test_numbers_of_the_report_are_those_of_the_drawings(tmp_path):
-    words = [*CYLINDER, "--assembly", "bonded", "--adc-bits", "10", "--supply-v", "3.0", "--material", *"abcde"]
-    words += ["--upper-sheet-ohm", "500", "--lower-sheet-ohm", "2000", "--current-full-scale-ma", "30"]
+    words = [*CYLINDER, *sets("layers.assembly=bonded", "layers.material=['a', 'b', 'c', 'd', 'e']")]
+    words += sets("electronics.adc_bits=10", "electronics.supply_v=3.0", "electronics.current_full_scale_ma=30")
+    words += sets("electronics.upper_sheet_ohm=500", "electronics.lower_sheet_ohm=2000")
     assert design(*words, "-o", str(tmp_path / "out")) == 0
     report = (tmp_path / "out" / "report.md").read_text()
     assert "Assembly: bonded" in report
@@ -274,9 +318,18 @@ def test_sensor_file_holds_every_digit_of_the_shape_and_a_pose_to_read(tmp_path)
 @pytest.mark.parametrize(
     "words",
     [
-        ["--radius1-mm", "60", "--radius2-mm", "160", "--height-mm", "0", "--current-full-scale-ma", "50"],
-        ["--radius1-mm", "50", "--radius2-mm", "150", "--height-mm", "85", "--wires", "end2"],
-        [*BALL, "--wrap-deg", "200", "--wires", "edge1"],
+        [
+            "--radius1-mm",
+            "60",
+            "--radius2-mm",
+            "160",
+            "--height-mm",
+            "0",
+            "--set",
+            "electronics.current_full_scale_ma=50",
+        ],
+        ["--radius1-mm", "50", "--radius2-mm", "150", "--height-mm", "85", *sets("sheet.wires=end2")],
+        [*BALL, "--wrap-deg", "200", *sets("sheet.wires=edge1")],
     ],
 )
 def test_pictures_of_discs_wide_sectors_and_partial_wraps(words, tmp_path):

@@ -1,6 +1,5 @@
 """Folder of ``coneskin design``: a person's files in it stay, signals leave nothing, names may be no text."""
 
-import argparse
 import itertools
 import json
 import math
@@ -8,9 +7,10 @@ import os
 import signal
 import struct
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,6 +18,7 @@ from coneskin import cli
 from coneskin.cli import main
 from coneskin.commands import design as command
 from coneskin.design import files as design_files
+from coneskin.design import link_design
 from coneskin.design.link import LinkMesh
 from coneskin.geometry.fit.cones import LinkFit
 
@@ -46,11 +47,11 @@ def turned(profile: list[tuple[float, float]], sides: int = 72) -> Iterator[Tria
 
 def test_a_replaced_design_leaves_what_a_person_put_beside_it(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert design(*CYLINDER, "--wires", "end2", "-o", str(out)) == 0
+    assert design(*CYLINDER, "--set", "sheet.wires=end2", "-o", str(out)) == 0
     (out / "notes").mkdir()
     (out / "notes" / "thesis.tex").write_text("years of work")
     (out / "link").symlink_to(tmp_path)
-    assert design(*CYLINDER, "--margin-mm", "8", "--force", "-o", str(out)) == 0
+    assert design(*CYLINDER, "--set", "electrodes.margin_mm=8", "--force", "-o", str(out)) == 0
     assert (out / "notes" / "thesis.tex").read_text() == "years of work"
     assert (out / "link").is_symlink()
     listed = set(json.loads((out / "design.json").read_text())["files"])
@@ -113,13 +114,13 @@ def test_a_mesh_whose_name_is_no_text_is_designed(tmp_path: Path) -> None:
     """With LC_ALL=C, or from another computer, the bytes of a name may be no UTF-8."""
     mesh = tmp_path / os.fsdecode(b"\xe4rm.stl")
     write_stl(mesh, list(turned([(0.0, 0.05), (0.2, 0.05)])))
-    words = ["--material", "weiß", "Папір", "net", "paper", "foam"]
+    words = ["--set", "layers.material=['weiß', 'Папір', 'net', 'paper', 'foam']"]
     assert design(str(mesh), *words, "-o", str(tmp_path / "out")) == 0
     assert "\\udce4rm" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     drawing = (tmp_path / "out" / "cut" / "1-lower-substrate.svg").read_text(encoding="utf-8")
     assert ">?rm: sheet 1<" in drawing
     assert ">weiss 2.50 mm<" in drawing
-    assert design(str(mesh), "--material", "a\nb", *"cdef", "-o", str(tmp_path / "bad")) == 1
+    assert design(str(mesh), "--set", 'layers.material=["a\\nb", "c", "d", "e", "f"]', "-o", str(tmp_path / "bad")) == 1
 
 
 def test_a_package_of_a_urdf_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -152,14 +153,14 @@ def test_no_share_is_said_that_prints_as_none(
 ) -> None:
     """Beside holes over 0.02 % of a sheet each."""
     write_stl(tmp_path / "tube.stl", list(turned([(0.0, 0.05), (0.2, 0.05)])))
-    found = command._load_and_fit
+    found = link_design.fit_link
 
-    def with_holes(args: argparse.Namespace, say: Callable[[str], None]) -> tuple[LinkMesh, LinkFit]:
-        source, fit = found(args, say)
+    def with_holes(*args: Any, **search: Any) -> tuple[LinkMesh, LinkFit]:
+        source, fit = found(*args, **search)
         sheets = (replace(sheet, bridged_share=0.0002 * holes, bridged_depth=0.05) for sheet in fit.sheets)
         return source, replace(fit, sheets=tuple(sheets))
 
-    monkeypatch.setattr(command, "_load_and_fit", with_holes)
+    monkeypatch.setattr(link_design, "fit_link", with_holes)
     assert design(str(tmp_path / "tube.stl"), "-o", str(tmp_path / "out")) == 0
     assert ("spans holes" in capsys.readouterr().out) == said
 
@@ -173,7 +174,7 @@ def test_a_step_file_that_cannot_be_written_is_refused_before_the_search(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "OCP", None)
-    assert design("nowhere.stl", "--step", "-o", str(tmp_path / "out")) == 1
+    assert design("nowhere.stl", "--set", "drawings.step=true", "-o", str(tmp_path / "out")) == 1
     err = capsys.readouterr().err
     assert "pip install 'coneskin[cad]'" in err
     assert "reading" not in err

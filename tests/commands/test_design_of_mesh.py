@@ -21,11 +21,14 @@ DATA = SHARED_DATA
     ("words", "line"),
     [
         (["--seam", "0", "0", "0"], "--seam takes a direction X Y Z, finite and not 0 0 0, got 0.0 0.0 0.0"),
-        (["--touch-side", "0", "0", "0"], "--touch-side takes a direction X Y Z"),
+        (["--set", "search.touch_side=[0, 0, 0]"], "search.touch_side must be a direction X, Y, Z that is not 0, 0, 0"),
         (["--seam", "nan", "0", "0"], "--seam takes a direction X Y Z, finite and not 0 0 0, got nan 0.0 0.0"),
-        (["--max-bridge-mm", "1e6"], "max_bridge must be at most 100 mm, got 1e+06 mm"),
-        (["--tolerance-mm", "1e9"], "tolerance must be at most 20 mm, got 1e+09 mm"),
-        (["--tolerance-mm", "nan"], "tolerance must be above 0 mm, got nan mm"),
+        (
+            ["--set", "search.max_bridge_mm=1e6"],
+            "--set search.max_bridge_mm must be above 0 to 100 mm, got 1000000.0 mm",
+        ),
+        (["--tolerance-mm", "1e9"], "--tolerance-mm must be above 0 to 20 mm, got 1000000000.0 mm"),
+        (["--tolerance-mm", "nan"], "--tolerance-mm must be above 0 to 20 mm, got nan mm"),
     ],
 )
 def test_a_mistake_about_a_mesh_is_one_clear_line(words, line, tmp_path, capsys):

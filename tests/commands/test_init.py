@@ -59,7 +59,7 @@ def test_a_simulated_scene_has_all_that_a_guard_needs(here: Path, capsys: Output
 
 def test_the_padding_is_as_thick_as_the_sheets_of_the_design(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    layers = ["--thickness-mm", "3", "0.2", "1", "0.2", "4"]
+    layers = ["--set", "layers.thickness_mm=[3, 0.2, 1, 0.2, 4]"]
     assert main(["design", *CYLINDER, *layers, "-o", "skin", "--no-pictures"]) == 0
     assert main(["init", "skin", "--simulated", "--link", "forearm"]) == 0
     padding = load_scene("scene.toml").padding

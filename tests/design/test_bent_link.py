@@ -108,7 +108,7 @@ def test_radii_that_differ_by_rounding_make_no_cone() -> None:
 
 def test_a_step_file_of_it_is_refused_before_anything_is_drawn(tmp_path: Path) -> None:
     done: list[str] = []
-    with pytest.raises(cs.GeometryError, match=r"bent as a general cylinder, of which no STEP file .*--round-only"):
+    with pytest.raises(cs.GeometryError, match=r"general cylinder, of which no STEP file .*round_only=true"):
         cs.write_design(
             tmp_path / "out", cs.design_sheets([stadium()]), options=FileOptions(step=True), progress=done.append
         )

@@ -16,8 +16,9 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 _NUMBER = r"([\d.]+)"
 _SENTENCE = (
     rf"only {_NUMBER}% of sheet 1 is active, {_NUMBER} of {_NUMBER} cm2: rims and electrodes leave {_NUMBER} of "
-    rf"{_NUMBER} mm along and {_NUMBER} of {_NUMBER} deg around; --margin-mm {_NUMBER} --electrode-mm {_NUMBER} "
-    rf"--lead-mm {_NUMBER} --hole-mm {_NUMBER} would leave {_NUMBER}%"
+    rf"{_NUMBER} mm along and {_NUMBER} of {_NUMBER} deg around; --set electrodes.margin_mm={_NUMBER} "
+    rf"--set electrodes.electrode_mm={_NUMBER} --set electrodes.lead_mm={_NUMBER} --set electrodes.hole_mm={_NUMBER} "
+    rf"would leave {_NUMBER}%"
 )
 
 
@@ -59,7 +60,7 @@ def test_report_and_command_line_warn_alike(tmp_path: Path, capsys: pytest.Captu
     sentence = line.removeprefix("  warning: ")
     assert re.fullmatch(_SENTENCE, sentence)
     assert f"* **Warning: {sentence}**\n" in (tmp_path / "a" / "report.md").read_text()
-    advised = sentence[sentence.index("--margin-mm") : sentence.index(" would leave")].split()
+    advised = sentence[sentence.index("--set") : sentence.index(" would leave")].split()
     assert main([*words, *advised, "-o", str(tmp_path / "b")]) == 0
     assert "warning" not in capsys.readouterr().out
     assert "Warning: only" not in (tmp_path / "b" / "report.md").read_text()

@@ -8,46 +8,122 @@ import math
 import shlex
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
 
 from coneskin.core.errors import GeometryError
-from coneskin.design.files import FileOptions, check_target
+from coneskin.design.design_toml import DESIGN_TABLES, read_settings, settings_text
 from coneskin.design.first_scene import arm_link
-from coneskin.design.folder import write_design
-from coneskin.design.link import LinkMesh, fit_link
-from coneskin.design.sheets.seam_strip import cover_seams
-from coneskin.design.sheets.sheet_design import SheetDesign, design_sheets
+from coneskin.design.link_design import LinkDesign, NothingFits, design_link
+from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.design.sheets.summary import small_active_area
-from coneskin.geometry.drawing.layer_stack import PAPER_STACK
-from coneskin.geometry.solid import require_step_writer
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.robot.arm.link_frames import LINK_INDEX
 from coneskin.robot.sim.machine.states import DEFAULT_MODEL
+from coneskin.scene.tables.sensor_keys import DOUBLE_CONE_KEYS
 from coneskin.skin.electronics import shunt_ohms
 
-from .arguments.design import (
-    add_arguments,
-    design_options,
-    links_from_dimensions,
-    package_folders,
-    refuse_dimensions,
-    requested_wrap,
-    seam_direction,
-    xacro_arguments,
-)
+from .arguments.dimensions import add_key_options, given_keys, option_name
 from .terminal.ending_signals import ending_signals
 from .terminal.hints import print_hint
 
-if TYPE_CHECKING:
-    from coneskin.geometry.fit.cones import LinkFit
-    from coneskin.geometry.fit.touch_weights import TouchWeights
-    from coneskin.geometry.placed_frustum import PlacedFrustum
-
-__all__ = ["add_arguments", "run"]
+__all__ = ["EXAMPLES", "add_arguments", "run"]
 
 _NO_FIT_EXIT_CODE = 3
-_SHOWN = 0.0005  # of a sheet that spans holes; less would print as 0.0 %
+_LEAST_BRIDGED_SHARE = 0.0005  # of a sheet that spans holes; less would print as 0.0 %
+#: keys of design.toml that have an option of their own
+_SHORT_KEYS = tuple(key for key in DESIGN_TABLES["search"][1] if key.name in ("tolerance_mm", "max_sheets"))
+
+EXAMPLES = """\
+examples:
+  coneskin design upperarm.stl -o skin                 find the cones in a mesh (STL, OBJ, DAE, PLY)
+  coneskin design ur10.urdf#upper_arm_link -o skin     the same for a link of a URDF
+  coneskin design --radius1-mm 54 --height-mm 400 -o skin                                   a cylinder
+  coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 270 -o skin    a partial wrap of a cone
+  coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --radius3-mm 40 --height2-mm 150 -o skin
+                                                                                            a rugby ball: two sheets
+  coneskin design --write-options design.toml          layers, electrodes, wires, drawings, jig, electronics: all keys
+  coneskin design upperarm.stl -o skin --options design.toml
+  coneskin design upperarm.stl -o skin --set drawings.kerf_mm=0.2 --set sheet.wires=end2
+
+The folder then holds report.md, sensor.toml, materials.csv, design.json, and cut/ with a DXF, SVG and PDF file for
+every layer. If the command fails, no folder is left. Exit code: 0 written; 3 no cone fits the mesh; 1 another failure;
+2 wrong usage.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.usage = "coneskin design [LINK] -o DIR [options]"
+    parser.epilog = EXAMPLES
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    add = parser.add_argument
+    add("link", metavar="LINK", nargs="?", help="mesh file or FILE.urdf#LINK; leave it out and give radii instead")
+    add("-o", "--output", metavar="DIR", required=True, type=Path, help="folder to create")
+    add("--force", action="store_true", help="replace an earlier design in that folder")
+    add("--json", action="store_true", help="print the design as JSON")
+    add("--no-pictures", action="store_true", help="write the report without pictures")
+    add("--options", type=Path, metavar="FILE", help="options of the design in a TOML file")
+    add(
+        "--write-options",
+        action=_WriteOptions,
+        metavar="FILE",
+        help="write such a file with every key, its default, unit and meaning, and end",
+    )
+    add(
+        "--set",
+        action="append",
+        default=[],
+        metavar="TABLE.KEY=VALUE",
+        help="one key of such a file; may be repeated, and goes before the file",
+    )
+
+    add = parser.add_argument_group("finding sheets in a mesh").add_argument
+    add("--unit", choices=("m", "cm", "mm", "inch"), help="unit of the mesh (default: guessed and reported)")
+    add_key_options(add, _SHORT_KEYS, defaults={"tolerance": "1", "max_sheets": "2"})
+    add(
+        "--seam",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="direction in which the seam faces, as the cable (default: where the link shields it most)",
+    )
+    add(
+        "--package",
+        action="append",
+        default=[],
+        metavar="NAME=DIR",
+        help="folder of a ROS package that a URDF names (package://NAME/...); may be repeated",
+    )
+    add(
+        "--xacro-arg",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="argument of a xacro file, which is expanded (extra xacro); may be repeated",
+    )
+
+    add = parser.add_argument_group("a link by its dimensions").add_argument
+    defaults = {"radius2": "radius 1, a cylinder", "wrap": "360, or the widest that fits the mesh"}
+    add_key_options(add, DOUBLE_CONE_KEYS, defaults=defaults)
+
+
+class _WriteOptions(argparse.Action):
+    """Write the file with every option, and end the command."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, _: argparse.Namespace, values: Any, __: str | None = None
+    ) -> None:
+        try:
+            with Path(values).open("x", encoding="utf-8") as file:
+                file.write(settings_text())
+        except FileExistsError:
+            parser.error(f"{values} exists already: choose another name")
+        except OSError as exc:
+            parser.error(f"{values} cannot be written: {exc.strerror or exc}")
+        parser.exit(message=f"{values} written: change it, then coneskin design LINK -o DIR --options {values}\n")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -63,125 +139,109 @@ def run(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
     began = time.perf_counter()
 
-    said = set()
-
     def say(step: str) -> None:
         look()
-        said.add(step)
         print(f"{time.perf_counter() - began:6.2f} s  {step}", file=sys.stderr, flush=True)
 
-    check_target(args.output, args.force)
-    options = design_options(args)
-    bed = (args.bed_mm[0] * 1e-3, args.bed_mm[1] * 1e-3)
-    file_options = FileOptions(
-        args.arcs, args.cut_tolerance_mm * 1e-3, args.page, bed, args.bed_gap_mm * 1e-3, args.step
-    )
-    if args.step:
-        require_step_writer()  # before the search, which takes a minute
-    source: LinkMesh | None = None
-    fit: LinkFit | None = None
-    notes: tuple[str, ...] = ()
-    links: tuple[PlacedFrustum, ...] = ()
+    settings = read_settings(args.options, args.set)
+    search = {**settings.search, **given_keys(args, _SHORT_KEYS)}
+    packages = _pairs(args.package, "--package takes NAME=DIR, as in --package ur_description=src/ur_description")
+    arguments = _pairs(args.xacro_arg, "--xacro-arg takes NAME=VALUE, as in --xacro-arg ur_type=ur5e")
+    link: str | Sequence[PlacedFrustum]
     if args.link is None:
-        title, frame = "a link by its dimensions", "the axis of the link (z from end 1, x at phi = 0)"
-        links = links_from_dimensions(args)
+        link = _links_from_dimensions(args, search)
+        search = {}
     else:
-        refuse_dimensions(args)
-        source, fit = _load_and_fit(args, say)
-        if not fit.sheets:
-            return _nothing_fits(source, fit)
-        title, frame, notes = source.name, source.frame, source.notes
-        # a unit that was guessed wrongly should be seen before anything is cut
-        for note in (note for note in notes if note not in said):
-            print(f"note: {note}", file=sys.stderr, flush=True)
-    named = replace(options, link="" if source is None else source.name)
-    designs = cover_seams(design_sheets(fit or links, named))
-    data = write_design(
-        args.output,
-        designs,
-        fit=fit,
-        mesh=source.mesh if source else None,
-        title=title,
-        source=args.link or title,
-        frame=frame,
-        notes=notes,
-        options=file_options,
-        pictures=not args.no_pictures,
-        replace=args.force,
-        progress=say,
-    )
-    if args.json:
-        print(json.dumps(data))
-    else:
-        _print(designs, fit)
-        folder = shlex.quote(str(args.output))
-        sensor = shlex.quote(str(args.output / ("sensor.toml" if len(designs) == 1 else "sheet-1/sensor.toml")))
-        print_hint(
-            f"real hardware: coneskin firmware {sensor} --to board, then coneskin init {folder} --board uno --help"
+        link = args.link
+        for key in DOUBLE_CONE_KEYS:
+            if key.plain != "wrap" and getattr(args, key.name) is not None:
+                raise GeometryError(
+                    f"a mesh and {option_name(key)} cannot go together: the radii are found in the mesh"
+                )
+        search |= given_keys(args, [key for key in DOUBLE_CONE_KEYS if key.plain == "wrap"])
+        if args.seam is not None:
+            search["seam_direction"] = _seam(args.seam, search)
+    try:
+        design = design_link(
+            link,
+            args.output,
+            options=settings.options,
+            unit=args.unit,
+            packages=packages,
+            arguments=arguments,
+            files=settings.files,
+            pictures=not args.no_pictures,
+            replace=args.force,
+            progress=say,
+            **search,
         )
-        unnamed = source is None or arm_link(source.name) is None
-        which = f" --link LINK, with LINK one of {', '.join(LINK_INDEX)}" if unnamed else ""
-        if source is not None:
-            print_hint(
-                f"on another arm than a UR: coneskin init {folder} --simulated --skin-only, which reports touches; "
-                "only UR arms are guarded"
-            )
-        print_hint(f"next: coneskin init {folder} --simulated --arm {DEFAULT_MODEL}{which}, for your model of arm")
+    except NothingFits as nothing:
+        return _report_nothing(nothing)
+    if args.json:
+        print(json.dumps(design.data))
+    else:
+        _print(design)
+        _print_next(design, args.output)
     return 0
 
 
-def _load_and_fit(args: argparse.Namespace, say: Callable[[str], None]) -> tuple[LinkMesh, LinkFit]:
-    """Return the first mesh of the link in which cones are found, with its fit; else the first mesh."""
-    return fit_link(
-        args.link,
-        args.unit,
-        args.up_axis,
-        package_folders(args),
-        say,
-        xacro_arguments(args),
-        tolerance=args.tolerance_mm * 1e-3,
-        max_sheets=args.max_sheets,
-        wrap=requested_wrap(args),
-        min_length=args.min_length_mm * 1e-3,
-        min_wrap=math.radians(args.min_wrap_deg),
-        max_bridge=args.max_bridge_mm * 1e-3,
-        max_wires=args.max_wires,
-        min_radius=2e-3 * args.lead_mm,
-        min_arc=design_options(args).plan.least_arc,
-        thickness=sum(args.thickness_mm) * 1e-3 if args.thickness_mm else PAPER_STACK.thickness,
-        gap=args.sheet_gap_mm * 1e-3,
-        seam_direction=seam_direction(args),
-        weights=_touch_weights(args),
-        exposure=args.exposure,
-        allow_hull=args.allow_hull,
-        round_only=args.round_only,
+def _links_from_dimensions(args: argparse.Namespace, search: dict[str, Any]) -> tuple[PlacedFrustum, ...]:
+    """Return the one or two places on a link that its radii and heights describe, in order along the axis.
+
+    Raises:
+        GeometryError: a dimension is missing or out of range, or an option is for a mesh.
+    """
+    values = given_keys(args, DOUBLE_CONE_KEYS)
+    if args.seam is not None or "seam_direction" in search:
+        option = "--seam" if args.seam is not None else "search.seam or search.touch_side"
+        raise GeometryError(
+            f"{option} is for a mesh: by its dimensions a link has no directions, and its seam is at phi = 0"
+        )
+    for name in ("exposure", "weights"):
+        if search.get(name):
+            raise GeometryError(f"search.{name} is for a mesh: a link by its dimensions is covered whole")
+    if not {"radius1", "height"} <= values.keys():
+        raise GeometryError("name a mesh file, or give --radius1-mm and --height-mm")
+    if ("radius3" in values) != ("height2" in values):
+        raise GeometryError("a second cone needs both --radius3-mm and --height2-mm")
+    values = {"radius2": values["radius1"], **values}
+    if "radius3" not in values:
+        return (PlacedFrustum(Frustum(**values)),)
+    wrap = values.get("wrap", 2.0 * math.pi)
+    return double_cone(
+        values["radius1"], values["radius2"], values["radius3"], values["height"], values["height2"], wrap
     )
 
 
-def _touch_weights(args: argparse.Namespace) -> TouchWeights | None:
-    """Return the user's map of what areas count; None without one.
-
-    Raises:
-        GeometryError: it cannot be read, or the exposure is asked for too.
-    """
-    if args.weights is None:
-        return None
-    if args.exposure:
-        raise GeometryError("--weights and --exposure cannot go together: areas count by a map or by their exposure")
-    from coneskin.geometry.fit.touch_weights import read_touch_weights
-
-    return read_touch_weights(args.weights)
+def _seam(way: Sequence[float], search: dict[str, Any]) -> tuple[float, ...]:
+    """Return the direction in which the seam of a full wrap faces."""
+    if "seam_direction" in search:
+        raise GeometryError("--seam cannot go together with search.seam or search.touch_side: the seam is given twice")
+    if not 0.0 < math.hypot(*way) < math.inf:
+        raise GeometryError(f"--seam takes a direction X Y Z, finite and not 0 0 0, got {' '.join(map(str, way))}")
+    return tuple(way)
 
 
-def _nothing_fits(source: LinkMesh, fit: LinkFit) -> int:
+def _pairs(texts: list[str], rule: str) -> dict[str, str]:
+    pairs = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise GeometryError(f"{rule}: {text}")
+        pairs[name] = value
+    return pairs
+
+
+def _report_nothing(nothing: NothingFits) -> int:
     """Report why there is no sheet and which one comes nearest; return the exit code."""
-    print(f"coneskin design: {source.mesh.source}: {fit.reason}", file=sys.stderr)
-    nearest = fit.nearest
+    print(f"coneskin design: {nothing.source}: {nothing.fit.reason}", file=sys.stderr)
+    nearest = nothing.fit.nearest
     if nearest is not None:
         side, wrap = nearest.frustum, math.degrees(nearest.frustum.wrap)
         print(
-            f"with --tolerance-mm {fit.needed_tolerance * 1e3:.2f} there is one: radius {side.radius1 * 1e3:.2f} to "
-            f"{side.radius2 * 1e3:.2f} mm over {side.height * 1e3:.1f} mm, wrap {wrap:.0f} deg",
+            f"with --tolerance-mm {nothing.fit.needed_tolerance * 1e3:.2f} there is one: radius "
+            f"{side.radius1 * 1e3:.2f} to {side.radius2 * 1e3:.2f} mm over {side.height * 1e3:.1f} mm, wrap "
+            f"{wrap:.0f} deg",
             file=sys.stderr,
         )
     return _NO_FIT_EXIT_CODE
@@ -200,8 +260,8 @@ def _two_digits(value: float) -> str:
     return f"{rounded:.{max(0, 1 - math.floor(math.log10(rounded)))}f}"
 
 
-def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
-    for design in designs:
+def _print(found: LinkDesign) -> None:
+    for design in found.sheets:
         side, share = design.place.frustum, design.layout.active_share
         line = (
             f"{design.name}: radius {side.radius1 * 1e3:.3f} to {side.radius2 * 1e3:.3f} mm, height "
@@ -215,7 +275,7 @@ def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
             line += f", deviation {worst * 1e3:.3f} mm at most, {rms * 1e3:.3f} mm rms"
             if design.fit.facet_height > 0.0:
                 line += f", of which the facets of the mesh are up to {design.fit.facet_height * 1e3:.3f} mm"
-            if design.fit.bridged_share >= _SHOWN:
+            if design.fit.bridged_share >= _LEAST_BRIDGED_SHARE:
                 line += (
                     f", but {design.fit.bridged_share:.1%} of it spans holes and grooves, down to "
                     f"{design.fit.bridged_depth * 1e3:.2f} mm"
@@ -227,12 +287,28 @@ def _print(designs: tuple[SheetDesign, ...], fit: LinkFit | None) -> None:
         print(
             f"  sheets of {upper.ohms:g} and {lower.ohms:g} ohm per square, {parts.supply_volts:g} V, shunt "
             f"{shunt_ohms(parts):.3g} ohm, {parts.adc_bits} bits: a count is {_count_size(design)} "
-            "(--upper-sheet-ohm and so on change it)"
+            "(electronics.upper_sheet_ohm and so on change it)"
         )
         if small := small_active_area(design):
             print(f"  warning: {small}")
+    fit = found.fit
     if fit is not None and fit.weights:
         share = sum(sheet.touch_share for sheet in fit.sheets)
         print(f"weighed by {fit.weights}, the sheets cover {share:.0%} of the hull")
     for area in fit.bare_areas if fit else ():
         print(f"no sheet: {area.share:.0%} of the hull: {area.reason}")
+
+
+def _print_next(design: LinkDesign, output: Path) -> None:
+    """Print the commands that can follow."""
+    folder = shlex.quote(str(output))
+    sensor = shlex.quote(str(output / ("sensor.toml" if len(design.sheets) == 1 else "sheet-1/sensor.toml")))
+    print_hint(f"real hardware: coneskin firmware {sensor} --to board, then coneskin init {folder} --board uno --help")
+    unnamed = design.mesh is None or arm_link(design.name) is None
+    which = f" --link LINK, with LINK one of {', '.join(LINK_INDEX)}" if unnamed else ""
+    if design.mesh is not None:
+        print_hint(
+            f"on another arm than a UR: coneskin init {folder} --simulated --skin-only, which reports touches; "
+            "only UR arms are guarded"
+        )
+    print_hint(f"next: coneskin init {folder} --simulated --arm {DEFAULT_MODEL}{which}, for your model of arm")

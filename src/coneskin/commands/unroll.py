@@ -8,7 +8,7 @@ import math
 
 from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
-from .arguments.dimensions import add_dimension_options, given_dimensions
+from .arguments.dimensions import add_key_options, given_keys
 
 __all__ = ["add_arguments", "run"]
 
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EXAMPLES
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
-    add_dimension_options(parser.add_argument, LINK_CONE_KEYS, ("radius1", "height"), defaults)
+    add_key_options(parser.add_argument, LINK_CONE_KEYS, ("radius1", "height"), defaults)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.geometry.frustum import Frustum
     from coneskin.geometry.sector import unroll
 
-    dimensions = given_dimensions(args, LINK_CONE_KEYS)
+    dimensions = given_keys(args, LINK_CONE_KEYS)
     cone = Frustum(**{"radius2": dimensions["radius1"], **dimensions})
     sector = unroll(cone)
     facts = {

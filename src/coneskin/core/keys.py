@@ -41,11 +41,12 @@ _UNITS: Mapping[str, tuple[float, str]] = {
     "_ohm": (1.0, "ohm"),
     "_v": (1.0, "V"),
     "_mb": (1e6, "MB"),
+    "_mpa": (1e6, "MPa"),
     "_n": (1.0, "N"),
     "_s": (1.0, "s"),
 }
 _MEANING = re.compile(r"^(\w+): (.*(?:\n .*)*)", re.MULTILINE)
-_TYPE_WORDS = {float: "ratio", int: "whole number", str: "text", bool: "true or false", dict: "tables"}
+_TYPE_WORDS = {float: "ratio", int: "whole number", str: "text", bool: "true or false", dict: "tables", tuple: "texts"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +55,12 @@ class Key:
 
     Attributes:
         name: in the file, with its unit.
-        kind: float, int, str or bool; list for a list of numbers, dict for a list of tables.
+        kind: float, int, str or bool; list for a list of numbers, tuple for one of texts, dict for one of tables.
         default: value of a missing key, in SI; ``...`` for a mandatory key.
         low: smallest value allowed, in the unit of the file.
         high: largest value allowed, in the unit of the file.
         choices: words allowed.
-        length: number of numbers in a list.
+        length: number of items in a list.
         above: True if low itself is not allowed.
         or_zero: True if 0 is allowed below low.
         one_for_all: True if one number may stand for a list of equal ones.
@@ -116,6 +117,8 @@ class Key:
             return "-"
         if self.unset or self.default is None or self.kind is dict:
             return self.unset or "none"
+        if self.kind is tuple:
+            return ", ".join(self.default)
         if self.kind is list:
             numbers = [f"{self.in_file_unit(value):g}" for value in self.default]
             return numbers[0] if self.one_for_all and len(set(numbers)) == 1 else f"[{', '.join(numbers)}]"
@@ -200,6 +203,11 @@ def _convert(key: Key, value: Any, where: str, report: Callable[[str], None]) ->
             return None
         numbers = [_number(key, item, f"{where}[{i}]", report) for i, item in enumerate(value)]
         return None if None in numbers else tuple(numbers)
+    if key.kind is tuple:
+        if isinstance(value, list) and len(value) == key.length and all(isinstance(item, str) for item in value):
+            return tuple(value)
+        report(f"{where} must be a list of {key.length} texts, got {_show(value)}")
+        return None
     if key.kind is float:
         return _number(key, value, where, report)
     if key.kind is int:

@@ -124,8 +124,8 @@ def _require_step(sheets: Sequence[SheetDesign]) -> None:
     for sheet in sheets:
         if sheet.place.bends:
             raise GeometryError(
-                f"{sheet.name} is bent as a {sheet.place.kind}, of which no STEP file is written: leave --step out, or "
-                "use cones only (--round-only)"
+                f"{sheet.name} is bent as a {sheet.place.kind}, of which no STEP file is written: leave out "
+                "drawings.step, or use cones only (--set search.round_only=true)"
             )
     require_step_writer()
 

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.solid import require_step_writer
 
 from .files import FileOptions, check_target
 from .folder import write_design
@@ -21,7 +23,20 @@ from .sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
 
-__all__ = ["LinkDesign", "design_link"]
+__all__ = ["LinkDesign", "NothingFits", "design_link"]
+
+
+class NothingFits(GeometryError):
+    """No sheet fits the mesh of a link.
+
+    Attributes:
+        source: the mesh.
+        fit: the search, with its reason and the nearest sheet.
+    """
+
+    def __init__(self, source: str, fit: LinkFit) -> None:
+        super().__init__(f"there is no sheet to design: {fit.reason}")
+        self.source, self.fit = source, fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,11 +100,20 @@ def design_link(
 
     Raises:
         MeshError: the mesh cannot be found or read.
-        GeometryError: nothing fits the mesh, a sheet cannot be made, or the folder is in use; nothing is written then.
+        NothingFits: no sheet fits the mesh, with the nearest one.
+        GeometryError: a sheet cannot be made, or the folder is in use; nothing is written then.
         MissingExtra: a package that the mesh, the drawings or the pictures need is not installed.
     """
     if folder is not None:
         check_target(Path(folder), replace)
+        if files is not None and files.step:
+            require_step_writer()  # before the search, which takes a minute
+    said = set()
+
+    def say(step: str) -> None:
+        said.add(step)
+        progress(step)
+
     options = options or DesignOptions()
     # neighbours about other axes need room for the sheets of these options
     search = {
@@ -107,15 +131,20 @@ def design_link(
     if isinstance(link, Frustum):
         places = (PlacedFrustum(link),)
     elif isinstance(link, str | Path):
-        source, fit = fit_link(str(link), unit, up_axis, packages, progress, arguments, **search)
+        source, fit = fit_link(str(link), unit, up_axis, packages, say, arguments, **search)
         places, origin = fit, str(link)
     elif isinstance(link, Mesh):
-        source, fit = fit_mesh(link, progress, **search)
+        source, fit = fit_mesh(link, say, **search)
         places = fit
     else:
         places = link
     if source is not None:
+        if fit is not None and not fit.sheets:
+            raise NothingFits(source.mesh.source, fit)
         name, frame, notes = source.name, source.frame, source.notes
+        # a unit that was guessed wrongly should be seen before anything is cut
+        for note in (note for note in notes if note not in said):
+            progress(f"note: {note}")
     if source is not None and not options.link:
         options = dataclasses.replace(options, link=source.name)
     sheets = cover_seams(design_sheets(places, options))

@@ -277,7 +277,7 @@ def draw_weights(figure: Any, triangles: Any, designs: Sequence[SheetDesign], we
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     colours, scale = colormaps["viridis"], Normalize(0.0, 1.0)
     paint = colours(weights.at(triangles.mean(axis=1)))
@@ -333,7 +333,7 @@ def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
         figure: an empty figure of matplotlib.
         collars: at least one.
     """
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     grid = figure.subplots(1, len(collars), subplot_kw={"projection": "3d", "proj_type": "ortho"}, squeeze=False)
     for axes, collar in zip(grid.flat, collars, strict=True):

@@ -256,14 +256,14 @@ def test_a_cable_beyond_the_end_of_the_link_is_led_to_what_is_there(low: float, 
     assert ("bolted to the link" in text) == bool(said)
     if said:
         assert f"The link ends {-1e3 * low:.1f} mm beyond end 1, {said}" in text
-        assert "design again with `--wires end2`, where there are 100.0 mm of link" in text
+        assert "design again with `--set sheet.wires=end2`, where there are 100.0 mm of link" in text
 
 
 def test_a_link_without_room_at_either_end_carries_its_cable_on_the_sheet() -> None:
     (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions())
     text = guide(design, measure_build(design, 0, "mesh", ending_at(-0.001, 0.202)))
     assert "glue the mount on part 7" in text
-    assert "design again with `--wires" not in text
+    assert "design again with `--set sheet.wires" not in text
 
 
 def test_only_a_sheet_whose_edges_meet_has_a_seam() -> None:

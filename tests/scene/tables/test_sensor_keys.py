@@ -10,7 +10,7 @@ import pytest
 import coneskin
 from coneskin.commands import design as design_command
 from coneskin.commands import unroll as unroll_command
-from coneskin.commands.arguments.dimensions import given_dimensions, option_name
+from coneskin.commands.arguments.dimensions import given_keys, option_name
 from coneskin.core.errors import GeometryError
 from coneskin.core.keys import Key, check
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
@@ -76,19 +76,6 @@ def test_a_command_has_an_option_for_each_key(command: object, keys: tuple[Key, 
     assert dimensions == {option_name(key) for key in keys}
 
 
-def test_the_options_of_the_electronics_have_the_defaults_of_a_sensor() -> None:
-    options = options_of(design_command)
-    shared = {key.name: key for key in SENSOR_KEYS if option_name(key) in options and key.default is not ...}
-    assert set(shared) >= {"supply_v", "adc_v", "adc_bits", "current_full_scale_ma", "upper_sheet_ohm"}
-    for key in shared.values():
-        if key not in CONE_KEYS:
-            given = options[option_name(key)].default
-            if key.default is None:
-                assert given is None, "chosen to match the sheets by both"
-                continue
-            assert check({key.name: given}, (key,), "t", []) == {key.plain: pytest.approx(key.default, rel=1e-15)}
-
-
 @pytest.mark.parametrize("wrap", [Frustum(1, 1, 1).wrap, 4.5])
 def test_what_a_design_writes_is_read_back_by_the_table(wrap: float) -> None:
     (design,) = design_sheets([PlacedFrustum(Frustum(0.04, 0.07, 0.15, wrap))], DesignOptions())
@@ -103,7 +90,7 @@ def test_what_a_design_writes_is_read_back_by_the_table(wrap: float) -> None:
 
 def test_a_link_may_end_in_an_apex_and_a_sensor_may_not() -> None:
     given = {"radius1_mm": 0.0, "radius2_mm": 70.0, "height_mm": 150.0}
-    assert given_dimensions(argparse.Namespace(**given), LINK_CONE_KEYS)["radius1"] == 0.0
+    assert given_keys(argparse.Namespace(**given), LINK_CONE_KEYS)["radius1"] == 0.0
     problems: list[str] = []
     check(given, CONE_KEYS, "sensor", problems)
     assert problems == ["sensor.radius1_mm must be from 1 to 5000 mm, got 0.0 mm"]
@@ -111,4 +98,4 @@ def test_a_link_may_end_in_an_apex_and_a_sensor_may_not() -> None:
 
 def test_a_dimension_in_metres_is_met_with_the_question() -> None:
     with pytest.raises(GeometryError, match=r"--height-mm must be .*got 0\.06 mm: is that in metres\? Then write 60"):
-        given_dimensions(argparse.Namespace(radius1_mm=54.0, height_mm=0.06), LINK_CONE_KEYS)
+        given_keys(argparse.Namespace(radius1_mm=54.0, height_mm=0.06), LINK_CONE_KEYS)

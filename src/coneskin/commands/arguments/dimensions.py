@@ -9,7 +9,7 @@ from typing import Any
 from coneskin.core.errors import GeometryError, SceneError
 from coneskin.core.keys import Key, check
 
-__all__ = ["add_dimension_options", "add_setting_option", "given_dimensions", "option_name"]
+__all__ = ["add_key_options", "given_keys", "option_name"]
 
 
 def option_name(key: Key) -> str:
@@ -17,36 +17,24 @@ def option_name(key: Key) -> str:
     return "--" + key.name.replace("_", "-")
 
 
-def add_dimension_options(
+def add_key_options(
     add: Callable[..., Any],
     keys: Sequence[Key],
     required: Collection[str] = (),
     defaults: Mapping[str, str] | None = None,
 ) -> None:
-    """Declare an option for each dimension of a link.
+    """Declare an option for each of some keys.
 
     Args:
         add: the ``add_argument`` of a parser or of a group.
-        keys: the dimensions.
-        required: plain names of the dimensions that must be given.
+        keys: numbers.
+        required: plain names of those that must be given.
         defaults: plain name -> what holds where the option is missing, in words.
     """
     for key in keys:
         default = (defaults or {}).get(key.plain)
         text = key.meaning.replace("%", "%%") + (f" (default: {default})" if default else "")
-        add(option_name(key), type=float, metavar=_metavar(key), required=key.plain in required, help=text)
-
-
-def add_setting_option(add: Callable[..., Any], key: Key) -> None:
-    """Declare an option with the default of a key, both in the unit of the key.
-
-    Args:
-        add: the ``add_argument`` of a parser or of a group.
-        key: a number with a default, or with None, which is chosen to match the rest.
-    """
-    default = None if key.default is None else key.kind(key.in_file_unit(key.default))
-    text = f"{key.meaning.replace('%', '%%')} ({'chosen to match' if default is None else f'default {default:g}'})"
-    add(option_name(key), type=key.kind, default=default, metavar=_metavar(key), help=text)
+        add(option_name(key), type=key.kind, metavar=_metavar(key), required=key.plain in required, help=text)
 
 
 def _metavar(key: Key) -> str:
@@ -54,12 +42,12 @@ def _metavar(key: Key) -> str:
     return key.suffix.removeprefix("_").upper() or "N"
 
 
-def given_dimensions(args: argparse.Namespace, keys: Sequence[Key]) -> dict[str, float]:
-    """Return the dimensions that were given, in SI, under the plain names of their keys.
+def given_keys(args: argparse.Namespace, keys: Sequence[Key]) -> dict[str, float]:
+    """Return the values that were given, in SI, under the plain names of their keys.
 
     Args:
         args: parsed; options that the command does not have, or that were not given, are left out.
-        keys: the dimensions, with their ranges.
+        keys: numbers, with their ranges.
 
     Raises:
         GeometryError: one is out of range; where it looks like metres, the message says what it would be in mm.

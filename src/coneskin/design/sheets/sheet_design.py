@@ -316,7 +316,8 @@ def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
             if abs(strain) > _MOST_STRAIN:
                 raise GeometryError(
                     f"{layer.name} is strained by {strain:+.0%} at the narrow end, at most {_MOST_STRAIN:.0%} is "
-                    f"possible: make it thinner than {layer.thickness * 1e3:g} mm, or choose another --assembly"
+                    f"possible: make it thinner than {layer.thickness * 1e3:g} mm, or choose another "
+                    "layers.assembly"
                 )
     if options.overlap and link.frustum.wrap < _TURN - 1e-9:
         wrap = math.degrees(link.frustum.wrap)

@@ -289,10 +289,11 @@ def small_active_area(design: SheetDesign) -> str:
         share = lay_out_sheet(side, narrow).active_share
     except GeometryError:  # a width of the user's own that cannot be halved
         return text
-    return (
-        f"{text}; --margin-mm {1e3 * narrow.margin:g} --electrode-mm {1e3 * narrow.electrode:g} "
-        f"--lead-mm {1e3 * narrow.lead:g} --hole-mm {1e3 * narrow.hole:g} would leave {share:.0%}"
+    advice = " ".join(
+        f"--set electrodes.{name}_mm={1e3 * getattr(narrow, name):g}"
+        for name in ("margin", "electrode", "lead", "hole")
     )
+    return f"{text}; {advice} would leave {share:.0%}"
 
 
 def _halved(plan: ElectrodePlan) -> ElectrodePlan:

@@ -46,14 +46,15 @@ def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         "falls out, and not further. Marks (blue) are drawn by pen, or by the same knife at a pressure that scratches. "
         "*Check:* measure the test piece with a caliper: the width of the cut is half of (hole - square + "
         f"{1e3 * (TEST_SQUARE - TEST_HOLE):g} mm). These files have {kerf:g} mm in their outlines; if yours differs by "
-        "more than 0.2 mm, design again with `--kerf-mm`. A scalpel has 0."
+        "more than 0.2 mm, design again with `--set drawings.kerf_mm=WIDTH`. A scalpel has 0."
     )
     ohms = " and ".join(f"{sheet.ohms:g}" for sheet in dict.fromkeys(reversed(design.conductive)))
     yield (
         "Measure the conductive sheet before it is cut: a strip of 20 x 120 mm, copper tape with conductive adhesive "
         "over 10 mm at both ends. *Check:* the multimeter's reading divided by 5 is its resistance per square; this "
         f"design wants {ohms} ohm per square (lower, upper), within {SPREAD:.0%}. Otherwise design again with "
-        "`--lower-sheet-ohm` and `--upper-sheet-ohm`: the electronics then match what you have. Which face conducts? "
+        "`--set electronics.lower_sheet_ohm=OHM` and `--set electronics.upper_sheet_ohm=OHM`: the electronics then "
+        "match what you have. Which face conducts? "
         "Printed and coated films conduct on one face only: try both with the probes. It must be the face that the "
         "labels call up (part 3 its outside, part 5 its inside): it carries the foils, and the two face each other "
         "through the isolation."
@@ -254,8 +255,8 @@ def _short_of_room(figures: BuildFigures, rooms: dict[str, float]) -> Iterator[s
         yield (
             f"Another part of the link is in the way of the cable at edge 0, {in_mm(room)} beyond "
             f"{side_name(cable.side)}: design again with `--seam X Y Z`, a direction in which the link goes on clear "
-            f"of it for {in_mm(cable.connector)}, or with a shorter `--connector-mm`; of a single sheet the wires can "
-            f"leave at the other end, `--wires {other}`, where {in_mm(more)} are free."
+            f"of it for {in_mm(cable.connector)}, or with a shorter `--set sheet.connector_mm=MM`; of a single sheet "
+            f"the wires can leave at the other end, `--set sheet.wires={other}`, where {in_mm(more)} are free."
         )
         return
     what = "connector lies" if room >= cable.tie + _MOUNT else "cable tie and the connector lie"
@@ -263,7 +264,7 @@ def _short_of_room(figures: BuildFigures, rooms: dict[str, float]) -> Iterator[s
         f"The link ends {in_mm(max(room, 0.0))} beyond {side_name(cable.side)}, so the {what} on what is bolted to the "
         "link there and moves with it, such as a flange or a cover; never on the far side of a joint. If nothing does, "
         + (
-            f"design again with `--wires {other}`, where there are {in_mm(more)} of link"
+            f"design again with `--set sheet.wires={other}`, where there are {in_mm(more)} of link"
             if more >= cable.tie + _MOUNT
             else "glue the mount on part 7, over the margin of that end, and let the connector hang from it"
         )
@@ -336,7 +337,7 @@ def jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iterat
     """
     plan, wires = design.options.jig, design.layout.plan.wires
     if plan.surface == "none":
-        yield "No jig was asked for (`--jig none`)."
+        yield "No jig was asked for (`jig.surface` is none)."
         return
     if figures.collars:
         yield (
@@ -344,7 +345,7 @@ def jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iterat
             f"layers of 0.2 mm, walls of {in_mm(plan.wall)} solid. A part has as many grooves on its outside as its "
             "number says; part 1 begins at edge 0, the others follow anticlockwise as seen from end 2. The step inside "
             "lies against the end of the sheet, the longer zone with the flat seat over the sheet, the lip on the "
-            f"link; the gap to both is {in_mm(plan.clearance)} (`--jig-clearance-mm`)."
+            f"link; the gap to both is {in_mm(plan.clearance)} (`jig.clearance_mm`)."
         )
         yield ""
         yield "| file | for | printed size [mm] | volume |"
