@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import FieldError
 from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
-from .arguments.dimensions import add_dimension_options, given_dimensions
+from .arguments.dimensions import add_key_options, given_keys
 
 if TYPE_CHECKING:
     from coneskin.skin.field.area_error import ErrorMap
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
-    add_dimension_options(add, LINK_CONE_KEYS, ("radius1", "height"), defaults)
+    add_key_options(add, LINK_CONE_KEYS, ("radius1", "height"), defaults)
     add("--upper-ohm", type=float, default=1000.0, help="upper sheet resistance [ohm per square] (default: 1000)")
     add("--lower-ohm", type=float, help="lower sheet resistance [ohm per square] (default: that of the upper one)")
     add("--contact-mm", type=float, default=5.0, help="radius of the contact (default: 5)")
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.grid < 2:
         raise FieldError(f"--grid must be at least 2 points, got {args.grid}")
-    dimensions = given_dimensions(args, LINK_CONE_KEYS)
+    dimensions = given_keys(args, LINK_CONE_KEYS)
     cone = Frustum(**{"radius2": dimensions["radius1"], **dimensions})
     lower_ohm = args.upper_ohm if args.lower_ohm is None else args.lower_ohm
     radial_ohm, angular_ohm = sheet_resistances(cone, args.upper_ohm, lower_ohm)
