@@ -73,7 +73,7 @@ BENCHES = {
     "firmware": Bench("bench.firmware.timing", "Sample-and-hold and non-linearity of the converter; real hardware."),
     "firmware-guard": Bench("bench.firmware.guard", _SIMULATED_ARM + " The board is emulated."),
     # sheets for links
-    "design": Bench("bench.design.error", "Links that were not drawn by chance."),
+    "design-map": Bench("bench.design.map", "Links of other shapes."),
     "design-planted": Bench("bench.design.planted", "Real links: the truth is planted."),
     "design-links": Bench("bench.design.links", "A proven bound: it is the best of many searches."),
     "design-reach": Bench("bench.design.reach", "Whether a person would build each sheet."),

@@ -1,18 +1,16 @@
 """Time from ``guard(scene)`` until the guard is active, with a virtual skin and no arm.
 
-    python -m bench start [--times 10] [--other PATH]
-
-``--other`` is the root of another checkout: the two take turns, so that a busy machine is as busy for both.
+python -m bench start [--times 10]
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import statistics
 import subprocess
 import sys
-from pathlib import Path
+
+from bench.report import head, show
 
 _SCENE = """
 [[link]]
@@ -35,24 +33,16 @@ with guard(scene):
 """
 
 
-def start(root: Path) -> float:
-    environment = {**os.environ, "PYTHONPATH": str(root / "src")}
-    done = subprocess.run([sys.executable, "-c", _RUN], env=environment, capture_output=True, text=True, check=True)
-    return float(done.stdout)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--times", type=int, default=10, help="starts of each (%(default)s)")
-    parser.add_argument("--other", type=Path, help="root of a checkout to compare with")
+    parser.add_argument("--times", type=int, default=10, help="starts (%(default)s)")
     args = parser.parse_args()
-    roots = [Path(__file__).parents[2], *([args.other.resolve()] if args.other else [])]
-    times: dict[Path, list[float]] = {root: [] for root in roots}
-    for _ in range(args.times):
-        for root in roots:
-            times[root].append(start(root))
-    for root, found in times.items():
-        print(f"{root.name}: median {statistics.median(found):.2f} s, fastest {min(found):.2f} s")
-    if args.other:
-        here, other = (statistics.median(times[root]) for root in roots)
-        print(f"ratio of the medians {here / other:.2f}")
+    done = (
+        subprocess.run([sys.executable, "-c", _RUN], capture_output=True, text=True, check=True)
+        for _ in range(args.times)
+    )
+    times = [float(each.stdout) for each in done]
+    print(head())
+    show(
+        "s until the guard is active", ["median", "fastest"], [[f"{statistics.median(times):.2f}", f"{min(times):.2f}"]]
+    )

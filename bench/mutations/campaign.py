@@ -7,8 +7,8 @@ A mutant is a file of geometry, skin, robot or src/coneskin with one comparison,
 (mutants.py). It runs against the tests of its room, in a copy of the tree: test_<module>.py, the other tests of the
 folder that mirrors its own, and those that import the module. First the short tests; where it survives these, the
 long ones.
-A mutant that the tests do not end in time counts as noticed. Each selection of tests first runs on the copy as it is,
-which gives its time; a test that fails there is left out.
+A mutant that the tests do not end in time counts as noticed. A test that fails with a mutant is run again without it,
+and is left out where it fails then too.
 The exit code is 1 where more than --most percent survive.
 """
 
@@ -23,7 +23,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -39,9 +38,9 @@ from .mutants import Mutant, draw
 _ROOT = Path(__file__).parents[2]
 _ROOMS = ("geometry", "skin", "robot", "src/coneskin")
 _SHORT, _LONG = "not long", "long"  # marker expressions
-_NO_TESTS = 5  # exit code of pytest where no test was selected
-_TIME_FACTOR, _TIME_MARGIN = 3.0, 60.0  # of the time of the unchanged copy; s
-_FIRST_TIMEOUT = 1800.0  # s, for the unchanged copy
+#: exit code of pytest -> verdict; 2: a file could not be collected, 5: no test was selected
+_VERDICTS = {0: "passed", 1: "failed", 2: "failed", 5: "passed", None: "timeout"}
+_TIMEOUTS = {_SHORT: 300.0, _LONG: 900.0}  # s, of the tests of a room
 
 
 def product(root: Path) -> list[str]:
@@ -97,11 +96,10 @@ class Tree:
         (self.folder / file).write_bytes(source)
         os.utime(self.folder / file, (self._clock, self._clock))
 
-    def run(self, tests: Sequence[str], marker: str, timeout: float) -> tuple[str, list[str], float]:
-        """Run tests; return "passed", "failed" or "timeout", the names of those that failed, and the time [s]."""
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", marker, *tests]
+    def run(self, tests: Sequence[str], marker: str, timeout: float) -> tuple[str, str]:
+        """Run tests until one fails; return the verdict, and the name of that which failed."""
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", marker, *tests]
         environment = {**os.environ, "PYTHONPATH": str(self.folder / "src")}
-        began = time.monotonic()
         with tempfile.TemporaryFile("w+") as said:
             child = subprocess.Popen(
                 command, cwd=self.folder, env=environment, stdout=said, stderr=said, start_new_session=True
@@ -113,9 +111,9 @@ class Tree:
             finally:
                 _end_group(child)
             said.seek(0)
-            failed = [line.split()[1] for line in said if line.startswith(("FAILED ", "ERROR "))]
-        verdict = "timeout" if code is None else "passed" if code in (0, _NO_TESTS) else "failed"
-        return verdict, failed, time.monotonic() - began
+            names = (line.partition(" ")[2] for line in said if line.startswith(("FAILED ", "ERROR ")))
+            failed = next(names, "").partition(" - ")[0].strip()
+        return _VERDICTS.get(code, "broken"), failed
 
 
 class Campaign:
@@ -130,9 +128,7 @@ class Campaign:
         self._trees = trees
         self._markers = markers
         self._importers = imports_of(_ROOT)
-        #: of the copy as it is: (marker, *tests) -> tests that fail, and the time that a mutant has
-        self._unchanged: dict[tuple[str, ...], tuple[list[str], float]] = {}
-        self._lock = threading.Lock()
+        self._failing: dict[str, bool] = {}  # test -> whether it fails on the copy as it is
 
     def judge(self, number: int, mutant: Mutant) -> dict[str, Any]:
         """Try a mutant; return its row."""
@@ -143,29 +139,25 @@ class Campaign:
         source = (tree.folder / mutant.file).read_bytes()
         try:
             for marker in self._markers:
-                failing, timeout = self._try_unchanged(tree, tests, marker)
-                options = ["-x", *(f"--deselect={name}" for name in failing)]
-                tree.write(mutant.file, mutant.apply(source))
-                verdict, failed, _ = tree.run([*options, *tests], marker, timeout)
-                tree.write(mutant.file, source)
+                while True:
+                    options = [f"--deselect={name}" for name, fails in self._failing.copy().items() if fails]
+                    tree.write(mutant.file, mutant.apply(source))
+                    verdict, failed = tree.run([*options, *tests], marker, _TIMEOUTS[marker])
+                    tree.write(mutant.file, source)
+                    if verdict != "failed" or not self._fails_anyway(tree, failed):
+                        break
                 if verdict != "passed":
-                    return row | {"verdict": f"{verdict}, {marker}", "by": " ".join(failed)}
+                    return row | {"verdict": f"{verdict}, {marker}", "by": failed}
             return row
         finally:
             tree.write(mutant.file, source)
             self._trees.put(tree)
 
-    def _try_unchanged(self, tree: Tree, tests: list[str], marker: str) -> tuple[list[str], float]:
-        """Return which tests fail on the copy as it is, and the time that a mutant has [s]."""
-        key = (marker, *tests)
-        with self._lock:
-            known = self._unchanged.get(key)
-        if known is None:
-            _, failed, seconds = tree.run(tests, marker, _FIRST_TIMEOUT)
-            known = failed, _TIME_FACTOR * seconds + _TIME_MARGIN
-            with self._lock:
-                self._unchanged[key] = known
-        return known
+    def _fails_anyway(self, tree: Tree, test: str) -> bool:
+        """Return whether a test fails on the copy as it is, too."""
+        if test and test not in self._failing:
+            self._failing[test] = tree.run([test], "", _TIMEOUTS[_LONG])[0] == "failed"
+        return bool(test) and self._failing[test]
 
 
 def _listed(root: Path, *patterns: str) -> list[str]:

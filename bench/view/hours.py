@@ -92,7 +92,7 @@ def main() -> None:
         writer.join()
         browser.close()
         child.terminate()
-        child.wait(20)
+        child.wait(60)
 
 
 def row(writer: Writer, tools: Any, server: int, since: float, began: float) -> str:

@@ -10,9 +10,9 @@ beyond the planes of its flat faces, and the distances of the places of a sheet 
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,9 @@ STRIPPED, LOOP, CONTACT, STEP = 8.0, 20.0, 4.0, 5.0  # mm; as the guide says
 
 
 def main() -> None:
-    for name in sys.argv[1:]:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", metavar="DESIGN-FOLDER")
+    for name in parser.parse_args().folders:
         folder = Path(name)
         data = json.loads((folder / "design.json").read_text())
         sheets, link = data["sheets"], _link(Path(data["link"]))

@@ -1,25 +1,18 @@
-"""Error against run time of the map from (u, phi) to a point of a link, and of the fit that finds the cone.
+"""Error against run time of the map from (u, phi) to a point of a link.
 
-    python -m bench design                       # about two minutes; every link of ../shared/data and a barrel
-    python -m bench design --quick               # half a minute, one link and the barrel
-    python -m bench design --long                # pyransac3d with 10 000 rounds too: minutes for each link
-    python -m bench design --link my_link.stl    # a link of yours
+    python -m bench design-map                # half a minute: a barrel that is made here
+    python -m bench design-map LINK ...       # mesh files too, with the time of each step from the file to the map
 
-Map: 20 000 random places of the first sheet, 5 mm from its ends; the reference is a ray along the cone's normal, its
+Random places, 20 000 of the first sheet, 5 mm from its ends; the reference is a ray along the cone's normal, its
 depth on the face's plane in float64. "closest point" answers another question (nearest instead of along the normal), so
 its error is what a guard would see of it. Places in holes deeper than the tolerance have no right answer and are left
 out. Times are the best of several; ratios hold within one run only.
-
-Fit: every method gets the samples of the hull that see the outside (trimesh: the corners). Axis and radius are compared
-with our fit of 60 000 samples: tilt, shift amid the sheet, and d radius [mm]; rms is over the samples under that sheet.
-trimesh and pyransac3d know cylinders only; the first bounds the whole link.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-import random
 import time
 import timeit
 from collections.abc import Callable, Iterator
@@ -33,22 +26,13 @@ from numpy.typing import NDArray
 
 from bench.report import head
 from coneskin.geometry.displacement_map import measure_displacement
-from coneskin.geometry.fit.cone_fit import InfiniteCone
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
-from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
 from coneskin.geometry.ray_casting import RayCaster
 
 Floats = NDArray[np.float64]
 
-DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
-LINKS = (
-    "ur/ur10/collision/upperarm.stl",
-    "ur/ur5e/visual/upperarm.dae",
-    "ur/ur5e/visual/forearm.dae",
-    "xarm/uf850_link4.stl",
-)
 GRIDS = ((32, 64), (64, 128), (128, 256), (256, 512))
 PLACES = 20_000
 TOLERANCE = 0.001
@@ -172,83 +156,6 @@ def print_map(name: str, mesh: Mesh, fit: LinkFit) -> None:
         )
 
 
-# ---- the fit ----
-
-
-def line_gap(origin: Floats, axis: Floats, sheet: FittedSheet) -> tuple[float, float]:
-    """Tilt [deg] from a sheet's axis, and distance [mm] from it at the sheet's middle."""
-    way = np.array(sheet.placed.link_frustum.rotation)[:, 2]
-    middle = np.array(sheet.placed.link_frustum.apply((0.0, 0.0, 0.5 * sheet.frustum.height)))
-    axis = axis / np.linalg.norm(axis)
-    tilt = math.degrees(math.asin(min(1.0, float(np.linalg.norm(np.cross(axis, way))))))
-    gap = middle - origin
-    return tilt, 1e3 * float(np.linalg.norm(gap - (gap @ axis) * axis))
-
-
-def fit_rows(
-    mesh: Mesh, fine: FittedSheet, long: bool
-) -> Iterator[tuple[str, float, float, float, float, float, float]]:
-    """Name, samples, seconds, tilt [deg], shift [mm], radius error [mm], rms residual [mm]."""
-    middle = 0.5 * (fine.frustum.radius1 + fine.frustum.radius2)
-    hull = sample_surface(mesh, RayCaster(mesh))
-    places = [fine.placed.locate((float(x), float(y), float(z))) for x, y, z in hull.points]
-    under = hull.points[np.array([0.0 <= u <= fine.frustum.slant and abs(d) <= TOLERANCE for u, _, d in places])]
-
-    def residual(origin: Floats, axis: Floats, radius: float, half_angle: float = 0.0) -> float:
-        cone = InfiniteCone(origin, axis / np.linalg.norm(axis), radius, half_angle)
-        return 1e3 * float(np.sqrt((cone.distances(under) ** 2).mean()))
-
-    for count in (500, 1000, 2000, 6000, 20_000):
-        seconds = best(partial(find_cones, mesh, tolerance=TOLERANCE, samples=count), repeat=3)
-        fit = find_cones(mesh, tolerance=TOLERANCE, samples=count)
-        if not fit.sheets:
-            yield "coneskin", count, seconds, math.nan, math.nan, math.nan, math.nan
-            continue
-        sheet = fit.sheets[0]
-        pose = sheet.placed.link_frustum
-        origin, axis = np.array(pose.translation), np.array(pose.rotation)[:, 2]
-        tilt, shift = line_gap(origin, axis, fine)
-        radius = 0.5 * (sheet.frustum.radius1 + sheet.frustum.radius2)
-        miss = residual(origin, axis, sheet.frustum.radius1, sheet.half_angle)
-        yield "coneskin", count, seconds, tilt, shift, 1e3 * (radius - middle), miss
-    import trimesh
-
-    start = time.perf_counter()
-    found = trimesh.bounds.minimum_cylinder(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False))
-    seconds = time.perf_counter() - start
-    origin, axis, radius = found["transform"][:3, 3], found["transform"][:3, 2], float(found["radius"])
-    tilt, shift = line_gap(origin, axis, fine)
-    yield (
-        "trimesh minimum_cylinder",
-        len(mesh.vertices),
-        seconds,
-        tilt,
-        shift,
-        1e3 * (radius - middle),
-        residual(origin, axis, radius),
-    )
-    if find_spec("pyransac3d"):
-        import pyransac3d  # type: ignore[import-untyped]
-
-        random.seed(1)  # it draws from the global generators
-        np.random.seed(1)
-        for rounds in (1000, 10_000) if long else (1000,):
-            start = time.perf_counter()
-            result = pyransac3d.Cylinder().fit(hull.points, thresh=TOLERANCE, maxIteration=rounds)
-            seconds = time.perf_counter() - start
-            origin, axis, radius = np.asarray(result[0], float), np.asarray(result[1], float), float(result[2])
-            tilt, shift = line_gap(origin, axis, fine)
-            miss = residual(origin, axis, radius)
-            yield f"pyransac3d {rounds} rounds", len(hull), seconds, tilt, shift, 1e3 * (radius - middle), miss
-
-
-def print_fit(name: str, mesh: Mesh, fine: FittedSheet, long: bool) -> None:
-    print(f"\nFIT  {name}: {len(mesh.faces)} faces")
-    print(f"{'method':26}{'points':>8}{'ms':>9}{'tilt deg':>10}{'shift mm':>10}{'d radius':>11}{'rms mm':>9}")
-    for label, count, seconds, tilt, shift, radius, rms in fit_rows(mesh, fine, long):
-        print(f"{label:26}{count:8.0f}{seconds * 1e3:9.0f}{tilt:10.4f}{shift:10.4f}{radius:+11.4f}{rms:9.3f}")
-
-
 def print_steps(name: str, path: Path) -> None:
     """From the file to the map, with the time of every step."""
     marks: list[tuple[str, float]] = [("reading the file", time.perf_counter())]
@@ -265,25 +172,15 @@ def print_steps(name: str, path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="one link and the barrel")
-    parser.add_argument("--long", action="store_true", help="pyransac3d with 10 000 rounds too")
-    parser.add_argument("--link", type=Path, action="append", help="a mesh file instead of the shared links")
+    parser.add_argument("links", type=Path, nargs="*", metavar="LINK", help="mesh files")
     arguments = parser.parse_args()
-    print(head("numpy", "scipy", "trimesh", "embreex", "pyransac3d"))
-    files = arguments.link or [DATA / name for name in (LINKS[:1] if arguments.quick else LINKS)]
-    there = [file for file in files if file.is_file()]
-    for file in files:
-        if file not in there:
-            print(f"{file}: not there, left out")
+    print(head("numpy", "scipy", "trimesh", "embreex"))
     make_mesh(barrel().vertices, barrel().faces)  # warm up
-    for file in [*there, *(() if arguments.link or arguments.quick else (DATA / "ur/ur5e/collision/forearm.stl",))]:
-        if file.is_file():
-            print_steps(file.name, file)
-    bodies = [("/".join(file.parts[-3:]), load_mesh(file)) for file in there] + [("barrel", barrel())]
-    for name, mesh in bodies:
+    for file in arguments.links:
+        print_steps(file.name, file)
+    for name, mesh in [*((file.name, load_mesh(file)) for file in arguments.links), ("barrel", barrel())]:
         fit = find_cones(mesh, tolerance=TOLERANCE, samples=60_000)
-        if not fit.sheets:
+        if fit.sheets:
+            print_map(name, mesh, fit)
+        else:
             print(f"\n{name}: {fit.reason}")
-            continue
-        print_map(name, mesh, fit)
-        print_fit(name, mesh, fit.sheets[0], arguments.long)
