@@ -3,6 +3,7 @@
 
     python scripts/reference.py            write them
     python scripts/reference.py --check    name the pages that are not what the code says; exit code 1
+    python scripts/reference.py --show methods    print what is a page of the site alone: methods of ur_rtde, options
 
 A page keeps its own text; what stands between `<!-- generated: NAME -->` and `<!-- end -->` is made here.
 In docs/look-up/scene.md each section of a table of the scene has the table of its keys.
@@ -13,11 +14,9 @@ from __future__ import annotations
 import argparse
 import ast
 import importlib
-import inspect
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +24,15 @@ ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "docs" / "look-up"
 #: first folder of a public name's module -> its group
 GROUPS = {
-    "design": "Design",
-    "geometry": "Design",
-    "session": "Guard and replay",
-    "scene": "Guard and replay",
-    "commissioning": "Guard and replay",
-    "runs": "Guard and replay",
-    "robot": "Guard and replay",
-    "skin": "Skin",
-    "core": "Errors",
+    "design": "design",
+    "geometry": "design",
+    "session": "guard and replay",
+    "scene": "guard and replay",
+    "commissioning": "guard and replay",
+    "runs": "guard and replay",
+    "robot": "guard and replay",
+    "skin": "skin",
+    "core": "errors",
 }
 
 
@@ -111,20 +110,16 @@ def _help(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
 
 
-def name_tables() -> str:
-    """Return the public names in groups, each with its first sentence."""
-    face = importlib.import_module("coneskin")
-    groups: dict[str, list[str]] = {group: [] for group in dict.fromkeys([*GROUPS.values(), "Simulation"])}
-    for name, home in face._HOMES.items():
-        if name.startswith("__"):
-            continue
-        group = "Simulation" if home.startswith(("skin.virtual", "robot.sim")) else GROUPS[home.split(".")[0]]
-        opening = (inspect.getdoc(getattr(face, name)) or "").split("\n\n")[0]
-        groups[group].append(f"| `{name}` | {' '.join(opening.split()).replace('|', chr(92) + '|')} |")
-    lines = []
-    for group, rows in groups.items():
-        lines += [f"## {group}", "", "| name | meaning |", "|---|---|", *rows, ""]
-    return "\n".join(lines).rstrip("\n") + "\n"
+def name_table() -> str:
+    """Return the public names in groups."""
+    homes = importlib.import_module("coneskin")._HOMES
+    groups: dict[str, list[str]] = {group: [] for group in dict.fromkeys([*GROUPS.values(), "simulation"])}
+    for name, home in homes.items():
+        if not name.startswith("__"):
+            group = "simulation" if home.startswith(("skin.virtual", "robot.sim")) else GROUPS[home.split(".")[0]]
+            groups[group].append(f"`{name}`")
+    rows = [f"| {group} | {' '.join(sorted(names))} |" for group, names in groups.items()]
+    return "\n".join(["| | names |", "|---|---|", *rows]) + "\n"
 
 
 # ur_rtde
@@ -202,10 +197,12 @@ PARTS: dict[str, dict[str, Callable[[], str]]] = {
     "scene.md": {},
     "events.md": {"events": event_table},
     "commands.md": {"commands": command_table},
-    "public-names.md": {"names": name_tables},
-    "ur-rtde.md": {"methods": method_table},
+    "public-names.md": {"names": name_table},
     "promises.md": {"proofs": proof_table},
 }
+
+#: what is a page of the site alone, or is printed: name -> what makes it
+SHOWN: dict[str, Callable[[], str]] = {"options": option_tables, "methods": method_table}
 
 
 def page(name: str) -> str:
@@ -214,10 +211,8 @@ def page(name: str) -> str:
     for part, make in PARTS[name].items():
         begin, end = f"<!-- generated: {part} -->\n", "<!-- end -->\n"
         before, rest = text.split(begin)
-        old, after = rest.split(end, 1)
-        text = (
-            before + begin + (old if name == "ur-rtde.md" and not find_spec("rtde_control") else make()) + end + after
-        )
+        after = rest.split(end, 1)[1]
+        text = before + begin + make() + end + after
     if name == "scene.md":
         from coneskin.scene.tables.keys import scene_tables
 
@@ -234,12 +229,16 @@ def main() -> int:
     """Write the pages, or check them."""
     parser = argparse.ArgumentParser(description="Write the tables of docs/look-up from those of the code.")
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where a page differs")
-    check = parser.parse_args().check
+    parser.add_argument("--show", choices=SHOWN, help="print a table that no page of the repository has")
+    args = parser.parse_args()
+    if args.show:
+        print(SHOWN[args.show](), end="")
+        return 0
     stale = []
     for name in PARTS:
         made = page(name)
         if made != (PAGES / name).read_text(encoding="utf-8"):
-            if check:
+            if args.check:
                 stale.append(f"{name}: run python scripts/reference.py")
             else:
                 (PAGES / name).write_text(made, encoding="utf-8")

@@ -13,7 +13,7 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parent))
-from reference import option_tables
+from reference import method_table, option_tables
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "coneskin"
@@ -42,6 +42,7 @@ def generated_pages() -> Iterator[tuple[str, str]]:
             text = text.replace(f"]({name})", f"]({other})")
         yield page, text
     yield "look-up/options.md", f"# Options of the commands\n\n{option_tables()}"
+    yield "look-up/ur-rtde.md", f"# Methods of ur_rtde on `session.arm`\n\n{methods()}"
     for folder in folders(PACKAGE):
         yield f"api/{folder}.md", folder_page(folder)
 
@@ -60,6 +61,14 @@ def folders(path: Path, prefix: str = "") -> Iterator[str]:
 def modules(path: Path) -> list[str]:
     """Return the names of the modules in a folder."""
     return sorted(file.stem for file in path.glob("*.py") if not file.stem.startswith("__"))
+
+
+def methods() -> str:
+    """Return the table of ur_rtde's methods, where its wheel is installed."""
+    try:
+        return method_table()
+    except ImportError:
+        return "The site was built without ur_rtde: `python scripts/reference.py --show methods` prints the table.\n"
 
 
 def folder_page(folder: str) -> str:
