@@ -15,7 +15,7 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.build import SensorOnArm, place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene, Scene
-from coneskin.testing.commissioned import commissioned
+from coneskin.testing.scenes import commissioned
 
 ARMS = ("UR5e", "UR10e", "UR3e")
 SPEED = 0.1, 1.5  # m/s of the touched place along its normal

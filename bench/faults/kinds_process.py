@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from coneskin.robot.driver.messages import HEARTBEAT_TIMEOUT
-from coneskin.testing.forearm import ESCALATE
+from coneskin.testing.scenes import ESCALATE
 
 from .kind import (
     EXTERNAL,

@@ -25,8 +25,7 @@ from typing import Any, ClassVar
 from coneskin.core.errors import ConeSkinError, RobotConnectionError
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import load_scene
-from coneskin.testing.commissioned import write_passed_record
-from coneskin.testing.forearm import START, forearm_scene
+from coneskin.testing.scenes import START, forearm_scene, write_passed_record
 
 from .child import Child
 from .motion import BEHIND, ArmMotion, Touch

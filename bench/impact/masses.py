@@ -16,7 +16,7 @@ import numpy as np
 from bench.report import head
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.scene.reader import parse_scene
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import forearm_scene
 
 MOTIONS = {
     "base turns 70 deg": "[[-10, -90, 90, -90, -90, 0], [60, -90, 90, -90, -90, 0]]",

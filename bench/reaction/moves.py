@@ -21,7 +21,7 @@ from typing import Any
 
 from coneskin.core.errors import ConeSkinError
 from coneskin.session.session import Session
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 
 MODES = ("moveJ", "moveL", "speedJ", "servoJ", "sync", "script")
 EXTERNAL = ("sync", "script", "urcl")

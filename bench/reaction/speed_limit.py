@@ -20,7 +20,7 @@ from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, Perm
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.sim.mock_arm import MockArm
 from coneskin.robot.ur.driver import UR_DRIVER
-from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q
+from tests.support.guard_rig import CONE, LINK, MODEL, START_Q
 
 CYCLE = 0.002  # s
 LATE = 10  # cycles from a command to its effect

@@ -24,7 +24,7 @@ from coneskin.robot.ur.state_reader import StateReader, decode_state
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
-from coneskin.testing.forearm import START, forearm_scene
+from coneskin.testing.scenes import START, forearm_scene
 
 from .moves import CLOCK, EXTERNAL, Child, ExternalArm, GuardedArm
 

@@ -29,7 +29,7 @@ from coneskin.robot.guard.signals.journal import EventName
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
-from coneskin.testing.forearm import START, forearm_scene
+from coneskin.testing.scenes import START, forearm_scene
 
 from .browser import PROCESSES, drawn_pictures, first_picture, resident
 from .guard import guard_rounds, print_lateness

@@ -14,7 +14,7 @@ from coneskin.commissioning.examination.wire_examination import WirePatch
 from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.sim.process import free_host
 from coneskin.scene.reader import load_scene
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import forearm_scene
 from tests.support.paths import SHARED_DATA
 
 from ..scene.scenes import SKIN_ONLY

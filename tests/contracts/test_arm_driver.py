@@ -23,7 +23,7 @@ from coneskin.robot.sim.mock_arm import CompanionProcesses
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Foam, Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.testing.guard_rig import CONE, START_Q, make_core, touch
+from tests.support.guard_rig import CONE, START_Q, make_core, touch
 
 
 class JsonDriver:

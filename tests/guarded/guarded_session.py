@@ -6,8 +6,7 @@ import threading
 import time
 
 from coneskin.scene.reader import parse_scene
-from coneskin.testing.commissioned import commissioned
-from coneskin.testing.forearm import GOAL, forearm_scene
+from coneskin.testing.scenes import GOAL, commissioned, forearm_scene
 
 _PATIENT = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 300\nprogram_silence_ms = 500"
 

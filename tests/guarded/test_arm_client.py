@@ -12,7 +12,7 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.waypoint import Waypoint
 from coneskin.robot.sim.urscript.values import values_of
 from coneskin.session.session import guard
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 
 from .guarded_session import scene_for, until
 

@@ -8,7 +8,7 @@ import pytest
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.ur.heartbeat_registers import program_lines
 from coneskin.session.session import guard
-from coneskin.testing.forearm import GOAL, START
+from coneskin.testing.scenes import GOAL, START
 
 from .guarded_session import fast, scene_for, until
 

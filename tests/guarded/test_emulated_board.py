@@ -10,7 +10,7 @@ import pytest
 from coneskin.core.errors import Collision, RobotRefused
 from coneskin.runs.replay.run import read_run, replay
 from coneskin.session.session import guard
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard
 from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 from tests.support.firmware.guarded_board import board_scene

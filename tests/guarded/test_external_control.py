@@ -17,7 +17,7 @@ import pytest
 from coneskin.core.errors import Collision, RobotRefused
 from coneskin.runs.replay.run import read_run, replay
 from coneskin.session.session import guard
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 from tests.support.sweep import sweep
 
 from .guarded_session import fast, kill, scene_for, scene_text, until

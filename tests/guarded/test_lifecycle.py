@@ -15,7 +15,7 @@ from coneskin.core import child_process
 from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused
 from coneskin.runs.replay.run import read_run, replay
 from coneskin.session.session import guard
-from coneskin.testing.forearm import GOAL, START
+from coneskin.testing.scenes import GOAL, START
 
 from ..robot import wheel
 from .guarded_session import assert_stopped_on_the_way, fast, kill, run_until_moving, scene_for, scene_text, until

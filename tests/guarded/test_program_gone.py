@@ -13,7 +13,7 @@ import pytest
 
 from coneskin.core.errors import RobotRefused
 from coneskin.session.session import guard
-from coneskin.testing.forearm import GOAL, START
+from coneskin.testing.scenes import GOAL, START
 
 from .guarded_session import (
     assert_stopped_on_the_way,

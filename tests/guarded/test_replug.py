@@ -12,8 +12,7 @@ from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.skin.virtual.pseudo_terminal import PseudoTerminal
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.testing.commissioned import commissioned
-from coneskin.testing.forearm import START, forearm_scene
+from coneskin.testing.scenes import START, commissioned, forearm_scene
 
 from .guarded_session import assert_stopped_on_the_way, run_until_moving
 

@@ -7,7 +7,7 @@ import pytest
 from coneskin.core.errors import Collision
 from coneskin.runs.replay.run import read_run, replay
 from coneskin.session.session import guard
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 
 from .guarded_session import run_until_moving, scene_for
 

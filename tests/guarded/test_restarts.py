@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.core.errors import Collision
 from coneskin.session.session import guard
-from coneskin.testing.forearm import GOAL, START
+from coneskin.testing.scenes import GOAL, START
 
 from .guarded_session import kill, scene_for, until
 

@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.session.session import guard
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 from tests.core.test_time_slice import told_by_kernel
 
 from .guarded_session import scene_for

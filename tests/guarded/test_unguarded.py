@@ -11,7 +11,7 @@ import pytest
 from coneskin.core.errors import RobotConnectionError, RobotRefused, SensorError
 from coneskin.session.guard_monitor import FallbackStop
 from coneskin.session.session import guard
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 
 from .guarded_session import fast, kill, scene_for, until
 

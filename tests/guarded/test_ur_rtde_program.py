@@ -12,7 +12,7 @@ import pytest
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.ur.state_reader import StateReader
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 
 pytestmark = pytest.mark.long
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")

@@ -10,7 +10,7 @@ from coneskin.core.errors import SceneError
 from coneskin.scene import required_packages
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.suspicions import suspicions
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import forearm_scene
 
 from .scenes import DOCUMENT
 

@@ -18,7 +18,7 @@ from coneskin.core.recording.recorder import Recorder
 from coneskin.geometry.pose import Vector
 from coneskin.robot.guard.signals.journal import BlockKind, force_block
 from coneskin.runs.replay.run import Run
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import forearm_scene
 from coneskin.view.history import History
 from coneskin.view.live_page import LivePage
 from coneskin.view.live_run import LiveRun

@@ -28,10 +28,10 @@ from coneskin.skin.wire import FRAME_LENGTH, FrameDecoder, encode
 
 __all__ = ["SOURCE_CHECKS", "OpenLine", "OpenLineFactory", "contract_bytes"]
 
-_PATIENCE = 2.0  # s; far beyond what a line in one machine needs, so reached only where the contract is broken
-_SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))
-_PERIOD = 1e-3  # s
-_FRAMES = 75  # a pseudo-terminal holds 4 kB
+_LINE_TIMEOUT = 10.0  # s; far beyond what a line in one machine needs, so reached only where the contract is broken
+_TOUCHED_SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))
+_FRAME_PERIOD = 1e-3  # s
+_FRAME_COUNT = 75  # a pseudo-terminal holds 4 kB
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class OpenLine:
         """
         data = b""
         while len(data) < count:
-            data += self.source.read(_PATIENCE)
+            data += self.source.read(_LINE_TIMEOUT)
         return data
 
 
@@ -65,9 +65,9 @@ def contract_bytes(wire_version: int = 1, driven: bool = False) -> bytes:
     """Return the bytes of 75 frames with a touch, which the checks send: less than 4 kB, which fits any buffer."""
     touch = ScriptedTouch(0.06, 0.3, u=0.2, phi=1.0)
     skin = VirtualSkin(
-        *(_SENSOR, [touch]),
+        *(_TOUCHED_SENSOR, [touch]),
         model="ladder",
-        duration=_FRAMES * _PERIOD,
+        duration=_FRAME_COUNT * _FRAME_PERIOD,
         seed=3,
         wire_version=wire_version,
         driven_potentials=driven,
@@ -88,12 +88,12 @@ def check_bytes_arrive_as_they_were_sent(open_line: OpenLineFactory) -> None:
 def check_a_touch_arrives(open_line: OpenLineFactory) -> None:
     """Check that a detector sees the touch where it is."""
     sent = contract_bytes()
-    stream = TouchStream([_SENSOR])
+    stream = TouchStream([_TOUCHED_SENSOR])
     with open_line(sent) as line:
-        events = stream.feed(line.read(len(sent)), _FRAMES * _PERIOD)
+        events = stream.feed(line.read(len(sent)), _FRAME_COUNT * _FRAME_PERIOD)
     began = [event for event in events if isinstance(event, TouchBegan)]
     assert len(began) == 1
-    assert stream.decoder.frames == _FRAMES
+    assert stream.decoder.frames == _FRAME_COUNT
 
 
 def check_a_cut_frame_costs_that_frame_only(open_line: OpenLineFactory) -> None:
@@ -104,7 +104,7 @@ def check_a_cut_frame_costs_that_frame_only(open_line: OpenLineFactory) -> None:
         received = line.read(len(sent))
     numbers = [frame.sequence for frame in FrameDecoder().feed(received)]
     assert received == sent
-    assert numbers == [number for number in range(_FRAMES) if number != 5]
+    assert numbers == [number for number in range(_FRAME_COUNT) if number != 5]
 
 
 def check_the_descriptor_is_readable_when_bytes_come(open_line: OpenLineFactory) -> None:
@@ -112,8 +112,8 @@ def check_the_descriptor_is_readable_when_bytes_come(open_line: OpenLineFactory)
     with open_line(contract_bytes()) as line:
         descriptor = line.source.fileno()
         if descriptor is not None:
-            assert select.select([descriptor], [], [], _PATIENCE)[0] == [descriptor]
-        assert line.source.read(_PATIENCE)
+            assert select.select([descriptor], [], [], _LINE_TIMEOUT)[0] == [descriptor]
+        assert line.source.read(_LINE_TIMEOUT)
 
 
 def check_silence_is_a_timeout_that_leaves_it_open(open_line: OpenLineFactory) -> None:
@@ -140,7 +140,7 @@ def check_unplugged_is_an_error_and_stays_one(open_line: OpenLineFactory) -> Non
             while True:
                 if len(received) >= len(sent) and line.pull is not None:
                     line.pull()
-                received += line.source.read(_PATIENCE)
+                received += line.source.read(_LINE_TIMEOUT)
         assert sent.startswith(received)
         for _ in range(2):
             try:

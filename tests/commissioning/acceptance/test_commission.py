@@ -10,7 +10,7 @@ from coneskin.commissioning.acceptance.commission import Commissioner, commissio
 from coneskin.core.errors import SkinConnectionError
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.values.scene import Scene
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import forearm_scene
 
 TEXT = forearm_scene(reaction='kind = "retreat"').replace("[[link.sensor]]", '[[link.sensor]]\nname = "forearm skin"')
 Output = pytest.CaptureFixture[str]

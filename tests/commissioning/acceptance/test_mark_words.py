@@ -20,7 +20,7 @@ from coneskin.robot.arm.link_frames import dh_mesh
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
-from coneskin.testing.forearm import START, forearm_scene
+from coneskin.testing.scenes import START, forearm_scene
 
 UR5E = arm_model("UR5e")
 #: of the sheet on the link; the second lies end for end

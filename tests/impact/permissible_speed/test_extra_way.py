@@ -28,7 +28,7 @@ from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.materials import Padding
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import forearm_scene
 
 MODEL = arm_model("UR5e")
 TURN = 2.0 * math.pi * 15.0

@@ -24,7 +24,7 @@ from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
-from coneskin.testing.guard_rig import CONE, LINK, MODEL
+from tests.support.guard_rig import CONE, LINK, MODEL
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 

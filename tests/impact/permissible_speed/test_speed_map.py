@@ -22,7 +22,7 @@ from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.skin.materials import Padding
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import forearm_scene
 
 from .test_limits_file import TEXT
 

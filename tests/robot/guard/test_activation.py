@@ -6,7 +6,7 @@ from coneskin.robot.driver.messages import Release
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.types import Reaction
-from coneskin.testing.guard_rig import GuardRig, touch
+from tests.support.guard_rig import GuardRig, touch
 
 
 def test_nothing_moves_before_everything_is_sound():

@@ -9,7 +9,7 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.sim.mock_arm import SLIDER
-from coneskin.testing.guard_rig import GuardRig, touch
+from tests.support.guard_rig import GuardRig, touch
 
 
 @pytest.mark.parametrize(

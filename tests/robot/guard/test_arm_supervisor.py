@@ -10,7 +10,7 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
-from coneskin.testing.guard_rig import LINK, GuardRig, make_core, touch
+from tests.support.guard_rig import LINK, GuardRig, make_core, touch
 from tests.support.sweep import sweep
 
 from .reactions import SLOW, comply

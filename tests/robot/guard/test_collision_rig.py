@@ -7,8 +7,8 @@ import pytest
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.sensor import Sensor
-from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q
 from tests.support.collision_rig import CollisionRig, SkinOnLink
+from tests.support.guard_rig import CONE, LINK, MODEL, START_Q
 from tests.support.pressing_body import Body, Pressing
 
 U, PHI = 0.13, 1.57

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from coneskin.robot.reaction.types import Reaction
-from coneskin.testing.guard_rig import CONE, GuardRig, touch
+from tests.support.guard_rig import CONE, GuardRig, touch
 
 
 def pressed(*touches):

@@ -17,7 +17,7 @@ from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.virtual.circuit import WiringFaults
 from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-from coneskin.testing.guard_rig import GuardRig, make_core, touch
+from tests.support.guard_rig import GuardRig, make_core, touch
 from tests.support.sweep import sweep
 
 

@@ -10,7 +10,7 @@ from coneskin.robot.guard.event_folding import EventFolding
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName
 from coneskin.robot.reaction.types import Reaction
-from coneskin.testing.guard_rig import GuardRig, touch
+from tests.support.guard_rig import GuardRig, touch
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 30.0), st.sampled_from("ab")), max_size=60))

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, decode_loss, encode_loss
-from coneskin.testing.guard_rig import GuardRig
+from tests.support.guard_rig import GuardRig
 
 HALF = "/dev/caf\udce9"  # a name in Latin-1, as Python reads it
 

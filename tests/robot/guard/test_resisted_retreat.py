@@ -10,8 +10,8 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.skin.sensor import Sensor
-from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q
 from tests.support.collision_rig import CollisionRig, SkinOnLink
+from tests.support.guard_rig import CONE, LINK, MODEL, START_Q
 from tests.support.pressing_body import Body
 
 QD = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -20,7 +20,7 @@ from coneskin.skin.sources.source import Source, SourceReopening
 from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.testing.guard_rig import CONE, GuardRig, make_core
+from tests.support.guard_rig import CONE, GuardRig, make_core
 
 
 def a_skin(device: int = 0, sensor: int = 0, *touches: ScriptedTouch) -> VirtualSkin:

@@ -12,7 +12,7 @@ from coneskin.robot.reaction.contact_approach import ContactApproach
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-from coneskin.testing.guard_rig import GuardRig, touch
+from tests.support.guard_rig import GuardRig, touch
 
 from .test_resisted_retreat import HAND, PHI, collide, excess
 

@@ -7,7 +7,7 @@ import pytest
 from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.variable_reader import RtdeVariableReader
-from coneskin.testing.forearm import START
+from coneskin.testing.scenes import START
 
 pytestmark = pytest.mark.long
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
-from coneskin.testing.commissioned import commissioned
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import commissioned, forearm_scene
 
 __all__ = ["board_scene"]
 

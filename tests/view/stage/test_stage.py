@@ -15,7 +15,7 @@ from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
-from coneskin.testing.forearm import forearm_scene
+from coneskin.testing.scenes import forearm_scene
 from coneskin.view.stage.level_scale import level_colour
 from coneskin.view.stage.solids import Solid, along, arm_solids, barrel, joined, quaternion
 from coneskin.view.stage.stage import CLEAR, Stage, clear_where_buried, floor_lines, set_stage

@@ -12,7 +12,7 @@ from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-from coneskin.testing.guard_rig import GuardRig, touch
+from tests.support.guard_rig import GuardRig, touch
 from tests.support.sweep import sweep
 
 BOTH = pytest.mark.parametrize("external", [False, True], ids=["internal", "external"])

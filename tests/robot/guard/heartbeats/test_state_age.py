@@ -12,7 +12,7 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.testing.guard_rig import GuardRig, touch
+from tests.support.guard_rig import GuardRig, touch
 
 PATIENT = MonitoringLimits(arm_silence=0.25)  # as a scene of a busy computer has it
 STANDING = (0.0,) * 6, (0.0,) * 6, True, False, True

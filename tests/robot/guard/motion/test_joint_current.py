@@ -8,7 +8,7 @@ from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.joint_current import MAX_RISE, JointCurrentMonitor
 from coneskin.robot.reaction.types import Reaction
-from coneskin.testing.guard_rig import GuardRig, touch
+from tests.support.guard_rig import GuardRig, touch
 
 ZEROS = (0.0,) * 6
 

@@ -11,7 +11,7 @@ from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
-from coneskin.testing.guard_rig import MODEL, GuardRig, felt, touch
+from tests.support.guard_rig import MODEL, GuardRig, felt, touch
 
 from ..reactions import comply
 

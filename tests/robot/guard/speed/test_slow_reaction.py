@@ -15,7 +15,7 @@ from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.sim.mock_arm import SLIDER
 from coneskin.robot.ur.speed_slider import decode_fraction
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-from coneskin.testing.guard_rig import GuardRig, felt, make_core, touch
+from tests.support.guard_rig import GuardRig, felt, make_core, touch
 from tests.support.sweep import sweep
 
 from ..reactions import SLOW

@@ -17,7 +17,7 @@ from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.sim.mock_arm import MockArm
 from coneskin.robot.ur.driver import UR_DRIVER
-from coneskin.testing.guard_rig import CONE, LINK, MODEL, START_Q, GuardRig, touch
+from tests.support.guard_rig import CONE, LINK, MODEL, START_Q, GuardRig, touch
 
 LEVERS = (0.1, 0.2, 0.4, 0.8)
 CURVE = (0.05, 0.1, 0.2, 0.3)  # up to 0.4 m/rad: 0.5 rad/s of the leading joint

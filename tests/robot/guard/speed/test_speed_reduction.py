@@ -11,7 +11,7 @@ from coneskin.robot.guard.speed.speed_reduction import HOLD, ReducedSpeedTouch, 
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
-from coneskin.testing.guard_rig import GuardRig, touch
+from tests.support.guard_rig import GuardRig, touch
 
 SLOW = 0.05  # m/s
 

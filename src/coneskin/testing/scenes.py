@@ -1,10 +1,16 @@
-"""Scene of a UR5e with one sensor on its forearm, which tests, benches and examples share."""
+"""Scene of a UR5e with one sensor on its forearm, and a commissioning of it that nobody has carried out."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
 
-__all__ = ["ESCALATE", "GOAL", "START", "forearm_scene", "start_with"]
+from coneskin.scene.commissioning_record import CommissioningRecord, MarkResult, fingerprint, write_record
+from coneskin.scene.values.scene import Commissioning, Scene
+
+__all__ = ["ESCALATE", "GOAL", "START", "commissioned", "forearm_scene", "start_with", "write_passed_record"]
 
 START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]  #: joint positions [rad]
 GOAL = [math.radians(60.0), *START[1:]]  #: joint positions 100 deg of the base further [rad]
@@ -53,3 +59,17 @@ def forearm_scene(
 def start_with(base_deg: float) -> list[float]:
     """Return ``START`` with the base turned to an angle [deg], as joint positions [rad]."""
     return [math.radians(base_deg), *START[1:]]
+
+
+def commissioned(scene: Scene) -> Scene:
+    """Return a scene whose reactions may move the arm away."""
+    return replace(scene, commissioning=Commissioning(True, "declared by a test"))
+
+
+def write_passed_record(scene: Scene) -> Path:
+    """Write a record beside a scene's file as if it had been commissioned now, and return its path."""
+    marks = tuple(
+        MarkResult(item.sensor.name, "nowhere", 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1, True) for item in scene.sensors
+    )
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return write_record(scene, CommissioningRecord(now, "", fingerprint(scene), True, "", "a test", marks))
