@@ -14,10 +14,10 @@ from .signals.outputs import Outputs, emit
 
 __all__ = ["EventFolding"]
 
-_BURST = 10  # events of a kind that come as they are
-_QUIET = 10.0  # s without one, after which they do so again
+_BURST_EVENTS = 10  # events of a kind that come as they are
+_CLEAR_TIME = 10.0  # s without one, after which they do so again
 _FIRST_INTERVAL = 1.0  # s until the first count; the next ones take twice as long
-_LONGEST_INTERVAL = 600.0  # s
+_MAX_INTERVAL = 600.0  # s
 
 
 @dataclass(slots=True)
@@ -55,10 +55,10 @@ class EventFolding:
             **details: of the event; the newest are reported.
         """
         kind = self._kinds.get((name, about))
-        if kind is None or (now - kind.newest >= _QUIET and not kind.held):
+        if kind is None or (now - kind.newest >= _CLEAR_TIME and not kind.held):
             kind = self._kinds[name, about] = _Kind(now, now)
         kind.newest = now
-        if kind.sent < _BURST:
+        if kind.sent < _BURST_EVENTS:
             kind.sent += 1
             kind.reported = now
             emit(out, name, now, **details)
@@ -78,7 +78,7 @@ class EventFolding:
             if now >= kind.reported + kind.interval:
                 emit(out, name, now, **kind.details, count=kind.held)
                 kind.held, kind.reported = 0, now
-                kind.interval = min(2.0 * kind.interval, _LONGEST_INTERVAL)
+                kind.interval = min(2.0 * kind.interval, _MAX_INTERVAL)
             else:
                 self._due = min(self._due, kind.reported + kind.interval)
 

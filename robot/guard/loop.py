@@ -29,10 +29,10 @@ from .signals.journal import BlockKind, encode_loss
 
 __all__ = ["GuardLoop"]
 
-_HEARTBEAT = Heartbeat().encode()
+_HEARTBEAT_BYTES = Heartbeat().encode()
 _SESSION_GONE_TIMEOUT = 1.5  # s that the arm has to stand when there is nobody left to tell
 #: what can be lost -> the attribute of ``GuardPorts``
-_PORTS = {
+_PORT_ATTRIBUTES = {
     "skin": "source",
     "controller": "reader",
     "slider": "slider",
@@ -40,9 +40,9 @@ _PORTS = {
     "watchdog": "watchdog",
     "driver": "driver",
 }
-_TICK = 0.002  # s between two looks at the clocks where nothing else happens
-_OVERRUN = 0.02  # s between two rounds, from which on the loop reports that it was held up
-_SUSPENSION = 1.0  # s between two rounds, from which on nobody has guarded; the driver process waits half of it
+_TICK_PERIOD = 0.002  # s between two looks at the clocks where nothing else happens
+_OVERRUN_TIME = 0.02  # s between two rounds, from which on the loop reports that it was held up
+_SUSPENSION_TIME = 1.0  # s between two rounds, from which on nobody has guarded; the driver process waits half of it
 _FLUSH_TIMEOUT = 1.0  # s that the recorder has to take what waits for it
 _SHUTDOWN_TIMEOUT = 3.0  # s that the arm has to stand when the guard is told to end
 
@@ -96,7 +96,7 @@ class GuardLoop:
         gc.disable()  # nothing here lives longer than a frame
         try:
             while not self._quit:
-                self.step(_TICK)
+                self.step(_TICK_PERIOD)
             self._end()
         finally:
             gc.enable()
@@ -150,7 +150,7 @@ class GuardLoop:
             self._drain(ports.stops)
         if ports.session in ready:
             for message in ports.session.receive():
-                if message == _HEARTBEAT:
+                if message == _HEARTBEAT_BYTES:
                     self._take(BlockKind.PROGRAM, b"")
                 elif message.startswith(b"reset "):
                     self._take(BlockKind.RESET, message.removeprefix(b"reset "))
@@ -168,9 +168,9 @@ class GuardLoop:
         """Report how late this round is; where it is so late that nobody has guarded, to the core as well."""
         (before, sleepless_before), now, sleepless = self._rounds_at, self._clock(), self._sleepless_clock()
         self._rounds_at = now, sleepless
-        if now - before > _OVERRUN:
+        if now - before > _OVERRUN_TIME:
             self._record(Block(BlockKind.OVERRUN, now, json.dumps({"late": now - before}).encode()))
-        if sleepless - sleepless_before > _SUSPENSION:
+        if sleepless - sleepless_before > _SUSPENSION_TIME:
             self._take(BlockKind.SUSPENDED, b"%.3f" % (sleepless - sleepless_before))
 
     def _report(self) -> None:
@@ -190,11 +190,11 @@ class GuardLoop:
         self._beat = self._clock()
         for channel in (self._ports.driver, self._ports.watchdog):
             if channel is not None:
-                channel.send(_HEARTBEAT)
+                channel.send(_HEARTBEAT_BYTES)
 
     def _read_skin(self, source: Source) -> None:
         try:
-            data = source.read(0.0 if source.fileno() is not None else _TICK)
+            data = source.read(0.0 if source.fileno() is not None else _TICK_PERIOD)
         except SkinTimeout:
             return
         except ConeSkinError as exc:
@@ -273,7 +273,7 @@ class GuardLoop:
         self._forget(fileobj)
         if what == "skin" and self._ports.reopen is not None:
             self._gone = self._ports.source
-        setattr(self._ports, _PORTS[what], None)
+        setattr(self._ports, _PORT_ATTRIBUTES[what], None)
         self._take(BlockKind.LOST, encode_loss(what, why))
         if what == "controller" and (driver := self._ports.driver) is not None:
             # it would connect again by itself, and its program start with whatever command is still there
@@ -289,7 +289,7 @@ class GuardLoop:
         self._take(BlockKind.LOST, b"session\nthe guard was told to end")
         end = self._clock() + (_SESSION_GONE_TIMEOUT if self._ports.session.closed else _SHUTDOWN_TIMEOUT)
         while (self._core.phase.stopping or self._core.phase is Phase.RETREATING) and self._clock() < end:
-            self.step(_TICK)
+            self.step(_TICK_PERIOD)
         if self._ports.watchdog is not None and not (self._core.phase.stopping or self._core.phase is Phase.RETREATING):
             self._ports.watchdog.send(Shutdown().encode())
         self._report()

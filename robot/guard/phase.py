@@ -21,13 +21,13 @@ class Phase(Enum):
     @property
     def watched(self) -> bool:
         """True where a fault has to stop the arm now."""
-        return self in _WATCHED
+        return self in _WATCHED_PHASES
 
     @property
     def stopping(self) -> bool:
         """True while a stop is under way."""
-        return self in _STOPPING
+        return self in _STOPPING_PHASES
 
 
-_WATCHED = frozenset({Phase.ACTIVE, Phase.SLOWED, Phase.RETREATING})
-_STOPPING = frozenset({Phase.STOPPING, Phase.HALTING})
+_WATCHED_PHASES = frozenset({Phase.ACTIVE, Phase.SLOWED, Phase.RETREATING})
+_STOPPING_PHASES = frozenset({Phase.STOPPING, Phase.HALTING})

@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 __all__ = ["BATCH", "take_inputs"]
 
 BATCH = 4096  #: inputs that are looked at together: some seconds, 5 MB
-_LEAST = 6  # inputs; fewer are quicker one by one
-_RETRY = 24  # inputs that are taken one by one where the guard is at work
-_MARGIN = 1e-6  # s; far above the rounding of a time
-_CALM = frozenset({BlockKind.TICK, BlockKind.PROGRAM, BlockKind.DRIVER, BlockKind.SLIDER})
+_MIN_BATCH = 6  # inputs; fewer are quicker one by one
+_RETRY_INPUTS = 24  # inputs that are taken one by one where the guard is at work
+_TIME_ROUNDING = 1e-6  # s; far above the rounding of a time
+_CALM_KINDS = frozenset({BlockKind.TICK, BlockKind.PROGRAM, BlockKind.DRIVER, BlockKind.SLIDER})
 _CALM_REPORTS = ("alive", "done", "released")  # to an active guard
 
 
@@ -54,12 +54,12 @@ def take_inputs(core: GuardCore, blocks: Sequence[Block], take: Callable[[Block]
     times, end, at, retry = batch.times, len(blocks), 0, 0
     while at < end:
         stop = batch.calm_until(at) if at >= retry else at
-        if stop - at >= _LEAST:
-            stop = bisect_left(times, core.quiet_until() - _MARGIN, at, stop)
-            if stop - at >= _LEAST and (reached := batch.give(at, stop)) > at:
+        if stop - at >= _MIN_BATCH:
+            stop = bisect_left(times, core.quiet_until() - _TIME_ROUNDING, at, stop)
+            if stop - at >= _MIN_BATCH and (reached := batch.give(at, stop)) > at:
                 at = reached
                 continue
-            retry = at + _RETRY
+            retry = at + _RETRY_INPUTS
         take(blocks[at])
         at += 1
 
@@ -96,7 +96,7 @@ class _Batch:
         stream, known = self._core.stream, self._bytes_before(at)
         if stream.decoder.rest != self._data[self._frame_starts[self._frames_before(at)] : known]:
             return at  # what came before was damaged
-        while stop - at >= _LEAST:
+        while stop - at >= _MIN_BATCH:
             first, behind = self._frames_before(at), self._frames_before(stop)
             reached = self._learn(first, behind)
             if reached == behind:
@@ -140,7 +140,7 @@ class _Batch:
     def _fits(self, block: Block) -> bool:
         """Tell whether an input that is neither the skin's nor a state of the arm is calm."""
         arm = self._core.arm
-        if block.kind not in _CALM:
+        if block.kind not in _CALM_KINDS:
             return False
         if arm is not None and block.kind == BlockKind.DRIVER:
             return StatusReport.decode(block.payload).kind in _CALM_REPORTS

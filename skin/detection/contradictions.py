@@ -13,8 +13,8 @@ _OF_CONTACTS = frozenset(
         *(Fault.SHORT_UPPER, Fault.SHORT_LOWER),
     }
 )
-_MOST = 2.5  # frames; the fourth in a row is a fault, three may be a contact that closes slowly
-_DECAY = 0.1  # frames; each good frame takes so many off the count
+_MAX_CONTRADICTIONS = 2.5  # frames; the fourth in a row is a fault, three may be a contact that closes slowly
+_CONTRADICTION_DECAY = 0.1  # frames; each good frame takes so many off the count
 
 
 class Contradictions:
@@ -38,11 +38,11 @@ class Contradictions:
         Args:
             fault: of the frame.
         """
-        if fault not in _OF_CONTACTS or self.count > _MOST:
+        if fault not in _OF_CONTACTS or self.count > _MAX_CONTRADICTIONS:
             return False
         self.count += 1.0
         return True
 
     def forget(self) -> None:
         """Take a good frame."""
-        self.count = max(0.0, self.count - _DECAY)
+        self.count = max(0.0, self.count - _CONTRADICTION_DECAY)

@@ -21,7 +21,7 @@ from coneskin.skin.wire import Frame, Status
 
 from .contradictions import Contradictions
 from .events import SkinEvent
-from .fault_diagnosis import DIAGNOSED, FaultDiagnosis
+from .fault_diagnosis import DIAGNOSED_FAULTS, FaultDiagnosis
 from .fault_reports import FaultReports
 from .frame.faults import Fault
 from .frame.reading import read
@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # for replays only
 
 __all__ = ["Detector"]
 
-_RESTARTED = int(Status.RESTARTED)
+_RESTARTED_BIT = int(Status.RESTARTED)
 
 
 class Detector:
@@ -128,7 +128,7 @@ class Detector:
         """
         events: list[SkinEvent] = []
         self._fed = now
-        restarted = frame.status & _RESTARTED and self.timing.frames > 0
+        restarted = frame.status & _RESTARTED_BIT and self.timing.frames > 0
         if restarted:
             self.timing.restart()
         late = self.timing.advance(frame.sequence, frame.clock_us, now)
@@ -143,7 +143,7 @@ class Detector:
         level = whole - self._level.value
         if fault is None and whole < self._release and self._guides.contradict(frame, whole, self.timing.period):
             fault = Fault.GUIDE_DRIVEN
-        if self._diagnosis.active and (fault is None or fault in DIAGNOSED):
+        if self._diagnosis.active and (fault is None or fault in DIAGNOSED_FAULTS):
             name = self._diagnosis.take(frame, fault)
             if name is not None:
                 self._report(events, name, frame, now, self._diagnosis.words)

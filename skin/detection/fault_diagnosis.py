@@ -18,32 +18,34 @@ from .frame.contact_matrix import FrameInversion
 from .frame.faults import Fault
 from .wiring_hypothesis import Observation, PointContact, WiringHypothesis, list_hypotheses, observe
 
-__all__ = ["DIAGNOSED", "FaultDiagnosis"]
+__all__ = ["DIAGNOSED_FAULTS", "FaultDiagnosis"]
 
 #: Faults that a broken wire or part may be the cause of.
-DIAGNOSED = frozenset(
+DIAGNOSED_FAULTS = frozenset(
     {
         *(Fault.OPEN_UPPER, Fault.OPEN_A, Fault.OPEN_B, Fault.OPEN_LOWER, Fault.OPEN_C, Fault.OPEN_D),
         *(Fault.SHORT_UPPER, Fault.SHORT_LOWER, Fault.LEAK),
         *(Fault.GUIDES_DISAGREE, Fault.GUIDE_DRIVEN, Fault.OUT_OF_RANGE),
     }
 )
-_PAIRS = {Fault.OPEN_UPPER: (Fault.OPEN_A, Fault.OPEN_B), Fault.OPEN_LOWER: (Fault.OPEN_C, Fault.OPEN_D)}
-_BOTH = {one: both for both, pair in _PAIRS.items() for one in pair}
-_AT_REST = 0.01  # part of full scale, by which two frames at rest differ at most
-_CHANGED = 0.03  # likewise; what is farther from the frame that was explained needs another explanation
-_STEPS = 2  # of the fit in one frame
-_ROUNDS = 12  # steps for one hypothesis
-_TRIED, _HOPELESS = 5, 2000.0  # steps, and the sum of squares beyond which no more are made then
+_WIRE_PAIRS = {Fault.OPEN_UPPER: (Fault.OPEN_A, Fault.OPEN_B), Fault.OPEN_LOWER: (Fault.OPEN_C, Fault.OPEN_D)}
+_PAIR_OF_WIRE = {one: both for both, pair in _WIRE_PAIRS.items() for one in pair}
+_REST_DIFFERENCE = 0.01  # part of full scale, by which two frames at rest differ at most
+_CHANGE_DIFFERENCE = 0.03  # likewise; what is farther from the frame that was explained needs another explanation
+_STEPS_PER_FRAME = 2  # of the fit in one frame
+_MAX_STEPS = 12  # steps for one hypothesis
+_TRIAL_STEPS, _HOPELESS_SUM = 5, 2000.0  # steps, and the sum of squares beyond which no more are made then
 _NO_CONTACT = PointContact(0.0, 0.5, 0.5)
-_STARTS = tuple(PointContact(3e-3, x, y) for x, y in ((0.5, 0.5), (0.1, 0.1), (0.9, 0.1), (0.1, 0.9), (0.9, 0.9)))
-_LEAST, _MOST = 1e-6, 1.0  # S; of a contact
-_EDGE = 2e-3  # of a side; a contact is no nearer to an electrode
-_SHOWN = 8.0  # by which a sum of squares must be less than those of other names,
-_SHOWN_OFF = 3.0  # and less than nothing broken, which the frame has excluded,
-_RATIO = 3.0  # and by so often what a contact leaves unexplained
-_TOUCH = 9.0  # by which the sum of squares is better at least where there is a contact
-_BAD = 200.0  # a sum of squares that explains nothing; a firm contact clipped by an edge leaves 140
+_START_CONTACTS = tuple(
+    PointContact(3e-3, x, y) for x, y in ((0.5, 0.5), (0.1, 0.1), (0.9, 0.1), (0.1, 0.9), (0.9, 0.9))
+)
+_MIN_CONDUCTANCE, _MAX_CONDUCTANCE = 1e-6, 1.0  # S; of a contact
+_EDGE_DISTANCE = 2e-3  # of a side; a contact is no nearer to an electrode
+_NAME_MARGIN = 8.0  # by which a sum of squares must be less than those of other names,
+_BROKEN_MARGIN = 3.0  # and less than nothing broken, which the frame has excluded,
+_SUM_RATIO = 3.0  # and by so often what a contact leaves unexplained
+_CONTACT_GAIN = 9.0  # by which the sum of squares is better at least where there is a contact
+_MAX_SUM = 200.0  # a sum of squares that explains nothing; a firm contact clipped by an edge leaves 140
 
 
 class FaultDiagnosis:
@@ -107,14 +109,14 @@ class FaultDiagnosis:
         """
         last, self._last = self._last, frame
         if self._frame is None or self._fit is None:
-            if last is None or self._differ(last, frame) > _AT_REST:
+            if last is None or self._differ(last, frame) > _REST_DIFFERENCE:
                 return None
-            if self._frame is not None and self._differ(self._frame, frame) < _CHANGED:
+            if self._frame is not None and self._differ(self._frame, frame) < _CHANGE_DIFFERENCE:
                 return None
             self._frame, self._given, self._number, self._found = frame, fault or self._name, 0, []
             self._fit = self._next()
             return None
-        for _ in range(_STEPS):
+        for _ in range(_STEPS_PER_FRAME):
             if self._fit.step():
                 self._found.append((self._fit.sum, self._fit.hypothesis))
                 self._number += 1
@@ -146,15 +148,15 @@ class FaultDiagnosis:
     def _decide(self) -> Fault:
         """Return the name of the likeliest hypothesis, where those of other names are far from it."""
         total, found = min(self._found, key=lambda each: each[0])
-        rest = total + _RATIO * (total if total < _TOUCH else total - _TOUCH)
-        near = [each for other, each in self._found if other < rest + (_SHOWN if each.fault else _SHOWN_OFF)]
+        rest = total + _SUM_RATIO * (total if total < _CONTACT_GAIN else total - _CONTACT_GAIN)
+        near = [each for other, each in self._found if other < rest + (_NAME_MARGIN if each.fault else _BROKEN_MARGIN)]
         names, fault = {hypothesis.fault for hypothesis in near}, found.fault
         self.words = ""
-        if total > _BAD or fault is None or self._given in names:
+        if total > _MAX_SUM or fault is None or self._given in names:
             fault = self._given
         elif names != {fault}:
-            both = _BOTH.get(fault)
-            fault = both if both and names <= {both, *_PAIRS[both]} else self._given
+            both = _PAIR_OF_WIRE.get(fault)
+            fault = both if both and names <= {both, *_WIRE_PAIRS[both]} else self._given
         if len(near) == 1 and found.fault is fault:
             self.words = found.words
         self._name = fault
@@ -200,9 +202,9 @@ class _Fit:
             (three * a + (pq * pr - pp * qr) * b + (pp * qq - pq * pq) * c) * scale,
         )
         moved = PointContact(
-            min(max(contact.conductance * math.exp(_within(steps[0], 2.0)), _LEAST), _MOST),
-            min(max(contact.x + _within(steps[1], 0.3), _EDGE), 1.0 - _EDGE),
-            min(max(contact.y + _within(steps[2], 0.3), _EDGE), 1.0 - _EDGE),
+            min(max(contact.conductance * math.exp(_within(steps[0], 2.0)), _MIN_CONDUCTANCE), _MAX_CONDUCTANCE),
+            min(max(contact.x + _within(steps[1], 0.3), _EDGE_DISTANCE), 1.0 - _EDGE_DISTANCE),
+            min(max(contact.y + _within(steps[2], 0.3), _EDGE_DISTANCE), 1.0 - _EDGE_DISTANCE),
         )
         after = self._compare(moved)
         better = _dot(after, after)
@@ -210,20 +212,20 @@ class _Fit:
         if better < total:
             settled = total - better < 1e-3 * total + 1e-3
             self._contact, self._errors, self._total = moved, after, better
-            self.sum = min(self.sum, better + _TOUCH)
+            self.sum = min(self.sum, better + _CONTACT_GAIN)
             self._damping *= 0.2
         else:
             self._damping *= 8.0
-        hopeless = self._round >= _TRIED and self._total > _HOPELESS
-        return settled or hopeless or self._round >= _ROUNDS
+        hopeless = self._round >= _TRIAL_STEPS and self._total > _HOPELESS_SUM
+        return settled or hopeless or self._round >= _MAX_STEPS
 
     def _start(self) -> bool:
         """Take the best of a few contacts; tell whether none is needed."""
         errors = self._compare(_NO_CONTACT)
         self.sum = _dot(errors, errors)
-        if self.sum < _TOUCH:
+        if self.sum < _CONTACT_GAIN:
             return True
-        for contact in _STARTS:
+        for contact in _START_CONTACTS:
             errors = self._compare(contact)
             total = _dot(errors, errors)
             if total < self._total:

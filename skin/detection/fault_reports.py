@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .events import SkinEvent, SkinFault
-from .fault_diagnosis import DIAGNOSED, FaultDiagnosis
+from .fault_diagnosis import DIAGNOSED_FAULTS, FaultDiagnosis
 from .frame.faults import Fault
 
 __all__ = ["FaultReports"]
@@ -47,7 +47,7 @@ class FaultReports:
             sequence: of the frame.
             detail: numbers that belong to it, or the diagnosis in words, which counts as another fault.
         """
-        if fault in DIAGNOSED:
+        if fault in DIAGNOSED_FAULTS:
             fault = self._diagnosis.rename(fault)
         self.present = fault
         told = detail if detail and detail == self._diagnosis.words else fault

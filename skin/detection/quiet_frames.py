@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from coneskin.skin.detection.untouched.guides import JUMP
+from coneskin.skin.detection.untouched.guides import GUIDE_JUMP
 from coneskin.skin.frame_batch import FrameBatch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status, frame_at
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["LIVELY", "QuietFrames", "find_quiet_frames"]
+__all__ = ["LIVELY_FIELDS", "QuietFrames", "find_quiet_frames"]
 
 #: fields that have noise in a working device, in the order of ``Detector``
-LIVELY = ("radial_current", "angular_current", "touch_supply", "radial_supply", "angular_supply")
-_STATUS = int(~Status.TOUCH & 0xFF)
-_LENGTHS = (36, 40)  # bytes; frames with the driven potentials are read one by one
-_ASKED = 32  # frames, of which one is read as a live one
+LIVELY_FIELDS = ("radial_current", "angular_current", "touch_supply", "radial_supply", "angular_supply")
+_FAULT_BITS = int(~Status.TOUCH & 0xFF)
+_FRAME_LENGTHS = (36, 40)  # bytes; frames with the driven potentials are read one by one
+_CHECK_INTERVAL = 32  # frames, of which one is read as a live one
 
 
 class QuietFrames(NamedTuple):
@@ -42,7 +42,7 @@ class QuietFrames(NamedTuple):
         radial_currents: over the supply.
         angular_currents: over the supply.
         supplies: in the touch phase [counts].
-        lively: the fields ``LIVELY``.
+        lively: the fields ``LIVELY_FIELDS``.
         repeats: how many frames in a row before it had the same value, for each of those.
         data: bytes of the frames.
         starts: offsets of the frames in them.
@@ -81,7 +81,7 @@ def find_quiet_frames(sensor: Sensor, batch: FrameBatch, times: NDArray[np.float
     import numpy as np
 
     bounds, limits = sensor.bounds, sensor.thresholds
-    names = ("touch_c", "touch_d", "touch_current", "radial_c", "radial_d", "angular_a", "angular_b", *LIVELY)
+    names = ("touch_c", "touch_d", "touch_current", "radial_c", "radial_d", "angular_a", "angular_b", *LIVELY_FIELDS)
     count = {name: batch.field(name).astype(np.int64) for name in names}
     touch, radial, angular = (
         count["touch_c"] + count["touch_d"],
@@ -90,7 +90,7 @@ def find_quiet_frames(sensor: Sensor, batch: FrameBatch, times: NDArray[np.float
     )
     supply, supply1, supply2 = count["touch_supply"], count["radial_supply"], count["angular_supply"]
     current1, current2 = count["radial_current"], count["angular_current"]
-    plain = (np.isin(batch.lengths, _LENGTHS)) & (batch.statuses & _STATUS == 0)
+    plain = (np.isin(batch.lengths, _FRAME_LENGTHS)) & (batch.statuses & _FAULT_BITS == 0)
     for each in (supply, supply1, supply2):
         plain &= (bounds.supply_low <= each) & (each <= bounds.supply_high)
     plain &= (bounds.radial_low <= current1) & (current1 <= bounds.radial_high)
@@ -105,11 +105,11 @@ def find_quiet_frames(sensor: Sensor, batch: FrameBatch, times: NDArray[np.float
         plain &= low + bounds.noise >= bounds.weaker_guide * high
         most = 1.0 / (1.0 + bounds.load_ratio * (1.0 / (level + LEVEL_NOISE / supply) - 1.0)) + GUIDE_SLACK
         plain &= (radial <= 2.0 * most * supply1) & (angular <= 2.0 * most * supply2)
-        plain &= np.abs(count["radial_c"] - count["radial_d"]) <= JUMP * supply
-        plain &= np.abs(count["angular_a"] - count["angular_b"]) <= JUMP * supply
+        plain &= np.abs(count["radial_c"] - count["radial_d"]) <= GUIDE_JUMP * supply
+        plain &= np.abs(count["angular_a"] - count["angular_b"]) <= GUIDE_JUMP * supply
         currents = current1 / supply1, current2 / supply2
         guides = 0.5 * radial / supply1, 0.5 * angular / supply2
-    lively = [count[name] for name in LIVELY]
+    lively = [count[name] for name in LIVELY_FIELDS]
     found = QuietFrames(
         plain=plain,
         sequences=batch.field("sequence").tolist(),
@@ -126,7 +126,7 @@ def find_quiet_frames(sensor: Sensor, batch: FrameBatch, times: NDArray[np.float
         data=batch.bytes.tobytes(),
         starts=batch.starts.tolist(),
     )
-    for number in np.flatnonzero(plain)[::_ASKED].tolist():
+    for number in np.flatnonzero(plain)[::_CHECK_INTERVAL].tolist():
         reading = read(sensor, found.frame(number))
         if reading.fault is not None or reading.level != found.levels[number]:
             plain[:] = False  # this code and ``read`` do not agree, and ``read`` decides

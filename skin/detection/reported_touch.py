@@ -17,7 +17,7 @@ from .frame.touch_reading import TouchReading
 
 __all__ = ["ReportedTouch"]
 
-_TURN = 2.0 * math.pi
+_FULL_TURN = 2.0 * math.pi
 
 
 class ReportedTouch:
@@ -86,7 +86,7 @@ class ReportedTouch:
     def _distance(self, u: float, phi: float) -> float:
         """Return the distance of a place from the last that was reported [m], never too small."""
         around = abs(phi - self._phi)
-        return math.hypot(u - self._u, self._radius * (around if around < math.pi else _TURN - around))
+        return math.hypot(u - self._u, self._radius * (around if around < math.pi else _FULL_TURN - around))
 
     def _remember(self, level: float, u: float, phi: float, doubt: str) -> None:
         self._level, self._u, self._phi, self._doubt = level, u, phi, doubt

@@ -20,13 +20,17 @@ from .frame.contact_matrix import ContactMatrix
 
 __all__ = ["FrameSelfTest"]
 
-_RECIPROCITY = 0.005  # of the supply, on a guide; a slide at 1 m/s leaves 4e-7, two contacts that grow by 10 %/ms 4e-4
-_SPLIT = 0.2  # of the supply; the same leave 0.014 and 0.03, a shunt 10 % off its value 0.14, pull-downs 1 % apart 0.1
-_DRAWN = 0.08  # of the touch phase's drive current; a pull-down and a shunt of 1 %, and an amplifier, leave 0.03
+_RECIPROCITY_LIMIT = (
+    0.005  # of the supply, on a guide; a slide at 1 m/s leaves 4e-7, two contacts that grow by 10 %/ms 4e-4
+)
+_SPLIT_LIMIT = (
+    0.2  # of the supply; the same leave 0.014 and 0.03, a shunt 10 % off its value 0.14, pull-downs 1 % apart 0.1
+)
+_DRAWN_LIMIT = 0.08  # of the touch phase's drive current; a pull-down and a shunt of 1 %, and an amplifier, leave 0.03
 # a third of the chi-squared each: below all, no more is computed
-_THIRD_RECIPROCITY, _THIRD_SPLIT, _THIRD_DRAWN = 0.57 * _RECIPROCITY, 0.57 * _SPLIT, 0.57 * _DRAWN
-_DEVIATIONS = 7.0  # standard deviations of the noise of one frame
-_FRAMES = 50  # by which the frames that deviate outnumber those that do not
+_RECIPROCITY_THIRD, _SPLIT_THIRD, _DRAWN_THIRD = 0.57 * _RECIPROCITY_LIMIT, 0.57 * _SPLIT_LIMIT, 0.57 * _DRAWN_LIMIT
+_LIMIT_DEVIATIONS = 7.0  # standard deviations of the noise of one frame
+_DOUBT_FRAMES = 50  # by which the frames that deviate outnumber those that do not
 
 
 class FrameSelfTest:
@@ -53,17 +57,17 @@ class FrameSelfTest:
         Args:
             matrix: of a valid frame that is touched firmly enough for a place.
         """
-        most, drawn = _THIRD_RECIPROCITY * matrix.around, _THIRD_DRAWN * self._drawn(matrix)
+        most, drawn = _RECIPROCITY_THIRD * matrix.around, _DRAWN_THIRD * self._drawn(matrix)
         if (
             -most <= matrix.reciprocity <= most
-            and -_THIRD_SPLIT <= matrix.split <= _THIRD_SPLIT
+            and -_SPLIT_THIRD <= matrix.split <= _SPLIT_THIRD
             and -drawn <= matrix.sum_rule <= drawn
         ) or self.deviation(matrix) < 1.0:
             if self._count:
                 self._count -= 1
             return False
         self._count += 1
-        return self._count >= _FRAMES
+        return self._count >= _DOUBT_FRAMES
 
     @property
     def doubted(self) -> bool:
@@ -73,12 +77,14 @@ class FrameSelfTest:
     def deviation(self, matrix: ContactMatrix) -> float:
         """Return how far a frame contradicts itself, over the limit."""
         along, around = matrix.along, matrix.around
-        noise = _DEVIATIONS * _DEVIATIONS * self._currents.variance * self._scale  # of a guide, over the supply
+        noise = (
+            _LIMIT_DEVIATIONS * _LIMIT_DEVIATIONS * self._currents.variance * self._scale
+        )  # of a guide, over the supply
         share = 1.0 + around * self._pulldown
         sheets = along * along + around * around
-        reciprocity = matrix.reciprocity**2 / ((_RECIPROCITY**2 + 2.0 * noise) * sheets)
-        drawn = matrix.sum_rule**2 / ((_DRAWN * self._drawn(matrix)) ** 2 + self._noise_drawn * noise)
-        return math.sqrt(reciprocity + drawn + matrix.split**2 / (_SPLIT**2 + 8.0 * share * share * noise))
+        reciprocity = matrix.reciprocity**2 / ((_RECIPROCITY_LIMIT**2 + 2.0 * noise) * sheets)
+        drawn = matrix.sum_rule**2 / ((_DRAWN_LIMIT * self._drawn(matrix)) ** 2 + self._noise_drawn * noise)
+        return math.sqrt(reciprocity + drawn + matrix.split**2 / (_SPLIT_LIMIT**2 + 8.0 * share * share * noise))
 
     def _drawn(self, matrix: ContactMatrix) -> float:
         """Return the drive current of the touch phase over the supply [S], within the drop in the sheets."""

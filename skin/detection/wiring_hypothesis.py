@@ -17,10 +17,10 @@ from .frame.faults import Fault
 
 __all__ = ["Observation", "PointContact", "WiringHypothesis", "list_hypotheses", "observe"]
 
-_SHORT = 10.0  # S; of a short
-_NOTHING = 1e-12  # S; brings what has lost all its wires to ground
-_ELECTRODES = "ABCD"
-_EDGE = 1e-3  # of a side; a tap is no nearer to an electrode
+_SHORT_CONDUCTANCE = 10.0  # S; of a short
+_OPEN_CONDUCTANCE = 1e-12  # S; brings what has lost all its wires to ground
+_ELECTRODE_NAMES = "ABCD"
+_EDGE_DISTANCE = 1e-3  # of a side; a tap is no nearer to an electrode
 
 
 class PointContact(NamedTuple):
@@ -94,15 +94,15 @@ class WiringHypothesis:
             highest: what a reading cannot exceed.
         """
         joint, x, y = contact
-        x = _EDGE if x < _EDGE else 1.0 - _EDGE if x > 1.0 - _EDGE else x
-        y = _EDGE if y < _EDGE else 1.0 - _EDGE if y > 1.0 - _EDGE else y
+        x = _EDGE_DISTANCE if x < _EDGE_DISTANCE else 1.0 - _EDGE_DISTANCE if x > 1.0 - _EDGE_DISTANCE else x
+        y = _EDGE_DISTANCE if y < _EDGE_DISTANCE else 1.0 - _EDGE_DISTANCE if y > 1.0 - _EDGE_DISTANCE else y
         sheets = (upper / (1.0 - x), upper / x, lower / (1.0 - y), lower / y)
         if not self._phases:  # in the frame that asks first: those of all hypotheses together are 2.6 ms
             self._phases = _phases(*self._broken)
         found: list[float] = []
         own: list[float] = []
         for groups, reads, driven in self._phases:
-            top = bottom = joint + _NOTHING
+            top = bottom = joint + _OPEN_CONDUCTANCE
             cross, from_top, from_bottom = joint, 0.0, 0.0
             kept = []
             for feed, source, measured, uppers, lowers in groups:
@@ -148,19 +148,21 @@ def _phase(sensor: Sensor, roles: str, opened: str, joined: tuple[str, str] | No
     """Return the feeds of a phase; a role is + for the supply, g for ground, p for a pull-down, i for an input."""
     parts = sensor.electronics
     loads = {"+": 0.0, "g": 0.0, "p": parts.pulldown_ohms, "i": parts.input_ohms}
-    feeds, sources, measured, seen = [_NOTHING] * 4, [0.0] * 4, [0.0] * 4, [0.0] * 4
-    for k, (name, role) in enumerate(zip(_ELECTRODES, roles, strict=True)):
+    feeds, sources, measured, seen = [_OPEN_CONDUCTANCE] * 4, [0.0] * 4, [0.0] * 4, [0.0] * 4
+    for k, (name, role) in enumerate(zip(_ELECTRODE_NAMES, roles, strict=True)):
         if name not in opened:
             feed = 1.0 / (parts.lead_ohms[k] + loads[role])
             feeds[k] += feed
             seen[k] = feed * loads[role]
             if role == "+":
                 sources[k], measured[k] = feed, feed
-        if joined is not None and joined[0] == name and joined[1] not in _ELECTRODES:
-            feeds[k] += _SHORT
-            sources[k] += _SHORT if joined[1] != "ground" else 0.0
-            measured[k] += _SHORT if joined[1] == "rail" else 0.0
-    pair = [] if joined is None or joined[1] not in _ELECTRODES else [_ELECTRODES.index(name) for name in joined]
+        if joined is not None and joined[0] == name and joined[1] not in _ELECTRODE_NAMES:
+            feeds[k] += _SHORT_CONDUCTANCE
+            sources[k] += _SHORT_CONDUCTANCE if joined[1] != "ground" else 0.0
+            measured[k] += _SHORT_CONDUCTANCE if joined[1] == "rail" else 0.0
+    pair = (
+        [] if joined is None or joined[1] not in _ELECTRODE_NAMES else [_ELECTRODE_NAMES.index(name) for name in joined]
+    )
     members = [[k] for k in range(4) if k not in pair] + ([pair] if pair else [])
     groups = tuple(
         _Group(
@@ -183,9 +185,9 @@ def list_hypotheses(sensor: Sensor) -> list[WiringHypothesis]:
     plus_lower, minus_lower = "CD" if sensor.c_positive else "DC"
     upper, lower = Fault.SHORT_UPPER, Fault.SHORT_LOWER
     found = [WiringHypothesis(sensor, "nothing", None)]
-    for name in _ELECTRODES:
+    for name in _ELECTRODE_NAMES:
         found.append(WiringHypothesis(sensor, f"{name} open", Fault[f"OPEN_{name}"], opened=name))
-    for fed in _ELECTRODES:
+    for fed in _ELECTRODE_NAMES:
         fault = Fault.OPEN_UPPER if fed in "AB" else Fault.OPEN_LOWER
         found.append(WiringHypothesis(sensor, f"{fed} joined to the supply", fault, joined=(fed, "supply")))
     for pair, fault in (("AB", upper), ("CD", lower)):
@@ -204,16 +206,19 @@ def list_hypotheses(sensor: Sensor) -> list[WiringHypothesis]:
         for second in "CD":
             words = f"{first} joined with {second}"
             found.append(WiringHypothesis(sensor, words, Fault.LAYERS_CLOSED, joined=(first, second)))
-    for name in _ELECTRODES:
+    for name in _ELECTRODE_NAMES:
         fault = Fault.GUIDES_DISAGREE if name in "AB" else Fault.LEAK
         found.append(WiringHypothesis(sensor, f"input of {name} dead", fault, dead=name))
     found.append(WiringHypothesis(sensor, "touch phase dead", Fault.GUIDE_DRIVEN, dead="touch"))
     return found
 
 
-_GUIDE = 0.01  # part of the supply; what the circuit's model may be off
-_CURRENT, _CURRENT_UNKNOWN = 0.05, 0.25  # part of a drive current, where the sheets are known and where not
-_CURRENT_FULL = 0.002  # part of a current's full scale
+_GUIDE_ERROR = 0.01  # part of the supply; what the circuit's model may be off
+_CURRENT_ERROR, _UNLEARNED_CURRENT_ERROR = (
+    0.05,
+    0.25,
+)  # part of a drive current, where the sheets are known and where not
+_FULL_SCALE_ERROR = 0.002  # part of a current's full scale
 
 
 def observe(sensor: Sensor, frame: Frame, noise: float, learned: bool) -> Observation:
@@ -227,7 +232,7 @@ def observe(sensor: Sensor, frame: Frame, noise: float, learned: bool) -> Observ
     """
     parts = sensor.electronics
     unit = parts.current_full_scale / parts.adc_volts
-    full, rest = parts.full_count, _CURRENT_FULL * parts.full_count
+    full, rest = parts.full_count, _FULL_SCALE_ERROR * parts.full_count
     values: list[float] = []
     weights: list[float] = []
     highest: list[float] = []
@@ -235,7 +240,7 @@ def observe(sensor: Sensor, frame: Frame, noise: float, learned: bool) -> Observ
     def put_potentials(scale: float, *counts: int) -> None:
         for count in counts:
             values.append(count * scale)
-            weights.append(1.0 / (noise * scale + _GUIDE))
+            weights.append(1.0 / (noise * scale + _GUIDE_ERROR))
             highest.append(full * scale)
 
     supplies = frame.touch_supply, frame.radial_supply, frame.angular_supply
@@ -245,7 +250,9 @@ def observe(sensor: Sensor, frame: Frame, noise: float, learned: bool) -> Observ
         put_potentials(1.0 / supplies[phase], *guides[2 * phase : 2 * phase + 2])
         scale, current = unit / supplies[phase], currents[phase]
         values.append(current * scale)
-        weights.append(1.0 / ((noise + rest + (_CURRENT if learned else _CURRENT_UNKNOWN) * current) * scale))
+        weights.append(
+            1.0 / ((noise + rest + (_CURRENT_ERROR if learned else _UNLEARNED_CURRENT_ERROR) * current) * scale)
+        )
         highest.append(full * scale)
     if frame.driven is not None:
         for phase in (0, 1, 2):

@@ -10,7 +10,7 @@ import math
 
 __all__ = ["ControllerClock"]
 
-_WINDOW = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
+_OFFSET_WINDOW = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
 
 
 class ControllerClock:
@@ -33,7 +33,7 @@ class ControllerClock:
         if controller < self._newest:
             self._before = self._now = math.inf
             self._since = controller
-        elif controller - self._since > _WINDOW:
+        elif controller - self._since > _OFFSET_WINDOW:
             self._before, self._now, self._since = self._now, math.inf, controller
         self._newest = controller
         difference = host - controller

@@ -6,18 +6,20 @@ report that is older than the program belongs to one before it.
 
 from __future__ import annotations
 
-__all__ = ["PERIOD", "ControllerHeartbeat", "heartbeat_count"]
+__all__ = ["COUNT_PERIOD", "ControllerHeartbeat", "heartbeat_count"]
 
-PERIOD = 0.02  #: s between two counts
-_MASK = 0x3FFFFFFF  # counts are whole numbers of 30 bits
-_MARGIN = 5  # counts by which a report may be older than the first state that shows the program
-_GRACE = 0.5  # s that a program has to report after its start
-_WITHOUT = "the program on the controller does not depend on the guard's heartbeat, and goes on if the network is cut"
+COUNT_PERIOD = 0.02  #: s between two counts
+_COUNT_MASK = 0x3FFFFFFF  # counts are whole numbers of 30 bits
+_COUNT_MARGIN = 5  # counts by which a report may be older than the first state that shows the program
+_REPORT_TIME = 0.5  # s that a program has to report after its start
+_NO_HEARTBEAT = (
+    "the program on the controller does not depend on the guard's heartbeat, and goes on if the network is cut"
+)
 
 
 def heartbeat_count(now: float) -> int:
     """Return the count that is sent at a host time [s]; never 0."""
-    return int(now / PERIOD) & _MASK or 1
+    return int(now / COUNT_PERIOD) & _COUNT_MASK or 1
 
 
 class ControllerHeartbeat:
@@ -48,16 +50,16 @@ class ControllerHeartbeat:
 
     def blocker(self) -> str:
         """Return why the guard must not become active; empty where it may."""
-        return _WITHOUT if self.required and self._running and not self._depends() else ""
+        return _NO_HEARTBEAT if self.required and self._running and not self._depends() else ""
 
     def trouble(self, now: float) -> str:
         """Return what is wrong with the program that runs, once for each program; empty where nothing is."""
         if not self._running or self._reported or self._depends():
             return ""
-        if self._began is not None and now - self._began < _GRACE:
+        if self._began is not None and now - self._began < _REPORT_TIME:
             return ""
         self._reported = True
-        return _WITHOUT
+        return _NO_HEARTBEAT
 
     @property
     def silent(self) -> bool:
@@ -67,5 +69,5 @@ class ControllerHeartbeat:
     def _depends(self) -> bool:
         if self._began is None or not self._echo:
             return False
-        first = heartbeat_count(self._began) - _MARGIN
-        return (self._echo - first) & _MASK < _MASK // 2
+        first = heartbeat_count(self._began) - _COUNT_MARGIN
+        return (self._echo - first) & _COUNT_MASK < _COUNT_MASK // 2

@@ -14,8 +14,8 @@ from coneskin.skin.detection.frame.touch_reading import TouchReading
 
 __all__ = ["Contact", "GuardedSensor"]
 
-_ELLIPSE = 5.991  # chi-squared of two degrees of freedom that holds 95 %
-_STEP = 1e-4  # m along, rad around; from the place to one that shows the direction
+_CHI_SQUARED_95 = 5.991  # chi-squared of two degrees of freedom that holds 95 %
+_DIRECTION_STEP = 1e-4  # m along, rad around; from the place to one that shows the direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,9 @@ class Contact:
     def _axes(self, point: Vector) -> tuple[Vector, Vector]:
         """Return the unit vectors along the side and around, at the place, in the link's frame."""
         u, phi = self.touch.u, self.touch.phi
-        return _unit(point, self.where.place(u + _STEP, phi)[0]), _unit(point, self.where.place(u, phi + _STEP)[0])
+        return _unit(point, self.where.place(u + _DIRECTION_STEP, phi)[0]), _unit(
+            point, self.where.place(u, phi + _DIRECTION_STEP)[0]
+        )
 
     def _ellipse(self, point: Vector) -> tuple[Vector, Vector] | None:
         """Return the two half axes of the ellipse that holds the place with 95 %, in the link's frame [m]."""
@@ -117,7 +119,7 @@ class Contact:
         angle = 0.5 * math.atan2(2.0 * us, uu - ss)
         axes = []
         for variance, turn in ((middle + apart, angle), (middle - apart, angle + 0.5 * math.pi)):
-            size = math.sqrt(_ELLIPSE * max(variance, 0.0))
+            size = math.sqrt(_CHI_SQUARED_95 * max(variance, 0.0))
             x, y = size * math.cos(turn), size * math.sin(turn)
             axes.append((x * along[0] + y * around[0], x * along[1] + y * around[1], x * along[2] + y * around[2]))
         return axes[0], axes[1]

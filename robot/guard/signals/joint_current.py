@@ -14,7 +14,7 @@ __all__ = ["MAX_RISE", "JointCurrentMonitor"]
 #: A by which a joint's current may deviate more than at its least since the motion began. Assumed, not measured on an
 #: arm: with about 12 N m/A at base, shoulder and elbow, and 9 at the wrists, 25 and 9 N m.
 MAX_RISE = (2.0, 2.0, 2.0, 1.0, 1.0, 1.0)
-_SAMPLES = 5  # in a row, 10 ms; a single one may be noise
+_RESISTED_SAMPLES = 5  # in a row, 10 ms; a single one may be noise
 
 
 class JointCurrentMonitor:
@@ -33,7 +33,7 @@ class JointCurrentMonitor:
         rises = [abs(a - b) - most for a, b, most in zip(off, least, MAX_RISE, strict=True)]
         worst = max(range(len(rises)), key=rises.__getitem__)
         self._beyond = self._beyond + 1 if rises[worst] > 0.0 else 0
-        if self._beyond < _SAMPLES:
+        if self._beyond < _RESISTED_SAMPLES:
             return ""
         rise = rises[worst] + MAX_RISE[worst]
         return f"joint {worst + 1} takes {rise:.1f} A more than expected: something resists it"

@@ -137,7 +137,7 @@ SESSION_EVENTS = frozenset(
 
 
 _PLACE_DIGITS = 5  # decimals of a body's place [m]: 0.01 mm
-_CONTACTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED})
+_CONTACT_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED})
 
 
 class GuardEvent(NamedTuple):
@@ -170,7 +170,7 @@ def stopping_contact(stop: GuardEvent, events: Sequence[GuardEvent]) -> GuardEve
     """
     if not (contact := stop.details.get("contact")):
         return None
-    same = [event for event in events if event.name in _CONTACTS and event.details["number"] == contact["number"]]
+    same = [event for event in events if event.name in _CONTACT_EVENTS and event.details["number"] == contact["number"]]
     return max(same, key=lambda event: event.name == EventName.CONTACT_LOCATED, default=None)
 
 

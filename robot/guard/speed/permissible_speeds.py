@@ -93,7 +93,7 @@ class SurfaceSpeeds:
         inside = speeds.covers(q)
         for link, place, rows in self._links:
             twist: list[float] = []
-            for point, axis in _FRAME:
+            for point, axis in _FRAME_POINTS:
                 _, _, _, nx, ny, nz, *columns = place(*q, *point, *axis)
                 vx, vy, vz = (sum(columns[3 * i + k] * qd[i] for i in range(link)) for k in range(3))
                 twist += (vx, vy, vz, nx, ny, nz)
@@ -109,7 +109,7 @@ class SurfaceSpeeds:
 
 
 #: points and directions in a link's frame, at which its motion is read off
-_FRAME = (
+_FRAME_POINTS = (
     ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
     ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),

@@ -25,21 +25,21 @@ from .slider_setting import SliderSetting
 
 __all__ = ["SpeedLimit"]
 
-_MARGIN = 0.9  # of the permissible speed, to which the slider goes
-_GROWTH = 1.05  # ratio; from which on an arm speeds up
-_STEADY = 1.02  # ratio; up to which it does not
+_SPEED_MARGIN = 0.9  # of the permissible speed, to which the slider goes
+_GROWTH_RATIO = 1.05  # ratio; from which on an arm speeds up
+_STEADY_RATIO = 1.02  # ratio; up to which it does not
 _STEADY_TIME = 0.04  # s for which it must not, to tell how fast the program goes
-_FALL = 0.98  # ratio; below, a speed falls
-_LEAD = 0.06  # s that the slider takes to have an effect
-_WINDOW = 0.02  # s over which the growth is taken
-_PATIENCE = 0.3  # s for which a speed above the limit may fall after the slider was set
-_TOLERANCE = 1.05  # of the permissible speed; above, after the patience, the arm is stopped
-_HOLD = 2.0  # s of motion after which the slider may go up again, the first time
-_LONGEST_HOLD = 64.0  # s
+_FALL_RATIO = 0.98  # ratio; below, a speed falls
+_SLIDER_LEAD = 0.06  # s that the slider takes to have an effect
+_GROWTH_WINDOW = 0.02  # s over which the growth is taken
+_FALL_TIME = 0.3  # s for which a speed above the limit may fall after the slider was set
+_SPEED_TOLERANCE = 1.05  # of the permissible speed; above, after the patience, the arm is stopped
+_HOLD_TIME = 2.0  # s of motion after which the slider may go up again, the first time
+_MAX_HOLD_TIME = 64.0  # s
 _STEP_UP = 1.2  # ratio; smaller ones are not worth it
-_LEAST = 0.01  # of the slider
-_SLOW = 0.02  # rad/s of the leading joint, below which an arm counts as not moving
-_REMEMBERED = 3.0 * _PATIENCE  # s; an arm that obeys is then as slow as the highest slider since lets its joints be
+_MIN_SLIDER = 0.01  # of the slider
+_STANDING_SPEED = 0.02  # rad/s of the leading joint, below which an arm counts as not moving
+_SLIDER_MEMORY = 3.0 * _FALL_TIME  # s; an arm that obeys is then as slow as the highest slider since lets its joints be
 _JOINT_MARGIN = 1.25  # of that speed
 
 
@@ -69,7 +69,7 @@ class SpeedLimit:
         self._ratio_then = 0.0  # when it was judged last whether the speed falls
         self._asked: float | None = None  # rad/s of the leading joint, for which the program asks at full slider
         self._steady_since = math.inf
-        self._hold = _HOLD
+        self._hold = _HOLD_TIME
         self._raised = False  # since the slider went down last
         self._looked_at = math.inf
         self._moved = 0.0  # s of motion since the slider was set
@@ -86,7 +86,7 @@ class SpeedLimit:
         now = state.time
         self._note_slider(now, slider, out)
         ahead = self._ahead(now, state)
-        ratio, name = self._surfaces.ratio([q + _LEAD * v for q, v in zip(state.q, ahead, strict=True)], ahead)
+        ratio, name = self._surfaces.ratio([q + _SLIDER_LEAD * v for q, v in zip(state.q, ahead, strict=True)], ahead)
         if ratio <= 1.0:
             self._over_since = None
             self._relax(now, ratio, state.speed, out)
@@ -101,14 +101,14 @@ class SpeedLimit:
             self._lower(now, slider, ratio, ahead, state.speed, name, out)
             return ""
         self._top = max(self._top, ratio)
-        if now - self._judged_at >= _LEAD:
-            if ratio > _FALL * self._ratio_then:  # it was not enough
+        if now - self._judged_at >= _SLIDER_LEAD:
+            if ratio > _FALL_RATIO * self._ratio_then:  # it was not enough
                 self._lower(now, slider, ratio, ahead, state.speed, name, out)
             self._judged_at, self._ratio_then = now, ratio
-        if now - self._over_since > _PATIENCE:
+        if now - self._over_since > _FALL_TIME:
             measured = self._surfaces.ratio(state.q, state.qd)[0]
-            falls = measured < _FALL * self._top
-            if measured > _TOLERANCE and (not falls or now - self._over_since > 3.0 * _PATIENCE):
+            falls = measured < _FALL_RATIO * self._top
+            if measured > _SPEED_TOLERANCE and (not falls or now - self._over_since > 3.0 * _FALL_TIME):
                 return f"{name} moves at {measured:.0%} of the permissible speed, and the speed slider has no effect"
         return ""
 
@@ -143,10 +143,10 @@ class SpeedLimit:
             return
         if not sliders or sliders[-1][1] != slider:
             sliders.append((now, slider))
-        while len(sliders) > 1 and now - sliders[1][0] >= _REMEMBERED:
+        while len(sliders) > 1 and now - sliders[1][0] >= _SLIDER_MEMORY:
             sliders.popleft()
         if self.setting.note(now, slider):  # a person wants it so: begin anew
-            self._hold, self._raised = _HOLD, False
+            self._hold, self._raised = _HOLD_TIME, False
             self._forget_demand()
         fraction, ceiling = self.setting.fraction, self.setting.ceiling
         if fraction is not None and fraction > ceiling:  # it crossed the person's setting on its way
@@ -161,13 +161,13 @@ class SpeedLimit:
         """Return the joint speeds that there will be when the slider can have an effect, where they grow [rad/s]."""
         qd, leading, before = state.qd, state.speed, self._before
         before.append((now, qd))
-        while now - before[0][0] > _WINDOW and len(before) > 1 and now - before[1][0] >= _WINDOW:
+        while now - before[0][0] > _GROWTH_WINDOW and len(before) > 1 and now - before[1][0] >= _GROWTH_WINDOW:
             before.popleft()
         since = now - before[0][0]
-        if not 0.5 * _WINDOW <= since <= 3.0 * _WINDOW:
+        if not 0.5 * _GROWTH_WINDOW <= since <= 3.0 * _GROWTH_WINDOW:
             self._steady_since = math.inf
             return qd
-        change = [_LEAD * (v - old) / since for v, old in zip(qd, before[0][1], strict=True)]
+        change = [_SLIDER_LEAD * (v - old) / since for v, old in zip(qd, before[0][1], strict=True)]
         self._note_program(now, leading, max(map(abs, change)))
         ahead = [v + dv if abs(v + dv) > abs(v) else v for v, dv in zip(qd, change, strict=True)]
         if self._asked is not None:
@@ -184,9 +184,9 @@ class SpeedLimit:
         if highest <= 0.0:
             self._asked = None
             return
-        if self._asked is not None and leading > _STEADY * self._asked * highest:
+        if self._asked is not None and leading > _STEADY_RATIO * self._asked * highest:
             self._asked = None  # faster than ever: nobody knows how fast it will be
-        if leading < _SLOW or change > (_STEADY - 1.0) * leading:
+        if leading < _STANDING_SPEED or change > (_STEADY_RATIO - 1.0) * leading:
             self._steady_since = math.inf
             return
         self._steady_since = min(self._steady_since, now)
@@ -195,10 +195,12 @@ class SpeedLimit:
 
     def _disobeys(self, now: float, qd: Joints) -> bool:
         """Tell whether a joint turns faster than the slider has let it for a while; short strokes show only here."""
-        if now - self._sliders[0][0] < _REMEMBERED:
+        if now - self._sliders[0][0] < _SLIDER_MEMORY:
             return False
         top = self._highest
-        return any(abs(v) > _JOINT_MARGIN * top * most + _SLOW for v, most in zip(qd, self._joint_speed, strict=True))
+        return any(
+            abs(v) > _JOINT_MARGIN * top * most + _STANDING_SPEED for v, most in zip(qd, self._joint_speed, strict=True)
+        )
 
     def _forget_demand(self) -> None:
         self._looked_at, self._moved, self._demand = math.inf, 0.0, 0.0
@@ -211,12 +213,12 @@ class SpeedLimit:
         """Put the slider down; farther where the arm still speeds up, as its program may, or as it was seen to."""
         setting = self.setting
         before = slider if setting.fraction is None else min(slider, setting.fraction)
-        share, top = _MARGIN / ratio, max(map(abs, ahead))
-        if top > _GROWTH * speed:
+        share, top = _SPEED_MARGIN / ratio, max(map(abs, ahead))
+        if top > _GROWTH_RATIO * speed:
             share *= top / max(top, (self._asked or self._fastest) * before)
-        fraction = min(slider, max(_LEAST, share * before))
+        fraction = min(slider, max(_MIN_SLIDER, share * before))
         if self._raised:
-            self._hold, self._raised = min(_LONGEST_HOLD, 2.0 * self._hold), False
+            self._hold, self._raised = min(_MAX_HOLD_TIME, 2.0 * self._hold), False
         self._set(now, fraction, slider, name, ratio, out)
 
     def _relax(self, now: float, ratio: float, speed: float, out: Outputs) -> None:
@@ -226,13 +228,13 @@ class SpeedLimit:
             self._forget_demand()
             return
         since, self._looked_at = max(0.0, now - self._looked_at), now
-        if speed < _SLOW:
+        if speed < _STANDING_SPEED:
             return
-        self._moved += min(since, _WINDOW)
-        self._demand = max(self._demand, ratio / max(_LEAST, setting.fraction))
+        self._moved += min(since, _GROWTH_WINDOW)
+        self._demand = max(self._demand, ratio / max(_MIN_SLIDER, setting.fraction))
         if self._moved < self._hold:
             return
-        fraction = min(setting.ceiling, _MARGIN / self._demand if self._demand > 0.0 else math.inf)
+        fraction = min(setting.ceiling, _SPEED_MARGIN / self._demand if self._demand > 0.0 else math.inf)
         before = setting.fraction
         self._forget_demand()
         if fraction <= before or fraction < min(setting.ceiling, _STEP_UP * before):

@@ -27,9 +27,9 @@ if TYPE_CHECKING:  # a scene without a slow reaction does not load it
     from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
     from coneskin.robot.reaction.contact_approach import ContactApproach
 
-__all__ = ["HOLD", "ReducedSpeedTouch", "SpeedReduction"]
+__all__ = ["CLEAR_TIME", "ReducedSpeedTouch", "SpeedReduction"]
 
-HOLD = 0.5  #: s without a touch after which the arm goes on at the speed it had
+CLEAR_TIME = 0.5  #: s without a touch after which the arm goes on at the speed it had
 _MAX_SPEED_RATIO = 0.9  # ratio; speed after the reduction to speed at the touch
 _SLIDER_TOLERANCE = 0.02  # ratio; allowed difference of the slider from its setting
 _MAX_SLIDER_AGE = 0.5  # s; it is read 50 times a second
@@ -115,7 +115,7 @@ class ReducedSpeedTouch:
 
     def over(self, now: float) -> bool:
         """Tell whether the arm may go on as before."""
-        return self._free_since is not None and now - self._free_since >= HOLD
+        return self._free_since is not None and now - self._free_since >= CLEAR_TIME
 
 
 class SpeedReduction:
@@ -188,7 +188,7 @@ class SpeedReduction:
         approach.note(state.q, state.qd, contacts)
         if approach.exceeded:
             return False
-        if self._last is not None and time - self._last[0] < HOLD:  # slider and speed may not yet be as before
+        if self._last is not None and time - self._last[0] < CLEAR_TIME:  # slider and speed may not yet be as before
             last = self._last[1]
             top = last.top
             if last.puts_back(before):  # else a person has moved it since

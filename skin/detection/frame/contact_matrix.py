@@ -20,7 +20,7 @@ from coneskin.skin.wire import Frame
 
 __all__ = ["ContactMatrix", "FrameInversion"]
 
-_TINY = 1e-9  # S; a conductance below this is none
+_MIN_CONDUCTANCE = 1e-9  # S; a conductance below this is none
 
 
 class ContactMatrix(NamedTuple):
@@ -104,7 +104,7 @@ class FrameInversion:
         c0, d0 = touch_c * scale, touch_d * scale
         ic0 = (c0 + d0) * pull
         determinant = hx1 * hy2 - hy1 * hx2
-        if ic0 < _TINY or -1e-3 < determinant < 1e-3:
+        if ic0 < _MIN_CONDUCTANCE or -1e-3 < determinant < 1e-3:
             return None
         inverse = 1.0 / determinant
         xx, xy, yx, yy = hy2 * inverse, -hy1 * inverse, -hx2 * inverse, hx1 * inverse
@@ -125,7 +125,7 @@ class FrameInversion:
         x, y = x0 + rho * x1, y0 + rho * y1
         # the noise of each is a guide's over the sheet that it lies in
         weight1, weight2 = along * along, around * around
-        if weight1 + weight2 < _TINY * _TINY:
+        if weight1 + weight2 < _MIN_CONDUCTANCE * _MIN_CONDUCTANCE:
             return None  # no sheet conducts: nothing drives them in the radial and the angular phase
         cross = (weight1 * cross1 + weight2 * cross2) / (weight1 + weight2)
         # c0 pull = -I_C and d0 pull = -I_D = Ic + I_C

@@ -19,17 +19,19 @@ from .faults import Fault
 __all__ = ["GUIDE_SLACK", "LEVEL_NOISE", "Reading", "read"]
 
 #: Fields of a frame that a reading is made of, in the order in which `read` and `_fault` take them.
-_FIELDS = (
+_READING_FIELDS = (
     *("status", "touch_supply", "radial_supply", "angular_supply"),
     *("touch_c", "touch_d", "touch_current"),
     *("radial_c", "radial_d", "radial_current"),
     *("angular_a", "angular_b", "angular_current"),
 )
-_pick_fields = itemgetter(*(Frame._fields.index(name) for name in _FIELDS))  # as fast as unpacking the whole frame
+_pick_fields = itemgetter(
+    *(Frame._fields.index(name) for name in _READING_FIELDS)
+)  # as fast as unpacking the whole frame
 _STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 LEVEL_NOISE = 1.5  #: counts; noise of the level in the bound on what a leak between the layers puts on a guide
 GUIDE_SLACK = 0.05  #: part of the supply that a guide may stand above that bound
-_DEVIATIONS = 7.0  # standard deviations of noise that are no contradiction
+_NOISE_DEVIATIONS = 7.0  # standard deviations of noise that are no contradiction
 _DRIVE_LOSS = 0.03  # part of the supply that a driven electrode may lose beyond what its lead is told to
 _RECIPROCITY_ERROR = 0.5  # part of the larger side; beyond it two guides contradict each other
 
@@ -125,11 +127,11 @@ def _fault(sensor: Sensor, values: tuple[int, ...], level: float, noise: float) 
     ):
         return Fault.SATURATED
     off = abs(current0 - (touch_c + touch_d) * bounds.touch_current_per_guide)
-    if off > bounds.touch_current_slack and off > _DEVIATIONS * noise:
+    if off > bounds.touch_current_slack and off > _NOISE_DEVIATIONS * noise:
         return Fault.LEAK
     high, low = (touch_c, touch_d) if touch_c >= touch_d else (touch_d, touch_c)
     lacking = bounds.weaker_guide * high - low
-    if lacking > bounds.noise and lacking > _DEVIATIONS * noise:
+    if lacking > bounds.noise and lacking > _NOISE_DEVIATIONS * noise:
         return Fault.GUIDES_DISAGREE
     most = 1.0 / (1.0 + bounds.load_ratio * (1.0 / (level + LEVEL_NOISE / supply) - 1.0)) + GUIDE_SLACK
     if radial_c + radial_d > 2.0 * most * supply1 or angular_a + angular_b > 2.0 * most * supply2:

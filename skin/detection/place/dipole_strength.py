@@ -16,16 +16,16 @@ from typing import NamedTuple
 
 __all__ = ["DipoleStrength", "weigh_dipole"]
 
-_USUAL = math.log(0.005)  # ln m; radius of a usual contact, a fingertip's
+_USUAL_RADIUS = math.log(0.005)  # ln m; radius of a usual contact, a fingertip's
 _WEIGHT_RADIUS = 1.0  # of ln a: one over its variance
-_SMALLEST, _LARGEST = math.log(0.0005), math.log(0.03)  # ln m
+_MIN_RADIUS, _MAX_RADIUS = math.log(0.0005), math.log(0.03)  # ln m
 _WEIGHT_KA = 0.25 / 1.5**2  # of ln (ka)^2: a quarter over the variance of ln ka about 1
-_MOST_KA = 6.0  # a bond has an infinite ka, and is no less usual than this says
-_LAST = 6
-_NODES = range(_LAST + 1)
-_LEAST_C = 0.003  # ka of 300: a bond
-_WIDTH = 0.35  # of the distance between a node's neighbours
-_MODEL = 0.05**2  # of A^2; no real contact is a uniform disc
+_MAX_KA_WEIGHT = 6.0  # a bond has an infinite ka, and is no less usual than this says
+_LAST_NODE = 6
+_NODE_NUMBERS = range(_LAST_NODE + 1)
+_MIN_C = 0.003  # ka of 300: a bond
+_NODE_WIDTH = 0.35  # of the distance between a node's neighbours
+_MODEL_VARIANCE = 0.05**2  # of A^2; no real contact is a uniform disc
 _MODEL_RADIUS = 0.1  # of ln a; half the distance of two nodes, and the same
 
 
@@ -58,25 +58,25 @@ def weigh_dipole(
     """
     k = 2.0 * math.pi / resistance
     shift = k * beyond - math.log(stretch)  # c = ln a + shift
-    low = max(_LEAST_C, _SMALLEST + shift)
-    high = max(_LARGEST + shift, low + 0.5)
+    low = max(_MIN_C, _MIN_RADIUS + shift)
+    high = max(_MAX_RADIUS + shift, low + 0.5)
     z = math.sqrt(low)
-    step = (math.sqrt(high) - z) / _LAST
+    step = (math.sqrt(high) - z) / _LAST_NODE
     # exp(2 c) from node to node, c = z^2: its ratios grow by a constant ratio
     power, ratio = k / (stretch * stretch) * math.exp(2.0 * (low - shift)), math.exp(2.0 * step * (2.0 * z + step))
     growth = math.exp(4.0 * step * step)
     nodes = []
-    for _ in _NODES:
+    for _ in _NODE_NUMBERS:
         c = z * z
         twice = 1.0 + c + c
-        off, ka = c - shift - _USUAL, math.log(twice / (c * c))
+        off, ka = c - shift - _USUAL_RADIUS, math.log(twice / (c * c))
         ka *= _WEIGHT_KA * ka
         # 1/f = I_0/I_2 to .4 %, exact at both ends; the last is d ln a/dz, but for a factor
         nodes.append(
             (
                 power / (1 / 3 + 4.0 * c + 2 / 3 / (1.0 + c * (3.0 + 7.0 * c))),
                 c - shift,
-                _WEIGHT_RADIUS * off * off + (ka if ka < _MOST_KA else _MOST_KA),
+                _WEIGHT_RADIUS * off * off + (ka if ka < _MAX_KA_WEIGHT else _MAX_KA_WEIGHT),
                 z,
             )
         )
@@ -92,8 +92,8 @@ def _posterior(
     """Weigh the measurement against a mixture of normal distributions about the nodes, as wide as these are apart."""
     before, found, best = nodes[0][0], [], math.inf
     for (strength, log_radius, unlikely, density), after in zip(nodes, [*nodes[1:], nodes[-1]], strict=True):
-        gap = _WIDTH * (after[0] - before)
-        width = gap * gap + _MODEL * strength * strength
+        gap = _NODE_WIDTH * (after[0] - before)
+        width = gap * gap + _MODEL_VARIANCE * strength * strength
         off, gain = measured - strength, 1.0 / (width + variance)
         unlikely += off * off * gain
         if unlikely < best:

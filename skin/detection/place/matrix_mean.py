@@ -6,13 +6,13 @@ from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
 
 from .matrix_noise import MatrixNoise
 
-__all__ = ["LONGEST", "MatrixMean"]
+__all__ = ["MEAN_FRAMES", "MatrixMean"]
 
-LONGEST = 128  #: frames; the average reaches back so far
-_SMOOTHING = 0.125  # of the distance to the mean; its variance is 1/15 of a frame's
-_SMOOTHED = _SMOOTHING / (2.0 - _SMOOTHING)
-_MOVED = 16.0  # four standard deviations, squared: once in 16 000 independent frames by chance
-_JUMPED = 36.0  # six, of one frame alone
+MEAN_FRAMES = 128  #: frames; the average reaches back so far
+_SMOOTHING_GAIN = 0.125  # of the distance to the mean; its variance is 1/15 of a frame's
+_SMOOTHED_VARIANCE = _SMOOTHING_GAIN / (2.0 - _SMOOTHING_GAIN)
+_MOVED_VARIANCE = 16.0  # four standard deviations, squared: once in 16 000 independent frames by chance
+_JUMPED_VARIANCE = 36.0  # six, of one frame alone
 
 
 class MatrixMean:
@@ -52,10 +52,10 @@ class MatrixMean:
         if frames:
             off_x, off_y = new_x - x, new_y - y
             smooth_x, smooth_y = self._smooth_x, self._smooth_y
-            self._smooth_x = smooth_x = smooth_x + _SMOOTHING * (off_x - smooth_x)
-            self._smooth_y = smooth_y = smooth_y + _SMOOTHING * (off_y - smooth_y)
+            self._smooth_x = smooth_x = smooth_x + _SMOOTHING_GAIN * (off_x - smooth_x)
+            self._smooth_y = smooth_y = smooth_y + _SMOOTHING_GAIN * (off_y - smooth_y)
             share, xx, yy = 1.0 / frames, noise.xx, noise.yy
-            alone, smooth = _JUMPED * (1.0 + share), _MOVED * (_SMOOTHED + share)
+            alone, smooth = _JUMPED_VARIANCE * (1.0 + share), _MOVED_VARIANCE * (_SMOOTHED_VARIANCE + share)
             if (
                 smooth_x * smooth_x > smooth * xx
                 or smooth_y * smooth_y > smooth * yy
@@ -67,7 +67,7 @@ class MatrixMean:
             self.frames, self.values = 1, new
             self._smooth_x = self._smooth_y = 0.0
             return new_g, new_x, new_y
-        if frames < LONGEST:
+        if frames < MEAN_FRAMES:
             self.frames = frames = frames + 1
         gain = 1.0 / frames
         g, x, y = g + gain * (new_g - g), x + gain * (new_x - x), y + gain * (new_y - y)

@@ -27,13 +27,15 @@ from .matrix_noise import MatrixNoise
 
 __all__ = ["PlaceEstimate", "PlaceEstimator", "SheetConductances"]
 
-_STANDS_OUT = 4.0**2  # deviations, squared; an inequality below is taken for noise and drift
-_UNEQUAL = 0.05  # of the dipole; inequality that an edge next to a round contact gives it; longer ones stand out
+_REAL_VARIANCE = 4.0**2  # deviations, squared; an inequality below is taken for noise and drift
+_ROUND_INEQUALITY = (
+    0.05  # of the dipole; inequality that an edge next to a round contact gives it; longer ones stand out
+)
 # what the multipoles beyond the dipole are, by the dipole's area: of the displacement, over the distance to the edge
 # squared; and of the taper, by its curvature squared (root mean squares of the difference to the exact field)
 _NEXT_IMAGE, _NEXT_TAPER = 0.02, 0.05
-_MARGIN = 1e-4  # of a side; the edge itself has no gradient
-_LARGEST_STEP = 0.03  # of a side; a displacement is smaller, save of what is no contact
+_EDGE_MARGIN = 1e-4  # of a side; the edge itself has no gradient
+_MAX_STEP = 0.03  # of a side; a displacement is smaller, save of what is no contact
 
 
 class SheetConductances(NamedTuple):
@@ -75,8 +77,8 @@ class PlaceEstimator:
         self._length = math.log1p(self._curvature * cone.slant) / self._curvature if self._curvature else cone.slant
         self._per_y = cone.wrap
         self._within = (
-            *(_MARGIN * self._length, (1.0 - _MARGIN) * self._length),
-            *(_MARGIN * self._breadth, (1.0 - _MARGIN) * self._breadth),
+            *(_EDGE_MARGIN * self._length, (1.0 - _EDGE_MARGIN) * self._length),
+            *(_EDGE_MARGIN * self._breadth, (1.0 - _EDGE_MARGIN) * self._breadth),
         )
         self._sheets = (0.0, 0.0)
         self._sum = 0.0
@@ -155,7 +157,7 @@ class PlaceEstimator:
         per_dipole = (0.5 * slope_x + taper) ** 2 + 0.25 * slope_y * slope_y  # square of the displacement by it
         tolerated = (xx + yy) / (per_dipole + 1e-12 * rs * rs)
         dipole = weigh_dipole(measured, noise, rs, 1.0 / matrix.conductance - robin, stretch, tolerated)
-        prior = (_UNEQUAL * dipole.strength) ** 2
+        prior = (_ROUND_INEQUALITY * dipole.strength) ** 2
         gain1, gain2 = _gain(unequal, noise_unequal, prior), _gain(a_xy, noise_xy, prior)
         half, cross = gain1 * unequal, gain2 * a_xy
         # where the inequality is real, the weighed mean must not count it twice
@@ -170,7 +172,7 @@ class PlaceEstimator:
                 slope_x, slope_y = self._robin.gradient(x, y)
             move_x = 0.5 * (a_xx * slope_x + a_xy * slope_y) + taper * (2.0 * a_xx - a_yy)
             move_y = 0.5 * (a_xy * slope_x + a_yy * slope_y) + 3.0 * taper * a_xy
-            most = _LARGEST_STEP * (length + breadth)
+            most = _MAX_STEP * (length + breadth)
             size = math.hypot(move_x, move_y)
             if size > most:
                 move_x, move_y = move_x * most / size, move_y * most / size
@@ -225,6 +227,6 @@ class PlaceEstimator:
 
 def _gain(seen: float, noise: float, prior: float) -> float:
     """Return how much of an inequality to believe: little of what a round contact has not, all of what stands out."""
-    beyond = seen * seen - _STANDS_OUT * noise
+    beyond = seen * seen - _REAL_VARIANCE * noise
     prior += beyond if beyond > 0.0 else 0.0
     return prior / (prior + noise) if prior + noise > 0.0 else 0.0

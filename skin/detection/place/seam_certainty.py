@@ -15,8 +15,10 @@ from .seam_contact import SeamPlace, SeamTest
 
 __all__ = ["SeamCertainty"]
 
-_BESIDE = 0.02  # P_yy over G; a press over the seam has more, and most touches are told from one by this alone
-_GROWS = 0.05  # ratio by which the conductance may differ from its mean at the seam, where means of products are taken
+_MIN_SEAM_SHARE = 0.02  # P_yy over G; a press over the seam has more, and most touches are told from one by this alone
+_CONDUCTANCE_CHANGE = (
+    0.05  # ratio by which the conductance may differ from its mean at the seam, where means of products are taken
+)
 
 
 class SeamCertainty:
@@ -57,7 +59,7 @@ class SeamCertainty:
         Args:
             values: the first six of a ``ContactMatrix``.
         """
-        return not values[5] - self._lower < _BESIDE * values[0]
+        return not values[5] - self._lower < _MIN_SEAM_SHARE * values[0]
 
     def follow(
         self,
@@ -88,7 +90,7 @@ class SeamCertainty:
         before, self._place = self._place, seam[:2]
         if not valid:
             return seam._replace(doubt=CONTRADICTS)
-        changes = abs(conductance / mean.conductance - 1.0) > _GROWS
+        changes = abs(conductance / mean.conductance - 1.0) > _CONDUCTANCE_CHANGE
         return seam._replace(doubt=self._doubt(seam, before, changes))
 
     def _doubt(self, seam: SeamPlace, before: tuple[float, float] | None, changes: bool) -> str:

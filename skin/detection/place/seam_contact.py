@@ -26,19 +26,23 @@ from .single_contact import DANGEROUS_ANGLE
 
 __all__ = ["SeamPlace", "SeamTest"]
 
-_WIDEST_GAP = math.radians(24.0)  # between the straight edges; beyond, the wrap does not close
-_LEAST_SHARE = 0.05  # P_yy over G below which hardly anything is on the other side of the seam
-_NEARER = 0.5  # of the spread about the electrical centre; contacts that are nearer to the seam belong to it
-_DEVIATIONS = 3.0  # standard deviations of the noise that may stand against the evidence
-_MODEL = 0.02  # of P_yy; gains of the two phases, and the coupling
-_MARGIN = 0.8  # of the limit; two contacts that are not quite at the edges show a little less
-_ALONG = 2.0  # of the second contact, at the dangerous angle's distance along the side
-_TERMS = 12
-_FLAT, _CUBIC, _QUINTIC = 1.85, -1.1, 0.25  # place of a disc over its mean distance, by how unequal its two parts are
-_SIDES = 0.5  # of the mean distance; standard deviation of the centroid across the seam
-_SKEW = 0.1  # of the mean distance; likewise along the side
+_MAX_GAP = math.radians(24.0)  # between the straight edges; beyond, the wrap does not close
+_MIN_FAR_SHARE = 0.05  # P_yy over G below which hardly anything is on the other side of the seam
+_SEAM_DISTANCE = 0.5  # of the spread about the electrical centre; contacts that are nearer to the seam belong to it
+_SEAM_DEVIATIONS = 3.0  # standard deviations of the noise that may stand against the evidence
+_SEAM_MODEL_ERROR = 0.02  # of P_yy; gains of the two phases, and the coupling
+_SEAM_MARGIN = 0.8  # of the limit; two contacts that are not quite at the edges show a little less
+_MAX_ALONG_SHARE = 2.0  # of the second contact, at the dangerous angle's distance along the side
+_COUPLING_TERMS = 12
+_OFFSET_LINEAR, _OFFSET_CUBIC, _OFFSET_QUINTIC = (
+    1.85,
+    -1.1,
+    0.25,
+)  # place of a disc over its mean distance, by how unequal its two parts are
+_ACROSS_DEVIATION = 0.5  # of the mean distance; standard deviation of the centroid across the seam
+_ALONG_DEVIATION = 0.1  # of the mean distance; likewise along the side
 
-_SEAM = "it presses on both sides of the seam: too far from it, or too long, for one contact"
+_OVER_SEAM = "it presses on both sides of the seam: too far from it, or too long, for one contact"
 
 
 class SeamPlace(NamedTuple):
@@ -67,13 +71,13 @@ class SeamTest:
         self._wrap, self._slant, self._radius_at = cone.wrap, cone.slant, cone.radius_at
         self._gap = 0.5 * max(0.0, 2.0 * math.pi - cone.wrap)  # [rad], from an edge to the middle of the seam
         #: whether the wrap closes, so that one body can press on both edges
-        self.closes = 2.0 * self._gap <= _WIDEST_GAP
+        self.closes = 2.0 * self._gap <= _MAX_GAP
         self._limit = settings.second_contact
         self._angle = (DANGEROUS_ANGLE - self._gap) / cone.wrap  # of the wrap
         self._estimator = estimator
         aspect = estimator.breadth / estimator.length
         self._coupling = tuple(
-            2.0 / (math.pi * n * math.sinh(min(n * math.pi * aspect, 300.0))) for n in range(1, _TERMS + 1)
+            2.0 / (math.pi * n * math.sinh(min(n * math.pi * aspect, 300.0))) for n in range(1, _COUPLING_TERMS + 1)
         )
 
     def place(
@@ -89,7 +93,7 @@ class SeamTest:
         """
         whole, x, y = matrix[:3]
         around = matrix.around - sheets.lower
-        if not self.closes or not 0.0 <= y <= 1.0 or not around > _LEAST_SHARE * whole > 0.0:
+        if not self.closes or not 0.0 <= y <= 1.0 or not around > _MIN_FAR_SHARE * whole > 0.0:
             return None
         coupled = self._coupled(x, sheets.upper) * whole
         if not coupled < 1.0:
@@ -97,21 +101,23 @@ class SeamTest:
         share = y * (1.0 - y) * whole
         away = share - around * (1.0 - coupled)  # [S]: sum of w y (1 - y)
         mean = away / whole if away > 0.0 else 0.0  # of the wrap
-        if mean > _NEARER * math.sqrt(around / whole):
+        if mean > _SEAM_DISTANCE * math.sqrt(around / whole):
             return None
         noise = abs(1.0 - 2.0 * y) * whole * math.sqrt(one.yy / frames) + math.sqrt(
             one.around / frames + sheets.lower_variance
         )
-        slack = _DEVIATIONS * noise + _MODEL * around
+        slack = _SEAM_DEVIATIONS * noise + _SEAM_MODEL_ERROR * around
         mean = 0.5 - math.sqrt(0.25 - mean if mean < 0.25 else 0.0)  # where all are equally far, y (1 - y) is that of y
         beyond = (y - mean) / max(1.0 - 2.0 * mean, 1e-3)  # part of the conductance before the seam, at phi = wrap
         uneven = 1.0 - 2.0 * (0.0 if beyond < 0.0 else 1.0 if beyond > 1.0 else beyond)
         square = uneven * uneven
         far = mean * self._wrap + self._gap  # [rad], from the middle of the seam
-        off = uneven * (_FLAT + square * (_CUBIC + square * _QUINTIC)) * far  # of the centroid, likewise
+        off = (
+            uneven * (_OFFSET_LINEAR + square * (_OFFSET_CUBIC + square * _OFFSET_QUINTIC)) * far
+        )  # of the centroid, likewise
         angle = max(0.0, self._angle - abs(off) / self._wrap)  # on the other side of the seam than the centroid
         second = whole if whole < self._limit else self._limit
-        doubt = "" if abs(away) + slack < _MARGIN * second * angle * (1.0 - angle) else _SEAM
+        doubt = "" if abs(away) + slack < _SEAM_MARGIN * second * angle * (1.0 - angle) else _OVER_SEAM
         return self._centroid(matrix, one, frames, sheets, (mean, far, off), doubt)
 
     def _coupled(self, x: float, upper: float) -> float:
@@ -141,15 +147,15 @@ class SeamTest:
         radius = self._radius_at(u)
         stretch = radius / self._radius_at(0.0)
         share = stretch * stretch / frames
-        uu = share * one.xx * length * length + (_SKEW * far * radius) ** 2
-        ss = share * one.yy * breadth * breadth * mean * mean + (_SIDES * far * radius) ** 2
+        uu = share * one.xx * length * length + (_ALONG_DEVIATION * far * radius) ** 2
+        ss = share * one.yy * breadth * breadth * mean * mean + (_ACROSS_DEVIATION * far * radius) ** 2
         # the side after the seam lies so much further along than the side before it
         ahead = -matrix.cross / (matrix.around - sheets.lower) * length * stretch
         if not doubt:
             along = (matrix.along - sheets.upper) * (length / (DANGEROUS_ANGLE * self._radius_at(0.0))) ** 2
             second = matrix.conductance if matrix.conductance < self._limit else self._limit
-            if along > _ALONG * second:
-                doubt = _SEAM
+            if along > _MAX_ALONG_SHARE * second:
+                doubt = _OVER_SEAM
         half = far * radius
         return SeamPlace(
             u,

@@ -21,17 +21,19 @@ __all__ = ["DANGEROUS_ANGLE", "SingleContactTest", "frames_until_certain", "weak
 #: Azimuth by which a place may be off every contact [rad]: a motion along its normal goes away from them all.
 DANGEROUS_ANGLE = math.radians(20.0)
 
-_DEVIATIONS = 3.0  # standard deviations of the averaged noise that may stand against the evidence
-_LONGEST = 512  # frames; the average reaches back so far
-_SHOWN = 4.0  # standard deviations of an inequality that is one
-_UNEQUAL = 0.15  # of the mean rise; a round contact of 15 mm next to an edge shows .07, two of 5 mm 20 mm apart 1.4
-_BEGIN = 0.9  # of the limit; what is not certain must fall below it to become so
+_PAIR_DEVIATIONS = 3.0  # standard deviations of the averaged noise that may stand against the evidence
+_PAIR_FRAMES = 512  # frames; the average reaches back so far
+_LINE_DEVIATIONS = 4.0  # standard deviations of an inequality that is one
+_ROUND_RISE_INEQUALITY = (
+    0.15  # of the mean rise; a round contact of 15 mm next to an edge shows .07, two of 5 mm 20 mm apart 1.4
+)
+_CERTAIN_SHARE = 0.9  # of the limit; what is not certain must fall below it to become so
 
-_UNLEARNED = "the untouched drive currents are not known yet"
-_NEW = "too few frames yet to exclude a second contact"
-_SEVERAL = "the drive currents rise unequally, or the guides differ: several contacts, or a long one"
-_LARGE = "the drive currents rise more than by one contact: several, or a very large one"
-_COARSE = "the readings are too coarse to exclude a second contact so lightly touched"
+_CURRENTS_UNKNOWN = "the untouched drive currents are not known yet"
+_TOO_FEW_FRAMES = "too few frames yet to exclude a second contact"
+_SEVERAL_CONTACTS = "the drive currents rise unequally, or the guides differ: several contacts, or a long one"
+_LARGE_CONTACT = "the drive currents rise more than by one contact: several, or a very large one"
+_COARSE_READINGS = "the readings are too coarse to exclude a second contact so lightly touched"
 
 
 class SingleContactTest:
@@ -107,9 +109,9 @@ class SingleContactTest:
         currents = self._currents
         learned = currents.frames
         if not learned:
-            return _UNLEARNED
+            return _CURRENTS_UNKNOWN
         frames = self._frames
-        if frames < _LONGEST:
+        if frames < _PAIR_FRAMES:
             self._frames = frames = frames + 1
         gain, limit = 1.0 / frames, self._limit
         along, cross, around = matrix[3:6]
@@ -121,18 +123,18 @@ class SingleContactTest:
         self._required = required = self._required + gain * ((total if total < limit else limit) - self._required)
         # what is seen, compared with what the weakest dangerous pair would show
         noise = self._scale * math.sqrt(currents.variance * (gain + 1.0 / learned))
-        slack = _DEVIATIONS * noise + self._unit * currents.bias
+        slack = _PAIR_DEVIATIONS * noise + self._unit * currents.bias
         seen = math.sqrt(differ * differ + across * across)
         # What was excluded once is not doubted again for noise: one standard deviation is left of three.
-        limit, held = (required, slack / _DEVIATIONS) if self._certain else (_BEGIN * required, slack)
+        limit, held = (required, slack / _PAIR_DEVIATIONS) if self._certain else (_CERTAIN_SHARE * required, slack)
         self._certain = False
         if seen + held > limit:
             if seen - slack > limit:
-                return _SEVERAL
-            return _NEW if frames < _LONGEST else _COARSE
+                return _SEVERAL_CONTACTS
+            return _TOO_FEW_FRAMES if frames < _PAIR_FRAMES else _COARSE_READINGS
         radius = self._radius1 + self._taper * u
         if (self._mean + slack) * radius * radius > self._largest:
-            return _LARGE
+            return _LARGE_CONTACT
         self._certain = True
         return ""
 
@@ -152,7 +154,9 @@ class SingleContactTest:
             return None
         noise = self._scale * math.sqrt(self._currents.variance * (1.0 / self._frames + 1.0 / self._currents.frames))
         seen = math.hypot(self._differ, self._across)
-        if seen < _SHOWN * noise + self._unit * self._currents.bias + _UNEQUAL * max(0.0, self._mean):
+        if seen < _LINE_DEVIATIONS * noise + self._unit * self._currents.bias + _ROUND_RISE_INEQUALITY * max(
+            0.0, self._mean
+        ):
             return None
         around = math.sqrt(seen / self._angles / conductance) * self._wrap  # [rad], of the circle about the axis
         return around * self._radius1, 0.5 * math.atan2(self._across, -self._differ)
@@ -184,8 +188,8 @@ def weakest_pair_excluded(sensor: Sensor, frames: int = 100, noise_counts: float
     supply = parts.supply_volts / parts.adc_volts * parts.full_count
     variance = (noise_counts**2 + 1.0 / 12.0) * (1.0 + currents.aspect**4) / supply**2
     unit = parts.current_full_scale / parts.adc_volts * (sensor.frustum.wrap / DANGEROUS_ANGLE) ** 2
-    noise = math.sqrt(variance / min(frames, _LONGEST))
-    return unit * _DEVIATIONS * max(1.0, _split_noise(sensor, currents.aspect)) * noise / _BEGIN
+    noise = math.sqrt(variance / min(frames, _PAIR_FRAMES))
+    return unit * _PAIR_DEVIATIONS * max(1.0, _split_noise(sensor, currents.aspect)) * noise / _CERTAIN_SHARE
 
 
 def frames_until_certain(sensor: Sensor, settings: DetectorSettings, noise_counts: float = 0.7) -> int | None:
@@ -198,4 +202,4 @@ def frames_until_certain(sensor: Sensor, settings: DetectorSettings, noise_count
     """
     one = weakest_pair_excluded(sensor, 1, noise_counts)  # it falls with the square root of the number of frames
     frames = max(1, math.ceil((one / settings.second_contact) ** 2))
-    return frames if frames <= _LONGEST else None
+    return frames if frames <= _PAIR_FRAMES else None

@@ -21,7 +21,7 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
 from .doubt import CONTRADICTS, MOVES, WEAK
-from .matrix_mean import LONGEST, MatrixMean
+from .matrix_mean import MEAN_FRAMES, MatrixMean
 from .matrix_noise import FrameNoise, MatrixNoise
 from .place_estimate import PlaceEstimate, PlaceEstimator, SheetConductances
 from .seam_certainty import SeamCertainty
@@ -33,13 +33,13 @@ __all__ = ["TouchPlace"]
 
 _MAX_SLIDE = 2.0  # settle distances; a touch that has moved this far is another one, and its evidence begins anew
 
-_REFRESH = 1.25  # ratio of frames at which the estimate is made anew
-_REST = 8  # frames for which an estimate serves at least; it costs as much as five of them
-_HARDER = 0.1  # ratio by which the conductance may change before it is
-_UNKNOWN = 0.05  # ratio; the sheets' conductance where none was learned yet
+_REFRESH_RATIO = 1.25  # ratio of frames at which the estimate is made anew
+_REFRESH_FRAMES = 8  # frames for which an estimate serves at least; it costs as much as five of them
+_CONDUCTANCE_STEP = 0.1  # ratio by which the conductance may change before it is
+_UNLEARNED_DEVIATION = 0.05  # ratio; the sheets' conductance where none was learned yet
 
-_UNTOLD = (None, None, None)  # of covariance, radius and its deviation
-_Told = tuple[tuple[float, float, float] | None, float | None, float | None]
+_NO_DETAILS = (None, None, None)  # of covariance, radius and its deviation
+_Details = tuple[tuple[float, float, float] | None, float | None, float | None]
 
 
 class TouchPlace:
@@ -185,7 +185,7 @@ class TouchPlace:
                 *(now, level, seam.u, seam.phi, not doubt, doubt, frame.clock_us, frame.sequence),
                 *(seam.covariance, None, None, seam.elongation, self._velocity.follow(matrix, self._noise, period)),
             )
-        covariance, radius, deviation = self._told if steady else _UNTOLD
+        covariance, radius, deviation = self._told if steady else _NO_DETAILS
         return TouchReading(
             now,
             level,
@@ -215,7 +215,7 @@ class TouchPlace:
         self._made_of = self._rest = 0
         self._next = 1.0
         self._softer = self._harder = 0.0
-        self._told: _Told = _UNTOLD
+        self._told: _Details = _NO_DETAILS
         self._noise = None
         self._estimate: PlaceEstimate | None = None
         self._velocity.restart()
@@ -233,9 +233,12 @@ class TouchPlace:
         identified = dipole.log_radius_deviation < 0.5
         radius = (math.exp(dipole.log_radius), dipole.log_radius_deviation) if identified else (None, None)
         self._told = covariance, *radius
-        self._softer, self._harder = (1.0 - _HARDER) * mean.conductance, (1.0 + _HARDER) * mean.conductance
-        self._estimate, self._made_of, self._rest = estimate, frames, _REST
-        self._next = frames * _REFRESH if frames < LONGEST else math.inf
+        self._softer, self._harder = (
+            (1.0 - _CONDUCTANCE_STEP) * mean.conductance,
+            (1.0 + _CONDUCTANCE_STEP) * mean.conductance,
+        )
+        self._estimate, self._made_of, self._rest = estimate, frames, _REFRESH_FRAMES
+        self._next = frames * _REFRESH_RATIO if frames < MEAN_FRAMES else math.inf
         return estimate
 
     def _noise_of(self, matrix: ContactMatrix, frame: Frame) -> MatrixNoise:
@@ -246,7 +249,9 @@ class TouchPlace:
         currents = self._currents
         if not currents.frames:
             upper, lower = self._estimator.sheets
-            return SheetConductances(upper, lower, (_UNKNOWN * upper) ** 2, (_UNKNOWN * lower) ** 2)
+            return SheetConductances(
+                upper, lower, (_UNLEARNED_DEVIATION * upper) ** 2, (_UNLEARNED_DEVIATION * lower) ** 2
+            )
         upper, lower = self._inversion.untouched(currents.radial, currents.angular)
         one = currents.variance / (1.0 + currents.aspect**4) / currents.frames + currents.bias**2
         ratio = one / currents.radial**2, one / currents.angular**2

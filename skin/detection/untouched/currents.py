@@ -15,16 +15,18 @@ from coneskin.skin.wire import Frame
 
 __all__ = ["UntouchedCurrents"]
 
-BLOCK = 32  # frames that are averaged at once; noise that lasts as long, mains hum for one, shows in their means
-_LONGEST = 64  # blocks that the mean remembers
-_FREE = 8  # blocks in which it is found; from then on its drift is bounded
-_PRIOR = 16  # blocks that the noise taken from the start counts for
-_NOISE = 0.7  # counts; standard deviation that is assumed at the start
-_ROUNDING = 1.0 / 12.0  # counts^2; variance of rounding alone
-_JUMP = 0.01  # ratio; an untouched current that is off by this has changed
-_JUMP_DEVIATIONS = 8.0
-_TELLING = 7.0  # standard deviations between a threshold and what noise reaches: once in 1e11 frames
-_GUIDE = 0.03  # part of the supply; the least threshold, on a guide, is raised by noise no further
+CURRENT_BLOCK = (
+    32  # frames that are averaged at once; noise that lasts as long, mains hum for one, shows in their means
+)
+_CURRENT_MEMORY = 64  # blocks that the mean remembers
+_FREE_BLOCKS = 8  # blocks in which it is found; from then on its drift is bounded
+_PRIOR_BLOCKS = 16  # blocks that the noise taken from the start counts for
+_PRIOR_NOISE = 0.7  # counts; standard deviation that is assumed at the start
+_ROUNDING_VARIANCE = 1.0 / 12.0  # counts^2; variance of rounding alone
+_CURRENT_JUMP = 0.01  # ratio; an untouched current that is off by this has changed
+_CURRENT_JUMP_DEVIATIONS = 8.0
+_THRESHOLD_DEVIATIONS = 7.0  # standard deviations between a threshold and what noise reaches: once in 1e11 frames
+_MAX_GUIDE_THRESHOLD = 0.03  # part of the supply; the least threshold, on a guide, is raised by noise no further
 
 
 class UntouchedCurrents:
@@ -68,12 +70,12 @@ class UntouchedCurrents:
         self._drift = drift
         parts = sensor.electronics
         supply = parts.supply_volts / parts.adc_volts * parts.full_count
-        self.variance = (_NOISE * _NOISE + _ROUNDING) * (1.0 + self._weight**2) / supply**2
-        self.noise = math.sqrt(_NOISE * _NOISE + _ROUNDING)
+        self.variance = (_PRIOR_NOISE * _PRIOR_NOISE + _ROUNDING_VARIANCE) * (1.0 + self._weight**2) / supply**2
+        self.noise = math.sqrt(_PRIOR_NOISE * _PRIOR_NOISE + _ROUNDING_VARIANCE)
         limits, bounds = sensor.thresholds, sensor.bounds
         current = min(bounds.radial_low, bounds.angular_low) * (1.0 / limits.current_low - 1.0)
-        guide = min(_GUIDE, math.sqrt(2.0) * (limits.touch_level - limits.release_level)) * supply
-        self._noisiest = min(guide, current) / _TELLING  # counts
+        guide = min(_MAX_GUIDE_THRESHOLD, math.sqrt(2.0) * (limits.touch_level - limits.release_level)) * supply
+        self._noisiest = min(guide, current) / _THRESHOLD_DEVIATIONS  # counts
         self.bias = 0.0
         self.radial = self.angular = self._last = 0.0
         self.restart()
@@ -101,7 +103,7 @@ class UntouchedCurrents:
         self._sum1 += frame.radial_current / frame.radial_supply
         self._sum2 += frame.angular_current / frame.angular_supply
         self._count += 1
-        return None if self._count < BLOCK else self._close(frame.touch_supply, period)
+        return None if self._count < CURRENT_BLOCK else self._close(frame.touch_supply, period)
 
     def learn(
         self, radial: Sequence[float], angular: Sequence[float], supplies: Sequence[int], periods: Sequence[float]
@@ -116,7 +118,7 @@ class UntouchedCurrents:
         """
         at, end = 0, len(periods)
         while at < end:
-            stop = min(at + BLOCK - self._count, end)
+            stop = min(at + CURRENT_BLOCK - self._count, end)
             sum1, sum2 = self._sum1, self._sum2
             for value in radial[at:stop]:
                 sum1 += value
@@ -125,26 +127,28 @@ class UntouchedCurrents:
             self._sum1, self._sum2 = sum1, sum2
             self._count += stop - at
             at = stop
-            if self._count == BLOCK and self._close(supplies[at - 1], periods[at - 1]):
+            if self._count == CURRENT_BLOCK and self._close(supplies[at - 1], periods[at - 1]):
                 return at - 1
         return at
 
     def _close(self, supply: int, period: float) -> tuple[Fault, str] | None:
-        mean1, mean2 = self._sum1 / BLOCK, self._sum2 / BLOCK
+        mean1, mean2 = self._sum1 / CURRENT_BLOCK, self._sum2 / CURRENT_BLOCK
         self.skip()
         mixed = mean2 - self._weight * mean1
         if not self._blocks:
             self.radial, self.angular, self._last = mean1, mean2, mixed
-        limit = _JUMP_DEVIATIONS * math.sqrt(self.variance / BLOCK)
+        limit = _CURRENT_JUMP_DEVIATIONS * math.sqrt(self.variance / CURRENT_BLOCK)
         step1, step2 = mean1 - self.radial, mean2 - self.angular
-        if abs(step1) > max(_JUMP * self.radial, limit) or abs(step2) > max(_JUMP * self.angular, limit):
+        if abs(step1) > max(_CURRENT_JUMP * self.radial, limit) or abs(step2) > max(
+            _CURRENT_JUMP * self.angular, limit
+        ):
             steps = f"radial {100.0 * step1 / self.radial:+.2f} %, angular {100.0 * step2 / self.angular:+.2f} %"
             return Fault.CURRENT_CHANGED, steps
         self._learn_noise(mixed - self._last, supply)
         self._last = mixed
-        self._blocks = min(self._blocks + 1, _LONGEST)
-        self.frames = self._blocks * BLOCK
-        most = self._drift * BLOCK * period if self._blocks > _FREE else math.inf
+        self._blocks = min(self._blocks + 1, _CURRENT_MEMORY)
+        self.frames = self._blocks * CURRENT_BLOCK
+        most = self._drift * CURRENT_BLOCK * period if self._blocks > _FREE_BLOCKS else math.inf
         self.radial += bounded(step1 / self._blocks, most * self.radial)
         self.angular += bounded(step2 / self._blocks, most * self.angular)
         if self.noise > self._noisiest:
@@ -153,11 +157,11 @@ class UntouchedCurrents:
 
     def _learn_noise(self, change: float, supply: int) -> None:
         scale = (1.0 + self._weight * self._weight) / (supply * supply)  # from counts^2
-        seen = 0.5 * BLOCK * change * change if self._blocks else self.variance
-        self.variance += (seen - self.variance) / (_PRIOR + self._blocks)
-        self.variance = max(self.variance, _ROUNDING * scale)
+        seen = 0.5 * CURRENT_BLOCK * change * change if self._blocks else self.variance
+        self.variance += (seen - self.variance) / (_PRIOR_BLOCKS + self._blocks)
+        self.variance = max(self.variance, _ROUNDING_VARIANCE * scale)
         self.noise = math.sqrt(self.variance / scale)
-        noise = max(0.0, self.variance / scale - _ROUNDING)
+        noise = max(0.0, self.variance / scale - _ROUNDING_VARIANCE)
         # The mean of a rounded value whose noise is Gaussian is off by at most this [counts]; here of two means.
         self.bias = 2.0 / math.pi * math.exp(-2.0 * math.pi * math.pi * noise) * math.sqrt(scale)
 

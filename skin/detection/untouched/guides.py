@@ -13,12 +13,12 @@ from coneskin.skin.wire import Frame
 
 from .currents import UntouchedCurrents, bounded
 
-__all__ = ["JUMP", "UntouchedGuides"]
+__all__ = ["GUIDE_JUMP", "UntouchedGuides"]
 
-JUMP = 0.01  #: part of the supply; a sudden potential of a guide, or a difference of two, that nothing explains
-_MOST = 0.03  # part of the supply; what noise raises that to at most
-_DEVIATIONS = 7.0  # standard deviations of noise that are no potential
-_FOLLOWED = 0.1  # parts of the supply a second; the fastest growth that is learned, a leak's
+GUIDE_JUMP = 0.01  #: part of the supply; a sudden potential of a guide, or a difference of two, that nothing explains
+_MAX_GUIDE_JUMP = 0.03  # part of the supply; what noise raises that to at most
+_GUIDE_DEVIATIONS = 7.0  # standard deviations of noise that are no potential
+_MAX_GUIDE_GROWTH = 0.1  # parts of the supply a second; the fastest growth that is learned, a leak's
 _LEVEL_COUNTS = 1.5  # counts; a change of the level by this explains what the guides show
 
 
@@ -51,12 +51,16 @@ class UntouchedGuides:
             self._radial, self._angular, self._level, self._known = radial, angular, level, True
         step1, step2 = radial - self._radial, angular - self._angular
         split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
-        differ = JUMP * supply
-        if step1 > JUMP or step2 > JUMP or not (-differ <= split1 <= differ and -differ <= split2 <= differ):
+        differ = GUIDE_JUMP * supply
+        if (
+            step1 > GUIDE_JUMP
+            or step2 > GUIDE_JUMP
+            or not (-differ <= split1 <= differ and -differ <= split2 <= differ)
+        ):
             return (level - self._level) * supply < _LEVEL_COUNTS and self._exceed_noise(
                 step1, step2, split1 / supply, split2 / supply, supply
             )
-        most = _FOLLOWED * period
+        most = _MAX_GUIDE_GROWTH * period
         self._radial += bounded(step1, most)
         self._angular += bounded(step2, most)
         self._level += bounded(0.1 * (level - self._level), most)  # a step of the noise is not followed
@@ -78,10 +82,10 @@ class UntouchedGuides:
         count, mine, others, known = 0, self._radial, self._angular, self._level
         for count, (one, other, level, period) in enumerate(zip(radial, angular, levels, periods, strict=True), 1):
             step1, step2 = one - mine, other - others
-            if step1 > JUMP or step2 > JUMP:
+            if step1 > GUIDE_JUMP or step2 > GUIDE_JUMP:
                 count -= 1
                 break
-            most = _FOLLOWED * period
+            most = _MAX_GUIDE_GROWTH * period
             mine += most if step1 > most else -most if step1 < -most else step1
             others += most if step2 > most else -most if step2 < -most else step2
             step = 0.1 * (level - known)
@@ -91,6 +95,9 @@ class UntouchedGuides:
 
     def _exceed_noise(self, step1: float, step2: float, split1: float, split2: float, supply: int) -> bool:
         """Tell whether steps, or differences, are more than noise leaves in as many readings."""
-        noise = _DEVIATIONS * self._currents.noise / supply
-        step, split = min(max(0.7 * noise, JUMP), _MOST), min(max(1.4 * noise, JUMP), _MOST)
+        noise = _GUIDE_DEVIATIONS * self._currents.noise / supply
+        step, split = (
+            min(max(0.7 * noise, GUIDE_JUMP), _MAX_GUIDE_JUMP),
+            min(max(1.4 * noise, GUIDE_JUMP), _MAX_GUIDE_JUMP),
+        )
         return step1 > step or step2 > step or abs(split1) > split or abs(split2) > split

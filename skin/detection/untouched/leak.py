@@ -13,11 +13,11 @@ from coneskin.skin.wire import Frame
 
 __all__ = ["UntouchedLeak"]
 
-BLOCK = 32  # frames that are averaged before they are inverted
-_LONGEST = 16  # blocks that the mean remembers
-_LEAST_LEVEL = 1e-3  # a leak that shows less does nothing to a touch: 5 Mohm with 10 kohm pull-downs
-_LEAST = 1e-7  # S; 10 Mohm are what the converter's own inputs are
-_MOST_SHARE = 0.5  # of the whole conductance; where the leak is more, a touch is too weak for a place
+LEAK_BLOCK = 32  # frames that are averaged before they are inverted
+_LEAK_MEMORY = 16  # blocks that the mean remembers
+_MIN_LEAK_LEVEL = 1e-3  # a leak that shows less does nothing to a touch: 5 Mohm with 10 kohm pull-downs
+_MIN_LEAK = 1e-7  # S; 10 Mohm are what the converter's own inputs are
+_MAX_LEAK_SHARE = 0.5  # of the whole conductance; where the leak is more, a touch is too weak for a place
 
 
 class UntouchedLeak:
@@ -49,24 +49,24 @@ class UntouchedLeak:
 
     def wants(self, highest: float) -> bool:
         """Tell whether anything is learned from quiet frames with at most this level."""
-        return highest >= _LEAST_LEVEL or bool(self.conductance)
+        return highest >= _MIN_LEAK_LEVEL or bool(self.conductance)
 
     def feed(self, frame: Frame, level: float) -> None:
         """Take a quiet frame and its level."""
-        if level < _LEAST_LEVEL and not self.conductance:
+        if level < _MIN_LEAK_LEVEL and not self.conductance:
             return  # a dry sensor, and nothing to learn
         self._frames.append(frame)
-        if len(self._frames) >= BLOCK:
+        if len(self._frames) >= LEAK_BLOCK:
             self._close()
 
     def _close(self) -> None:
-        sums = [sum(counts) / BLOCK for counts in zip(*[frame[6:18] for frame in self._frames], strict=True)]
+        sums = [sum(counts) / LEAK_BLOCK for counts in zip(*[frame[6:18] for frame in self._frames], strict=True)]
         mean = Frame._make((*self._frames[-1][:6], *sums, None))
         self._frames.clear()
         matrix = self._inversion.take(mean)
-        self._blocks = min(self._blocks + 1, _LONGEST)
+        self._blocks = min(self._blocks + 1, _LEAK_MEMORY)
         share = 1.0 / self._blocks
-        if matrix is None or matrix.conductance < _LEAST:
+        if matrix is None or matrix.conductance < _MIN_LEAK:
             self.conductance -= share * self.conductance
             return
         known, seen = (1.0 - share) * self.conductance, share * min(matrix.conductance, self._largest)
@@ -81,7 +81,7 @@ class UntouchedLeak:
         is the part of the distance between leak and touch.
         """
         leak, whole = self.conductance, matrix.conductance
-        if leak < _LEAST or leak > _MOST_SHARE * whole:
+        if leak < _MIN_LEAK or leak > _MAX_LEAK_SHARE * whole:
             return matrix
         touch = whole - leak
         off_x, off_y = matrix.x - self.x, matrix.y - self.y

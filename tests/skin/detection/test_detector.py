@@ -12,7 +12,7 @@ from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, Tou
 from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
-from coneskin.skin.detection.untouched.currents import BLOCK
+from coneskin.skin.detection.untouched.currents import CURRENT_BLOCK
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.virtual.fault_injection import FaultInjection
@@ -36,7 +36,7 @@ def test_not_ready_until_a_run_of_untouched_frames():
 
 def test_not_ready_before_the_untouched_drive_currents_are_known():
     bench = DetectorBench(DetectorSettings(settle_frames=3))
-    bench.feed(times=BLOCK - 1)
+    bench.feed(times=CURRENT_BLOCK - 1)
     assert not bench.detector.ready
     bench.feed()
     assert bench.detector.ready

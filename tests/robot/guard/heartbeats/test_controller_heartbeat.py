@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.robot.guard.heartbeats.controller_heartbeat import PERIOD, ControllerHeartbeat, heartbeat_count
+from coneskin.robot.guard.heartbeats.controller_heartbeat import COUNT_PERIOD, ControllerHeartbeat, heartbeat_count
 from coneskin.robot.ur.heartbeat_registers import decode_echo, program_lines
 from coneskin.robot.ur.rtde_codec import Recipe
 
@@ -16,13 +16,13 @@ def started(at=100.0, echo_age=0.0, required=True):
     return heartbeat
 
 
-@pytest.mark.parametrize("at", [100.0, 2**30 * PERIOD + 0.01, 2**31 * PERIOD])
+@pytest.mark.parametrize("at", [100.0, 2**30 * COUNT_PERIOD + 0.01, 2**31 * COUNT_PERIOD])
 def test_a_program_that_found_the_count_of_its_start_depends_on_it(at):
     assert started(at).trouble(at + 10.0) == ""
     assert started(at).blocker() == ""
 
 
-@pytest.mark.parametrize("at", [100.0, 2**30 * PERIOD + 0.01])
+@pytest.mark.parametrize("at", [100.0, 2**30 * COUNT_PERIOD + 0.01])
 def test_a_count_from_before_its_start_is_that_of_another_program(at):
     heartbeat = started(at, echo_age=0.5)
     assert heartbeat.trouble(at + 0.49) == ""  # it may not have got there yet

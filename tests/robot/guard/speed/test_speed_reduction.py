@@ -7,7 +7,7 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.speed.speed_reduction import HOLD, ReducedSpeedTouch, SpeedReduction
+from coneskin.robot.guard.speed.speed_reduction import CLEAR_TIME, ReducedSpeedTouch, SpeedReduction
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
@@ -86,10 +86,10 @@ def test_it_is_over_a_while_after_the_last_touch():
     for now, touched, over in (
         (10.1, True, False),
         (10.2, False, False),
-        (10.2 + HOLD - 0.01, False, False),
-        (10.3 + HOLD, True, False),  # touched again in time
-        (10.4 + HOLD, False, False),
-        (10.4 + 2 * HOLD, False, True),
+        (10.2 + CLEAR_TIME - 0.01, False, False),
+        (10.3 + CLEAR_TIME, True, False),  # touched again in time
+        (10.4 + CLEAR_TIME, False, False),
+        (10.4 + 2 * CLEAR_TIME, False, True),
     ):
         one.touched(now, touched)
         assert one.over(now) is over

@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
-from coneskin.skin.detection.untouched.leak import BLOCK, UntouchedLeak
+from coneskin.skin.detection.untouched.leak import LEAK_BLOCK, UntouchedLeak
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
@@ -25,7 +25,7 @@ def frames_of(*touches: ScriptedTouch, leak: float, seed: int = 0, duration: flo
 
 def learned(leak: float, blocks: int = 8) -> UntouchedLeak:
     found = UntouchedLeak(FOREARM, 1e-4)
-    for frame in frames_of(leak=leak, duration=blocks * BLOCK * 1e-3):
+    for frame in frames_of(leak=leak, duration=blocks * LEAK_BLOCK * 1e-3):
         found.feed(frame, (frame.touch_c + frame.touch_d) / (2.0 * frame.touch_supply))
     return found
 
