@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CompanionMonitor"]
 
-_GUARDED_PROGRAM = "the program that guards"
+_USER_PROGRAM = "the program that guards"
 _RESTART_TIMEOUT = 5.0  # s for the driver's program to run again after an announced end
 #: process that can be lost -> the stop path that goes with it; the driver knows those of its connections
 _LOST_WITH_PROCESS: Mapping[str, frozenset[StopPath]] = {
@@ -40,9 +40,7 @@ class CompanionMonitor:
     def __init__(self, limits: MonitoringLimits, arm: ArmSupervisor | None) -> None:
         self._arm = arm
         self._helper = "the guard watchdog" if arm is None or not arm.internal_control else "the driver process"
-        silences = (
-            {} if arm is None else {_GUARDED_PROGRAM: limits.program_silence, self._helper: limits.process_silence}
-        )
+        silences = {} if arm is None else {_USER_PROGRAM: limits.program_silence, self._helper: limits.process_silence}
         self._heartbeats = HeartbeatMonitor(silences)
         self._silent: dict[str, str] = {}  # process -> what is wrong with it now
         self._ran = False  # the driver's program, on the controller
@@ -55,7 +53,7 @@ class CompanionMonitor:
 
     def note_program(self, now: float) -> None:
         """Note a heartbeat of the program that guards, at a host time [s]."""
-        self._heartbeats.note(_GUARDED_PROGRAM, now)
+        self._heartbeats.note(_USER_PROGRAM, now)
 
     def note_helper(self, now: float) -> None:
         """Note a message of the driver process, or of the guard watchdog, at a host time [s]."""

@@ -20,12 +20,8 @@ from .frame.contact_matrix import ContactMatrix
 
 __all__ = ["FrameSelfTest"]
 
-_RECIPROCITY_LIMIT = (
-    0.005  # of the supply, on a guide; a slide at 1 m/s leaves 4e-7, two contacts that grow by 10 %/ms 4e-4
-)
-_SPLIT_LIMIT = (
-    0.2  # of the supply; the same leave 0.014 and 0.03, a shunt 10 % off its value 0.14, pull-downs 1 % apart 0.1
-)
+_RECIPROCITY_LIMIT = 0.005  # of the supply, on a guide; a slide at 1 m/s leaves 4e-7, two contacts growing 10 %/ms 4e-4
+_SPLIT_LIMIT = 0.2  # of the supply; the same leave 0.014 and 0.03, a shunt 10 % off 0.14, pull-downs 1 % apart 0.1
 _DRAWN_LIMIT = 0.08  # of the touch phase's drive current; a pull-down and a shunt of 1 %, and an amplifier, leave 0.03
 # a third of the chi-squared each: below all, no more is computed
 _RECIPROCITY_THIRD, _SPLIT_THIRD, _DRAWN_THIRD = 0.57 * _RECIPROCITY_LIMIT, 0.57 * _SPLIT_LIMIT, 0.57 * _DRAWN_LIMIT
@@ -77,9 +73,7 @@ class FrameSelfTest:
     def deviation(self, matrix: ContactMatrix) -> float:
         """Return how far a frame contradicts itself, over the limit."""
         along, around = matrix.along, matrix.around
-        noise = (
-            _LIMIT_DEVIATIONS * _LIMIT_DEVIATIONS * self._currents.variance * self._scale
-        )  # of a guide, over the supply
+        noise = _LIMIT_DEVIATIONS**2 * self._currents.variance * self._scale  # of a guide, over the supply
         share = 1.0 + around * self._pulldown
         sheets = along * along + around * around
         reciprocity = matrix.reciprocity**2 / ((_RECIPROCITY_LIMIT**2 + 2.0 * noise) * sheets)

@@ -19,7 +19,7 @@ __all__ = ["Observation", "PointContact", "WiringHypothesis", "list_hypotheses",
 
 _SHORT_CONDUCTANCE = 10.0  # S; of a short
 _OPEN_CONDUCTANCE = 1e-12  # S; brings what has lost all its wires to ground
-_ELECTRODE_NAMES = "ABCD"
+_WIRE_NAMES = "ABCD"
 _EDGE_DISTANCE = 1e-3  # of a side; a tap is no nearer to an electrode
 
 
@@ -149,20 +149,18 @@ def _phase(sensor: Sensor, roles: str, opened: str, joined: tuple[str, str] | No
     parts = sensor.electronics
     loads = {"+": 0.0, "g": 0.0, "p": parts.pulldown_ohms, "i": parts.input_ohms}
     feeds, sources, measured, seen = [_OPEN_CONDUCTANCE] * 4, [0.0] * 4, [0.0] * 4, [0.0] * 4
-    for k, (name, role) in enumerate(zip(_ELECTRODE_NAMES, roles, strict=True)):
+    for k, (name, role) in enumerate(zip(_WIRE_NAMES, roles, strict=True)):
         if name not in opened:
             feed = 1.0 / (parts.lead_ohms[k] + loads[role])
             feeds[k] += feed
             seen[k] = feed * loads[role]
             if role == "+":
                 sources[k], measured[k] = feed, feed
-        if joined is not None and joined[0] == name and joined[1] not in _ELECTRODE_NAMES:
+        if joined is not None and joined[0] == name and joined[1] not in _WIRE_NAMES:
             feeds[k] += _SHORT_CONDUCTANCE
             sources[k] += _SHORT_CONDUCTANCE if joined[1] != "ground" else 0.0
             measured[k] += _SHORT_CONDUCTANCE if joined[1] == "rail" else 0.0
-    pair = (
-        [] if joined is None or joined[1] not in _ELECTRODE_NAMES else [_ELECTRODE_NAMES.index(name) for name in joined]
-    )
+    pair = [] if joined is None or joined[1] not in _WIRE_NAMES else [_WIRE_NAMES.index(name) for name in joined]
     members = [[k] for k in range(4) if k not in pair] + ([pair] if pair else [])
     groups = tuple(
         _Group(
@@ -185,9 +183,9 @@ def list_hypotheses(sensor: Sensor) -> list[WiringHypothesis]:
     plus_lower, minus_lower = "CD" if sensor.c_positive else "DC"
     upper, lower = Fault.SHORT_UPPER, Fault.SHORT_LOWER
     found = [WiringHypothesis(sensor, "nothing", None)]
-    for name in _ELECTRODE_NAMES:
+    for name in _WIRE_NAMES:
         found.append(WiringHypothesis(sensor, f"{name} open", Fault[f"OPEN_{name}"], opened=name))
-    for fed in _ELECTRODE_NAMES:
+    for fed in _WIRE_NAMES:
         fault = Fault.OPEN_UPPER if fed in "AB" else Fault.OPEN_LOWER
         found.append(WiringHypothesis(sensor, f"{fed} joined to the supply", fault, joined=(fed, "supply")))
     for pair, fault in (("AB", upper), ("CD", lower)):
@@ -206,7 +204,7 @@ def list_hypotheses(sensor: Sensor) -> list[WiringHypothesis]:
         for second in "CD":
             words = f"{first} joined with {second}"
             found.append(WiringHypothesis(sensor, words, Fault.LAYERS_CLOSED, joined=(first, second)))
-    for name in _ELECTRODE_NAMES:
+    for name in _WIRE_NAMES:
         fault = Fault.GUIDES_DISAGREE if name in "AB" else Fault.LEAK
         found.append(WiringHypothesis(sensor, f"input of {name} dead", fault, dead=name))
     found.append(WiringHypothesis(sensor, "touch phase dead", Fault.GUIDE_DRIVEN, dead="touch"))
@@ -217,7 +215,7 @@ _GUIDE_ERROR = 0.01  # part of the supply; what the circuit's model may be off
 _CURRENT_ERROR, _UNLEARNED_CURRENT_ERROR = (
     0.05,
     0.25,
-)  # part of a drive current, where the sheets are known and where not
+)  # part of a current, where the sheets are known and where not
 _FULL_SCALE_ERROR = 0.002  # part of a current's full scale
 
 

@@ -12,9 +12,7 @@ COUNT_PERIOD = 0.02  #: s between two counts
 _COUNT_MASK = 0x3FFFFFFF  # counts are whole numbers of 30 bits
 _COUNT_MARGIN = 5  # counts by which a report may be older than the first state that shows the program
 _REPORT_TIME = 0.5  # s that a program has to report after its start
-_NO_HEARTBEAT = (
-    "the program on the controller does not depend on the guard's heartbeat, and goes on if the network is cut"
-)
+_NO_HEARTBEAT = "the controller's program does not depend on the guard's heartbeat: it goes on if the network is cut"
 
 
 def heartbeat_count(now: float) -> int:

@@ -15,7 +15,7 @@ from coneskin.skin.detection.frame.touch_reading import TouchReading
 __all__ = ["Contact", "GuardedSensor"]
 
 _CHI_SQUARED_95 = 5.991  # chi-squared of two degrees of freedom that holds 95 %
-_DIRECTION_STEP = 1e-4  # m along, rad around; from the place to one that shows the direction
+_AXIS_STEP = 1e-4  # m along, rad around; from the place to one that shows the direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +104,8 @@ class Contact:
     def _axes(self, point: Vector) -> tuple[Vector, Vector]:
         """Return the unit vectors along the side and around, at the place, in the link's frame."""
         u, phi = self.touch.u, self.touch.phi
-        return _unit(point, self.where.place(u + _DIRECTION_STEP, phi)[0]), _unit(
-            point, self.where.place(u, phi + _DIRECTION_STEP)[0]
+        return _unit(point, self.where.place(u + _AXIS_STEP, phi)[0]), _unit(
+            point, self.where.place(u, phi + _AXIS_STEP)[0]
         )
 
     def _ellipse(self, point: Vector) -> tuple[Vector, Vector] | None:

@@ -10,8 +10,8 @@ import math
 
 __all__ = ["SliderSetting"]
 
-_SLIDER_TOLERANCE = 0.01  # of the slider; between what was set and what is read
-_SLIDER_DELAY = 0.5  # s after which it must show what was set
+_READ_TOLERANCE = 0.01  # of the slider; between what was set and what is read
+_READ_DELAY = 0.5  # s after which it must show what was set
 
 
 class SliderSetting:
@@ -39,19 +39,17 @@ class SliderSetting:
     def note(self, now: float, slider: float) -> bool:
         """Take where the slider is at a time [s]; return whether a person has moved it there."""
         if self.fraction is None:
-            if now - self.set_at <= _SLIDER_DELAY and any(
-                abs(slider - value) <= _SLIDER_TOLERANCE for value in self._late
-            ):
+            if now - self.set_at <= _READ_DELAY and any(abs(slider - value) <= _READ_TOLERANCE for value in self._late):
                 self.fraction, self._expected, self._late = slider, [slider], []  # it was under way to the controller
                 return False
-            moved, self.ceiling = abs(slider - self.ceiling) > _SLIDER_TOLERANCE, slider
+            moved, self.ceiling = abs(slider - self.ceiling) > _READ_TOLERANCE, slider
             return moved
         if self._resumes:
             self._resumes, self.set_at = False, now
-        shown = [number for number, value in enumerate(self._expected) if abs(slider - value) <= _SLIDER_TOLERANCE]
+        shown = [number for number, value in enumerate(self._expected) if abs(slider - value) <= _READ_TOLERANCE]
         if shown:
             del self._expected[: shown[-1]]
-        if shown and (len(self._expected) == 1 or now - self.set_at <= _SLIDER_DELAY):
+        if shown and (len(self._expected) == 1 or now - self.set_at <= _READ_DELAY):
             return False
         self._late = self._expected[1:]
         self.ceiling, self.fraction = slider, None
@@ -71,6 +69,6 @@ class SliderSetting:
 
     def found(self, slider: float) -> float | None:
         """Return where to put the slider back to, from ``slider``; None where it is not where the guard has put it."""
-        if self.fraction is None or all(abs(slider - value) > _SLIDER_TOLERANCE for value in self._expected):
+        if self.fraction is None or all(abs(slider - value) > _READ_TOLERANCE for value in self._expected):
             return None
         return self.ceiling

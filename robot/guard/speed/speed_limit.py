@@ -38,7 +38,7 @@ _HOLD_TIME = 2.0  # s of motion after which the slider may go up again, the firs
 _MAX_HOLD_TIME = 64.0  # s
 _STEP_UP = 1.2  # ratio; smaller ones are not worth it
 _MIN_SLIDER = 0.01  # of the slider
-_STANDING_SPEED = 0.02  # rad/s of the leading joint, below which an arm counts as not moving
+_MIN_SPEED = 0.02  # rad/s of the leading joint, below which an arm counts as not moving
 _SLIDER_MEMORY = 3.0 * _FALL_TIME  # s; an arm that obeys is then as slow as the highest slider since lets its joints be
 _JOINT_MARGIN = 1.25  # of that speed
 
@@ -186,7 +186,7 @@ class SpeedLimit:
             return
         if self._asked is not None and leading > _STEADY_RATIO * self._asked * highest:
             self._asked = None  # faster than ever: nobody knows how fast it will be
-        if leading < _STANDING_SPEED or change > (_STEADY_RATIO - 1.0) * leading:
+        if leading < _MIN_SPEED or change > (_STEADY_RATIO - 1.0) * leading:
             self._steady_since = math.inf
             return
         self._steady_since = min(self._steady_since, now)
@@ -199,7 +199,7 @@ class SpeedLimit:
             return False
         top = self._highest
         return any(
-            abs(v) > _JOINT_MARGIN * top * most + _STANDING_SPEED for v, most in zip(qd, self._joint_speed, strict=True)
+            abs(v) > _JOINT_MARGIN * top * most + _MIN_SPEED for v, most in zip(qd, self._joint_speed, strict=True)
         )
 
     def _forget_demand(self) -> None:
@@ -228,7 +228,7 @@ class SpeedLimit:
             self._forget_demand()
             return
         since, self._looked_at = max(0.0, now - self._looked_at), now
-        if speed < _STANDING_SPEED:
+        if speed < _MIN_SPEED:
             return
         self._moved += min(since, _GROWTH_WINDOW)
         self._demand = max(self._demand, ratio / max(_MIN_SLIDER, setting.fraction))

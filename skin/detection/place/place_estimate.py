@@ -28,9 +28,7 @@ from .matrix_noise import MatrixNoise
 __all__ = ["PlaceEstimate", "PlaceEstimator", "SheetConductances"]
 
 _REAL_VARIANCE = 4.0**2  # deviations, squared; an inequality below is taken for noise and drift
-_ROUND_INEQUALITY = (
-    0.05  # of the dipole; inequality that an edge next to a round contact gives it; longer ones stand out
-)
+_ROUND_INEQUALITY = 0.05  # of the dipole; inequality that an edge next to a round contact gives it
 # what the multipoles beyond the dipole are, by the dipole's area: of the displacement, over the distance to the edge
 # squared; and of the taper, by its curvature squared (root mean squares of the difference to the exact field)
 _NEXT_IMAGE, _NEXT_TAPER = 0.02, 0.05

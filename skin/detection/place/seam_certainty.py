@@ -16,9 +16,7 @@ from .seam_contact import SeamPlace, SeamTest
 __all__ = ["SeamCertainty"]
 
 _MIN_SEAM_SHARE = 0.02  # P_yy over G; a press over the seam has more, and most touches are told from one by this alone
-_CONDUCTANCE_CHANGE = (
-    0.05  # ratio by which the conductance may differ from its mean at the seam, where means of products are taken
-)
+_CONDUCTANCE_CHANGE = 0.05  # ratio by which the conductance may differ from its mean
 
 
 class SeamCertainty:

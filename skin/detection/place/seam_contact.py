@@ -34,7 +34,7 @@ _SEAM_MODEL_ERROR = 0.02  # of P_yy; gains of the two phases, and the coupling
 _SEAM_MARGIN = 0.8  # of the limit; two contacts that are not quite at the edges show a little less
 _MAX_ALONG_SHARE = 2.0  # of the second contact, at the dangerous angle's distance along the side
 _COUPLING_TERMS = 12
-_OFFSET_LINEAR, _OFFSET_CUBIC, _OFFSET_QUINTIC = (
+_OFFSET_1, _OFFSET_3, _OFFSET_5 = (
     1.85,
     -1.1,
     0.25,
@@ -112,9 +112,7 @@ class SeamTest:
         uneven = 1.0 - 2.0 * (0.0 if beyond < 0.0 else 1.0 if beyond > 1.0 else beyond)
         square = uneven * uneven
         far = mean * self._wrap + self._gap  # [rad], from the middle of the seam
-        off = (
-            uneven * (_OFFSET_LINEAR + square * (_OFFSET_CUBIC + square * _OFFSET_QUINTIC)) * far
-        )  # of the centroid, likewise
+        off = uneven * (_OFFSET_1 + square * (_OFFSET_3 + square * _OFFSET_5)) * far  # of the centroid, likewise
         angle = max(0.0, self._angle - abs(off) / self._wrap)  # on the other side of the seam than the centroid
         second = whole if whole < self._limit else self._limit
         doubt = "" if abs(away) + slack < _SEAM_MARGIN * second * angle * (1.0 - angle) else _OVER_SEAM

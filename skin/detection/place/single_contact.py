@@ -24,9 +24,7 @@ DANGEROUS_ANGLE = math.radians(20.0)
 _PAIR_DEVIATIONS = 3.0  # standard deviations of the averaged noise that may stand against the evidence
 _PAIR_FRAMES = 512  # frames; the average reaches back so far
 _LINE_DEVIATIONS = 4.0  # standard deviations of an inequality that is one
-_ROUND_RISE_INEQUALITY = (
-    0.15  # of the mean rise; a round contact of 15 mm next to an edge shows .07, two of 5 mm 20 mm apart 1.4
-)
+_ROUND_UNEQUAL = 0.15  # of the mean rise; a round contact of 15 mm at an edge shows .07, two of 5 mm 20 mm apart 1.4
 _CERTAIN_SHARE = 0.9  # of the limit; what is not certain must fall below it to become so
 
 _CURRENTS_UNKNOWN = "the untouched drive currents are not known yet"
@@ -154,9 +152,7 @@ class SingleContactTest:
             return None
         noise = self._scale * math.sqrt(self._currents.variance * (1.0 / self._frames + 1.0 / self._currents.frames))
         seen = math.hypot(self._differ, self._across)
-        if seen < _LINE_DEVIATIONS * noise + self._unit * self._currents.bias + _ROUND_RISE_INEQUALITY * max(
-            0.0, self._mean
-        ):
+        if seen < _LINE_DEVIATIONS * noise + self._unit * self._currents.bias + _ROUND_UNEQUAL * max(0.0, self._mean):
             return None
         around = math.sqrt(seen / self._angles / conductance) * self._wrap  # [rad], of the circle about the axis
         return around * self._radius1, 0.5 * math.atan2(self._across, -self._differ)

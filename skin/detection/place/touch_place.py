@@ -35,8 +35,8 @@ _MAX_SLIDE = 2.0  # settle distances; a touch that has moved this far is another
 
 _REFRESH_RATIO = 1.25  # ratio of frames at which the estimate is made anew
 _REFRESH_FRAMES = 8  # frames for which an estimate serves at least; it costs as much as five of them
-_CONDUCTANCE_STEP = 0.1  # ratio by which the conductance may change before it is
-_UNLEARNED_DEVIATION = 0.05  # ratio; the sheets' conductance where none was learned yet
+_SOLVE_STEP = 0.1  # ratio by which the conductance may change before it is
+_UNLEARNED_ERROR = 0.05  # ratio; the sheets' conductance where none was learned yet
 
 _NO_DETAILS = (None, None, None)  # of covariance, radius and its deviation
 _Details = tuple[tuple[float, float, float] | None, float | None, float | None]
@@ -234,8 +234,8 @@ class TouchPlace:
         radius = (math.exp(dipole.log_radius), dipole.log_radius_deviation) if identified else (None, None)
         self._told = covariance, *radius
         self._softer, self._harder = (
-            (1.0 - _CONDUCTANCE_STEP) * mean.conductance,
-            (1.0 + _CONDUCTANCE_STEP) * mean.conductance,
+            (1.0 - _SOLVE_STEP) * mean.conductance,
+            (1.0 + _SOLVE_STEP) * mean.conductance,
         )
         self._estimate, self._made_of, self._rest = estimate, frames, _REFRESH_FRAMES
         self._next = frames * _REFRESH_RATIO if frames < MEAN_FRAMES else math.inf
@@ -249,9 +249,7 @@ class TouchPlace:
         currents = self._currents
         if not currents.frames:
             upper, lower = self._estimator.sheets
-            return SheetConductances(
-                upper, lower, (_UNLEARNED_DEVIATION * upper) ** 2, (_UNLEARNED_DEVIATION * lower) ** 2
-            )
+            return SheetConductances(upper, lower, (_UNLEARNED_ERROR * upper) ** 2, (_UNLEARNED_ERROR * lower) ** 2)
         upper, lower = self._inversion.untouched(currents.radial, currents.angular)
         one = currents.variance / (1.0 + currents.aspect**4) / currents.frames + currents.bias**2
         ratio = one / currents.radial**2, one / currents.angular**2

@@ -15,16 +15,14 @@ from coneskin.skin.wire import Frame
 
 __all__ = ["UntouchedCurrents"]
 
-CURRENT_BLOCK = (
-    32  # frames that are averaged at once; noise that lasts as long, mains hum for one, shows in their means
-)
+CURRENT_BLOCK = 32  # frames that are averaged at once; noise that lasts as long, as mains hum does, shows in the means
 _CURRENT_MEMORY = 64  # blocks that the mean remembers
 _FREE_BLOCKS = 8  # blocks in which it is found; from then on its drift is bounded
 _PRIOR_BLOCKS = 16  # blocks that the noise taken from the start counts for
 _PRIOR_NOISE = 0.7  # counts; standard deviation that is assumed at the start
 _ROUNDING_VARIANCE = 1.0 / 12.0  # counts^2; variance of rounding alone
 _CURRENT_JUMP = 0.01  # ratio; an untouched current that is off by this has changed
-_CURRENT_JUMP_DEVIATIONS = 8.0
+_JUMP_DEVIATIONS = 8.0
 _THRESHOLD_DEVIATIONS = 7.0  # standard deviations between a threshold and what noise reaches: once in 1e11 frames
 _MAX_GUIDE_THRESHOLD = 0.03  # part of the supply; the least threshold, on a guide, is raised by noise no further
 
@@ -137,7 +135,7 @@ class UntouchedCurrents:
         mixed = mean2 - self._weight * mean1
         if not self._blocks:
             self.radial, self.angular, self._last = mean1, mean2, mixed
-        limit = _CURRENT_JUMP_DEVIATIONS * math.sqrt(self.variance / CURRENT_BLOCK)
+        limit = _JUMP_DEVIATIONS * math.sqrt(self.variance / CURRENT_BLOCK)
         step1, step2 = mean1 - self.radial, mean2 - self.angular
         if abs(step1) > max(_CURRENT_JUMP * self.radial, limit) or abs(step2) > max(
             _CURRENT_JUMP * self.angular, limit

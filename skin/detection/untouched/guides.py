@@ -16,7 +16,7 @@ from .currents import UntouchedCurrents, bounded
 __all__ = ["GUIDE_JUMP", "UntouchedGuides"]
 
 GUIDE_JUMP = 0.01  #: part of the supply; a sudden potential of a guide, or a difference of two, that nothing explains
-_MAX_GUIDE_JUMP = 0.03  # part of the supply; what noise raises that to at most
+_MAX_JUMP = 0.03  # part of the supply; what noise raises that to at most
 _GUIDE_DEVIATIONS = 7.0  # standard deviations of noise that are no potential
 _MAX_GUIDE_GROWTH = 0.1  # parts of the supply a second; the fastest growth that is learned, a leak's
 _LEVEL_COUNTS = 1.5  # counts; a change of the level by this explains what the guides show
@@ -97,7 +97,7 @@ class UntouchedGuides:
         """Tell whether steps, or differences, are more than noise leaves in as many readings."""
         noise = _GUIDE_DEVIATIONS * self._currents.noise / supply
         step, split = (
-            min(max(0.7 * noise, GUIDE_JUMP), _MAX_GUIDE_JUMP),
-            min(max(1.4 * noise, GUIDE_JUMP), _MAX_GUIDE_JUMP),
+            min(max(0.7 * noise, GUIDE_JUMP), _MAX_JUMP),
+            min(max(1.4 * noise, GUIDE_JUMP), _MAX_JUMP),
         )
         return step1 > step or step2 > step or abs(split1) > split or abs(split2) > split
