@@ -24,7 +24,7 @@ FLOORS = (
     "geometry.drawing geometry.fit robot.arm robot.sim.urscript skin",
     "geometry.fit.developable robot.driver robot.reaction robot.sim.motion skin.detection.frame skin.diagnosis "
     "skin.firmware skin.sources",
-    "robot.guard.heartbeats robot.stop robot.ur skin.detection.untouched skin.virtual",
+    "robot.stop robot.ur skin.virtual",
     "robot.sim.machine scene.values skin.detection.place",
     "scene.tables skin.detection",
     "design.sheets robot.guard.signals",
@@ -83,14 +83,14 @@ HOT = {
     "src/coneskin/core": "channel recording/block",
     "skin": "wire sensor",
     "skin/sources": "source serial_port kinds",
-    "skin/detection": "stream detector events frame/reading frame/timing",
-    "skin/detection/place": "touch_place place_estimate single_contact seam_contact seam_certainty",
+    "skin/detection": "stream detector events",
+    "skin/detection/frame": "contact_matrix reading timing untouched",
+    "skin/detection/place": "touch_place place_estimate single_contact seam_contact",
     "robot/arm": "kinematics compiled_kinematics damped_least_squares joint_limits",
     "robot/reaction": "retreat types",
-    "robot/guard": "core skin_contacts arm_stop arm_supervisor companion_monitor loop ports outbox port_losses "
-    "preconditions stop_escalation signals/journal",
+    "robot/guard": "core skin_contacts arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
+    "port_losses state_age signals/journal",
     "robot/guard/motion": "motion_away reaction_motion",
-    "robot/guard/heartbeats": "heartbeat_monitor controller_heartbeat controller_clock",
     "robot/stop": "stop_monitor",
     "robot/ur": "driver_process state_reader control_program ur_rtde",
 }

@@ -82,7 +82,7 @@ class Day:
 
     def run(self, frames: int) -> None:
         """So many more frames, each by itself."""
-        take, out, quiet, every = self.core.take, self._out, self._quiet, self._every
+        take, out, quiet, every = self.core.feed, self._out, self._quiet, self._every
         for number in range(self.frames, self.frames + frames):
             since = number % every - (every - TOUCHED)
             if since < 0:
@@ -114,7 +114,7 @@ class Day:
         self._q[0] = (self._q[0] + 0.002 * self._speed + 3.0) % 6.0 - 3.0
         state = (now, tuple(self._q), (self._speed, 0.0, 0.0, 0.0, 0.0, 0.0), 7, 1, 2, (0.0,) * 6, (0.0,) * 6)
         block = Block(BlockKind.ARM, now, RECIPE.pack(state))
-        self.core.take(block, self._out)
+        self.core.feed(block, self._out)
         self.recorded += len(encode_block(block))
 
     def _serve(self) -> None:
@@ -139,7 +139,7 @@ class Day:
     def _person(self, now: float) -> None:
         """Reset; refused while the touch lasts."""
         if self.core.phase is Phase.LATCHED:
-            self.core.take(self._companions.reset(now), self._out)
+            self.core.feed(self._companions.reset(now), self._out)
 
 
 def resident() -> int:

@@ -17,9 +17,8 @@ from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.loop import GuardLoop
+from coneskin.robot.guard.loop import GuardLoop, GuardPorts
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.ports import GuardPorts
 from coneskin.robot.guard.signals.contact import GuardedSensor
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
@@ -88,21 +87,21 @@ class Guarded:
             ports = GuardPorts(session, stamps.wrap_source(port), States(far.states), stamps.wrap_driver(driver))  # type: ignore[arg-type]
             loop = GuardLoop(core, ports, CLOCK)
             loop._open()
-            core.take(Block(BlockKind.DRIVER, CLOCK(), StatusReport("ready").encode()), [])
+            core.feed(Block(BlockKind.DRIVER, CLOCK(), StatusReport("ready").encode()), [])
             end, reset_at, spoke = CLOCK() + seconds + 0.5, 0.0, 0.0
             gc.disable()
             while CLOCK() < end:
-                loop.step(0.002)
+                loop.poll(0.002)
                 if CLOCK() - spoke > 0.02:
                     spoke = CLOCK()
-                    core.take(Block(BlockKind.PROGRAM, spoke, b""), [])
+                    core.feed(Block(BlockKind.PROGRAM, spoke, b""), [])
                     acknowledged = StatusReport("released", str(core._activation.number))
-                    core.take(Block(BlockKind.DRIVER, spoke, acknowledged.encode()), [])
+                    core.feed(Block(BlockKind.DRIVER, spoke, acknowledged.encode()), [])
                 drain(recorder)
                 drain(arm)
                 if core.phase is Phase.LATCHED and CLOCK() >= reset_at:  # refused until nothing stands against it
                     reset_at = CLOCK() + RESET_PERIOD
-                    core.take(Block(BlockKind.RESET, CLOCK(), b"%d 1" % core._arm.stop_number), [])
+                    core.feed(Block(BlockKind.RESET, CLOCK(), b"%d 1" % core._arm.stop_number), [])
             gc.enable()
             loop._close()
             written = far.written()

@@ -67,7 +67,7 @@ class Stamps:
     def wrap_core(self, core: GuardCore) -> Any:
         """Return the core; it stamps when it is done, and notes why the guard stops."""
         self.core = core
-        return Wrapped(core, "take", lambda _, __, out: self._stamp_done(out))
+        return Wrapped(core, "feed", lambda _, __, out: self._stamp_done(out))
 
     def wrap_source(self, port: SerialPort) -> Any:
         """Return the port; it stamps when it has read."""

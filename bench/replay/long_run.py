@@ -10,8 +10,7 @@ from pathlib import Path
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.driver.messages import StatusReport
-from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
-from coneskin.robot.guard.signals.outputs import Output
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent, Output
 from coneskin.robot.ur.state_reader import RECIPE
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.build import build_core
@@ -36,7 +35,7 @@ def record_long_run(path: Path, model: Path, seconds: float) -> None:
 
         def take(kind: BlockKind, time: float, payload: bytes) -> None:
             block, outputs = Block(kind, time, payload), list[Output]()
-            core.take(block, outputs)
+            core.feed(block, outputs)
             events = [output for output in outputs if isinstance(output, GuardEvent)]
             recorder.write(block, *(event.block() for event in events), flush=bool(events))
 

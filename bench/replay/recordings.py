@@ -19,8 +19,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from bench.report import head
-from coneskin.robot.guard.signals.journal import INPUTS
-from coneskin.robot.guard.signals.outputs import Output
+from coneskin.robot.guard.signals.journal import INPUTS, Output
 from coneskin.runs.replay.run import read_run, replay
 from coneskin.runs.replay.touch_scan import scan_touches
 from coneskin.scene.build import build_core
@@ -101,7 +100,7 @@ def _slowly(path: Path) -> float:
     outputs: list[Output] = []
     began = time.process_time()
     for block in inputs:
-        core.take(block, outputs)
+        core.feed(block, outputs)
     return (inputs[-1].time - inputs[0].time) / (time.process_time() - began)
 
 

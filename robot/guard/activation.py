@@ -2,12 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
 
-from .signals.journal import EventName
-from .signals.outputs import Outputs, emit
+from .signals.journal import EventName, Outputs, emit
 
-__all__ = ["Activation", "ActivationStep"]
+__all__ = ["Activation", "ActivationStep", "ControllerNeeds"]
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerNeeds:
+    """What a guard needs of the arm's controller, beside its states and a way to stop it; without an arm nothing.
+
+    Attributes:
+        slider: the speed slider: a reaction, or the limit of the speed, may use it.
+        stops_by_slider: the speed slider as a stop path, without which the guard does where another client has it.
+        setpoints: a setpoint program: a reaction may move an arm that another program moves.
+        heartbeat: a program that counts the guard's heartbeats: True where it must, False where it may, None where no
+            other program moves the arm.
+    """
+
+    slider: bool = False
+    stops_by_slider: bool = False
+    setpoints: bool = False
+    heartbeat: bool | None = None
+
 
 _REPORT_PERIOD = 0.5  # s between two lists of what the guard waits for
 _RELEASE_TIMEOUT = 4.0  # s; a driver process may first have to start its program on the controller again
@@ -57,7 +76,7 @@ class Activation:
         """Note a manual reset at a time [s], with the number of the request."""
         self._request, self._free_since, self._released_at, self._disturbed = request, now, None, False
 
-    def look(self, now: float, blockers: list[str], out: Outputs) -> ActivationStep:
+    def poll(self, now: float, blockers: list[str], out: Outputs) -> ActivationStep:
         """Return what is due. A first activation waits as long as there is a blocker; any refuses a reset.
 
         Args:

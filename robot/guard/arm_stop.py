@@ -1,4 +1,4 @@
-"""Stop of one arm under guard: why, by which stop paths, and whether the arm stands and may be called latched. Pure."""
+"""Stop of one arm under guard: its cause, one stop path after the other, standstill, and latching. Pure."""
 
 from __future__ import annotations
 
@@ -6,16 +6,147 @@ import math
 
 from coneskin.robot.driver.messages import EndReaction, StopProgram
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.stop_path import StopPath, UseStopPath
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.standstill import WATCH, StandstillWatch
+from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
 from .signals.contact import Contact
-from .signals.journal import EventName
-from .signals.outputs import Outputs, emit
-from .stop_escalation import StopEscalation
+from .signals.journal import EventName, Outputs, emit
 
-__all__ = ["ArmStop"]
+__all__ = [
+    "ArmStop",
+]
+
+
+class _StopEscalation:
+    """Stops of one arm: the first path is used for every stop, the others where it does not work.
+
+    Args:
+        limits: of the monitoring.
+        paths: the stop paths that there are, in the order of their use.
+
+    Attributes:
+        paths: those that are left.
+        first_was_enough: True where the newest stop came to a standstill by the first path alone.
+        used: paths of the newest stop.
+    """
+
+    def __init__(self, limits: MonitoringLimits, paths: tuple[StopPath, ...]) -> None:
+        self.paths = paths
+        self.first_was_enough = False
+        self.used: tuple[StopPath, ...] = ()
+        self._limits = limits
+        self._first = paths[0]
+        self._order = paths  # of the stop under way
+        self._stop: StopMonitor | None = None
+        self._protective_at = 0.0  # when it was last used
+
+    @property
+    def under_way(self) -> bool:
+        """True from a stop until the arm is measured standing."""
+        return self._stop is not None
+
+    def send(self, command: StopProgram | EndReaction, strongest_first: bool, out: Outputs) -> None:
+        """Send a stop by its first path.
+
+        Args:
+            command: for the driver process; another path has its deceleration.
+            strongest_first: begin with the protective stop.
+            out: takes the command.
+        """
+        paths = self.paths
+        if strongest_first and StopPath.PROTECTIVE in paths:
+            paths = (StopPath.PROTECTIVE, *(path for path in paths if path is not StopPath.PROTECTIVE))
+        for first in paths[:1]:
+            out.append(command if first is StopPath.DRIVER else UseStopPath(first, command.deceleration))
+        self._order, self.used = paths, paths[:1]
+
+    def begin(self, now: float, speed: float | None, deceleration: float) -> None:
+        """Begin to monitor the stop that was sent.
+
+        Args:
+            now: host time [s].
+            speed: largest joint speed [rad/s]; None where it is not known.
+            deceleration: of the stop [rad/s2].
+        """
+        limits = self._limits
+        if self._order[:1] == (StopPath.PROTECTIVE,):
+            self._protective_at = now
+        budget = limits.stop_budget(speed or 0.0, deceleration)
+        self._stop = StopMonitor(
+            now, speed, self._order, limits.escalate, budget, limits.standstill, limits.arm_silence
+        )
+
+    def lose(self, paths: frozenset[StopPath], now: float, for_good: bool) -> None:
+        """Drop stop paths that are lost, or that this stop must not count on, and use the next one at once."""
+        self.paths = tuple(path for path in self.paths if path not in paths or not for_good)
+        if self._stop is not None:
+            self._stop.forget(paths, now)
+
+    def escalate(self, now: float, deceleration: float, state: ControllerState | None, out: Outputs) -> None:
+        """Use the next path where one is due.
+
+        Args:
+            now: host time [s].
+            deceleration: of the stop [rad/s2].
+            state: the newest, for the report; None before the first.
+            out: takes commands and events.
+        """
+        stop = self._stop
+        if stop is None:
+            return
+        rounds, used = stop.rounds, len(stop.used)
+        for path in stop.next_paths(now):
+            out.append(UseStopPath(path, deceleration))
+            self.used = tuple(stop.used)
+            if path is StopPath.PROTECTIVE:
+                self._protective_at = now
+            if len(stop.used) > used:
+                emit(out, EventName.ESCALATED, now, path=path.value)
+        if stop.rounds > rounds and (stop.rounds & rounds) == 0:  # the first, second, fourth ... time
+            speed = None if state is None else state.speed
+            emit(out, EventName.STOP_FAILED, now, rounds=stop.rounds, speed=speed)
+
+    def insist(self, state: ControllerState, deceleration: float, out: Outputs) -> None:
+        """Repeat a protective stop that the controller's safety system does not show, though the arm stands.
+
+        Args:
+            state: as measured.
+            deceleration: of the stop [rad/s2].
+            out: takes the command.
+        """
+        if not self.unconfirmed(state) or StopPath.PROTECTIVE not in self.paths:
+            return
+        if state.time - self._protective_at >= PROTECTIVE_PATIENCE * self._limits.escalate:
+            self._protective_at = state.time
+            out.append(UseStopPath(StopPath.PROTECTIVE, deceleration))
+
+    def unconfirmed(self, state: ControllerState) -> bool:
+        """Tell whether the newest stop took a protective stop that the controller does not show."""
+        return StopPath.PROTECTIVE in self.used and not state.stopped_by_safety
+
+    def sample(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
+        """Take a measured state, and return whether the arm stands: then the stop is over.
+
+        Args:
+            state: as measured.
+            measured_at: host time of the measurement [s].
+            out: takes events.
+        """
+        stop = self._stop
+        if stop is None:
+            return False
+        before = stop.slowed_at
+        stop.sample(state.time, state.speed, measured_at)
+        if before is None and stop.slowed_at is not None and not stop.rippled:
+            emit(out, EventName.DECELERATING, state.time, speed=state.speed)
+        if stop.standing_at is None:
+            return False
+        emit(out, EventName.STANDSTILL, state.time, speed=state.speed, paths=[path.value for path in stop.used])
+        self.first_was_enough = stop.used == [self._first]
+        self._stop = None
+        return True
 
 
 class ArmStop:
@@ -35,7 +166,7 @@ class ArmStop:
     def __init__(self, limits: MonitoringLimits, paths: tuple[StopPath, ...]) -> None:
         self.number = 0
         self.why = ""
-        self.escalation = StopEscalation(limits, paths)
+        self.escalation = _StopEscalation(limits, paths)
         self.watch = StandstillWatch(limits.standstill)
         self._others_move = StopPath.DRIVER not in paths
 
@@ -48,7 +179,7 @@ class ArmStop:
         self.escalation.send(command, self.watch.insists, out)
 
     def begin(self, now: float, speed: float | None, deceleration: float) -> None:
-        """Begin to monitor the stop that was sent; arguments as of ``StopEscalation.begin``."""
+        """Begin to monitor the stop that was sent; arguments as of ``_StopEscalation.begin``."""
         self.escalation.begin(now, speed, deceleration)
         self.watch.end()
 

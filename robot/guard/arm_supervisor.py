@@ -23,24 +23,21 @@ from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.heartbeats.state_age import StateAge
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import Done, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 
+from .activation import ControllerNeeds
 from .arm_stop import ArmStop
-from .controller_needs import ControllerNeeds
 from .motion.motion_away import MotionAway
 from .phase import Phase
-from .signals.contact import Contact
-from .signals.journal import EventName
-from .signals.outputs import Outputs, emit
-from .signals.touch_record import TouchRecord
+from .signals.contact import Contact, TouchRecord
+from .signals.journal import EventName, Outputs, emit
 from .speed.speed_reduction import SpeedReduction
+from .state_age import StateAge
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
-    from coneskin.robot.guard.heartbeats.controller_heartbeat import ControllerHeartbeat
-
+    from .controller_heartbeat import ControllerHeartbeat
     from .motion.reaction_motion import ReactionPlanner
     from .speed.speed_limit import SpeedLimit
 
@@ -97,7 +94,6 @@ class ArmSupervisor:
         self.internal_control = StopPath.DRIVER in paths
         self.model = model
         self._rules = RuleSet(reaction, rules)
-        self._plain = not rules and reaction.kind in ("stop", "retreat")
         self._touches = TouchRecord(self._rules)
         self._speed_limit = speed_limit
         self.speed_reduction = SpeedReduction(model, self._needs_slider)
@@ -109,6 +105,7 @@ class ArmSupervisor:
         self._stop = ArmStop(limits, paths)
         self._reaction = reaction  # the one that is under way
         self._ending = False
+        self._sent = False  # the stop for a touch whose event comes next
 
     @property
     def stop_number(self) -> int:
@@ -122,6 +119,39 @@ class ArmSupervisor:
         by_slider = StopPath.SLIDER in self._stop.escalation.paths
         setpoints = self._rules.move and not self.internal_control
         return ControllerNeeds(self._needs_slider, by_slider, setpoints, heartbeat)
+
+    def blockers(self, now: float) -> list[str]:
+        """Return why the arm must not be put under guard at a host time [s], one line each; empty where it may.
+
+        Whether a program runs does not matter: a guard may be there before the program is.
+        """
+        blockers = []
+        if not self.backup_ready:
+            process = "the arm's driver" if self.internal_control else "the guard watchdog"
+            blockers.append(f"{process} is not ready")
+        if self._needs_slider and not self.speed_reduction.knows(now):
+            blockers.append("the position of the controller's speed slider is not known")
+        if self.heartbeat is not None and (blocker := self.heartbeat.blocker()):
+            blockers.append(blocker)
+        state = self.state
+        if state is None or self.state_age.silent(now):
+            return [*blockers, "the controller is silent"]
+        if trouble := self.state_age.trouble(now):
+            blockers.append(trouble)
+        if state.stopped_by_safety:
+            blockers.append("the controller's own safety system holds the arm: see its screen")
+        if not state.powered:
+            blockers.append("the arm is not powered, or its brakes are not released")
+        limits = zip(state.q, self.model.joint_lower, self.model.joint_upper, strict=True)
+        for number, (q, low, high) in enumerate(limits, 1):
+            if not low <= q <= high:
+                blockers.append(f"joint {number} must be within {low:.3f} to {high:.3f} rad, it is at {q:.3f} rad")
+        return blockers
+
+    @property
+    def _speed(self) -> float:
+        """Newest speed of the leading joint [rad/s]; infinite before the first."""
+        return math.inf if self.state is None else self.state.speed
 
     @property
     def _needs_slider(self) -> bool:
@@ -144,17 +174,25 @@ class ArmSupervisor:
             self._speed_limit.forget()
         self.speed_reduction.release(out)
 
+    def stop_for_touch(self, link: int, level: float, out: Outputs) -> None:
+        """Send the stop for a touch that begins, before anything else is known of it; ``touch`` has to come next.
+
+        Args:
+            link: index of the touched link's DH frame.
+            level: how firm the touch is.
+            out: takes the stop; nothing where the reaction only slows the arm.
+        """
+        reaction = self._rules.choose(link, level, self._speed) if self._rules.rules else self._rules.default
+        if self.phase is Phase.ACTIVE and reaction.kind != "slow":
+            self._stop.send(StopProgram(reaction.deceleration), out)
+            self._sent = True
+
     def touch(self, now: float, contact: Contact, began: bool, out: Outputs) -> None:
         """Take a touch that has begun, or has changed, at a host time [s]."""
         phase, touches = self.phase, self._touches
         if phase is Phase.ACTIVE:
-            if self._plain:  # nothing to choose: the stop is out before anything is looked at
-                self._stop_now(now, "touch", True, out, contact)
-            speed = math.inf if self.state is None else self.state.speed
-            touches.begin(contact, speed)
-            if self._plain:
-                return
-            reaction = self._reaction = touches.note(contact)
+            touches.begin(contact, self._speed)
+            reaction = self._reaction = touches.update(contact)
             if reaction.kind == "slow" and self.speed_reduction.begin(
                 now, self.state, reaction, self._limits, [contact.on_link()], out
             ):
@@ -162,7 +200,7 @@ class ArmSupervisor:
             else:
                 self._stop_now(now, "touch", True, out, contact)
             return
-        reaction, away = touches.note(contact), self._away
+        reaction, away = touches.update(contact), self._away
         if phase is Phase.SLOWED and reaction.kind != "slow":
             self._reaction = reaction
             self._stop_now(now, "touch", True, out, contact)
@@ -174,11 +212,11 @@ class ArmSupervisor:
             away.oppose()
             self._halt(now, "touch", out, contact)
 
-    def follow(self, now: float, contacts: Sequence[Contact], out: Outputs) -> None:
+    def feed_contacts(self, now: float, contacts: Sequence[Contact], out: Outputs) -> None:
         """Take what the newest frames say of every touch that there is, at a host time [s]."""
         for contact in contacts:
             self.touch(now, contact, False, out)
-        self._touches.follow(contacts, self.phase is Phase.STOPPING)
+        self._touches.feed(contacts, self.phase is Phase.STOPPING)
         away, state = self._away, self.state
         if away.under_way and state is not None and contacts:
             over = away.resisted(state, now, self._touches.contacts)
@@ -213,10 +251,10 @@ class ArmSupervisor:
     def sample(self, state: ControllerState, out: Outputs) -> None:
         """Take a measured state."""
         self.state = state
-        stop, measured_at = self._stop, self.state_age.note(state)
-        self._away.note(measured_at, state)
+        stop, measured_at = self._stop, self.state_age.feed(state)
+        self._away.feed(measured_at, state)
         if stop.escalation.under_way:
-            self._follow(state, measured_at, out)
+            self._brake(state, measured_at, out)
         elif self._away.under_way:
             self._move(state, out)
         elif self._speed_limit is not None and self.phase is Phase.ACTIVE:
@@ -232,14 +270,14 @@ class ArmSupervisor:
             stop.escalation.insist(state, self._reaction.deceleration, out)
             self._latch(state, out)
 
-    def look(self, now: float, out: Outputs) -> None:
+    def poll(self, now: float, out: Outputs) -> None:
         """Decide what only the passing of time shows."""
         stop = self._stop
         if stop.escalation.under_way:
             stop.escalation.escalate(now, self._reaction.deceleration, self.state, out)
             self.speed_reduction.note_stop(stop.escalation.used)
         elif self.phase is Phase.SLOWED:
-            if why := self.speed_reduction.look(now, bool(self._touches.contacts)):
+            if why := self.speed_reduction.poll(now, bool(self._touches.contacts)):
                 approach = self.speed_reduction.approach
                 self._stop_now(now, why, False, out, self._touches.find(approach.exceeded if approach else 0))
             elif self.speed_reduction.over(now):
@@ -274,7 +312,10 @@ class ArmSupervisor:
         self._stop.report(now, why, contact, out)
 
     def _begin(self, now: float, phase: Phase, command: StopProgram | EndReaction, out: Outputs) -> None:
-        self._stop.send(command, out)
+        if self._sent:
+            self._sent = False
+        else:
+            self._stop.send(command, out)
         self.speed_reduction.note_stop(self._stop.escalation.used)
         self._away.end(out)
         state = self.state
@@ -282,7 +323,7 @@ class ArmSupervisor:
         self._stop.begin(now, speed, command.deceleration)
         self.phase = phase
 
-    def _follow(self, state: ControllerState, measured_at: float, out: Outputs) -> None:
+    def _brake(self, state: ControllerState, measured_at: float, out: Outputs) -> None:
         if self._stop.stands(state, measured_at, out):
             self.speed_reduction.put_back(state.time, out)
             self._away.await_place(state.time)
@@ -307,7 +348,7 @@ class ArmSupervisor:
             self._latch(state, out)
 
     def _move(self, state: ControllerState, out: Outputs) -> None:
-        over = self._away.step(state, self._touches.contacts, out)
+        over = self._away.update(state, self._touches.contacts, out)
         if over is not None:
             self._end_motion(state.time, over, out)
 

@@ -13,12 +13,67 @@ from typing import TYPE_CHECKING
 from coneskin.robot.driver.stop_path import StopPath
 from coneskin.robot.stop.limits import MonitoringLimits
 
-from .heartbeats.heartbeat_monitor import HeartbeatMonitor
-
 if TYPE_CHECKING:
-    from coneskin.robot.guard.arm_supervisor import ArmSupervisor
+    from .arm_supervisor import ArmSupervisor
 
-__all__ = ["CompanionMonitor"]
+__all__ = ["HELD_UP", "CompanionMonitor", "HeartbeatMonitor"]
+
+HELD_UP = 0.02  #: s between two looks, from which on the guard itself was held up
+
+
+class HeartbeatMonitor:
+    """Ages of the heartbeats of several processes.
+
+    While the guard itself is held up it hears nobody: that time is nobody's silence. What came meanwhile is read next.
+    So only the longest time counts, not the sum: a guard that is held up again and again reads in between.
+
+    Args:
+        limits: longest silence of each process [s], by its name; one that is not named is not monitored.
+    """
+
+    def __init__(self, limits: Mapping[str, float]) -> None:
+        self._limits = dict(limits)
+        self._heard: dict[str, float] = {}
+        self._held_up: dict[str, float] = {}  # the longest time, since then [s]
+        self._looked: float | None = None
+
+    def feed(self, process: str, now: float) -> None:
+        """Note a heartbeat at a host time [s]."""
+        self._heard[process], self._held_up[process] = now, 0.0
+
+    def forget(self, process: str) -> None:
+        """Monitor a process no longer: it is known to be gone."""
+        self._limits.pop(process, None)
+
+    def quiet_until(self) -> float:
+        """Return the host time before which nobody becomes silent [s], whether or not more is heard."""
+        if not self._heard.keys() >= self._limits.keys():
+            return -math.inf
+        ends = (self._heard[name] + self._held_up[name] + limit for name, limit in self._limits.items())
+        return min(ends, default=math.inf)
+
+    def skip_to(self, now: float) -> None:
+        """Note a look at a host time [s] before which it was looked often, and nobody was silent."""
+        self._looked = now
+
+    def silent(self, now: float) -> dict[str, str]:
+        """Return what is wrong with each process that is silent; empty where all are heard. To be asked continuously.
+
+        Args:
+            now: host time [s].
+        """
+        if self._looked is not None and (held_up := now - self._looked) > HELD_UP:
+            self._held_up = {process: max(held_up, longest) for process, longest in self._held_up.items()}
+        self._looked = now
+        found = {}
+        for process, limit in self._limits.items():
+            heard = self._heard.get(process)
+            if heard is None:
+                found[process] = f"{process}: no heartbeat yet"
+            elif now - heard - self._held_up[process] > limit:
+                found[process] = f"{process}: no heartbeat for {1e3 * limit:.0f} ms: it hangs, or is frozen"
+        return found
+
 
 _USER_PROGRAM = "the program that guards"
 _RESTART_TIMEOUT = 5.0  # s for the driver's program to run again after an announced end
@@ -51,13 +106,13 @@ class CompanionMonitor:
         """What stood against an activation when the clocks were last looked at, one line each."""
         return self._silent.values()
 
-    def note_program(self, now: float) -> None:
+    def hear_program(self, now: float) -> None:
         """Note a heartbeat of the program that guards, at a host time [s]."""
-        self._heartbeats.note(_USER_PROGRAM, now)
+        self._heartbeats.feed(_USER_PROGRAM, now)
 
-    def note_helper(self, now: float) -> None:
+    def hear_helper(self, now: float) -> None:
         """Note a message of the driver process, or of the guard watchdog, at a host time [s]."""
-        self._heartbeats.note(self._helper, now)
+        self._heartbeats.feed(self._helper, now)
 
     def doubt_driver(self, now: float) -> None:
         """Let the stop under way not count on the driver process, which has reported an error."""
@@ -74,7 +129,7 @@ class CompanionMonitor:
             self._heartbeats.forget(self._helper)
         arm.lose(_LOST_WITH_PROCESS.get(what) or arm.driver.lost_with.get(what, frozenset()), now)
 
-    def note_restart(self, now: float, over: bool) -> None:
+    def restart(self, now: float, over: bool) -> None:
         """Note that the driver process ends its program and starts it again, or has done so.
 
         Nothing moves while it does not run. A start that is not reported in time counts as an end; announced again and
@@ -107,7 +162,7 @@ class CompanionMonitor:
         """Note a look at a host time [s] before which it was looked often, and no process was missed."""
         self._heartbeats.skip_to(now)
 
-    def look(self, now: float) -> list[tuple[str, frozenset[StopPath]]]:
+    def poll(self, now: float) -> list[tuple[str, frozenset[StopPath]]]:
         """Return each process that has fallen silent since the last look: why, and what a stop must not count on.
 
         Args:

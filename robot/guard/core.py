@@ -3,34 +3,31 @@
 One machine without input or output of its own, so that a replay of a recording is the same run again, bit by bit. It
 becomes active once nothing has stood against it for a while; a touch or a fault then makes the arm react and latch
 (``arm_supervisor``). Without an arm it reports touches and faults.
+
+A touch stops the arm before anything else is known of it: the place of the touch, its covariance and every event are
+worked out after the command is out.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from coneskin.core.errors import RobotConnectionError
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEvent
+from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchEvent
 from coneskin.skin.detection.stream import TouchStream
 
-from .activation import Activation, ActivationStep
+from .activation import Activation, ActivationStep, ControllerNeeds
 from .companion_monitor import CompanionMonitor
-from .controller_inputs import ControllerInputs
-from .controller_needs import ControllerNeeds
 from .event_folding import EventFolding
-from .fault_register import FaultRegister
 from .phase import Phase
-from .port_losses import PortLosses
-from .preconditions import arm_blockers, skin_blockers
-from .signals.contact import GuardedSensor
-from .signals.journal import BlockKind, EventName
-from .signals.outputs import Outputs, emit
-from .skin_connection import SkinConnection
-from .skin_contacts import SkinContacts
+from .signals.contact import Contact, GuardedSensor
+from .signals.journal import BlockKind, EventName, Outputs, decode_loss, emit
 
 if TYPE_CHECKING:
     from coneskin.robot.driver.state import ControllerState
@@ -38,6 +35,10 @@ if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
 __all__ = ["GuardCore"]
+
+#: s; a skin that is this far behind does not show what a motion away presses on, however late a scene lets it be
+_MAX_SUPERVISION_AGE = 0.05
+_Decoded = TypeVar("_Decoded")
 
 
 class GuardCore:
@@ -60,32 +61,35 @@ class GuardCore:
         not_commissioned: str = "",
     ) -> None:
         self._stream = stream
+        self._sensors = {sensor.name: sensor for sensor in sensors}
         self._limits = limits
         self._arm = arm
         self._not_commissioned = not_commissioned
         self._phase = Phase.STARTING
         self._folding = EventFolding()
-        self._contacts = SkinContacts(sensors, arm, self._folding)
         self._companions = CompanionMonitor(limits, arm)
-        self._faults = FaultRegister(arm, self._folding)
-        self._controller = None if arm is None else ControllerInputs(arm, self._companions, self._faults)
-        self._connection = SkinConnection(stream)
-        self._losses = PortLosses(arm, self._connection, self._companions, self._faults, self._folding)
         self._activation = Activation(limits.settle)
-        self._takers: dict[int, Callable[[Block, Outputs], None]] = {
-            BlockKind.SKIN: self._take_skin,
-            BlockKind.DRIVER: self._take_driver,
-            BlockKind.RESET: self._take_reset,
-            BlockKind.LOST: self._losses.take_lost,
-            BlockKind.PROGRAM: self._take_program,
-            BlockKind.ABSENT: self._losses.take_absent,
-            BlockKind.SUSPENDED: self._take_suspended,
-            BlockKind.REOPENED: self._losses.take_reopened,
+        self._faults: dict[str, str] = {}  # since the last reset: kind -> what is wrong
+        self._lost: dict[str, str] = {}  # port that is gone -> why
+        self._reopened = False  # the skin's port, and the guard has not been active since
+        self._contacts: dict[str, Contact] = {}  # by sensor
+        self._newest_number = 0
+        self._extended = 0  # number of the newest touch that was reported as not one disc
+        self._located: set[str] = set()  # sensors whose touch had a certain place in its newest event
+        self._feeders: dict[int, Callable[[Block, Outputs], None]] = {
+            BlockKind.SKIN: self._feed_skin,
+            BlockKind.DRIVER: self._feed_report,
+            BlockKind.RESET: self._reset,
+            BlockKind.LOST: self._lose,
+            BlockKind.PROGRAM: self._feed_program,
+            BlockKind.ABSENT: self._miss,
+            BlockKind.SUSPENDED: self._suspend,
+            BlockKind.REOPENED: self._reopen,
         }
-        if self._controller is not None:
-            self._takers[BlockKind.ARM] = self._controller.take_arm
-            self._takers[BlockKind.SLIDER] = self._controller.take_slider
-            self._takers[BlockKind.ECHO] = self._controller.take_echo
+        if arm is not None:
+            self._feeders[BlockKind.ARM] = partial(self._feed_arm, arm)
+            self._feeders[BlockKind.SLIDER] = partial(self._feed_slider, arm)
+            self._feeders[BlockKind.ECHO] = partial(self._feed_echo, arm)
 
     @property
     def phase(self) -> Phase:
@@ -107,7 +111,7 @@ class GuardCore:
         """What it needs of the arm's controller."""
         return ControllerNeeds() if self._arm is None else self._arm.needs
 
-    def take(self, block: Block, out: Outputs) -> None:
+    def feed(self, block: Block, out: Outputs) -> None:
         """Take one input.
 
         Args:
@@ -115,28 +119,42 @@ class GuardCore:
             out: takes commands and events as soon as they are decided; a command comes before the event that explains
                 it, and before anything is computed that it does not need.
         """
-        taker = self._takers.get(block.kind)
-        if taker is not None:
-            taker(block, out)
-        self._look(block.time, out)
+        feeder = self._feeders.get(block.kind)
+        if feeder is not None:
+            feeder(block, out)
+        self._poll(block.time, out)
 
     def blockers(self, now: float) -> list[str]:
         """Return why the guard cannot become active, one line each; empty where it can."""
-        blockers = list(dict.fromkeys([*self._losses.blockers, *self._faults.messages, *self._companions.blockers]))
-        blockers += self._connection.blockers
-        blockers += skin_blockers(self._stream.detectors, now, self._limits.skin_silence)
-        return blockers if self._arm is None else blockers + arm_blockers(self._arm, now)
+        blockers = list(dict.fromkeys([*self._lost.values(), *self._faults.values(), *self._companions.blockers]))
+        others = self._stream.unknown
+        if self._reopened and others:
+            expected = ", ".join(f"{d.sensor.device_id}/{d.sensor.sensor_id}" for d in self._stream.detectors)
+            sent = ", ".join(f"{device}/{sensor}" for device, sensor in others)
+            blockers.append(
+                f"another device is on the skin's port: it sends as device/sensor {sent}, guarded was {expected}; plug "
+                "in the one that was there"
+            )
+        for detector in self._stream.detectors:
+            name, fault = detector.sensor.name, detector.fault
+            if detector.age(now) > self._limits.skin_silence:
+                blockers.append(f"{name}: no valid frame" + (f" ({fault.value})" if fault else ""))
+            elif detector.touched:
+                blockers.append(f"{name}: it is touched, or its layers are stuck together")
+            elif not detector.ready:
+                blockers.append(f"{name}: {fault.value if fault else 'settling'}")
+        return blockers if self._arm is None else blockers + self._arm.blockers(now)
 
     def quiet_until(self) -> float:
         """Return the host time before which nothing is decided [s], whatever quiet input comes (``quiet_inputs``)."""
         activating = self.phase is not Phase.ACTIVE or self._activation.resetting
-        if activating or self._contacts.any or not self._stream.settled:
+        if activating or self._contacts or not self._stream.settled:
             return -math.inf
         valid = [detector.timing.valid_at + self._limits.skin_silence for detector in self._stream.detectors]
         arm = () if self._arm is None else (self._arm.quiet_until(), self._companions.quiet_until())
         return min(self._folding.due, *valid, *arm)
 
-    def take_quiet(self, block: Block, state: ControllerState | None, out: Outputs) -> None:
+    def feed_quiet(self, block: Block, state: ControllerState | None, out: Outputs) -> None:
         """Take a quiet input other than the skin's, without a look at what the passing of time shows.
 
         Args:
@@ -145,65 +163,221 @@ class GuardCore:
             out: takes nothing.
         """
         if state is not None:
-            assert self._controller is not None
-            self._controller.take_state(state, out)
-        else:
-            taker = self._takers.get(block.kind)
-            if taker is not None:
-                taker(block, out)
+            assert self._arm is not None
+            self._feed_state(self._arm, state, out)
+        elif (feeder := self._feeders.get(block.kind)) is not None:
+            feeder(block, out)
 
     def skip_to(self, now: float) -> None:
         """Go on at a host time [s], that of the last of many quiet inputs."""
         if self._arm is not None:
             self._companions.skip_to(now)
 
-    # ---- what comes in
+    # ---- the skin
 
-    def _take_skin(self, block: Block, out: Outputs) -> None:
-        for event in self._stream.feed(block.payload, block.time):
-            self._skin_event(event, out)
-        self._contacts.follow(block.time, self._stream.detectors, out)
+    def _feed_skin(self, block: Block, out: Outputs) -> None:
+        guarded = self._arm is not None and self._arm.phase is Phase.ACTIVE
+        for event in self._stream.feed(block.payload, block.time, partial(self._stop, out) if guarded else None):
+            self._feed_event(event, out)
+        if self._contacts:
+            self._update_contacts(block.time, out)
 
-    def _skin_event(self, event: SkinEvent, out: Outputs) -> None:
+    def _stop(self, out: Outputs, name: str, level: float) -> None:
+        """Stop the arm for a touch that begins; the event of the touch, which tells where it is, comes next."""
+        assert self._arm is not None
+        self._arm.stop_for_touch(self._sensors[name].link, level, out)
+
+    def _feed_event(self, event: SkinEvent, out: Outputs) -> None:
         if isinstance(event, SkinFault):
             if self.phase is not Phase.STARTING or not event.sensor:  # until then ``blockers`` lists it
-                self._faults.add(event.time, event.message, out, f"{event.sensor}: {event.fault.value}")
-            return
-        assert isinstance(event, TouchEvent)
-        self._contacts.note(event, out)
-        if isinstance(event, TouchBegan):
+                self._add_fault(event.time, event.message, out, f"{event.sensor}: {event.fault.value}")
+        elif isinstance(event, TouchEnded):
+            self._contacts.pop(event.sensor, None)
+            if self._arm is not None:
+                self._arm.feed_contacts(event.time, tuple(self._contacts.values()), out)
+            self._emit_touch(out, EventName.TOUCH_ENDED, event, {"sensor": event.sensor})
+        else:
+            assert isinstance(event, TouchEvent)
+            self._feed_touch(event, out)
+
+    def _feed_touch(self, event: TouchEvent, out: Outputs) -> None:
+        """Take a touch that has begun or changed."""
+        began = isinstance(event, TouchBegan)
+        before = self._contacts.get(event.sensor)
+        self._newest_number += began
+        number = self._newest_number if began or before is None else before.number
+        contact = self._contacts[event.sensor] = Contact(event, self._sensors[event.sensor], number)
+        if self._arm is not None:
+            self._arm.touch(event.time, contact, began, out)
+        if began:
+            self._emit_touch(out, EventName.CONTACT, event, contact.details())
+        elif event.location_valid and event.sensor not in self._located:
+            self._emit_touch(out, EventName.CONTACT_LOCATED, event, contact.details())
+        if not event.location_valid and event.elongation is not None and number > self._extended:
+            self._extended = number
+            self._emit_touch(out, EventName.CONTACT_EXTENDED, event, contact.details())
+        (self._located.add if event.location_valid else self._located.discard)(event.sensor)
+        if began:
             self._activation.disturb()
 
-    def _take_driver(self, block: Block, out: Outputs) -> None:
+    def _update_contacts(self, now: float, out: Outputs) -> None:
+        """Give the arm what each touch's newest frame says; events come only where something changes."""
+        contacts = self._contacts
+        for detector in self._stream.detectors:
+            name, reading = detector.sensor.name, detector.reading_now
+            if reading is not None and (before := contacts.get(name)) is not None:
+                contacts[name] = Contact(reading, before.where, before.number)
+        if self._arm is not None:
+            self._arm.feed_contacts(now, tuple(contacts.values()), out)
+
+    def _stale(self, now: float) -> str:
+        """Return whose frames are too old to supervise a motion away by; empty where none are."""
+        for detector in self._stream.detectors:
+            age = detector.timing.measured_age(now)
+            if age > _MAX_SUPERVISION_AGE:
+                return (
+                    f"{detector.sensor.name}: what it measured {1e3 * age:.0f} ms ago is too old to move away by "
+                    f"({1e3 * _MAX_SUPERVISION_AGE:.0f} ms at most; a busy computer needs fewer frames a second)"
+                )
+        return ""
+
+    def _emit_touch(self, out: Outputs, name: EventName, event: TouchEvent, details: dict[str, Any]) -> None:
+        """Report a touch; one upon the other is counted where the program does not move an arm."""
+        if self._arm is None or self._arm.phase in (Phase.STARTING, Phase.LATCHED):
+            self._folding.emit(out, name, event.sensor, event.time, **details)
+        else:
+            emit(out, name, event.time, **details)
+
+    # ---- the controller
+
+    def _feed_arm(self, arm: ArmSupervisor, block: Block, out: Outputs) -> None:
+        """Take a state of the arm, as it was sent."""
+        what, decode = "the controller's state cannot be read", partial(arm.driver.decode_state, block.time)
+        if (state := self._decode(block, what, decode, out)) is not None:
+            self._feed_state(arm, state, out)
+
+    def _feed_state(self, arm: ArmSupervisor, state: ControllerState, out: Outputs) -> None:
+        now = state.time
+        arm.sample(state, out)
+        if state.stopped_by_safety and arm.phase.watched:
+            self._add_fault(now, "the controller's own safety system has stopped the arm", out)
+        elif not state.powered and arm.phase.watched:
+            self._add_fault(now, "the arm is not powered any more, or its brakes are closed", out)
+        if ended := self._companions.program_ended(now, state.program_running):
+            self._add_fault(now, ended, out)
+        heartbeat = arm.heartbeat  # does the program end by itself where no packet reaches the controller?
+        if heartbeat is None:
+            return
+        heartbeat.sample(now, state.program_running)
+        if arm.phase not in (Phase.ACTIVE, Phase.SLOWED) or not (trouble := heartbeat.trouble(now)):
+            return
+        if heartbeat.required:
+            self._add_fault(now, trouble, out)
+        else:
+            emit(out, EventName.MESSAGE, now, what=trouble)
+
+    def _feed_slider(self, arm: ArmSupervisor, block: Block, out: Outputs) -> None:
+        decode = arm.driver.decode_speed_fraction
+        fraction = self._decode(block, "the speed slider cannot be read", decode, out)
+        if fraction is not None:
+            arm.speed_reduction.feed(block.time, fraction)
+
+    def _feed_echo(self, arm: ArmSupervisor, block: Block, out: Outputs) -> None:
+        """Take the program's answer to the heartbeat."""
+        if arm.heartbeat is None:
+            return
+        what = "the program's answer to the heartbeat cannot be read"
+        count = self._decode(block, what, arm.driver.decode_heartbeat, out)
+        if count is not None:
+            arm.heartbeat.feed(count)
+
+    def _decode(self, block: Block, what: str, decode: Callable[[bytes], _Decoded], out: Outputs) -> _Decoded | None:
+        """Return what the controller has sent; None, after a fault that says ``what``, where it is unreadable."""
+        try:
+            return decode(block.payload)
+        except RobotConnectionError as exc:
+            self._add_fault(block.time, f"{what}: {exc}", out, what)
+            return None
+
+    # ---- processes and ports
+
+    def _feed_report(self, block: Block, out: Outputs) -> None:
+        """Take a report of the driver process, or of the guard watchdog."""
         if self._arm is None:
             return
-        note = StatusReport.decode(block.payload)
-        self._companions.note_helper(block.time)
-        match note.kind:
+        report = StatusReport.decode(block.payload)
+        self._companions.hear_helper(block.time)
+        match report.kind:
             case "ready":
                 self._arm.backup_ready = True
             case "released":
-                if note.text.isdecimal() and self._activation.acknowledged(int(note.text)):
+                if report.text.isdecimal() and self._activation.acknowledged(int(report.text)):
                     self._activate(block.time, out)
             case "restarts" | "restarted" as restart:
-                self._companions.note_restart(block.time, restart == "restarted")
+                self._companions.restart(block.time, restart == "restarted")
             case "remark":
-                emit(out, EventName.MESSAGE, block.time, what=note.text)
+                emit(out, EventName.MESSAGE, block.time, what=report.text)
             case "error":
                 self._companions.doubt_driver(block.time)
-                self._faults.add(block.time, note.text, out)
+                self._add_fault(block.time, report.text, out)
 
-    def _take_program(self, block: Block, _: Outputs) -> None:
-        self._companions.note_program(block.time)
+    def _feed_program(self, block: Block, _: Outputs) -> None:
+        self._companions.hear_program(block.time)
 
-    def _take_suspended(self, block: Block, out: Outputs) -> None:
+    def _lose(self, block: Block, out: Outputs) -> None:
+        """Take that a port is gone: the arm stops."""
+        what, why = decode_loss(block.payload)
+        self._lost[what] = why
+        self._companions.lose(what, block.time)
+        if self._arm is not None:
+            if what == "slider":
+                self._arm.speed_reduction.feed(block.time, None)
+            self._arm.fault(block.time, why, out)
+        if what == "session":
+            self._folding.flush(block.time, out)
+            if self._arm is not None:
+                self._arm.end(block.time, out)
+        emit(out, EventName.ENDING if what == "session" else EventName.FAULT, block.time, what=why)
+
+    def _miss(self, block: Block, out: Outputs) -> None:
+        """Take that there is no such stop path in this run."""
+        what, why = decode_loss(block.payload)
+        self._companions.lose(what, block.time)
+        emit(out, EventName.MESSAGE, block.time, what=f"a stop path is missing, {what}: {why}")
+
+    def _reopen(self, block: Block, out: Outputs) -> None:
+        """Take a skin that is open again; only the reset of a latched arm makes the guard active with it."""
+        latched = self._arm is not None and self._arm.phase is Phase.LATCHED
+        if block.payload != b"skin" or "skin" not in self._lost or not latched:
+            return
+        del self._lost["skin"]
+        self._stream.reconnect(block.time)
+        self._reopened = True
+        emit(out, EventName.MESSAGE, block.time, what="the skin's port is open again; a reset is needed")
+
+    def _suspend(self, block: Block, out: Outputs) -> None:
         """Stop an arm that nobody has guarded for a while: what came meanwhile is lost, or is too old."""
         if self.phase is not Phase.STARTING:
             seconds = block.payload.decode("ascii", "replace")
             what = "the guard did nothing for a while: the computer slept, or froze or overloaded it"
-            self._faults.add(block.time, f"{what} ({seconds} s)", out, what)
+            self._add_fault(block.time, f"{what} ({seconds} s)", out, what)
 
-    def _take_reset(self, block: Block, out: Outputs) -> None:
+    # ---- what is decided
+
+    def _add_fault(self, now: float, what: str, out: Outputs, kind: str = "") -> None:
+        """React to a fault, once until the next reset.
+
+        One that repeats itself in other words or numbers has a kind, and is counted. Without one, it lasts.
+        """
+        known = (kind or what) in self._faults
+        if known and not kind:
+            return
+        self._faults[kind or what] = what
+        if not known and self._arm is not None:
+            self._arm.fault(now, what, out)
+        self._folding.emit(out, EventName.FAULT, kind or what, now, what=what)
+
+    def _reset(self, block: Block, out: Outputs) -> None:
         """Take a manual reset, which forgives one stop: the one that a person has looked at."""
         numbers = block.payload.split()
         stop, request = map(int, numbers) if len(numbers) == 2 and all(map(bytes.isdigit, numbers)) else (0, 0)
@@ -225,27 +399,25 @@ class GuardCore:
         self._activation.reset(block.time, request)
         emit(out, EventName.RESET, block.time, stop=stop, request=request)
 
-    # ---- what is decided
-
-    def _look(self, now: float, out: Outputs) -> None:
+    def _poll(self, now: float, out: Outputs) -> None:
         """Decide what only the passing of time shows."""
-        self._folding.look(now, out)
+        self._folding.poll(now, out)
         for event in self._stream.silence(now, self._limits.skin_silence):
-            self._skin_event(event, out)
+            self._feed_event(event, out)
         arm = self._arm
         if arm is not None:
             if arm.phase is not Phase.STARTING and (trouble := arm.state_age.trouble(now)):
-                self._faults.add(now, trouble, out)
+                self._add_fault(now, trouble, out)
             self._check_companions(now, arm, out)
-            if arm.phase is Phase.RETREATING:
-                self._look_at_ages(now, arm, out)
-            arm.look(now, out)
+            if arm.phase is Phase.RETREATING and (stale := self._stale(now) or arm.state_age.stale(now)):
+                arm.abandon_motion(now, stale, out)  # what supervises it is too old
+            arm.poll(now, out)
         if self.phase is not Phase.STARTING and not self._activation.resetting:
             return
         blockers = self.blockers(now)
         if self.phase not in (Phase.STARTING, Phase.LATCHED):
             blockers.append("something has moved the arm, or its standstill is not confirmed")
-        step = self._activation.look(now, blockers, out)
+        step = self._activation.poll(now, blockers, out)
         if step is ActivationStep.RELEASE and arm is None:
             self._activate(now, out)
         elif step is ActivationStep.RELEASE and arm is not None:
@@ -253,21 +425,16 @@ class GuardCore:
         elif step is ActivationStep.WITHDRAW and arm is not None:
             arm.withdraw(out)
 
-    def _look_at_ages(self, now: float, arm: ArmSupervisor, out: Outputs) -> None:
-        """End a motion away where what supervises it is too old."""
-        if stale := self._contacts.stale(now, self._stream.detectors) or arm.state_age.stale(now):
-            arm.abandon_motion(now, stale, out)
-
     def _check_companions(self, now: float, arm: ArmSupervisor, out: Outputs) -> None:
         """Stop the arm where a process beside the guard has fallen silent, by a path that does not need it."""
-        for why, paths in self._companions.look(now):
+        for why, paths in self._companions.poll(now):
             if self.phase is not Phase.STARTING:
-                self._faults.add(now, why, out)
+                self._add_fault(now, why, out)
                 if paths:
                     arm.lose(paths, now, for_good=False)
 
     def _activate(self, now: float, out: Outputs) -> None:
-        self._connection.trust()
+        self._reopened = False
         if self._arm is None:
             self._phase = Phase.ACTIVE
         else:

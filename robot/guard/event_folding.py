@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from .signals.journal import EventName
-from .signals.outputs import Outputs, emit
+from .signals.journal import EventName, Outputs, emit
 
 __all__ = ["EventFolding"]
 
@@ -67,7 +66,7 @@ class EventFolding:
         kind.details = details
         self._due = min(self._due, kind.reported + kind.interval)
 
-    def look(self, now: float, out: Outputs) -> None:
+    def poll(self, now: float, out: Outputs) -> None:
         """Report the counts that are due at a host time [s]."""
         if now < self._due:
             return

@@ -10,24 +10,111 @@ import gc
 import json
 import selectors
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 
 from coneskin.core.channel import Channel
 from coneskin.core.errors import ConeSkinError, SkinTimeout
 from coneskin.core.recording.block import Block, encode_block
-from coneskin.robot.driver.messages import HEARTBEAT_PERIOD, Heartbeat, Shutdown
-from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SpeedSlider, StopConnections
-from coneskin.robot.guard.heartbeats.controller_heartbeat import heartbeat_count
+from coneskin.robot.driver.messages import HEARTBEAT_PERIOD, Heartbeat, Shutdown, StopProgram
+from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SetpointWriter, SpeedSlider, StopConnections
+from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
+from coneskin.robot.driver.stop_path import StopPath, UseStopPath
 from coneskin.skin.sources.source import Source, SourceReopening
 
+from .controller_heartbeat import heartbeat_count
 from .core import GuardCore
-from .outbox import Outbox
 from .phase import Phase
-from .ports import GuardPorts
-from .signals.journal import BlockKind, encode_loss
+from .signals.journal import BlockKind, GuardEvent, Output, encode_loss
 
-__all__ = ["GuardLoop"]
+__all__ = [
+    "GuardLoop",
+    "GuardPorts",
+]
+
+
+@dataclass(slots=True)
+class GuardPorts:
+    """Connections of the loop; None for what the scene does not have.
+
+    Attributes:
+        session: the process that records and shows.
+        source: of the skin's bytes, open.
+        reader: of the controller's state, open.
+        driver: the driver process, where it moves the arm.
+        stops: connections for stops that do not need the driver process, open.
+        slider: of the controller's speed, open.
+        watchdog: the guard watchdog, where another program moves the arm.
+        heartbeat: writer of the count that the controller's own watchdog waits for, open.
+        setpoints: the reader once more, where it carries setpoints.
+        reopen: begins to open a source that is gone again; None where it is gone for good.
+        absent: connection of a stop path that the guard does without -> why.
+    """
+
+    session: Channel
+    source: Source | None
+    reader: PayloadReader | None = None
+    driver: Channel | None = None
+    stops: StopConnections | None = None
+    slider: SpeedSlider | None = None
+    watchdog: Channel | None = None
+    heartbeat: HeartbeatWriter | None = None
+    setpoints: SetpointWriter | None = None
+    reopen: Callable[[Source], SourceReopening] | None = None
+    absent: Mapping[str, str] = field(default_factory=dict)
+
+
+_OWN_COMMANDS = (UseStopPath, JointVelocitySetpoint, SetpointProgram, SetSpeedSlider)
+
+
+class _Outbox:
+    """Sink that sends a command as soon as the core has decided it, and keeps the rest for the recorder."""
+
+    __slots__ = ("_ports", "events", "sent")
+
+    def __init__(self, ports: GuardPorts) -> None:
+        self._ports = ports
+        self.sent: list[bytes] = []
+        self.events: list[GuardEvent] = []
+
+    def append(self, output: Output, /) -> None:
+        """Take an output of the core."""
+        ports = self._ports
+        if isinstance(output, GuardEvent):
+            self.events.append(output)
+        elif isinstance(output, _OWN_COMMANDS):
+            self._send_own(ports, output)
+        else:
+            message = output.encode()
+            name, channel = (b"driver", ports.driver) if ports.watchdog is None else (b"watchdog", ports.watchdog)
+            taken = channel is not None and channel.send(message)
+            self.sent.append(name + (b"\n" if taken else b", not sent\n") + message)
+
+    def _send_own(
+        self, ports: GuardPorts, output: UseStopPath | JointVelocitySetpoint | SetpointProgram | SetSpeedSlider
+    ) -> None:
+        """Send a command over a connection of the guard's own."""
+        if isinstance(output, UseStopPath):
+            name = output.path.value
+            if output.path is StopPath.WATCHDOG:
+                taken = ports.watchdog is not None and ports.watchdog.send(StopProgram(output.deceleration).encode())
+            elif output.path is StopPath.SLIDER:
+                taken = ports.slider is not None and ports.slider.set(0.0)
+            else:
+                taken = ports.stops is not None and ports.stops.use(*output)
+            text = "sent" if taken else "not sent"
+        elif isinstance(output, JointVelocitySetpoint):
+            taken = ports.setpoints is not None and ports.setpoints.write(output)
+            name, text = ("setpoint" if taken else "setpoint, not sent"), str(tuple(output))
+        elif isinstance(output, SetpointProgram):
+            taken = ports.stops is not None and ports.stops.follow(output)
+            name, text = ("follow" if taken else "follow, not sent"), str(tuple(output))
+        else:
+            taken = ports.slider is not None and ports.slider.set(output.fraction)
+            name, text = ("slider" if taken else "slider, not sent"), str(output.fraction)
+        self.sent.append(f"{name}\n{text}".encode())
+
 
 _HEARTBEAT_BYTES = Heartbeat().encode()
 _SESSION_GONE_TIMEOUT = 1.5  # s that the arm has to stand when there is nobody left to tell
@@ -76,11 +163,11 @@ class GuardLoop:
         self._rounds_at = (clock(), sleepless_clock())  # when the newest round began
         self._selector = selectors.DefaultSelector()
         self._quit = False
-        self._took = False  # anything, in this step
+        self._fed = False  # anything, in this step
         self._beat = -HEARTBEAT_PERIOD
         self._count = 0  # sent last
         self._out: list[bytes] = []
-        self._outbox = Outbox(ports)
+        self._outbox = _Outbox(ports)
         self._gone: Source | None = None  # the skin's source, where it may be opened again
         self._reopening: SourceReopening | None = None
 
@@ -96,7 +183,7 @@ class GuardLoop:
         gc.disable()  # nothing here lives longer than a frame
         try:
             while not self._quit:
-                self.step(_TICK_PERIOD)
+                self.poll(_TICK_PERIOD)
             self._end()
         finally:
             gc.enable()
@@ -112,7 +199,7 @@ class GuardLoop:
         for sock in ports.stops.sockets().values() if ports.stops else ():
             self._selector.register(sock, selectors.EVENT_READ, "stops")
         for what, why in ports.absent.items():
-            self._take(BlockKind.ABSENT, encode_loss(what, why))
+            self._feed(BlockKind.ABSENT, encode_loss(what, why))
 
     def _watch_skin(self, source: Source) -> None:
         if (descriptor := source.fileno()) is not None:
@@ -123,7 +210,7 @@ class GuardLoop:
             self._reopening.stop()
         self._selector.close()
 
-    def step(self, timeout: float) -> None:
+    def poll(self, timeout: float) -> None:
         """Wait for input, or for the timeout [s], and serve it."""
         ports = self._ports
         ready = {key.data or key.fileobj for key, _ in self._selector.select(timeout)}
@@ -151,17 +238,17 @@ class GuardLoop:
         if ports.session in ready:
             for message in ports.session.receive():
                 if message == _HEARTBEAT_BYTES:
-                    self._take(BlockKind.PROGRAM, b"")
+                    self._feed(BlockKind.PROGRAM, b"")
                 elif message.startswith(b"reset "):
-                    self._take(BlockKind.RESET, message.removeprefix(b"reset "))
+                    self._feed(BlockKind.RESET, message.removeprefix(b"reset "))
                 elif message == b"quit":
                     self._quit = True
         if ports.session.closed:
             self._quit = True
             self._forget(ports.session)  # its end would be ready for ever
-        if not self._took:
-            self._take(BlockKind.TICK, b"")
-        self._took = False
+        if not self._fed:
+            self._feed(BlockKind.TICK, b"")
+        self._fed = False
         self._report()
 
     def _note_overrun(self) -> None:
@@ -171,7 +258,7 @@ class GuardLoop:
         if now - before > _OVERRUN_TIME:
             self._record(Block(BlockKind.OVERRUN, now, json.dumps({"late": now - before}).encode()))
         if sleepless - sleepless_before > _SUSPENSION_TIME:
-            self._take(BlockKind.SUSPENDED, b"%.3f" % (sleepless - sleepless_before))
+            self._feed(BlockKind.SUSPENDED, b"%.3f" % (sleepless - sleepless_before))
 
     def _report(self) -> None:
         if self._out:
@@ -180,7 +267,7 @@ class GuardLoop:
 
     def _read_channel(self, channel: Channel) -> None:
         for message in channel.receive():
-            self._take(BlockKind.DRIVER, message)
+            self._feed(BlockKind.DRIVER, message)
         if channel.closed:
             driver = channel is self._ports.driver
             name, what = ("driver", "the driver process") if driver else ("watchdog", "the guard watchdog")
@@ -200,7 +287,7 @@ class GuardLoop:
         except ConeSkinError as exc:
             self._lose("skin", str(exc), source.fileno())
             return
-        self._take(BlockKind.SKIN, data)
+        self._feed(BlockKind.SKIN, data)
 
     def _open_skin_again(self, source: Source) -> None:
         """Open a skin that is gone, while the arm stands latched; a person's reset has to follow."""
@@ -212,22 +299,22 @@ class GuardLoop:
             if reopening.opened:
                 ports.source = source
                 self._watch_skin(source)
-                self._take(BlockKind.REOPENED, b"skin")
+                self._feed(BlockKind.REOPENED, b"skin")
             else:
                 why = f"{source.name} is gone and could not be opened again: start the guard anew"
-                self._take(BlockKind.LOST, encode_loss("skin", why))
+                self._feed(BlockKind.LOST, encode_loss("skin", why))
 
     def _read_arm(self, reader: PayloadReader) -> None:
         try:
             for payload in reader.read():
-                self._take(BlockKind.ARM, payload)
+                self._feed(BlockKind.ARM, payload)
         except ConeSkinError as exc:
             self._lose("controller", str(exc), reader)
 
     def _read_slider(self, slider: SpeedSlider) -> None:
         try:
             for payload in slider.read():
-                self._take(BlockKind.SLIDER, payload)
+                self._feed(BlockKind.SLIDER, payload)
         except ConeSkinError as exc:
             self._lose("slider", str(exc), slider)
 
@@ -239,7 +326,7 @@ class GuardLoop:
             heartbeat.write(count)
         try:
             for payload in heartbeat.read() if ready else []:
-                self._take(BlockKind.ECHO, payload)
+                self._feed(BlockKind.ECHO, payload)
         except ConeSkinError as exc:
             self._lose("heartbeat", str(exc), heartbeat)
 
@@ -248,14 +335,14 @@ class GuardLoop:
             self._forget(sock)
             sock.close()
             why = f"the controller has closed the {name} connection, which a stop may need"
-            self._take(BlockKind.LOST, encode_loss(name, why))
+            self._feed(BlockKind.LOST, encode_loss(name, why))
 
-    def _take(self, kind: BlockKind, payload: bytes) -> None:
+    def _feed(self, kind: BlockKind, payload: bytes) -> None:
         """Feed the core, which sends its commands at once; then record all of it."""
-        self._took = True
+        self._fed = True
         block = Block(kind, self._clock(), payload)
         outbox = self._outbox
-        self._core.take(block, outbox)
+        self._core.feed(block, outbox)
         self._record(block)
         if outbox.sent or outbox.events:
             done = self._clock()
@@ -274,7 +361,7 @@ class GuardLoop:
         if what == "skin" and self._ports.reopen is not None:
             self._gone = self._ports.source
         setattr(self._ports, _PORT_ATTRIBUTES[what], None)
-        self._take(BlockKind.LOST, encode_loss(what, why))
+        self._feed(BlockKind.LOST, encode_loss(what, why))
         if what == "controller" and (driver := self._ports.driver) is not None:
             # it would connect again by itself, and its program start with whatever command is still there
             driver.close()
@@ -286,10 +373,10 @@ class GuardLoop:
 
     def _end(self) -> None:
         """Stop the arm and see it stand."""
-        self._take(BlockKind.LOST, b"session\nthe guard was told to end")
+        self._feed(BlockKind.LOST, b"session\nthe guard was told to end")
         end = self._clock() + (_SESSION_GONE_TIMEOUT if self._ports.session.closed else _SHUTDOWN_TIMEOUT)
         while (self._core.phase.stopping or self._core.phase is Phase.RETREATING) and self._clock() < end:
-            self.step(_TICK_PERIOD)
+            self.poll(_TICK_PERIOD)
         if self._ports.watchdog is not None and not (self._core.phase.stopping or self._core.phase is Phase.RETREATING):
             self._ports.watchdog.send(Shutdown().encode())
         self._report()

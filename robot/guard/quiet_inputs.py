@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 from coneskin.core.errors import RobotConnectionError
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
-from coneskin.robot.guard.heartbeats.heartbeat_monitor import HELD_UP
 from coneskin.skin.detection.quiet_frames import QuietFrames, find_quiet_frames
 from coneskin.skin.frame_batch import find_frames
 
+from .companion_monitor import HELD_UP
 from .core import GuardCore
 from .signals.journal import BlockKind
 
@@ -124,7 +124,7 @@ class _Batch:
         core, blocks, states = self._core, self._blocks, self._states
         nothing: list[Any] = []
         for number in self._others[bisect_left(self._others, at) : bisect_left(self._others, stop)]:
-            core.take_quiet(blocks[number], states.get(number), nothing)
+            core.feed_quiet(blocks[number], states.get(number), nothing)
         assert not nothing, "a quiet input made something happen"
         end = self._bytes_before(stop)
         begun = self._frame_starts[self._frames_before(stop)]

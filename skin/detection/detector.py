@@ -3,41 +3,123 @@
 A detector is a machine of plain numbers for one sensor. It begins *not ready*: until it has seen a run of valid
 untouched frames, its silence does not mean "no touch". Time is an argument, so the same frames at the same times
 give the same events, bit by bit, live and in a replay.
+
+Whether a touch is believed does not depend on its place. So who has to stop an arm is called first, and the place is
+worked out afterwards.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SensorError
-from coneskin.skin.detection.place.touch_place import TouchPlace
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
-from coneskin.skin.detection.untouched.guides import UntouchedGuides
-from coneskin.skin.detection.untouched.leak import UntouchedLeak
-from coneskin.skin.detection.untouched.level import UntouchedLevel
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
 
-from .contradictions import Contradictions
-from .events import SkinEvent
+from .events import ReportedTouch, SkinEvent, SkinFault
 from .fault_diagnosis import DIAGNOSED_FAULTS, FaultDiagnosis
-from .fault_reports import FaultReports
+from .frame.contact_matrix import FrameInversion
 from .frame.faults import Fault
-from .frame.reading import read
+from .frame.reading import Reading, TouchReading, read
 from .frame.settings import DetectorSettings
 from .frame.timing import FrameTiming
-from .frame.touch_reading import TouchReading
-from .reported_touch import ReportedTouch
+from .frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak, UntouchedLevel
+from .place.touch_place import TouchPlace
 from .self_test import FrameSelfTest
-from .stuck_values import StuckValues
 
 if TYPE_CHECKING:  # for replays only
     from .quiet_frames import QuietFrames
 
-__all__ = ["Detector"]
+__all__ = ["Contradictions", "Detector", "TouchAlarm"]
+
+#: called with the sensor's name and the level as soon as a touch is certain, before its place is worked out
+TouchAlarm = Callable[[str, float], None]
 
 _RESTARTED_BIT = int(Status.RESTARTED)
+#: Faults that a contact produces when it changes between the phases of one frame; over the seam it looks like a short.
+_CONTACT_FAULTS = frozenset(
+    {
+        *(Fault.GUIDE_DRIVEN, Fault.OUT_OF_RANGE, Fault.GUIDES_DISAGREE, Fault.LEAK),
+        *(Fault.SHORT_UPPER, Fault.SHORT_LOWER),
+    }
+)
+_MAX_CONTRADICTIONS = 2.5  # frames; the fourth in a row is a fault, three may be a contact that closes slowly
+_CONTRADICTION_DECAY = 0.1  # frames; each good frame takes so many off the count
+
+
+class Contradictions:
+    """Contradictory frames of one sensor: contacts that come or go between the phases, told from faults by number.
+
+    Attributes:
+        count: of those that were taken for a change of contact, less what good frames have taken off.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0.0
+
+    def is_change(self, fault: Fault) -> bool:
+        """Tell whether a fault may be a contact that came or went between the phases of this one frame.
+
+        The phases are measured one after the other, so such a frame contradicts itself. A few frames later the contact
+        rests, or has passed the threshold; if they go on, or come more often than now and then, it is a fault.
+
+        Args:
+            fault: of the frame.
+        """
+        if fault not in _CONTACT_FAULTS or self.count > _MAX_CONTRADICTIONS:
+            return False
+        self.count += 1.0
+        return True
+
+    def forget(self) -> None:
+        """Take a good frame."""
+        self.count = max(0.0, self.count - _CONTRADICTION_DECAY)
+
+
+class _StuckValues:
+    """How long each lively value of a sensor's frames has stood still; a stuck current would hide an open wire.
+
+    Args:
+        most: frames in a row with the same value that are a fault; 0: none is.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._last: tuple[int, ...] = (-1, -1, -1, -1, -1)
+        self._still = [0, 0, 0, 0, 0]
+
+    def feed(self, frame: Frame) -> bool:
+        """Take a frame; tell whether one of its values is stuck."""
+        if not self._most:
+            return False
+        counts = (
+            *(frame.radial_current, frame.angular_current),
+            *(frame.touch_supply, frame.radial_supply, frame.angular_supply),
+        )
+        still, last = self._still, self._last
+        for k in (0, 1, 2, 3, 4):
+            still[k] = still[k] + 1 if counts[k] == last[k] else 0
+        self._last = counts
+        return max(still) >= self._most
+
+    def learn(self, frames: QuietFrames, begin: int, end: int) -> int:
+        """Take frames in a row; return how many are taken: none where a value may be stuck."""
+        if not self._most:
+            return end - begin
+        last, still = end - 1, []
+        for k, (values, repeats) in enumerate(zip(frames.lively, frames.repeats, strict=True)):
+            here = repeats[last]
+            if here >= last - begin:  # it has had this value since the first frame
+                here = last - begin + (self._still[k] + 1 if values[begin] == self._last[k] else 0)
+            still.append(here)
+        longest = max(max(self._still) + end - begin, max(max(repeats[begin:end]) for repeats in frames.repeats))
+        if longest >= self._most:
+            return 0
+        self._still = still
+        self._last = tuple([values[last] for values in frames.lively])
+        return end - begin
 
 
 class Detector:
@@ -55,34 +137,6 @@ class Detector:
         timing: sequence and clocks; counts of what was missing.
     """
 
-    __slots__ = (
-        "_above",
-        "_began",
-        "_below",
-        "_contradictions",
-        "_currents",
-        "_diagnosis",
-        "_faults",
-        "_fed",
-        "_guides",
-        "_lasting",
-        "_leak",
-        "_level",
-        "_places",
-        "_quiet",
-        "_release",
-        "_self_test",
-        "_stuck",
-        "_told",
-        "_touch",
-        "reading_now",
-        "ready",
-        "sensor",
-        "settings",
-        "timing",
-        "touched",
-    )
-
     def __init__(self, sensor: Sensor, settings: DetectorSettings | None = None) -> None:
         self.sensor = sensor
         self.settings = settings or DetectorSettings()
@@ -98,13 +152,15 @@ class Detector:
         self._currents = UntouchedCurrents(sensor, self.settings.current_drift)
         self._guides = UntouchedGuides(self._currents)
         self._diagnosis = FaultDiagnosis(sensor, self._currents)
-        self._faults = FaultReports(sensor.name, self._diagnosis)
+        self._fault: Fault | None = None
+        self._reported: set[Fault | str] = set()  # since it was ready last: each is reported once
         self._touch, self._release = sensor.thresholds.touch_level, sensor.thresholds.release_level
         self._level = UntouchedLevel(self.settings, self._release)
-        self._stuck = StuckValues(self.settings.stuck_frames)
+        self._stuck = _StuckValues(self.settings.stuck_frames)
         release = self._release
         self._leak = UntouchedLeak(sensor, 2.0 * release / (1.0 - release) / sensor.electronics.pulldown_ohms)
         self._self_test = FrameSelfTest(sensor, self._currents)
+        self._inversion = FrameInversion(sensor)
         self._places = TouchPlace(sensor, self.settings, self._currents, self._leak)
         self._told = ReportedTouch(sensor, self.settings)
         self._above = self._below = self._quiet = 0
@@ -116,12 +172,13 @@ class Detector:
         """Return the time since the newest valid frame [s]; infinite before the first."""
         return self.timing.age(now)
 
-    def feed(self, frame: Frame, now: float) -> list[SkinEvent]:
+    def feed(self, frame: Frame, now: float, alarm: TouchAlarm | None = None) -> list[SkinEvent]:
         """Take the next frame of this sensor.
 
         Args:
             frame: the frame.
             now: host clock when it arrived [s], monotonic.
+            alarm: called where a touch begins with this frame, and that is the first that happens in it.
 
         Returns:
             what happened; mostly nothing.
@@ -131,20 +188,20 @@ class Detector:
         restarted = frame.status & _RESTARTED_BIT and self.timing.frames > 0
         if restarted:
             self.timing.restart()
-        late = self.timing.advance(frame.sequence, frame.clock_us, now)
+        late = self.timing.feed(frame.sequence, frame.clock_us, now)
         if restarted:
             self._report(events, Fault.RESTARTED, frame, now)
         elif late is not None:
             self._report(events, late, frame, now, self.timing.detail)
             if late is Fault.REPLAYED:
                 return events  # an old frame says nothing about now
-        reading = read(self.sensor, frame, self._places.inversion, self._currents.noise)
+        reading = read(self.sensor, frame, self._inversion, self._currents.noise)
         whole, fault = reading.level, reading.fault
         level = whole - self._level.value
         if fault is None and whole < self._release and self._guides.contradict(frame, whole, self.timing.period):
             fault = Fault.GUIDE_DRIVEN
         if self._diagnosis.active and (fault is None or fault in DIAGNOSED_FAULTS):
-            name = self._diagnosis.take(frame, fault)
+            name = self._diagnosis.feed(frame, fault)
             if name is not None:
                 self._report(events, name, frame, now, self._diagnosis.words)
         if fault is not None:
@@ -159,23 +216,23 @@ class Detector:
             if self._contradictions.count:
                 self._contradictions.forget()
             self.timing.seen_valid(now)
-        if self._stuck.take(frame):
+        if self._stuck.feed(frame):
             self._report(events, Fault.STUCK, frame, now)
             return events
         if self.touched:
             matrix = reading.matrix
             firm = self.settings.self_test and fault is None and reading.level >= self.sensor.thresholds.location_level
-            if firm and matrix is not None and self._self_test.take(matrix):
+            if firm and matrix is not None and self._self_test.feed(matrix):
                 self._places.interrupt()
                 detail = f"{self._self_test.deviation(matrix):.1f} times the limit"
                 self._report(events, Fault.GUIDES_DISAGREE, frame, now, detail)
                 return events
             if self._self_test.doubted:
                 reading = reading._replace(location_valid=False)
-            touch = self._places.take(frame, reading, level, now, self.timing.period)
+            touch = self._places.feed(frame, reading, level, now, self.timing.period)
             self._while_touched(events, frame, touch)
         elif level >= self._touch:
-            self._before_touch(events, self._places.begin(frame, reading, level, now))
+            self._before_touch(events, frame, reading, level, now, alarm)
         else:
             self._while_untouched(events, frame, now, level)
         return events
@@ -183,7 +240,7 @@ class Detector:
     @property
     def fault(self) -> Fault | None:
         """Why the sensor cannot be believed at present; None where it can."""
-        return self._faults.present
+        return self._fault
 
     @property
     def baseline(self) -> float:
@@ -195,8 +252,8 @@ class Detector:
         """True while a quiet frame changes nothing but what is learned, which ``learn`` does."""
         waiting = (
             self.touched
-            or self._faults.present
-            or self._faults.reported
+            or self._fault
+            or self._reported
             or self._above
             or self._contradictions.count
             or self._diagnosis.active
@@ -215,10 +272,10 @@ class Detector:
         Returns:
             ``end``; or the number of the first frame that is not quiet, or may not be. Then nothing was taken.
         """
-        from .quiet_learning import QuietLearning
+        from .quiet_frames import learn_quiet_frames
 
-        parts = self.timing, self._guides, self._currents, self._level, self._stuck
-        reached = QuietLearning(*parts, self._leak).take(frames, begin, end, final)
+        parts = self.timing, self._guides, self._currents, self._level, self._stuck, self._leak
+        reached = learn_quiet_frames(parts, frames, begin, end, final)
         if reached == end and final:
             self._fed = frames.times[end - 1]
             self._quiet += end - begin
@@ -248,7 +305,7 @@ class Detector:
         """
         age = self.timing.age(now)
         events: list[SkinEvent] = []
-        if age > longest and (self._faults.present is None or now - self._fed > longest):
+        if age > longest and (self._fault is None or now - self._fed > longest):
             frame_clock, sequence = self.timing.clock_us, self.timing.sequence
             detail = f"{age * 1e3:.1f} ms" if math.isfinite(age) else "none at all"
             self._put_fault(events, Fault.SILENT, now, frame_clock, sequence, detail)
@@ -275,17 +332,30 @@ class Detector:
             self._report(events, changed[0], frame, now, changed[1])
         if self._quiet >= settings.settle_frames and self._currents.frames:
             self.ready = True
-            self._faults.forget()
-        self._level.follow(level, self.timing.period)
+            self._fault = None
+            self._reported.clear()
+        self._level.update(level, self.timing.period)
 
-    def _before_touch(self, events: list[SkinEvent], touch: TouchReading) -> None:
+    def _before_touch(
+        self,
+        events: list[SkinEvent],
+        frame: Frame,
+        reading: Reading,
+        level: float,
+        now: float,
+        alarm: TouchAlarm | None,
+    ) -> None:
         """Take a frame above the threshold; a touch begins once there are enough of them."""
+        self._above += 1
+        certain = self._above >= self.settings.confirm_frames
+        if certain and alarm is not None and not events:
+            alarm(self.sensor.name, level)
         self._quiet = 0
         self._skip()
-        self._above += 1
-        if self._above < self.settings.confirm_frames:
+        touch = self._places.begin(frame, reading, level, now)
+        if not certain:
             return
-        self.touched, self._lasting, self._began = True, False, touch.time
+        self.touched, self._lasting, self._began = True, False, now
         self._below = 0
         self.reading_now = touch
         events.append(self._told.begin(touch))
@@ -326,7 +396,14 @@ class Detector:
     def _put_fault(
         self, events: list[SkinEvent], fault: Fault, now: float, clock_us: int, sequence: int, detail: str
     ) -> None:
+        """Take a fault, and report it where it was not; the diagnosis in words counts as another one."""
         self._quiet = self._above = 0
         self._currents.restart()
         self.ready = False
-        self._faults.add(events, fault, now, clock_us, sequence, detail)
+        if fault in DIAGNOSED_FAULTS:
+            fault = self._diagnosis.rename(fault)
+        self._fault = fault
+        told = detail if detail and detail == self._diagnosis.words else fault
+        if told not in self._reported:
+            self._reported |= {told, fault}
+            events.append(SkinFault(self.sensor.name, now, clock_us, sequence, fault, detail))

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
 from .frame.contact_matrix import FrameInversion
 from .frame.faults import Fault
+from .frame.untouched import UntouchedCurrents
 from .wiring_hypothesis import Observation, PointContact, WiringHypothesis, list_hypotheses, observe
 
 __all__ = ["DIAGNOSED_FAULTS", "FaultDiagnosis"]
@@ -60,21 +60,6 @@ class FaultDiagnosis:
         words: what is broken, for people, where that is known; else empty.
     """
 
-    __slots__ = (
-        "_currents",
-        "_fit",
-        "_found",
-        "_frame",
-        "_given",
-        "_hypotheses",
-        "_last",
-        "_name",
-        "_number",
-        "_sensor",
-        "active",
-        "words",
-    )
-
     def __init__(self, sensor: Sensor, currents: UntouchedCurrents) -> None:
         self._sensor, self._currents = sensor, currents
         self._hypotheses: list[WiringHypothesis] = []
@@ -97,7 +82,7 @@ class FaultDiagnosis:
             self.active, self._name = True, fault
         return self._name
 
-    def take(self, frame: Frame, fault: Fault | None) -> Fault | None:
+    def feed(self, frame: Frame, fault: Fault | None) -> Fault | None:
         """Take a frame while the fault lasts.
 
         Args:
@@ -117,7 +102,7 @@ class FaultDiagnosis:
             self._fit = self._next()
             return None
         for _ in range(_STEPS_PER_FRAME):
-            if self._fit.step():
+            if self._fit.improve():
                 self._found.append((self._fit.sum, self._fit.hypothesis))
                 self._number += 1
                 if self._number == len(self._hypotheses):
@@ -166,11 +151,6 @@ class FaultDiagnosis:
 class _Fit:
     """The fit of a contact to an observation under a hypothesis (Levenberg and Marquardt)."""
 
-    __slots__ = (
-        *("_contact", "_damping", "_errors", "_observation", "_round", "_sheets", "_total"),
-        *("hypothesis", "sum"),
-    )
-
     def __init__(self, hypothesis: WiringHypothesis, observation: Observation, upper: float, lower: float) -> None:
         self.hypothesis = hypothesis
         self._observation, self._sheets = observation, (upper, lower)
@@ -178,7 +158,7 @@ class _Fit:
         self._round, self._damping = 0, 0.01
         self.sum = self._total = math.inf
 
-    def step(self) -> bool:
+    def improve(self) -> bool:
         """Make the next step; tell whether it was the last."""
         self._round += 1
         if self._round == 1:

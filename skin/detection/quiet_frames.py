@@ -1,28 +1,28 @@
 """Frames of one sensor in which nothing shows, many at once: for replays. They change only what a detector learns.
 
 A frame is *plain* where, whatever came before, it is neither a fault nor a touch; ``reading.read`` says the same, and
-is asked of every 32nd. What a detector learns from plain frames, ``Detector.learn`` works out without it.
+is asked of every 32nd. What a detector learns from plain frames is worked out here without it, with the same numbers.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.skin.detection.untouched.guides import GUIDE_JUMP
 from coneskin.skin.frame_batch import FrameBatch
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status, frame_at
 
 from .frame.reading import GUIDE_SLACK, LEVEL_NOISE, read
+from .frame.untouched import GUIDE_JUMP
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["LIVELY_FIELDS", "QuietFrames", "find_quiet_frames"]
+__all__ = ["QuietFrames", "find_quiet_frames", "learn_quiet_frames"]
 
-#: fields that have noise in a working device, in the order of ``Detector``
-LIVELY_FIELDS = ("radial_current", "angular_current", "touch_supply", "radial_supply", "angular_supply")
+# fields that have noise in a working device, in the order of ``Detector``
+_LIVELY_FIELDS = ("radial_current", "angular_current", "touch_supply", "radial_supply", "angular_supply")
 _FAULT_BITS = int(~Status.TOUCH & 0xFF)
 _FRAME_LENGTHS = (36, 40)  # bytes; frames with the driven potentials are read one by one
 _CHECK_INTERVAL = 32  # frames, of which one is read as a live one
@@ -42,7 +42,7 @@ class QuietFrames(NamedTuple):
         radial_currents: over the supply.
         angular_currents: over the supply.
         supplies: in the touch phase [counts].
-        lively: the fields ``LIVELY_FIELDS``.
+        lively: the fields ``_LIVELY_FIELDS``.
         repeats: how many frames in a row before it had the same value, for each of those.
         data: bytes of the frames.
         starts: offsets of the frames in them.
@@ -81,7 +81,7 @@ def find_quiet_frames(sensor: Sensor, batch: FrameBatch, times: NDArray[np.float
     import numpy as np
 
     bounds, limits = sensor.bounds, sensor.thresholds
-    names = ("touch_c", "touch_d", "touch_current", "radial_c", "radial_d", "angular_a", "angular_b", *LIVELY_FIELDS)
+    names = ("touch_c", "touch_d", "touch_current", "radial_c", "radial_d", "angular_a", "angular_b", *_LIVELY_FIELDS)
     count = {name: batch.field(name).astype(np.int64) for name in names}
     touch, radial, angular = (
         count["touch_c"] + count["touch_d"],
@@ -109,7 +109,7 @@ def find_quiet_frames(sensor: Sensor, batch: FrameBatch, times: NDArray[np.float
         plain &= np.abs(count["angular_a"] - count["angular_b"]) <= GUIDE_JUMP * supply
         currents = current1 / supply1, current2 / supply2
         guides = 0.5 * radial / supply1, 0.5 * angular / supply2
-    lively = [count[name] for name in LIVELY_FIELDS]
+    lively = [count[name] for name in _LIVELY_FIELDS]
     found = QuietFrames(
         plain=plain,
         sequences=batch.field("sequence").tolist(),
@@ -142,3 +142,37 @@ def _repeats(values: NDArray[np.int64]) -> NDArray[np.int64]:
     changed[1:] = values[1:] != values[:-1]
     found: NDArray[np.int64] = index - np.maximum.accumulate(np.where(changed, index, 0))
     return found
+
+
+def learn_quiet_frames(parts: tuple[Any, ...], frames: QuietFrames, begin: int, end: int, final: bool) -> int:
+    """Let the parts of one detector learn from plain frames in a row; arguments and result as of ``Detector.learn``.
+
+    Args:
+        parts: timing, guides, currents, level, stuck values and leak of the detector.
+        frames: of the sensor.
+        begin: the first of them.
+        end: the one behind the last.
+        final: False: only tell what would be returned.
+    """
+    timing, guides, currents, level, stuck, leak = parts
+    before = [dict(vars(part)) for part in parts[:-1]]  # the leak is learned last, when nothing has to be restored
+    part = slice(begin, end)
+    levels = frames.levels[part]
+    periods = timing.learn(frames.sequences[part], frames.clocks[part], frames.times[part])
+    count = len(periods)
+    taken = guides.learn(frames.radial[part][:count], frames.angular[part][:count], levels[:count], periods)
+    taken = level.learn(levels[:taken], periods)
+    if taken == end - begin:
+        taken = currents.learn(
+            frames.radial_currents[part], frames.angular_currents[part], frames.supplies[part], periods
+        )
+    if taken == end - begin:
+        taken = stuck.learn(frames, begin, end)
+    if taken < end - begin or not final:
+        for learner, values in zip(parts[:-1], before, strict=True):
+            vars(learner).update(values)
+        return begin + taken
+    if leak.wants(max(levels)):
+        for number in range(begin, end):
+            leak.feed(frames.frame(number), frames.levels[number])
+    return end

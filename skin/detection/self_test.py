@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 
 from .frame.contact_matrix import ContactMatrix
+from .frame.untouched import UntouchedCurrents
 
 __all__ = ["FrameSelfTest"]
 
@@ -37,8 +37,6 @@ class FrameSelfTest:
         currents: of the untouched sensor, with the noise that was learned.
     """
 
-    __slots__ = ("_count", "_currents", "_noise_drawn", "_pulldown", "_scale")
-
     def __init__(self, sensor: Sensor, currents: UntouchedCurrents) -> None:
         self._currents = currents
         parts = sensor.electronics
@@ -47,7 +45,7 @@ class FrameSelfTest:
         self._scale = 1.0 / (1.0 + currents.aspect**4)
         self._count = 0
 
-    def take(self, matrix: ContactMatrix) -> bool:
+    def feed(self, matrix: ContactMatrix) -> bool:
         """Take a frame of a touch; tell whether its guides contradict each other, and have for long.
 
         Args:

@@ -12,7 +12,7 @@ from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder
 
-from .detector import Detector
+from .detector import Detector, TouchAlarm
 from .events import SkinEvent, SkinFault
 from .frame.faults import Fault
 from .frame.settings import DetectorSettings
@@ -39,19 +39,6 @@ class TouchStream:
         SensorError: there is no sensor, or two have the same numbers or the same name.
     """
 
-    __slots__ = (
-        "_bad",
-        "_by_number",
-        "_corrupt",
-        "_skipped",
-        "_starting",
-        "_version_reported",
-        "_versions",
-        "decoder",
-        "detectors",
-        "unknown",
-    )
-
     def __init__(self, sensors: Sequence[Sensor], settings: DetectorSettings | None = None) -> None:
         if not sensors:
             raise SensorError("a stream needs at least one sensor, got none")
@@ -76,12 +63,13 @@ class TouchStream:
         """True while any sensor is touched."""
         return any(detector.touched for detector in self.detectors)
 
-    def feed(self, data: bytes, now: float) -> list[SkinEvent]:
+    def feed(self, data: bytes, now: float, alarm: TouchAlarm | None = None) -> list[SkinEvent]:
         """Take the next bytes.
 
         Args:
             data: any number of bytes.
             now: host clock when they arrived [s], monotonic.
+            alarm: called where the first that happens is that a touch begins, before its place is worked out.
 
         Returns:
             what happened, in the order of the frames.
@@ -91,11 +79,13 @@ class TouchStream:
         for frame in frames:
             detector = self._by_number.get((frame.device, frame.sensor))
             if detector is not None:
-                happened = detector.feed(frame, now)
+                happened = detector.feed(frame, now, alarm)
                 if happened:
                     events += happened
+                    alarm = None  # what has happened decides first
             else:
                 self._note_unknown(events, frame, now)
+                alarm = None
         if self.decoder.bytes_skipped != self._skipped or self._bad:
             self._watch_bytes(events, len(frames), now)
         if self.decoder.unknown_versions != self._versions:

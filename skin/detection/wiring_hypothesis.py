@@ -67,8 +67,6 @@ class WiringHypothesis:
         dead: electrodes, or "touch", whose readings are 0.
     """
 
-    __slots__ = ("_broken", "_dead", "_phases", "fault", "words")
-
     def __init__(
         self,
         sensor: Sensor,

@@ -43,12 +43,12 @@ def run(core, payload, seconds, start, packets, lose=None):
     for step in range(round(1000 * seconds)):
         now = start + 0.001 * (step + 1)
         for block in list(companions.blocks(now)):
-            core.take(block, out)
-        core.take(Block(BlockKind.SKIN, now, next(packets)[1]), out)
+            core.feed(block, out)
+        core.feed(Block(BlockKind.SKIN, now, next(packets)[1]), out)
         if step % 2 == 0:
-            core.take(Block(BlockKind.ARM, now, payload(now)), out)
+            core.feed(Block(BlockKind.ARM, now, payload(now)), out)
         if lose is not None and now >= lose[0]:
-            core.take(Block(BlockKind.LOST, now, lose[1]), out)
+            core.feed(Block(BlockKind.LOST, now, lose[1]), out)
             lose = None
         for output in out[known:]:
             companions.take(output)

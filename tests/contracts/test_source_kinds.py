@@ -10,8 +10,7 @@ from coneskin.core.errors import SceneError, SensorError, SkinConnectionError
 from coneskin.core.keys import Key
 from coneskin.core.recording.block import decode_blocks
 from coneskin.geometry.frustum import Frustum
-from coneskin.robot.guard.loop import GuardLoop
-from coneskin.robot.guard.ports import GuardPorts
+from coneskin.robot.guard.loop import GuardLoop, GuardPorts
 from coneskin.robot.guard.signals.journal import BlockKind, decode_event
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
@@ -106,7 +105,7 @@ def test_the_guard_reports_a_touch_that_comes_through_it(i2c: None) -> None:
         names = []
         for number in range(200):
             now = 1e-3 * number  # [s], one packet a step
-            loop.step(0.0)
+            loop.poll(0.0)
             for message in session.receive():
                 names += [decode_event(b).name for _, b in decode_blocks(message) if b.kind == BlockKind.EVENT]
         loop._close()

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from coneskin.core.channel import Channel, decode_json, pair, wait_readable, wait_writable
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
-from coneskin.robot.guard.overflow import RecordingOverflowFilter
-from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent, decode_event
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent, RecordingOverflowFilter, decode_event
 
 
 def ends():

@@ -9,8 +9,7 @@ from pathlib import Path
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.driver.messages import StatusReport
-from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
-from coneskin.robot.guard.signals.outputs import Output
+from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent, Output
 from coneskin.robot.ur import rtde_codec as rtde
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
@@ -74,7 +73,7 @@ def record(path: Path, text: str = FULL, touch: ScriptedTouch | None = None) -> 
         recorder.write(Block(BlockKind.HEADER, 1000.0, json.dumps(header).encode()))
         for block in inputs(scene, touch):
             outputs: list[Output] = []
-            core.take(block, outputs)
+            core.feed(block, outputs)
             happened = [output for output in outputs if isinstance(output, GuardEvent)]
             recorder.write(block, *(event.block() for event in happened))
             events += happened

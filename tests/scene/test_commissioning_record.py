@@ -194,7 +194,7 @@ def test_without_a_record_the_arm_only_stops_and_says_so(text: str, tmp_path: Pa
     for name, known_scene in (("bare", with_commissioning(scene, 0.0)), ("commissioned", commissioned(scene))):
         core, outputs = build_core(known_scene), []
         for block in inputs(known_scene, touch, 0.6):
-            core.take(block, outputs)
+            core.feed(block, outputs)
         told[name] = [output for output in outputs if isinstance(output, GuardEvent)]
     assert "not_commissioned" not in [event.name for event in told["commissioned"]]
     assert "retreating" in [event.name for event in told["commissioned"]]

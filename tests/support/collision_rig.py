@@ -193,7 +193,7 @@ class CollisionRig:
 
     def _take(self, block: Block) -> None:
         out: list[object] = []
-        self.core.take(block, out)
+        self.core.feed(block, out)
         for output in out:
             self._companions.take(output)
             if isinstance(output, GuardEvent):

@@ -27,8 +27,8 @@ from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
+from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.detection.frame.settings import DetectorSettings
-from coneskin.skin.detection.frame.touch_reading import TouchReading
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor
@@ -120,7 +120,7 @@ class GuardRig:
     def _take(self, block: Block) -> list[object]:
         self.blocks.append(block)
         out: list[object] = []
-        self.core.take(block, out)
+        self.core.feed(block, out)
         for output in out:
             self.companions.take(output)
             if isinstance(output, GuardEvent):

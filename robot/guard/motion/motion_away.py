@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.guard.signals.outputs import Outputs
-from coneskin.robot.guard.signals.touch_record import TouchRecord
+from coneskin.robot.guard.signals.contact import TouchRecord
+from coneskin.robot.guard.signals.journal import Outputs
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 if TYPE_CHECKING:  # a reaction that only stops loads it not
@@ -75,12 +75,12 @@ class MotionAway:
         """True while a standing arm waits for the place of a touch."""
         return self._decide_by > -math.inf
 
-    def note(self, measured_at: float, state: ControllerState) -> None:
+    def feed(self, measured_at: float, state: ControllerState) -> None:
         """Take a measured state, and the host time of its measurement [s]."""
         if state.stopped_by_safety or not state.powered:
             self._barred = "the controller has stopped the arm itself"  # nothing of ours moves it then
         if self._planner is not None:
-            self._planner.note(measured_at, state.q)
+            self._planner.feed(measured_at, state.q)
 
     def bar(self, why: str) -> None:
         """Let no motion begin before the next stop."""
@@ -156,11 +156,11 @@ class MotionAway:
         self._stream = self._newest = stream
         return ""
 
-    def step(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
+    def update(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
         """Go on from a measured state, or return Done where the motion is over."""
         if self._stream is None or self._barred:
             return None  # the core ends a barred motion: it names the fault
-        return self._stream.step(state, contacts, out)
+        return self._stream.update(state, contacts, out)
 
     def resisted(self, state: ControllerState, now: float, contacts: Sequence[ContactOnLink]) -> Done | None:
         """Return Done where the newest frames, of a host time [s], show that the motion must end."""

@@ -1,7 +1,10 @@
-"""Journal of a guard: the kinds of block that it records, and its events.
+"""Journal of a guard: the kinds of block that it records, its events, and the sink of all that it puts out.
 
 Everything that goes into a guard is recorded, and everything that comes out. What goes in is enough to run the guard
-again: ``GuardCore.take`` is fed the same blocks, live and in a replay.
+again: ``GuardCore.feed`` is fed the same blocks, live and in a replay.
+
+A program that is frozen for long makes its guard's channel run full. Inputs and commands are then left out of the
+recording, but no event is: a program that goes on has to know of a collision.
 """
 
 from __future__ import annotations
@@ -10,23 +13,33 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from enum import IntEnum, StrEnum
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.recording.block import Block
+from coneskin.core.recording.block import Block, decode_blocks, encode_block
 from coneskin.core.text import read_json
+
+if TYPE_CHECKING:
+    from coneskin.robot.driver.messages import EndReaction, Release, SetJointVelocity, StopProgram
+    from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
+    from coneskin.robot.driver.stop_path import UseStopPath
 
 __all__ = [
     "INPUTS",
     "SESSION_EVENTS",
     "BlockKind",
+    "Command",
     "EventName",
     "GuardEvent",
+    "Output",
+    "Outputs",
+    "RecordingOverflowFilter",
     "body_places",
     "contact_force",
     "decode_event",
     "decode_loss",
     "describe_way",
+    "emit",
     "encode_loss",
     "force_block",
     "stopping_contact",
@@ -250,3 +263,54 @@ def describe_way(details: Mapping[str, Any], verb: str = "retreated") -> str:
         return f"{verb} {progress:.1f} mm"
     went = 1e3 * float(braking)
     return f"went {went:.1f} mm on while it braked and then {went + progress:.1f} mm back"
+
+
+#: to the driver process, and over connections of the guard's own
+Command: TypeAlias = (
+    "StopProgram | SetJointVelocity | EndReaction | Release"
+    " | UseStopPath | SetpointProgram | JointVelocitySetpoint | SetSpeedSlider"
+)
+Output: TypeAlias = "Command | GuardEvent"
+
+
+class Outputs(Protocol):
+    """Sink of outputs, in order: a list, or something that sends a command as soon as it is there."""
+
+    def append(self, output: Output, /) -> None:
+        """Take one output."""
+
+
+def emit(out: Outputs, name: EventName, time: float, **details: Any) -> None:
+    """Put an event out, of a host time [s]."""
+    out.append(GuardEvent(name, time, details))
+
+
+class RecordingOverflowFilter:
+    """Filter for ``Channel.overflow``, where each message consists of whole blocks of a recording."""
+
+    def __init__(self) -> None:
+        self._left_out = 0
+        self._since = self._until = 0.0
+
+    def shorten(self, message: bytes) -> bytes:
+        """Return the events in a message; the rest of it is counted."""
+        kept = []
+        for _, block in decode_blocks(message):
+            if block.kind == BlockKind.EVENT:
+                kept.append(encode_block(block))
+                continue
+            if not self._left_out:
+                self._since = block.time
+            self._left_out += 1
+            self._until = block.time
+        return b"".join(kept)
+
+    def notice(self) -> bytes:
+        """Return the event that says what was left out since the last one; empty where nothing was."""
+        if not self._left_out:
+            return b""
+        length = self._until - self._since
+        what = f"{self._left_out} blocks of {length:.3f} s are not recorded: the program did not read them"
+        details = {"what": what, "blocks": self._left_out, "since": self._since, "until": self._until}
+        self._left_out = 0
+        return encode_block(GuardEvent(EventName.RECORDING_GAP, self._until, details).block())

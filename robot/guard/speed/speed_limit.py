@@ -17,13 +17,75 @@ from collections.abc import Sequence
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.guard.signals.journal import EventName
-from coneskin.robot.guard.signals.outputs import Outputs, emit
+from coneskin.robot.guard.signals.journal import EventName, Outputs, emit
 
 from .permissible_speeds import PermissibleSpeeds, SurfaceSpeeds
-from .slider_setting import SliderSetting
 
-__all__ = ["SpeedLimit"]
+__all__ = ["SliderSetting", "SpeedLimit"]
+
+_READ_TOLERANCE = 0.01  # of the slider; between what was set and what is read
+_READ_DELAY = 0.5  # s after which it must show what was set
+
+
+class SliderSetting:
+    """Setting of one slider.
+
+    Attributes:
+        ceiling: where a person has put it.
+        fraction: where the guard has put it; None where that has not, or a person has moved it since.
+        set_at: when that was [s].
+    """
+
+    def __init__(self) -> None:
+        self.ceiling = 1.0
+        self.fraction: float | None = None
+        self.set_at = -math.inf
+        self._expected: list[float] = []  # what may be read, the oldest first, until the newest is
+        self._late: list[float] = []  # what may still arrive after a person's setting
+        self._resumes = False
+
+    @property
+    def shown(self) -> bool:
+        """True where the slider was read where the guard has put it."""
+        return self.fraction is not None and len(self._expected) == 1
+
+    def feed(self, now: float, slider: float) -> bool:
+        """Take where the slider is at a time [s]; return whether a person has moved it there."""
+        if self.fraction is None:
+            if now - self.set_at <= _READ_DELAY and any(abs(slider - value) <= _READ_TOLERANCE for value in self._late):
+                self.fraction, self._expected, self._late = slider, [slider], []  # it was under way to the controller
+                return False
+            moved, self.ceiling = abs(slider - self.ceiling) > _READ_TOLERANCE, slider
+            return moved
+        if self._resumes:
+            self._resumes, self.set_at = False, now
+        shown = [number for number, value in enumerate(self._expected) if abs(slider - value) <= _READ_TOLERANCE]
+        if shown:
+            del self._expected[: shown[-1]]
+        if shown and (len(self._expected) == 1 or now - self.set_at <= _READ_DELAY):
+            return False
+        self._late = self._expected[1:]
+        self.ceiling, self.fraction = slider, None
+        return True
+
+    def set(self, now: float, fraction: float, slider: float) -> None:
+        """Note that the guard sets the slider, which was read last at ``slider``."""
+        if self.fraction is None:
+            self._expected = [slider]
+        self._expected.append(fraction)
+        self.fraction, self.set_at = fraction, now
+
+    def resume(self) -> None:
+        """Note that a stop may have put the slider to 0, and that it is put back now."""
+        if self.fraction is not None:
+            self._expected, self._resumes = [0.0, self.fraction], True
+
+    def found(self, slider: float) -> float | None:
+        """Return where to put the slider back to, from ``slider``; None where it is not where the guard has put it."""
+        if self.fraction is None or all(abs(slider - value) > _READ_TOLERANCE for value in self._expected):
+            return None
+        return self.ceiling
+
 
 _SPEED_MARGIN = 0.9  # of the permissible speed, to which the slider goes
 _GROWTH_RATIO = 1.05  # ratio; from which on an arm speeds up
@@ -145,7 +207,7 @@ class SpeedLimit:
             sliders.append((now, slider))
         while len(sliders) > 1 and now - sliders[1][0] >= _SLIDER_MEMORY:
             sliders.popleft()
-        if self.setting.note(now, slider):  # a person wants it so: begin anew
+        if self.setting.feed(now, slider):  # a person wants it so: begin anew
             self._hold, self._raised = _HOLD_TIME, False
             self._forget_demand()
         fraction, ceiling = self.setting.fraction, self.setting.ceiling

@@ -17,8 +17,7 @@ from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.setpoint import SetSpeedSlider
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.signals.journal import EventName
-from coneskin.robot.guard.signals.outputs import Outputs, emit
+from coneskin.robot.guard.signals.journal import EventName, Outputs, emit
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
@@ -147,7 +146,7 @@ class SpeedReduction:
         self._last: tuple[float, ReducedSpeedTouch] | None = None  # when it was over, and what
         self._halted_from: float | None = None  # where the slider was before a stop put it to 0
 
-    def note(self, time: float, slider: float | None) -> None:
+    def feed(self, time: float, slider: float | None) -> None:
         """Take where the slider is, as read at a time [s]; None where it cannot be read any more."""
         self.slider, self._read_at = slider, time
 
@@ -209,7 +208,7 @@ class SpeedReduction:
             if self._currents is not None and contacts and not self._held:
                 self._held = self._currents.resistance(state)
 
-    def look(self, time: float, touched: bool) -> str:
+    def poll(self, time: float, touched: bool) -> str:
         """Return why the arm has to be stopped after all; empty where it has not."""
         if self.now is None:
             return ""

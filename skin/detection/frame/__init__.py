@@ -1,1 +1,1 @@
-"""What one frame says: currents, matrices, timing, faults."""
+"""What frames say: readings, contact matrices, timing, faults, and the untouched sensor."""

@@ -16,7 +16,26 @@ from coneskin.skin.wire import Frame, Status
 from .contact_matrix import ContactMatrix, FrameInversion
 from .faults import Fault
 
-__all__ = ["GUIDE_SLACK", "LEVEL_NOISE", "Reading", "read"]
+__all__ = ["GUIDE_SLACK", "LEVEL_NOISE", "Reading", "TouchReading", "read"]
+
+
+class TouchReading(NamedTuple):
+    """One frame of a touch; events come only where something changes, this comes with every frame."""
+
+    time: float  #: host clock when the frame arrived [s]
+    level: float  #: how firmly, 0..1, the drift of the untouched sensor taken off
+    u: float  #: slant distance from end 1 [m]; while the touch rests, the mean of its frames
+    phi: float  #: azimuth [rad], likewise
+    location_valid: bool  #: u and phi can be trusted
+    doubt: str  #: why the place is not certain, for people; empty where it is
+    clock_us: int  #: device clock of the frame [us], modulo 2**32
+    sequence: int  #: sequence number of the frame
+    covariance: tuple[float, float, float] | None = None  #: uu, us, ss [m^2], s along the circle
+    radius: float | None = None  #: of a round contact [m]; None where the frames do not tell
+    radius_deviation: float | None = None  #: standard deviation of its logarithm
+    elongation: tuple[float, float] | None = None  #: of what is not one disc: half length [m], direction [rad]
+    velocity: tuple[float, float] = (0.0, 0.0)  #: along the side and around [m/s]
+
 
 #: Fields of a frame that a reading is made of, in the order in which `read` and `_fault` take them.
 _READING_FIELDS = (
@@ -84,7 +103,7 @@ def read(sensor: Sensor, frame: Frame, inversion: FrameInversion | None = None, 
         fault = Fault.LEAD
     if level < limits.release_level:
         return Reading(sensor, sequence, clock_us, level, None, False, fault)
-    matrix = (inversion or FrameInversion(sensor)).take(frame)
+    matrix = (inversion or FrameInversion(sensor)).invert(frame)
     if matrix is None:
         return Reading(sensor, sequence, clock_us, level, None, False, fault)
     slack = limits.overshoot

@@ -67,27 +67,6 @@ class FrameTiming:
         detail: numbers that belong to the newest fault.
     """
 
-    __slots__ = (
-        "_bucket",
-        "_device_time",
-        "_drift",
-        "_gained",
-        "_known",
-        "_offset",
-        "_old_run",
-        "_started",
-        "_valid_at",
-        "clock_us",
-        "detail",
-        "frames",
-        "lag",
-        "limits",
-        "missing",
-        "old",
-        "period",
-        "sequence",
-    )
-
     def __init__(self, limits: TimingLimits) -> None:
         self.limits = limits
         self._drift = limits.clock_drift
@@ -123,7 +102,7 @@ class FrameTiming:
         """Note that a valid frame came."""
         self._valid_at = now
 
-    def advance(self, sequence: int, clock_us: int, now: float) -> Fault | None:
+    def feed(self, sequence: int, clock_us: int, now: float) -> Fault | None:
         """Take the numbers of the next frame.
 
         Args:
@@ -158,7 +137,7 @@ class FrameTiming:
         return self._judge_interval(steps, elapsed) or arrival
 
     def learn(self, sequences: Sequence[int], clocks: Sequence[int], times: Sequence[float]) -> list[float]:
-        """Take valid frames in a row as ``advance`` does, up to the first that is not in time, or not the next.
+        """Take valid frames in a row as ``feed`` does, up to the first that is not in time, or not the next.
 
         Args:
             sequences: sequence numbers.

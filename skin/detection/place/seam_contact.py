@@ -16,15 +16,17 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, MatrixNoise
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 
-from .matrix_noise import MatrixNoise
 from .place_estimate import PlaceEstimator, SheetConductances
-from .single_contact import DANGEROUS_ANGLE
+from .single_contact import CONTRADICTS, DANGEROUS_ANGLE, MOVES
 
-__all__ = ["SeamPlace", "SeamTest"]
+__all__ = [
+    "SeamCertainty",
+    "SeamPlace",
+]
 
 _MAX_GAP = math.radians(24.0)  # between the straight edges; beyond, the wrap does not close
 _MIN_FAR_SHARE = 0.05  # P_yy over G below which hardly anything is on the other side of the seam
@@ -55,7 +57,7 @@ class SeamPlace(NamedTuple):
     elongation: tuple[float, float]  #: half length [m] and direction of the line across the seam [rad]
 
 
-class SeamTest:
+class _SeamTest:
     """The seam of one sensor.
 
     Args:
@@ -63,8 +65,6 @@ class SeamTest:
         settings: the weakest second contact that is to be excluded.
         estimator: of its places.
     """
-
-    __slots__ = ("_angle", "_coupling", "_estimator", "_gap", "_limit", "_radius_at", "_slant", "_wrap", "closes")
 
     def __init__(self, sensor: Sensor, settings: DetectorSettings, estimator: PlaceEstimator) -> None:
         cone = sensor.frustum
@@ -162,3 +162,87 @@ class SeamTest:
             doubt,
             (math.hypot(0.5 * ahead, half), math.atan2(half, 0.5 * ahead) - (math.pi if ahead < 0.0 else 0.0)),
         )
+
+
+_MIN_SEAM_SHARE = 0.02  # P_yy over G; a press over the seam has more, and most touches are told from one by this alone
+_CONDUCTANCE_CHANGE = 0.05  # ratio by which the conductance may differ from its mean
+
+
+class SeamCertainty:
+    """The presses over the seam of one sensor.
+
+    Args:
+        sensor: the sensor.
+        settings: how far a place may move while it is certain, and the weakest second contact.
+        estimator: of its places.
+        breadth: of the wrap at the wider end [m].
+
+    Attributes:
+        closes: the wrap closes, so that one body can press on both edges.
+    """
+
+    def __init__(self, sensor: Sensor, settings: DetectorSettings, estimator: PlaceEstimator, breadth: float) -> None:
+        self._test = _SeamTest(sensor, settings, estimator)
+        self.closes = self._test.closes
+        self._map, self._lower = sensor.place_map, estimator.sheets[1]
+        self._settle = settings.settle_distance**2
+        self._breadth, self._wrap = breadth, sensor.frustum.wrap
+        self._place: tuple[float, float] | None = None  # of the frame before
+        self._held = False  # its place was certain
+
+    def end(self) -> None:
+        """Forget the touch: it is over."""
+        self._place, self._held = None, False
+
+    def interrupt(self) -> None:
+        """Note a frame that is no press over the seam: the next one follows no other."""
+        self._place = None
+
+    def may_be(self, values: tuple[float, float, float, float, float, float]) -> bool:
+        """Tell at little cost whether a touch may be a press over the seam.
+
+        Args:
+            values: the first six of a ``ContactMatrix``.
+        """
+        return not values[5] - self._lower < _MIN_SEAM_SHARE * values[0]
+
+    def feed(
+        self,
+        mean: ContactMatrix,
+        noise: MatrixNoise,
+        frames: float,
+        sheets: SheetConductances,
+        conductance: float,
+        valid: bool,
+    ) -> SeamPlace | None:
+        """Return the place of a press over the seam, and why it is not certain; None where it is none.
+
+        Args:
+            mean: of the matrices of a touch that may be one.
+            noise: of one frame.
+            frames: in the mean.
+            sheets: without contact.
+            conductance: of the newest frame [S].
+            valid: the newest frame does not contradict itself.
+        """
+        seam = self._test.place(mean, noise, frames, sheets)
+        if seam is None:
+            self._place = None
+            return None
+        if self._map is not None:
+            wrap = self._map.frustum.wrap
+            seam = seam._replace(u=0.5 * (self._map.apply(seam.u, 0.0)[0] + self._map.apply(seam.u, wrap)[0]))
+        before, self._place = self._place, seam[:2]
+        if not valid:
+            return seam._replace(doubt=CONTRADICTS)
+        changes = abs(conductance / mean.conductance - 1.0) > _CONDUCTANCE_CHANGE
+        return seam._replace(doubt=self._doubt(seam, before, changes))
+
+    def _doubt(self, seam: SeamPlace, before: tuple[float, float] | None, changes: bool) -> str:
+        """Return why the place is not certain; empty where it is."""
+        if seam.doubt or before is None or (changes and not self._held):
+            self._held = False
+            return seam.doubt or MOVES
+        self._held = True  # what was excluded once is not doubted again because the press changes
+        around = math.remainder(seam.phi - before[1], 2.0 * math.pi) * self._breadth / self._wrap
+        return MOVES if (seam.u - before[0]) ** 2 + around * around > self._settle else ""

@@ -13,10 +13,23 @@ import math
 
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
 from coneskin.skin.detection.frame.settings import DetectorSettings
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
+from coneskin.skin.detection.frame.untouched import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 
-__all__ = ["DANGEROUS_ANGLE", "SingleContactTest", "frames_until_certain", "weakest_pair_excluded"]
+__all__ = [
+    "CONTRADICTS",
+    "DANGEROUS_ANGLE",
+    "MOVES",
+    "WEAK",
+    "SingleContactTest",
+    "frames_until_certain",
+    "weakest_pair_excluded",
+]
+
+WEAK = "it presses too lightly for a place"  #: below the level from which places are told
+CONTRADICTS = "the guides of a phase differ too much for one contact"  #: the frame itself
+MOVES = "it has only begun, or moves"  #: the place is not that of the frame before
+
 
 #: Azimuth by which a place may be off every contact [rad]: a motion along its normal goes away from them all.
 DANGEROUS_ANGLE = math.radians(20.0)
@@ -42,30 +55,6 @@ class SingleContactTest:
         settings: the weakest second contact, the largest single one.
         currents: of the untouched sensor.
     """
-
-    __slots__ = (
-        "_across",
-        "_angles",
-        "_certain",
-        "_currents",
-        "_differ",
-        "_frames",
-        "_inversion",
-        "_largest",
-        "_limit",
-        "_lower",
-        "_mean",
-        "_per_along",
-        "_per_cross",
-        "_pulldown",
-        "_radius1",
-        "_required",
-        "_scale",
-        "_taper",
-        "_unit",
-        "_upper",
-        "_wrap",
-    )
 
     def __init__(self, sensor: Sensor, settings: DetectorSettings, currents: UntouchedCurrents) -> None:
         parts, cone = sensor.electronics, sensor.frustum
@@ -93,7 +82,7 @@ class SingleContactTest:
         if self._currents.frames:
             self._upper, self._lower = self._inversion.untouched(self._currents.radial, self._currents.angular)
 
-    def take(self, matrix: ContactMatrix, level: float, u: float) -> str:
+    def feed(self, matrix: ContactMatrix, level: float, u: float) -> str:
         """Take a frame of the touch.
 
         Args:

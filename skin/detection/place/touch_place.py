@@ -11,25 +11,138 @@ from __future__ import annotations
 
 import math
 
-from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
-from coneskin.skin.detection.frame.reading import Reading
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion, FrameNoise, MatrixNoise
+from coneskin.skin.detection.frame.reading import Reading, TouchReading
 from coneskin.skin.detection.frame.settings import DetectorSettings
-from coneskin.skin.detection.frame.touch_reading import TouchReading
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
-from coneskin.skin.detection.untouched.leak import UntouchedLeak
+from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedLeak
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
-from .doubt import CONTRADICTS, MOVES, WEAK
-from .matrix_mean import MEAN_FRAMES, MatrixMean
-from .matrix_noise import FrameNoise, MatrixNoise
 from .place_estimate import PlaceEstimate, PlaceEstimator, SheetConductances
-from .seam_certainty import SeamCertainty
-from .seam_contact import SeamPlace
-from .single_contact import SingleContactTest
-from .touch_velocity import TouchVelocity
+from .seam_contact import SeamCertainty, SeamPlace
+from .single_contact import CONTRADICTS, MOVES, WEAK, SingleContactTest
 
-__all__ = ["TouchPlace"]
+__all__ = [
+    "TouchPlace",
+]
+
+_MEAN_FRAMES = 128  # frames; the average reaches back so far
+_SMOOTHING_GAIN = 0.125  # of the distance to the mean; its variance is 1/15 of a frame's
+_SMOOTHED_VARIANCE = _SMOOTHING_GAIN / (2.0 - _SMOOTHING_GAIN)
+_MOVED_VARIANCE = 16.0  # four standard deviations, squared: once in 16 000 independent frames by chance
+_JUMPED_VARIANCE = 36.0  # six, of one frame alone
+
+
+class _MatrixMean:
+    """The mean of the matrices of one touch after another.
+
+    Attributes:
+        frames: in the mean; 1 where it has just begun anew, 0 before the first.
+        values: the first six of a ``ContactMatrix``, averaged.
+    """
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all matrices."""
+        self.frames = 0
+        self.values = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self._smooth_x = self._smooth_y = 0.0
+
+    def begin(self, matrix: ContactMatrix) -> None:
+        """Begin with the matrix of a frame with which a touch may begin; how far the last ones lay apart is kept."""
+        self.frames, self.values = 1, matrix[:6]
+
+    def feed(self, matrix: ContactMatrix, noise: MatrixNoise) -> tuple[float, float, float]:
+        """Take a matrix into the mean, or begin a new mean with it where the touch has moved; return its G, X, Y.
+
+        Args:
+            matrix: of the next frame.
+            noise: of one frame.
+        """
+        frames = self.frames
+        g, x, y, along, cross, around = self.values
+        new = matrix[:6]
+        new_g, new_x, new_y, new_along, new_cross, new_around = new
+        if frames:
+            off_x, off_y = new_x - x, new_y - y
+            smooth_x, smooth_y = self._smooth_x, self._smooth_y
+            self._smooth_x = smooth_x = smooth_x + _SMOOTHING_GAIN * (off_x - smooth_x)
+            self._smooth_y = smooth_y = smooth_y + _SMOOTHING_GAIN * (off_y - smooth_y)
+            share, xx, yy = 1.0 / frames, noise.xx, noise.yy
+            alone, smooth = _JUMPED_VARIANCE * (1.0 + share), _MOVED_VARIANCE * (_SMOOTHED_VARIANCE + share)
+            if (
+                smooth_x * smooth_x > smooth * xx
+                or smooth_y * smooth_y > smooth * yy
+                or off_x * off_x > alone * xx
+                or off_y * off_y > alone * yy
+            ):
+                frames = 0
+        if not frames:
+            self.frames, self.values = 1, new
+            self._smooth_x = self._smooth_y = 0.0
+            return new_g, new_x, new_y
+        if frames < _MEAN_FRAMES:
+            self.frames = frames = frames + 1
+        gain = 1.0 / frames
+        g, x, y = g + gain * (new_g - g), x + gain * (new_x - x), y + gain * (new_y - y)
+        self.values = (
+            g,
+            x,
+            y,
+            along + gain * (new_along - along),
+            cross + gain * (new_cross - cross),
+            around + gain * (new_around - around),
+        )
+        return g, x, y
+
+
+_POSITION_REST, _VELOCITY_GAIN = 0.8, 0.02  # critically damped
+_VELOCITY_NOISE = 0.035  # of a frame's noise over the period; what the filter leaves
+_MIN_VELOCITY_VARIANCE = (5.0 * _VELOCITY_NOISE) ** 2  # five standard deviations, squared; what is less is no velocity
+_NO_VELOCITY = (0.0, 0.0)
+
+
+class _TouchVelocity:
+    """The velocity of one touch after another.
+
+    Args:
+        estimator: of the sheet; says how long and broad it is.
+    """
+
+    def __init__(self, estimator: PlaceEstimator) -> None:
+        self._length, self._breadth, self._curvature = estimator.length, estimator.breadth, estimator.curvature
+        self._track: tuple[float, float, float, float] | None = None
+
+    def restart(self) -> None:
+        """Forget the touch."""
+        self._track = None
+
+    def feed(self, matrix: ContactMatrix, noise: MatrixNoise | None, period: float) -> tuple[float, float]:
+        """Return the velocity along the side and around [m/s]; zeros where noise explains what moved.
+
+        Args:
+            matrix: of the next frame of the touch.
+            noise: of one frame; None: not known yet.
+            period: time from frame to frame [s].
+        """
+        track = self._track
+        if track is None or noise is None or not period > 0.0:
+            self._track = matrix.x, matrix.y, 0.0, 0.0
+            return _NO_VELOCITY
+        x, y, step_x, step_y = track
+        new_x, new_y = matrix.x, matrix.y
+        off_x, off_y = new_x - x - step_x, new_y - y - step_y
+        step_x, step_y = step_x + _VELOCITY_GAIN * off_x, step_y + _VELOCITY_GAIN * off_y
+        x, y = new_x - _POSITION_REST * off_x, new_y - _POSITION_REST * off_y
+        self._track = x, y, step_x, step_y
+        if step_x * step_x < _MIN_VELOCITY_VARIANCE * noise.xx and step_y * step_y < _MIN_VELOCITY_VARIANCE * noise.yy:
+            return _NO_VELOCITY
+        on_sheet = min(max(x, 0.0), 1.0)  # hostile counts put a centre anywhere
+        stretch = math.exp(self._curvature * on_sheet * self._length) / period
+        return step_x * self._length * stretch, step_y * self._breadth * stretch
+
 
 _MAX_SLIDE = 2.0  # settle distances; a touch that has moved this far is another one, and its evidence begins anew
 
@@ -52,38 +165,6 @@ class TouchPlace:
         leak: between its layers, which is no part of a touch.
     """
 
-    __slots__ = (
-        "_began",
-        "_begun",
-        "_count_variance",
-        "_currents",
-        "_drift",
-        "_estimate",
-        "_estimator",
-        "_first_x",
-        "_first_y",
-        "_harder",
-        "_inversion",
-        "_leak",
-        "_level",
-        "_made_of",
-        "_map",
-        "_mean",
-        "_newest",
-        "_next",
-        "_noise",
-        "_of_frame",
-        "_rest",
-        "_scale",
-        "_seam",
-        "_settle",
-        "_single",
-        "_slide",
-        "_softer",
-        "_told",
-        "_velocity",
-    )
-
     def __init__(
         self, sensor: Sensor, settings: DetectorSettings, currents: UntouchedCurrents, leak: UntouchedLeak
     ) -> None:
@@ -101,7 +182,7 @@ class TouchPlace:
         self._seam = SeamCertainty(sensor, settings, self._estimator, self._scale[1])
         supply = parts.supply_volts / parts.adc_volts * parts.full_count
         self._count_variance = supply * supply / (1.0 + currents.aspect**4)
-        self._mean, self._velocity = MatrixMean(), TouchVelocity(self._estimator)
+        self._mean, self._velocity = _MatrixMean(), _TouchVelocity(self._estimator)
         self._noise: MatrixNoise | None = None
         self._softer = self._harder = 0.0
         self._begun = False
@@ -109,11 +190,6 @@ class TouchPlace:
         self._newest: tuple[float, float] | None = None
         self._first_x = self._first_y = 0.0
         self._restart()
-
-    @property
-    def inversion(self) -> FrameInversion:
-        """The inversion of the sensor's frames."""
-        return self._inversion
 
     def end(self) -> None:
         """Forget the touch: it is over."""
@@ -146,7 +222,7 @@ class TouchPlace:
         doubt = self._doubt(reading, matrix, level, u) or MOVES
         return TouchReading(now, level, u, phi, False, doubt, frame.clock_us, frame.sequence)
 
-    def take(self, frame: Frame, reading: Reading, level: float, now: float, period: float) -> TouchReading:
+    def feed(self, frame: Frame, reading: Reading, level: float, now: float, period: float) -> TouchReading:
         """Take a frame of a touch that has begun.
 
         Args:
@@ -166,7 +242,7 @@ class TouchPlace:
             self._began = now
         if noise is None:
             self._noise = noise = self._noise_of(matrix, frame)
-        whole, x, y = mean.take(matrix, noise)
+        whole, x, y = mean.feed(matrix, noise)
         frames = mean.frames
         if frames == 1:
             self._next = 1.0
@@ -183,7 +259,7 @@ class TouchPlace:
             doubt = seam.doubt
             return TouchReading(
                 *(now, level, seam.u, seam.phi, not doubt, doubt, frame.clock_us, frame.sequence),
-                *(seam.covariance, None, None, seam.elongation, self._velocity.follow(matrix, self._noise, period)),
+                *(seam.covariance, None, None, seam.elongation, self._velocity.feed(matrix, self._noise, period)),
             )
         covariance, radius, deviation = self._told if steady else _NO_DETAILS
         return TouchReading(
@@ -199,7 +275,7 @@ class TouchPlace:
             radius,
             deviation,
             self._single.elongation(whole) if doubt else None,
-            self._velocity.follow(matrix, self._noise, period),
+            self._velocity.feed(matrix, self._noise, period),
         )
 
     def _contacts(self, reading: Reading) -> ContactMatrix | None:
@@ -238,7 +314,7 @@ class TouchPlace:
             (1.0 + _SOLVE_STEP) * mean.conductance,
         )
         self._estimate, self._made_of, self._rest = estimate, frames, _REFRESH_FRAMES
-        self._next = frames * _REFRESH_RATIO if frames < MEAN_FRAMES else math.inf
+        self._next = frames * _REFRESH_RATIO if frames < _MEAN_FRAMES else math.inf
         return estimate
 
     def _noise_of(self, matrix: ContactMatrix, frame: Frame) -> MatrixNoise:
@@ -281,7 +357,7 @@ class TouchPlace:
             self._single.begin()
             self._begun, self._first_x, self._first_y = True, x, y
         self._newest = x, y
-        doubt = self._single.take(matrix, level, u)
+        doubt = self._single.feed(matrix, level, u)
         if before is None:
             return doubt or MOVES
         off_x, off_y = along * (x - before[0]), around * (y - before[1])
@@ -295,4 +371,4 @@ class TouchPlace:
             return None
         whole = ContactMatrix(*mean.values, 0.0, 0.0, 0.0)
         frames, sheets = float(mean.frames), self._sheets(now)
-        return self._seam.follow(whole, noise, frames, sheets, matrix.conductance, reading.location_valid)
+        return self._seam.feed(whole, noise, frames, sheets, matrix.conductance, reading.location_valid)

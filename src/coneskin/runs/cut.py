@@ -20,8 +20,7 @@ from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.version import __version__, code_commit
 from coneskin.robot.driver.messages import Release, StatusReport
-from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, EventName, GuardEvent
-from coneskin.robot.guard.signals.outputs import Command, Output
+from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, Command, EventName, GuardEvent, Output
 from coneskin.scene.settings import resolved_settings
 
 from .comparison import Comparison, compare_decisions
@@ -209,7 +208,7 @@ def _written(run: Run, since: float, until: float) -> list[Block]:
             taken = queue.pop(0)
             blocks.append(taken)
             if taken.kind in INPUTS:
-                core.take(taken, outputs)
+                core.feed(taken, outputs)
             commands = [output for output in outputs if not isinstance(output, GuardEvent)]
             blocks += [command_block(command, taken.time, process) for command in commands]
             blocks += [output.block() for output in outputs if isinstance(output, GuardEvent)]

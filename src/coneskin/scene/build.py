@@ -97,7 +97,7 @@ def _arm(scene: Scene) -> ArmSupervisor:
     planner = _planner(scene, arm) if rules.move else None
     heartbeat = None
     if scene.arm.control == "external":
-        from coneskin.robot.guard.heartbeats.controller_heartbeat import ControllerHeartbeat
+        from coneskin.robot.guard.controller_heartbeat import ControllerHeartbeat
 
         heartbeat = ControllerHeartbeat(scene.arm.controller_heartbeat == "required")
     limit = None if scene.speed_limit is None else _speed_limit(scene, scene.speed_limit, arm)

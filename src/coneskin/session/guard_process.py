@@ -25,8 +25,7 @@ def main(arguments: list[str]) -> int:
     shorten_time_slice()
     lifeline, (session, *rest) = inherit(arguments)
     # while the other processes start; not above, because the program may be gone before all of it is loaded
-    from coneskin.robot.guard.overflow import RecordingOverflowFilter
-    from coneskin.robot.guard.signals.journal import EventName, GuardEvent
+    from coneskin.robot.guard.signals.journal import EventName, GuardEvent, RecordingOverflowFilter
     from coneskin.scene.reader import parse_scene
     from coneskin.scene.values.scene import Commissioning
 

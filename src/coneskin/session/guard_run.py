@@ -15,8 +15,7 @@ from coneskin.core.channel import Channel
 from coneskin.core.child_process import Lifeline
 from coneskin.core.errors import RobotRefused
 from coneskin.core.recording.block import encode_block
-from coneskin.robot.guard.loop import GuardLoop
-from coneskin.robot.guard.ports import GuardPorts
+from coneskin.robot.guard.loop import GuardLoop, GuardPorts
 from coneskin.scene.build import build_core, place_on_arm
 from coneskin.scene.surface_record import encode_surfaces
 from coneskin.scene.values.scene import Scene

@@ -11,7 +11,7 @@ from coneskin.commissioning.calibration.touch_sequence import SensorTouches, Tou
 from coneskin.commissioning.misreadings import Place
 from coneskin.commissioning.touching import Notice, Touching
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.frame.touch_reading import TouchReading
+from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.sensor import Sensor
 
 STEP = 0.01  # s

@@ -84,6 +84,6 @@ def test_the_same_inputs_give_the_same_run_bit_by_bit(settings):
     )
     outputs: list[object] = []
     for block in rig.blocks:
-        again.take(Block(*block), outputs)
+        again.feed(Block(*block), outputs)
     assert [repr(output) for output in outputs] == [repr(output) for output in rig.outputs]
     assert any(isinstance(output, EndReaction | SetSpeedSlider | SetpointProgram) for output in outputs)

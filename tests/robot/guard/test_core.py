@@ -294,7 +294,7 @@ def test_nonsense_never_raises_and_never_arms(inputs):
     now = 0.0
     for kind, dt, payload in inputs:
         now += dt
-        core.take(Block(kind, now, payload), [])
+        core.feed(Block(kind, now, payload), [])
     assert core.phase is not Phase.ACTIVE
 
 
@@ -304,5 +304,5 @@ def test_the_same_inputs_give_the_same_run_bit_by_bit(script):
     again: GuardCore = make_core(list(rig.skin.sensors), Reaction(kind="retreat"))
     outputs: list[object] = []
     for block in rig.blocks:
-        again.take(block, outputs)
+        again.feed(block, outputs)
     assert [repr(output) for output in outputs] == [repr(output) for output in rig.outputs]

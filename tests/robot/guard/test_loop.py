@@ -6,11 +6,9 @@ import pytest
 
 from coneskin.core.channel import Channel, pair
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
-from coneskin.robot.guard.loop import GuardLoop
-from coneskin.robot.guard.overflow import RecordingOverflowFilter
+from coneskin.robot.guard.loop import GuardLoop, GuardPorts
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.ports import GuardPorts
-from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.robot.guard.signals.journal import BlockKind, RecordingOverflowFilter
 
 
 class Core:
@@ -21,7 +19,7 @@ class Core:
     def __init__(self):
         self.taken = []
 
-    def take(self, block, out):
+    def feed(self, block, out):
         self.taken.append(block.kind)
 
 
@@ -54,7 +52,7 @@ def test_a_connection_that_talks_does_not_stop_the_clock(ends):
     loop._open()
     for number in range(1, 50):
         stops.far.send(b"state")
-        loop.step(0.002)
+        loop.poll(0.002)
         assert len(core.taken) == number
     loop._close()
     stops.near.close()
@@ -67,7 +65,7 @@ def test_a_program_that_has_gone_does_not_stop_the_clock(ends):
     loop._open()
     ends[1].close()
     for number in range(1, 20):
-        loop.step(0.001)
+        loop.poll(0.001)
         assert len(core.taken) == number
     loop._close()
 
@@ -79,13 +77,13 @@ def test_a_guard_that_was_suspended_says_so_to_its_core_before_anything_else(end
     loop = GuardLoop(core, GuardPorts(ends[0], None), lambda: now[0], lambda: sleepless[0])
     loop._open()
     ends[1].send(b"heartbeat")
-    loop.step(0.0)
+    loop.poll(0.0)
     assert BlockKind.SUSPENDED not in core.taken
     core.taken.clear()
     now[0], sleepless[0] = now[0] + (0.001 if asleep else 5.0), sleepless[0] + 5.0
-    loop.step(0.0)
+    loop.poll(0.0)
     assert core.taken == [BlockKind.SUSPENDED]
-    loop.step(0.0)
+    loop.poll(0.0)
     assert core.taken == [BlockKind.SUSPENDED, BlockKind.TICK]
     loop._close()
 

@@ -12,8 +12,7 @@ from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.quiet_inputs import take_inputs
-from coneskin.robot.guard.signals.journal import INPUTS, BlockKind
-from coneskin.robot.guard.signals.outputs import Output
+from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, Output
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
@@ -51,11 +50,11 @@ def assert_the_same(build: Callable[[], GuardCore], blocks: Blocks, size: int) -
 
     def take(block: Block) -> None:
         slow.append(block)
-        many.take(block, said[1])
+        many.feed(block, said[1])
 
     for at in range(0, len(blocks), size):
         for block in blocks[at : at + size]:
-            one.take(block, said[0])
+            one.feed(block, said[0])
         take_inputs(many, blocks[at : at + size], take)
         assert state_of(many) == state_of(one), at
     assert said[0] == said[1]

@@ -8,9 +8,8 @@ import pytest
 
 from coneskin.core.channel import Channel, pair
 from coneskin.core.errors import SkinConnectionError
-from coneskin.robot.guard.loop import GuardLoop
+from coneskin.robot.guard.loop import GuardLoop, GuardPorts
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.ports import GuardPorts
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.electronics import Electronics
@@ -126,7 +125,7 @@ def test_a_replay_of_it_is_the_same_run():
     core = make_core([Sensor(CONE.frustum, 0, Electronics(adc_bits=16), name="one")], Reaction())
     again: list[object] = []
     for block in rig.blocks:
-        core.take(block, again)
+        core.feed(block, again)
     assert again == rig.outputs
 
 
@@ -137,7 +136,7 @@ class _Latched:
         self.phase = Phase.STOPPING
         self.taken: list[tuple[BlockKind, bytes]] = []
 
-    def take(self, block, out) -> None:
+    def feed(self, block, out) -> None:
         if block.kind != BlockKind.TICK:
             self.taken.append((block.kind, block.payload))
 
@@ -190,26 +189,26 @@ def test_the_loop_opens_it_only_once_the_arm_is_latched(session):
     loop = GuardLoop(core, ports)
     loop._open()
     for _ in range(3):
-        loop.step(0.0)
+        loop.poll(0.0)
     assert core.taken == [(BlockKind.LOST, b"skin\nthe port is gone")]
     assert not attempts
     core.phase = Phase.LATCHED
     for _ in range(3):
-        loop.step(0.0)
+        loop.poll(0.0)
     (attempt,) = attempts
     assert attempt.source is source
     assert len(core.taken) == 1
     source.open()
     attempt.done = attempt.opened = True
-    loop.step(0.0)
-    loop.step(0.0)
+    loop.poll(0.0)
+    loop.poll(0.0)
     assert core.taken[1:3] == [(BlockKind.REOPENED, b"skin"), (BlockKind.SKIN, b"frame")]
     source.close()
-    loop.step(0.0)
-    loop.step(0.0)
+    loop.poll(0.0)
+    loop.poll(0.0)
     attempts[1].done = True
-    loop.step(0.0)
-    loop.step(0.0)
+    loop.poll(0.0)
+    loop.poll(0.0)
     lost = b"skin\nthe port is gone and could not be opened again: start the guard anew"
     assert core.taken[-1] == (BlockKind.LOST, lost)
     assert len(attempts) == 2
@@ -222,8 +221,8 @@ def test_a_loop_that_ends_stops_the_attempts(session):
     ports = GuardPorts(session, _Pulled(), reopen=lambda gone: attempts.append(_Attempt(gone)) or attempts[-1])
     loop = GuardLoop(core, ports)
     loop._open()
-    loop.step(0.0)
-    loop.step(0.0)
+    loop.poll(0.0)
+    loop.poll(0.0)
     loop._close()
     assert attempts[0].stopped
 
@@ -247,18 +246,18 @@ def test_a_real_port_that_comes_back_is_read_again(session, tmp_path: Path):
         loop = GuardLoop(core, GuardPorts(session, port, reopen=reopen))
         loop._open()
         os.write(ends[0], b"before")
-        loop.step(2.0)
+        loop.poll(2.0)
         link.unlink()
         for end in ends:
             os.close(end)
-        loop.step(2.0)
+        loop.poll(2.0)
         ends = list(open_raw_terminal())
         link.symlink_to(ends.pop())
-        loop.step(0.0)
+        loop.poll(0.0)
         reopenings[0]._thread.join(10.0)
-        loop.step(0.0)
+        loop.poll(0.0)
         os.write(ends[0], b"after")
-        loop.step(2.0)
+        loop.poll(2.0)
         loop._close()
     for end in ends:
         os.close(end)

@@ -21,7 +21,7 @@ def follow(drift, limits, seed, seconds=SECONDS):
         measured = number * PERIOD
         free = max(free, measured + WAY + draw.expovariate(1.0 / 2e-3))  # frames do not overtake one another
         clock = int(measured * (1.0 + drift) * 1e6) & 0xFFFFFFFF
-        fault = timing.advance(number & 0xFFFF, clock, free)
+        fault = timing.feed(number & 0xFFFF, clock, free)
         timing.seen_valid(free)
         if fault is not None:
             faults.append(fault)

@@ -10,8 +10,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import TouchBegan
 from coneskin.skin.detection.frame.faults import Fault
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
-from coneskin.skin.detection.untouched.guides import UntouchedGuides
+from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedGuides
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, measure
 from coneskin.skin.virtual.field_contacts import FieldContacts

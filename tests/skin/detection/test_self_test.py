@@ -10,8 +10,8 @@ from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault, TouchBegan
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.untouched import UntouchedCurrents
 from coneskin.skin.detection.self_test import FrameSelfTest
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
@@ -104,6 +104,6 @@ def test_a_contact_that_moves_or_grows_between_the_phases_is_none(contacts, spee
             name: v * (ampere if name.endswith("current") else volt)
             for name, v in measure(sensor, phases)._asdict().items()
         }
-        matrix = inversion.take(Frame(2, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]]))
+        matrix = inversion.invert(Frame(2, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]]))
         assert matrix is not None
         assert tested.deviation(matrix) < 0.3

@@ -14,7 +14,7 @@ def started(count: int = 100, sequence: int = 0, clock_us: int = 0) -> FrameTimi
     """Timing after a run of perfect frames, 1 ms apart."""
     timing = FrameTiming(TimingLimits())
     for k in range(count):
-        fault = timing.advance((sequence + k) & 0xFFFF, (clock_us + 1000 * k) & 0xFFFFFFFF, k * 1e-3)
+        fault = timing.feed((sequence + k) & 0xFFFF, (clock_us + 1000 * k) & 0xFFFFFFFF, k * 1e-3)
         assert fault is None
     return timing
 
@@ -30,23 +30,23 @@ def test_both_counters_wrap_without_a_fault():
 @pytest.mark.parametrize("back", [0, 1, 5, 99])
 def test_a_frame_from_the_past_is_replayed(back):
     timing = started()
-    assert timing.advance(99 - back, (99 - back) * 1000, 0.1) is Fault.REPLAYED
+    assert timing.feed(99 - back, (99 - back) * 1000, 0.1) is Fault.REPLAYED
     assert timing.old == 1
-    assert timing.advance(100, 100_000, 0.1) is None  # the true next one is welcome
+    assert timing.feed(100, 100_000, 0.1) is None  # the true next one is welcome
 
 
 @pytest.mark.parametrize(("sequence", "clock"), [(99, 100_000), (100, 99_000), (100, 98_000)])
 def test_sequence_and_clock_must_both_be_news(sequence, clock):
-    assert started().advance(sequence, clock, 0.1) is Fault.REPLAYED
+    assert started().feed(sequence, clock, 0.1) is Fault.REPLAYED
 
 
 def test_a_few_missing_frames_are_counted_and_more_are_a_fault():
     timing = started()
-    assert timing.advance(102, 102_000, 0.102) is None
+    assert timing.feed(102, 102_000, 0.102) is None
     assert timing.missing == 2
-    assert timing.advance(104, 104_000, 0.104) is Fault.GAP  # a third within so short a time
+    assert timing.feed(104, 104_000, 0.104) is Fault.GAP  # a third within so short a time
     assert "3 in all" in timing.detail
-    assert started().advance(103, 103_000, 0.103) is Fault.GAP
+    assert started().feed(103, 103_000, 0.103) is Fault.GAP
 
 
 def test_allowed_losses_drain_from_memory():
@@ -55,7 +55,7 @@ def test_allowed_losses_drain_from_memory():
     for _ in range(20):  # one frame in 101 missing, for long: 1 % is below the 2 % allowed
         sequence += 2
         for _ in range(100):
-            assert timing.advance(sequence & 0xFFFF, sequence * 1000, sequence * 1e-3) is None
+            assert timing.feed(sequence & 0xFFFF, sequence * 1000, sequence * 1e-3) is None
             sequence += 1
         sequence -= 1
     assert timing.missing == 20
@@ -64,14 +64,14 @@ def test_allowed_losses_drain_from_memory():
 @pytest.mark.parametrize("interval_us", [1_000_000, 6000])
 def test_a_clock_that_does_not_go_with_the_sequence(interval_us):
     timing = started()
-    assert timing.advance(100, 99_000 + interval_us, 0.1) is Fault.CLOCK_JUMP
-    assert timing.advance(101, 100_000 + interval_us, 0.101) is None
+    assert timing.feed(100, 99_000 + interval_us, 0.1) is Fault.CLOCK_JUMP
+    assert timing.feed(101, 100_000 + interval_us, 0.101) is None
 
 
 def test_a_backlog_is_late():
     timing = started()
     # the reader stood still and takes 60 frames at once, when the last of them has just been measured
-    verdicts = [timing.advance(k, k * 1000, 0.160) for k in range(101, 161)]
+    verdicts = [timing.feed(k, k * 1000, 0.160) for k in range(101, 161)]
     assert set(verdicts[:9]) == {Fault.LATE}  # measured 51 to 59 ms ago
     assert set(verdicts[10:]) == {None}
     assert timing.lag == pytest.approx(0.0, abs=1e-3)
@@ -86,7 +86,7 @@ def first_fault(
     for k in range(int(seconds / step)):
         time = k * step
         arrival = time * (1.0 + lag_per_second) + 0.002 * rng.random()
-        fault = timing.advance(k & 0xFFFF, int(time * 1e6 * (1.0 + ratio)) & 0xFFFFFFFF, arrival)
+        fault = timing.feed(k & 0xFFFF, int(time * 1e6 * (1.0 + ratio)) & 0xFFFFFFFF, arrival)
         if fault is not None:
             return arrival, fault
     return None
@@ -124,7 +124,7 @@ def test_a_ceramic_resonator_is_followed_where_it_is_declared():
 def test_the_message_tells_what_to_do_about_the_clock():
     timing = FrameTiming(TimingLimits())
     for k in range(1000):
-        if timing.advance(k, k * 2000, k * 1e-3) is Fault.CLOCK_FAST:
+        if timing.feed(k, k * 2000, k * 1e-3) is Fault.CLOCK_FAST:
             break
     assert "clock_drift_ppm = 100" in timing.detail
     assert "5000" in timing.detail
@@ -133,12 +133,12 @@ def test_the_message_tells_what_to_do_about_the_clock():
 def test_a_backlog_that_drains_at_the_start_is_no_fast_clock():
     timing = FrameTiming(TimingLimits())
     for k in range(500):  # 150 frames were waiting when the port was opened
-        assert timing.advance(k, k * 1000, max(k * 1e-3, 0.15)) is None
+        assert timing.feed(k, k * 1000, max(k * 1e-3, 0.15)) is None
 
 
 def test_a_device_that_went_back_for_good_is_followed_again():
     timing = started(1000)
-    verdicts = [timing.advance(k, k * 1000, 1.0 + k * 1e-3) for k in range(100)]
+    verdicts = [timing.feed(k, k * 1000, 1.0 + k * 1e-3) for k in range(100)]
     assert set(verdicts[:32]) == {Fault.REPLAYED}
     assert set(verdicts[32:]) == {None}
 
@@ -146,7 +146,7 @@ def test_a_device_that_went_back_for_good_is_followed_again():
 def test_age_counts_from_the_last_valid_frame():
     timing = FrameTiming(TimingLimits())
     assert timing.age(5.0) == math.inf
-    timing.advance(0, 0, 5.0)
+    timing.feed(0, 0, 5.0)
     assert timing.age(5.0) == math.inf  # a frame came, but nobody said that it was valid
     timing.seen_valid(5.0)
     assert timing.age(5.5) == 0.5

@@ -300,7 +300,7 @@ class CollisionRun:
         assert self._core is not None
         self._note(block)
         out: list[object] = []
-        self._core.take(block, out)
+        self._core.feed(block, out)
         for output in out:
             self._companions.take(output)
             if isinstance(output, GuardEvent):

@@ -22,8 +22,15 @@ from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.reader import RecordedBlocks, read_recording
 from coneskin.core.text import read_json
 from coneskin.core.version import recorded_version, running_version
-from coneskin.robot.guard.signals.journal import INPUTS, SESSION_EVENTS, BlockKind, EventName, GuardEvent, decode_event
-from coneskin.robot.guard.signals.outputs import Output
+from coneskin.robot.guard.signals.journal import (
+    INPUTS,
+    SESSION_EVENTS,
+    BlockKind,
+    EventName,
+    GuardEvent,
+    Output,
+    decode_event,
+)
 from coneskin.scene.values.scene import Commissioning, Scene
 
 from .event_details import EXACT, describe_differences, milliseconds
@@ -320,7 +327,7 @@ def replay(run: Run, scene: Scene | None = None, progress: Callable[[float], Non
         scene = replace(scene, commissioning=run.commissioning)
     core = build_core(run.scene(), run.place_sensors()) if scene is None else build_core(scene)
     outputs: list[Output] = []
-    take = partial(core.take, out=outputs)
+    take = partial(core.feed, out=outputs)
     gap, recorded = run.gap, run.events
     first = last = None
     frames = 0

@@ -104,11 +104,11 @@ def test_a_slider_that_a_stop_has_put_to_0_stays_there_until_the_reset():
     """The newest reading may be from before the stop: it must not look as if the slider were still where it was."""
     reduction, out = SpeedReduction(arm_model("UR5e"), used=True), []
     state = ControllerState(10.0, 1.0, (0.0, -1.5, 1.5, -1.5, -1.5, 0.0), ZERO_VELOCITY, True, False, True)
-    reduction.note(10.0, 1.0)
+    reduction.feed(10.0, 1.0)
     assert reduction.begin(10.0, state, Reaction(kind="slow", slow_to=0.2), MonitoringLimits(), [], out)
     reduction.note_stop((StopPath.SLIDER,))
     reduction.put_back(10.02, out)
-    reduction.note(10.04, 0.0)
+    reduction.feed(10.04, 0.0)
     before, out = out, []
     reduction.release(out)
     assert [one for one in before if isinstance(one, SetSpeedSlider)] == [SetSpeedSlider(0.2)]

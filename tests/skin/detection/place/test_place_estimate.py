@@ -6,8 +6,7 @@ import random
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.frame.contact_matrix import FrameInversion
-from coneskin.skin.detection.place.matrix_noise import FrameNoise
+from coneskin.skin.detection.frame.contact_matrix import FrameInversion, FrameNoise
 from coneskin.skin.detection.place.place_estimate import PlaceEstimator, SheetConductances
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.field.model import FieldModel
@@ -45,7 +44,7 @@ def errors(shape: str, bits: int, radius: float, ka: float, off: float, places: 
             for name, v in inputs.items()
         }
         frame = Frame(2, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]])
-        matrix = inversion.take(frame)
+        matrix = inversion.invert(frame)
         assert matrix is not None
         one = noise.of(matrix, frame, NOISE**2 + 1.0 / 12.0)
         learned = SheetConductances(

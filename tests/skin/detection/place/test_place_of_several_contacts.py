@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
+from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.detection.frame.settings import DetectorSettings
-from coneskin.skin.detection.frame.touch_reading import TouchReading
 from coneskin.skin.detection.place.single_contact import frames_until_certain, weakest_pair_excluded
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.sensor import Sensor

@@ -12,11 +12,10 @@ from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import TouchBegan, TouchMoved
 from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedLeak
 from coneskin.skin.detection.place.place_estimate import PlaceEstimator
 from coneskin.skin.detection.place.single_contact import SingleContactTest
 from coneskin.skin.detection.place.touch_place import TouchPlace
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
-from coneskin.skin.detection.untouched.leak import UntouchedLeak
 from coneskin.skin.electronics import Electronics, Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sheet_functions import RobinFunction
@@ -85,7 +84,7 @@ def test_what_stops_an_arm_waits_for_no_place(monkeypatch, confirm_frames):
 
 
 def test_no_place_is_certain_before_it_is_worked_out(monkeypatch):
-    monkeypatch.setattr(SingleContactTest, "take", lambda *_: "")
+    monkeypatch.setattr(SingleContactTest, "feed", lambda *_: "")
     touch = CountedTouch(monkeypatch, 2)
     touch.feed(press(1e-3))
     (began,) = touch.feed(press(1e-3))
@@ -154,5 +153,5 @@ def test_a_centre_far_off_the_sheet_has_a_finite_velocity():
     good = measured(sensor, [LayerContact(0.1, 1.0, 1e-3)])
     far = dict(zip(COUNTS, (48634, 64561, 1089, 33060, 10132, 7643, 53009, 53330, 48986), strict=False))
     for number, frame in enumerate((good, good, good._replace(**far))):
-        place = places.take(frame, read(sensor, frame), 0.9, 1e-3 * number, 1e-3)
+        place = places.feed(frame, read(sensor, frame), 0.9, 1e-3 * number, 1e-3)
     assert 0.0 < math.hypot(*place.velocity) < math.inf

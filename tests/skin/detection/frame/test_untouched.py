@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
-from coneskin.skin.detection.untouched.leak import LEAK_BLOCK, UntouchedLeak
+from coneskin.skin.detection.frame.untouched import LEAK_BLOCK, UntouchedLeak
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
@@ -33,7 +33,7 @@ def learned(leak: float, blocks: int = 8) -> UntouchedLeak:
 def centre_of(frames: list[Frame]) -> ContactMatrix:
     """The matrix of the mean of some frames."""
     sums = [sum(counts) / len(frames) for counts in zip(*[frame[6:18] for frame in frames], strict=True)]
-    matrix = FrameInversion(FOREARM).take(Frame._make((*frames[-1][:6], *sums, None)))
+    matrix = FrameInversion(FOREARM).invert(Frame._make((*frames[-1][:6], *sums, None)))
     assert matrix is not None
     return matrix
 

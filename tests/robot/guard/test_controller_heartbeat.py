@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.robot.guard.heartbeats.controller_heartbeat import COUNT_PERIOD, ControllerHeartbeat, heartbeat_count
+from coneskin.robot.guard.controller_heartbeat import COUNT_PERIOD, ControllerHeartbeat, heartbeat_count
 from coneskin.robot.ur.heartbeat_registers import decode_echo, program_lines
 from coneskin.robot.ur.rtde_codec import Recipe
 
@@ -12,7 +12,7 @@ def started(at=100.0, echo_age=0.0, required=True):
     heartbeat = ControllerHeartbeat(required)
     heartbeat.sample(at - 0.01, running=False)
     heartbeat.sample(at, running=True)
-    heartbeat.note(heartbeat_count(at - echo_age))
+    heartbeat.feed(heartbeat_count(at - echo_age))
     return heartbeat
 
 

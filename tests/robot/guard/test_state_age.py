@@ -4,15 +4,52 @@ import math
 from collections import deque
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.guard.heartbeats.state_age import StateAge
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.robot.guard.state_age import ControllerClock, StateAge
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from tests.support.guard_rig import GuardRig, touch
+
+CYCLE = 0.002
+
+
+def run(clock, delays, start=1000.0, offset=500.0, rate=1.0):
+    """Feed states of every cycle, each read so much later; what comes of it beside the truth."""
+    results = []
+    for k, delay in enumerate(delays):
+        true = start + rate * CYCLE * k
+        results.append((clock.measured_at(true + delay, start - offset + CYCLE * k), true, true + delay))
+    return results
+
+
+@given(st.lists(st.floats(0.0, 0.1), min_size=1, max_size=200))
+def test_never_before_it_was_measured_never_after_it_was_read(delays):
+    quickest = float("inf")
+    for (measured, true, read), delay in zip(run(ControllerClock(), delays), delays, strict=True):
+        quickest = min(quickest, delay)
+        # 1e-9: differences of numbers near 1000 s, which have 1e-13 each
+        assert true - 1e-9 <= measured <= read
+        assert abs(measured - true - quickest) < 1e-9  # off by the quickest reading so far, no more
+
+
+def test_drift_of_100_ppm_does_not_pile_up():
+    results = run(ControllerClock(), [0.0002 if k % 7 else 0.0001 for k in range(60_000)], rate=1.0 + 1e-4)
+    worst = max(abs(measured - true) for measured, true, _ in results)
+    assert worst < 2 * 5.0 * 1e-4 + 0.0003  # two windows of 5 s at 100 ppm, and the delay itself
+
+
+def test_a_controller_that_starts_anew():
+    clock = ControllerClock()
+    run(clock, [0.0001] * 10)
+    assert clock.measured_at(2000.0, 0.002) == 2000.0  # nothing is known of its clock yet
+    assert abs(clock.measured_at(2000.010, 0.004) - 2000.002) < 1e-9
+
 
 PATIENT = MonitoringLimits(arm_silence=0.25)  # as a scene of a busy computer has it
 STANDING = (0.0,) * 6, (0.0,) * 6, True, False, True
@@ -114,7 +151,7 @@ def test_neither_drift_nor_a_busy_reader_is_a_lag(period, drift):
         measured = k * period
         held = measured % 0.1 < 0.03  # the reader takes up to 30 ms of them at once, ten times a second
         read = measured - measured % 0.1 + 0.03 if held else measured
-        age.note(ControllerState(read, 100.0 + (1.0 - drift) * measured, *STANDING))
+        age.feed(ControllerState(read, 100.0 + (1.0 - drift) * measured, *STANDING))
         seen += [age.trouble(read), age.stale(read)]
     assert set(seen) == {""}
 
@@ -122,5 +159,5 @@ def test_neither_drift_nor_a_busy_reader_is_a_lag(period, drift):
 def test_a_simulator_that_falls_behind_is_a_lag_that_says_so():
     age = StateAge(0.05)
     for k in range(4000):
-        age.note(ControllerState(0.002 * k, 0.98 * 0.002 * k, *STANDING))
+        age.feed(ControllerState(0.002 * k, 0.98 * 0.002 * k, *STANDING))
     assert "does not keep up with its clock" in age.trouble(8.0)

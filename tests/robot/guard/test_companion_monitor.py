@@ -6,7 +6,7 @@ import pytest
 
 from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.guard.heartbeats.heartbeat_monitor import HeartbeatMonitor
+from coneskin.robot.guard.companion_monitor import HeartbeatMonitor
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact
 from coneskin.robot.reaction.rules import Rule
@@ -60,13 +60,13 @@ def test_a_frozen_process_is_a_fault_although_nobody_needs_it_and_another_path_s
 
 def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
     monitor = HeartbeatMonitor({"it": 0.15})
-    monitor.note("it", 1.0)
+    monitor.feed("it", 1.0)
     assert monitor.silent(1.0) == {}
     assert monitor.silent(1.5) == {}  # its heartbeats wait to be read
     for step in range(1, 150):
         assert monitor.silent(1.5 + 0.001 * step) == {}
     assert "no heartbeat for 150 ms" in monitor.silent(1.652)["it"]
-    monitor.note("it", 1.653)
+    monitor.feed("it", 1.653)
     assert monitor.silent(1.653) == {}
     monitor.forget("it")
     assert monitor.silent(1.66) == {}
@@ -75,14 +75,14 @@ def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
 def test_a_guard_that_is_held_up_again_and_again_notices_silence():
     """Held up for 30 ms after each 3 ms it took 1.3 s, and a frozen program's arm moved on by 64 deg."""
     monitor = HeartbeatMonitor({"it": 0.15})
-    monitor.note("it", 0.0)
+    monitor.feed("it", 0.0)
     now = 0.0
     while not monitor.silent(now):
         now += 0.03
         if not monitor.silent(now):
             now += 0.003
     assert 0.15 < now < 0.15 + 0.03 + 0.034
-    monitor.note("it", now)
+    monitor.feed("it", now)
     assert not monitor.silent(now)
 
 

@@ -34,7 +34,7 @@ class ControllerHeartbeat:
         self._began: float | None = None  # when the program that runs was first seen; None where it ran before
         self._reported = False
 
-    def note(self, count: int) -> None:
+    def feed(self, count: int) -> None:
         """Take the count that the newest program with the heartbeat found at its start."""
         self._echo = count
 

@@ -1,0 +1,391 @@
+"""Untouched sensor: what is learned of it over quiet frames, as the zero of what a touch adds.
+
+The design's currents will not do: a sheet resistance that is 2 % off would hide what distinguishes two contacts from
+one. Both currents are kept over the supply, which cancels its drift.
+
+A dead touch phase reads 0 for ever, and so does an untouched sensor. But nothing joins the layers then, so no guide may
+have a potential, and the guides of a phase cannot differ. A leak that grows slowly is learned. What comes suddenly is a
+contact, and without a rise of the level it is one that the touch phase does not see.
+
+Damp joins the layers everywhere a little. To the electrodes that leak is a contact matrix as any contact is, and the
+matrices of weak contacts add. So a touch is what is left of the whole. This is for the place alone: no threshold is
+compared with what is left, so that no press is lost by it, however slowly it comes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.wire import Frame
+
+from .contact_matrix import ContactMatrix, FrameInversion
+from .faults import Fault
+from .settings import DetectorSettings
+
+__all__ = ["GUIDE_JUMP", "UntouchedCurrents", "UntouchedGuides", "UntouchedLeak", "UntouchedLevel"]
+
+CURRENT_BLOCK = 32  # frames that are averaged at once; noise that lasts as long, as mains hum does, shows in the means
+_CURRENT_MEMORY = 64  # blocks that the mean remembers
+_FREE_BLOCKS = 8  # blocks in which it is found; from then on its drift is bounded
+_PRIOR_BLOCKS = 16  # blocks that the noise taken from the start counts for
+_PRIOR_NOISE = 0.7  # counts; standard deviation that is assumed at the start
+_ROUNDING_VARIANCE = 1.0 / 12.0  # counts^2; variance of rounding alone
+_CURRENT_JUMP = 0.01  # ratio; an untouched current that is off by this has changed
+_JUMP_DEVIATIONS = 8.0
+_THRESHOLD_DEVIATIONS = 7.0  # standard deviations between a threshold and what noise reaches: once in 1e11 frames
+_MAX_GUIDE_THRESHOLD = 0.03  # part of the supply; the least threshold, on a guide, is raised by noise no further
+
+
+class UntouchedCurrents:
+    """The two drive currents of an untouched sensor.
+
+    Args:
+        sensor: the sensor.
+        drift: fastest change that is followed once they are known, as a ratio of the current [1/s].
+
+    Attributes:
+        radial: drive current of the radial phase over the supply [counts over counts].
+        angular: drive current of the angular phase over the supply.
+        frames: frames that the means stand for; 0 before the first block: nothing is known.
+        noise: standard deviation of a reading, rounding included [counts].
+        variance: of (angular - aspect^2 radial) from frame to frame, as the means of blocks show it.
+        bias: largest error of the same quantity that averaging cannot remove: rounding where there is no noise.
+        aspect: length of the sheet over its breadth, in the rectangle of the field.
+    """
+
+    def __init__(self, sensor: Sensor, drift: float) -> None:
+        self.aspect = sensor.radial_ohms / sensor.upper_sheet_ohms
+        self._weight = self.aspect * self.aspect
+        self._drift = drift
+        parts = sensor.electronics
+        supply = parts.supply_volts / parts.adc_volts * parts.full_count
+        self.variance = (_PRIOR_NOISE * _PRIOR_NOISE + _ROUNDING_VARIANCE) * (1.0 + self._weight**2) / supply**2
+        self.noise = math.sqrt(_PRIOR_NOISE * _PRIOR_NOISE + _ROUNDING_VARIANCE)
+        limits, bounds = sensor.thresholds, sensor.bounds
+        current = min(bounds.radial_low, bounds.angular_low) * (1.0 / limits.current_low - 1.0)
+        guide = min(_MAX_GUIDE_THRESHOLD, math.sqrt(2.0) * (limits.touch_level - limits.release_level)) * supply
+        self._noisiest = min(guide, current) / _THRESHOLD_DEVIATIONS  # counts
+        self.bias = 0.0
+        self.radial = self.angular = self._last = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Learn the currents anew; the noise stays known."""
+        self._blocks = self._count = self.frames = 0
+        self._sum1 = self._sum2 = 0.0
+
+    def skip(self) -> None:
+        """Forget the block that was under way: the sensor is not quiet any more."""
+        self._count = 0
+        self._sum1 = self._sum2 = 0.0
+
+    def feed(self, frame: Frame, period: float) -> tuple[Fault, str] | None:
+        """Take the currents of a quiet frame.
+
+        Args:
+            frame: the frame.
+            period: time from frame to frame [s].
+
+        Returns:
+            a fault, where a current has changed suddenly, or where there is more noise than thresholds bear; and what.
+        """
+        self._sum1 += frame.radial_current / frame.radial_supply
+        self._sum2 += frame.angular_current / frame.angular_supply
+        self._count += 1
+        return None if self._count < CURRENT_BLOCK else self._close(frame.touch_supply, period)
+
+    def learn(
+        self, radial: Sequence[float], angular: Sequence[float], supplies: Sequence[int], periods: Sequence[float]
+    ) -> int:
+        """Take quiet frames in a row as ``feed`` does; return how many, up to the first that shows a change.
+
+        Args:
+            radial: currents of the radial phase over the supply.
+            angular: the same of the angular phase.
+            supplies: in the touch phase [counts].
+            periods: time from frame to frame [s].
+        """
+        at, end = 0, len(periods)
+        while at < end:
+            stop = min(at + CURRENT_BLOCK - self._count, end)
+            sum1, sum2 = self._sum1, self._sum2
+            for value in radial[at:stop]:
+                sum1 += value
+            for value in angular[at:stop]:
+                sum2 += value
+            self._sum1, self._sum2 = sum1, sum2
+            self._count += stop - at
+            at = stop
+            if self._count == CURRENT_BLOCK and self._close(supplies[at - 1], periods[at - 1]):
+                return at - 1
+        return at
+
+    def _close(self, supply: int, period: float) -> tuple[Fault, str] | None:
+        mean1, mean2 = self._sum1 / CURRENT_BLOCK, self._sum2 / CURRENT_BLOCK
+        self.skip()
+        mixed = mean2 - self._weight * mean1
+        if not self._blocks:
+            self.radial, self.angular, self._last = mean1, mean2, mixed
+        limit = _JUMP_DEVIATIONS * math.sqrt(self.variance / CURRENT_BLOCK)
+        step1, step2 = mean1 - self.radial, mean2 - self.angular
+        if abs(step1) > max(_CURRENT_JUMP * self.radial, limit) or abs(step2) > max(
+            _CURRENT_JUMP * self.angular, limit
+        ):
+            steps = f"radial {100.0 * step1 / self.radial:+.2f} %, angular {100.0 * step2 / self.angular:+.2f} %"
+            return Fault.CURRENT_CHANGED, steps
+        self._learn_noise(mixed - self._last, supply)
+        self._last = mixed
+        self._blocks = min(self._blocks + 1, _CURRENT_MEMORY)
+        self.frames = self._blocks * CURRENT_BLOCK
+        most = self._drift * CURRENT_BLOCK * period if self._blocks > _FREE_BLOCKS else math.inf
+        self.radial += bounded(step1 / self._blocks, most * self.radial)
+        self.angular += bounded(step2 / self._blocks, most * self.angular)
+        if self.noise > self._noisiest:
+            return Fault.NOISE, f"{self.noise:.1f} counts, at most {self._noisiest:.1f}"
+        return None
+
+    def _learn_noise(self, change: float, supply: int) -> None:
+        scale = (1.0 + self._weight * self._weight) / (supply * supply)  # from counts^2
+        seen = 0.5 * CURRENT_BLOCK * change * change if self._blocks else self.variance
+        self.variance += (seen - self.variance) / (_PRIOR_BLOCKS + self._blocks)
+        self.variance = max(self.variance, _ROUNDING_VARIANCE * scale)
+        self.noise = math.sqrt(self.variance / scale)
+        noise = max(0.0, self.variance / scale - _ROUNDING_VARIANCE)
+        # The mean of a rounded value whose noise is Gaussian is off by at most this [counts]; here of two means.
+        self.bias = 2.0 / math.pi * math.exp(-2.0 * math.pi * math.pi * noise) * math.sqrt(scale)
+
+
+def bounded(step: float, most: float) -> float:
+    """Return a step, or the largest that is allowed in its direction."""
+    return most if step > most else -most if step < -most else step
+
+
+GUIDE_JUMP = 0.01  #: part of the supply; a sudden potential of a guide, or a difference of two, that nothing explains
+_MAX_JUMP = 0.03  # part of the supply; what noise raises that to at most
+_GUIDE_DEVIATIONS = 7.0  # standard deviations of noise that are no potential
+_MAX_GUIDE_GROWTH = 0.1  # parts of the supply a second; the fastest growth that is learned, a leak's
+_LEVEL_COUNTS = 1.5  # counts; a change of the level by this explains what the guides show
+
+
+class UntouchedGuides:
+    """The potentials that the guides of an untouched sensor have by a leak between the layers.
+
+    Args:
+        currents: of the untouched sensor, with the noise that was learned.
+    """
+
+    def __init__(self, currents: UntouchedCurrents) -> None:
+        self._currents = currents
+        self._radial = self._angular = self._level = 0.0
+        self._known = False
+
+    def contradict(self, frame: Frame, level: float, period: float) -> bool:
+        """Tell whether the guides show a contact that the level does not.
+
+        Args:
+            frame: one whose level is below the release threshold.
+            level: its level.
+            period: time from frame to frame [s].
+        """
+        supply = frame.touch_supply
+        radial = 0.5 * (frame.radial_c + frame.radial_d) / frame.radial_supply
+        angular = 0.5 * (frame.angular_a + frame.angular_b) / frame.angular_supply
+        if not self._known:
+            self._radial, self._angular, self._level, self._known = radial, angular, level, True
+        step1, step2 = radial - self._radial, angular - self._angular
+        split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
+        differ = GUIDE_JUMP * supply
+        if (
+            step1 > GUIDE_JUMP
+            or step2 > GUIDE_JUMP
+            or not (-differ <= split1 <= differ and -differ <= split2 <= differ)
+        ):
+            return (level - self._level) * supply < _LEVEL_COUNTS and self._exceed_noise(
+                step1, step2, split1 / supply, split2 / supply, supply
+            )
+        most = _MAX_GUIDE_GROWTH * period
+        self._radial += bounded(step1, most)
+        self._angular += bounded(step2, most)
+        self._level += bounded(0.1 * (level - self._level), most)  # a step of the noise is not followed
+        return False
+
+    def learn(
+        self, radial: Sequence[float], angular: Sequence[float], levels: Sequence[float], periods: Sequence[float]
+    ) -> int:
+        """Take frames in a row as ``contradict`` does; return how many, up to the first that may contradict.
+
+        Args:
+            radial: mean potential of the guides in the radial phase over the supply; those of a pair do not differ.
+            angular: the same in the angular phase.
+            levels: of the frames.
+            periods: time from frame to frame [s].
+        """
+        if not self._known:
+            return 0
+        count, mine, others, known = 0, self._radial, self._angular, self._level
+        for count, (one, other, level, period) in enumerate(zip(radial, angular, levels, periods, strict=True), 1):
+            step1, step2 = one - mine, other - others
+            if step1 > GUIDE_JUMP or step2 > GUIDE_JUMP:
+                count -= 1
+                break
+            most = _MAX_GUIDE_GROWTH * period
+            mine += most if step1 > most else -most if step1 < -most else step1
+            others += most if step2 > most else -most if step2 < -most else step2
+            step = 0.1 * (level - known)
+            known += most if step > most else -most if step < -most else step
+        self._radial, self._angular, self._level = mine, others, known
+        return count
+
+    def _exceed_noise(self, step1: float, step2: float, split1: float, split2: float, supply: int) -> bool:
+        """Tell whether steps, or differences, are more than noise leaves in as many readings."""
+        noise = _GUIDE_DEVIATIONS * self._currents.noise / supply
+        step, split = (
+            min(max(0.7 * noise, GUIDE_JUMP), _MAX_JUMP),
+            min(max(1.4 * noise, GUIDE_JUMP), _MAX_JUMP),
+        )
+        return step1 > step or step2 > step or abs(split1) > split or abs(split2) > split
+
+
+LEAK_BLOCK = 32  # frames that are averaged before they are inverted
+_LEAK_MEMORY = 16  # blocks that the mean remembers
+_MIN_LEAK_LEVEL = 1e-3  # a leak that shows less does nothing to a touch: 5 Mohm with 10 kohm pull-downs
+_MIN_LEAK = 1e-7  # S; 10 Mohm are what the converter's own inputs are
+_MAX_LEAK_SHARE = 0.5  # of the whole conductance; where the leak is more, a touch is too weak for a place
+
+
+class UntouchedLeak:
+    """The leak of one sensor.
+
+    Args:
+        sensor: the sensor.
+        largest: conductance that is learned at most [S]; what is more is not a leak.
+
+    Attributes:
+        conductance: of the leak [S]; 0 where there is none.
+        x: its electrical centre, as in ContactMatrix.
+        y: the same around.
+    """
+
+    def __init__(self, sensor: Sensor, largest: float) -> None:
+        self._inversion = FrameInversion(sensor)
+        self._largest = largest
+        self._frames: list[Frame] = []
+        self._blocks = 0
+        self.conductance = self.x = self.y = 0.0
+
+    def skip(self) -> None:
+        """Forget the block that was under way: the sensor is not quiet any more."""
+        if self._frames:
+            self._frames.clear()
+
+    def wants(self, highest: float) -> bool:
+        """Tell whether anything is learned from quiet frames with at most this level."""
+        return highest >= _MIN_LEAK_LEVEL or bool(self.conductance)
+
+    def feed(self, frame: Frame, level: float) -> None:
+        """Take a quiet frame and its level."""
+        if level < _MIN_LEAK_LEVEL and not self.conductance:
+            return  # a dry sensor, and nothing to learn
+        self._frames.append(frame)
+        if len(self._frames) >= LEAK_BLOCK:
+            self._close()
+
+    def _close(self) -> None:
+        sums = [sum(counts) / LEAK_BLOCK for counts in zip(*[frame[6:18] for frame in self._frames], strict=True)]
+        mean = Frame._make((*self._frames[-1][:6], *sums, None))
+        self._frames.clear()
+        matrix = self._inversion.invert(mean)
+        self._blocks = min(self._blocks + 1, _LEAK_MEMORY)
+        share = 1.0 / self._blocks
+        if matrix is None or matrix.conductance < _MIN_LEAK:
+            self.conductance -= share * self.conductance
+            return
+        known, seen = (1.0 - share) * self.conductance, share * min(matrix.conductance, self._largest)
+        total = known + seen
+        self.x, self.y = (known * self.x + seen * matrix.x) / total, (known * self.y + seen * matrix.y) / total
+        self.conductance = total
+
+    def take_off(self, matrix: ContactMatrix) -> ContactMatrix:
+        """Return the contact matrix of the touch alone.
+
+        The learned untouched currents contain the leak's own part of ``along`` and ``around``; what is taken off here
+        is the part of the distance between leak and touch.
+        """
+        leak, whole = self.conductance, matrix.conductance
+        if leak < _MIN_LEAK or leak > _MAX_LEAK_SHARE * whole:
+            return matrix
+        touch = whole - leak
+        off_x, off_y = matrix.x - self.x, matrix.y - self.y
+        ratio = leak / touch
+        pull = ratio * whole  # G_c G_l/G (X_c - X_l)^2, with X_c - X_l = (X - X_l) G/G_c
+        return matrix._replace(
+            conductance=touch,
+            x=matrix.x + ratio * off_x,
+            y=matrix.y + ratio * off_y,
+            along=matrix.along - pull * off_x * off_x,
+            cross=matrix.cross - pull * off_x * off_y,
+            around=matrix.around - pull * off_y * off_y,
+        )
+
+
+class UntouchedLevel:
+    """The level that a sensor has while nothing touches it.
+
+    Args:
+        settings: how fast it may drift, and how far.
+        release: level below which nothing touches the sensor.
+
+    Attributes:
+        value: what is taken off each level.
+    """
+
+    def __init__(self, settings: DetectorSettings, release: float) -> None:
+        self._rate, self._limit, self._settle_frames = settings.drift_rate, settings.drift_limit, settings.settle_frames
+        self._release = release
+        self.value = 0.0
+        self._drifted = 0
+
+    def exhausted(self, whole: float) -> bool:
+        """Tell whether a frame's whole level rests above the threshold though all was taken off that may be.
+
+        A touch passes this range; a growing leak rests in it.
+        """
+        if abs(self.value) >= self._limit and whole > self._release:
+            self._drifted += 1
+            return self._drifted >= self._settle_frames
+        self._drifted = 0
+        return False
+
+    def update(self, level: float, period: float) -> None:
+        """Follow the drift.
+
+        Args:
+            level: of a frame in which nothing shows, less ``value``.
+            period: time from frame to frame [s].
+        """
+        most = self._rate * period
+        self.value += most if level > most else -most if level < -most else level
+        if not -self._limit <= self.value <= self._limit:
+            self.value = math.copysign(self._limit, self.value)
+
+    def learn(self, levels: Sequence[float], periods: Sequence[float]) -> int:
+        """Follow the drift through frames in a row; return in how many of them that is all that happens.
+
+        Args:
+            levels: whole levels.
+            periods: times from frame to frame [s].
+        """
+        value, release, limit, rate, count = self.value, self._release, self._limit, self._rate, 0
+        for count, (whole, period) in enumerate(zip(levels, periods, strict=False), 1):
+            level = whole - value
+            if level >= release:
+                count -= 1
+                break
+            most = rate * period
+            value += most if level > most else -most if level < -most else level
+            if not -limit <= value <= limit:
+                value = math.copysign(limit, value)
+        self.value, self._drifted = value, 0
+        return count
