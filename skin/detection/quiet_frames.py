@@ -155,6 +155,7 @@ def learn_quiet_frames(parts: tuple[Any, ...], frames: QuietFrames, begin: int, 
         final: False: only tell what would be returned.
     """
     timing, guides, currents, level, stuck, leak = parts
+    taken: int
     before = [dict(vars(part)) for part in parts[:-1]]  # the leak is learned last, when nothing has to be restored
     part = slice(begin, end)
     levels = frames.levels[part]

@@ -9,7 +9,7 @@ from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import TouchEvent, TouchMoved
-from coneskin.skin.detection.frame.touch_reading import TouchReading
+from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import ContactLaw, Foam, Imperfections
