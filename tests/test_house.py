@@ -88,8 +88,8 @@ HOT = {
     "skin/detection/place": "touch_place place_estimate single_contact seam_contact",
     "robot/arm": "kinematics compiled_kinematics damped_least_squares joint_limits",
     "robot/reaction": "retreat types",
-    "robot/guard": "core skin_contacts arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
-    "port_losses state_age signals/journal",
+    "robot/guard": "core arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop state_age "
+    "signals/contact signals/journal",
     "robot/guard/motion": "motion_away reaction_motion",
     "robot/stop": "stop_monitor",
     "robot/ur": "driver_process state_reader control_program ur_rtde",
