@@ -6,8 +6,7 @@ from coneskin.cli import main
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
 from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.recorder import Recorder
-from coneskin.robot.guard.overflow import RecordingOverflowFilter
-from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.robot.guard.signals.journal import BlockKind, RecordingOverflowFilter
 from coneskin.runs.replay.run import Verdict, read_run, replay
 
 from ..scene.scenes import record

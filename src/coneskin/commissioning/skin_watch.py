@@ -24,7 +24,7 @@ from .touching import REQUESTS, Notice, Touching, TouchJudge
 if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.session.skin_client import SkinClient
-    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["SkinWatch", "TouchSession", "check_touchable", "start_skin"]

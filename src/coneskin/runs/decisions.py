@@ -15,8 +15,15 @@ from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import Release, SetJointVelocity, decode_command
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
 from coneskin.robot.driver.stop_path import UseStopPath
-from coneskin.robot.guard.signals.journal import INPUTS, SESSION_EVENTS, BlockKind, EventName, GuardEvent
-from coneskin.robot.guard.signals.outputs import Command, Output
+from coneskin.robot.guard.signals.journal import (
+    INPUTS,
+    SESSION_EVENTS,
+    BlockKind,
+    Command,
+    EventName,
+    GuardEvent,
+    Output,
+)
 
 from .progress import Progress, silent, watch
 from .replay.event_details import Tolerances
@@ -282,7 +289,7 @@ def decide_again(
     for block in watch(run, run.select(kinds=INPUTS), progress):
         if block.time < gap:
             sink.now = block.time
-            core.take(block, sink)
+            core.feed(block, sink)
     label = label or ", ".join(f"{name} = {value}" for name, value in (settings or {}).items()) or "replayed"
     return replace(_decisions(run, label, tuple(sink.events), tuple(sink.commands)), other_code=run.other_code())
 

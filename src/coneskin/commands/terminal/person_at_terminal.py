@@ -13,7 +13,7 @@ from .typed_lines import typed_lines
 
 if TYPE_CHECKING:
     from coneskin.commissioning.touching import Notice
-    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.detection.frame.reading import TouchReading
 
 __all__ = ["LiveReading", "Person"]
 

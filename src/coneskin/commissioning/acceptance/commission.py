@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from coneskin.commissioning.touching import Notice
-    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.detection.frame.reading import TouchReading
 
 __all__ = ["Commissioner", "commission_virtual_skin", "prepare"]
 

@@ -15,7 +15,7 @@ from coneskin.scene.commissioning_record import MarkResult
 from .marks import plan_marks
 
 if TYPE_CHECKING:
-    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["Procedure", "SensorMarks"]

@@ -24,7 +24,7 @@ from .touch_sequence import SensorTouches, TouchSequence
 if TYPE_CHECKING:
     from coneskin.commissioning.touching import Mark, Notice
     from coneskin.scene.values.scene import Scene
-    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["CalibrationResult", "Calibrator"]

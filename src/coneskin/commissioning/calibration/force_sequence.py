@@ -12,7 +12,7 @@ from coneskin.commissioning.touching import Held, Mark, Notice, TouchJudge
 from .force_fit import KnownPress
 
 if TYPE_CHECKING:
-    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["ForceSequence", "SensorPresses"]

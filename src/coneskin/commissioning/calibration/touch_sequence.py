@@ -18,7 +18,7 @@ from .fit import agreeing
 from .refusals import LEAST_TOUCHES, KnownTouch
 
 if TYPE_CHECKING:
-    from coneskin.skin.detection.frame.touch_reading import TouchReading
+    from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["SensorTouches", "TouchSequence"]

@@ -18,8 +18,8 @@ from coneskin.core.finding import Finding, Verdict
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.frame.settings import DetectorSettings
+from coneskin.skin.detection.frame.untouched import UntouchedCurrents
 from coneskin.skin.detection.self_test import FrameSelfTest
-from coneskin.skin.detection.untouched.currents import UntouchedCurrents
 from coneskin.skin.wire import Frame, FrameDecoder
 
 from .wire_examination import touch_words
