@@ -11,7 +11,7 @@ from coneskin.commissioning.misreadings import WRONG, Place, misread
 from coneskin.commissioning.touching import Notice, Touching
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
-from coneskin.skin.detection.frame.touch_reading import TouchReading
+from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.testing.scenes import START, forearm_scene
 
 STEP = 0.01  # s

@@ -13,7 +13,7 @@ from coneskin.core.errors import SceneError, SensorError, SkinError
 from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.calibration import ForceTable
-from coneskin.skin.detection.frame.touch_reading import TouchReading
+from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.testing.scenes import forearm_scene
 
 FORCES = (1.0, 2.0, 5.0, 10.0)
