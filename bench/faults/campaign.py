@@ -3,7 +3,7 @@
     python -m bench faults [--times 100] [--kinds guard,skin] [--control internal] [--parallel 1] [--keep FILE] [--json]
 
 A simulated arm moves under guard, by its own program (control = "internal") or by a raw one (control = "external").
-At a random time something fails, or two at once (bench/faults/kinds.py). The budget is the time in which the fault
+At a random time something fails, or two at once (bench/faults/kinds_*.py). The budget is the time in which the fault
 must be noticed, v / a and four times escalate_ms (docs/safety.md), and --slack for a machine that is busy with other
 things. Time runs until the log of the simulated controller says that the arm stands. A trial fails where the arm
 
@@ -32,11 +32,25 @@ from dataclasses import asdict
 from pathlib import Path
 
 from .kind import FaultKind
-from .kinds import KINDS
+from .kinds_peer import CONTROLLER_KINDS, DRIVER_KINDS, NETWORK_KINDS, SKIN_KINDS
+from .kinds_process import PROCESS_KINDS, PROGRAM_KINDS
+from .kinds_reaction import CONTACT_KINDS, REACTION_KINDS
 from .setup import CLOCK, Outcome
 from .table import show, show_head, summary
 from .trial import EXTERNAL_CONTROL
 from .verdict import run_trial
+
+#: in the order in which they are tried
+KINDS: tuple[FaultKind, ...] = (
+    *SKIN_KINDS,
+    *CONTROLLER_KINDS,
+    *NETWORK_KINDS,
+    *PROCESS_KINDS,
+    *PROGRAM_KINDS,
+    *CONTACT_KINDS,
+    *REACTION_KINDS,
+    *DRIVER_KINDS,
+)
 
 
 def chosen(args: argparse.Namespace) -> list[tuple[FaultKind, str]]:

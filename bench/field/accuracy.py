@@ -13,7 +13,6 @@ peer installed the rest is still printed.
 
 from __future__ import annotations
 
-# isort: split
 import argparse
 import json
 import statistics
@@ -29,13 +28,85 @@ from typing import Any
 import numpy as np
 
 from bench.report import head
-from tests.support.field.port_solution import port_solution
+from coneskin.skin.field.fourport import Readings, angular_phase, radial_phase
+from coneskin.skin.field.patch import solve_patch
+from tests.support.field.port_solution import PortSolution, port_solution
 from tests.support.field.problems import Problem
 from tests.support.field.reference import Reference, load_references, provenance
-from tests.support.field.solution import solve_discs, solve_general
+from tests.support.field.solution import contact_patch, disc_arrays, field_model, solve_discs, solve_general
 
-from . import ours as field_ours
 from .tables import Run, draw, print_agreement, print_table, print_work, show_time
+
+PHASES = (radial_phase(), angular_phase())
+
+
+class Single:
+    """One disc at a time, both phases: what a user's loop pays for each. `order` None: the solver's choice."""
+
+    def __init__(self, problem: Problem, order: int | None, tolerance: float = 1e-12) -> None:
+        self.sensor, self.order, self.count = field_model(problem, tolerance), order, 1
+        self.contact: tuple[Any, ...] = tuple(float(row[0, 0]) for row in disc_arrays(problem))
+
+    def __call__(self) -> list[Readings]:
+        u, phi, radius, conductance = self.contact
+        coupling = self.sensor.contacts(u, phi, radius, conductance, order=self.order)
+        return [self.sensor.read(coupling, phase) for phase in PHASES]
+
+
+class Batch(Single):
+    """Many different discs in one call, the problem's own the first of them.
+
+    The others lie within a twentieth of a radius of it, where the same order leaves the same error.
+    """
+
+    def __init__(self, problem: Problem, order: int | None, tolerance: float = 1e-12, count: int = 2000) -> None:
+        super().__init__(problem, order, tolerance)
+        u, phi, radius, conductance = self.contact
+        draw = np.random.default_rng(1)
+        us, phis = np.full(count, u), np.full(count, phi)
+        us[1:] += radius * draw.uniform(-0.05, 0.05, count - 1)
+        phis[1:] += radius / problem.discs[0].r * draw.uniform(-0.05, 0.05, count - 1)
+        self.contact, self.count = (us, phis, radius, conductance), count
+
+
+class General:
+    """One contact of any shape by the general method, both phases."""
+
+    def __init__(self, problem: Problem, directions: int, rings: int) -> None:
+        self.sensor, self.patch = field_model(problem), contact_patch(problem)
+        self.cells, self.count = (directions, rings), 1
+
+    def __call__(self) -> list[Readings]:
+        coupling = solve_patch(self.sensor, self.patch, *self.cells)
+        return [self.sensor.read(coupling, phase) for phase in PHASES]
+
+
+class Map:
+    """10 000 discs all over the sheet, both phases: an error map."""
+
+    def __init__(self, problem: Problem, tolerance: float = 1e-9, side: int = 100) -> None:
+        self.sensor, self.count = field_model(problem, tolerance), side * side
+        radius, conductance = problem.discs[0].radius, problem.discs[0].conductance
+        inner, outer = problem.inner + 1.1 * radius, problem.outer - 1.1 * radius
+        r, share = np.meshgrid(np.linspace(inner, outer, side), np.linspace(0.0, 1.0, side))
+        margin = np.arcsin(1.1 * radius / r)
+        phi = margin + share * (problem.theta0 - 2 * margin)
+        self.contact = (np.abs(r - problem.r1).ravel(), phi.ravel(), radius, conductance)
+
+    def __call__(self) -> list[Readings]:
+        u, phi, radius, conductance = self.contact
+        coupling = self.sensor.contacts(u, phi, radius, conductance)
+        return [self.sensor.read(coupling, phase) for phase in PHASES]
+
+
+def largest_error(readings: list[Readings], reference: PortSolution) -> float:
+    """Largest error of an electrode's potential over both phases [V at 1 V of drive]."""
+    pairs = zip(readings, reference.voltages, strict=True)
+    return max(float(np.abs(r.electrodes[0] - volts).max()) for r, volts in pairs)
+
+
+# isort: split
+
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
 CELLS = ((8, 2), (12, 3), (16, 4), (24, 5), (32, 7), (48, 9), (64, 11))
@@ -77,15 +148,15 @@ def our_runs(reference: Reference, quick: bool) -> Iterator[Run]:
     calls: list[tuple[str, str, Any]] = []
     if problem.discs and not problem.name.startswith("clipped"):
         for order in ORDERS[:9] if quick else ORDERS:
-            batch = field_ours.Batch(problem, order, count=400 if quick else 2000)
+            batch = Batch(problem, order, count=400 if quick else 2000)
             calls.append(("coneskin batched", f"M={order}", batch))
-            calls.append(("coneskin single", f"M={order}", field_ours.Single(problem, order)))
+            calls.append(("coneskin single", f"M={order}", Single(problem, order)))
     for directions, rings in CELLS[:5:2] if quick else CELLS:
-        general = field_ours.General(problem, directions, rings)
+        general = General(problem, directions, rings)
         calls.append(("coneskin general", f"{directions}x{rings}", general))
     for solver, configuration, call in calls:
         seconds, readings = repeat(call, 0.05 if quick else 0.3)
-        error = field_ours.error(readings, reference.ports)
+        error = largest_error(readings, reference.ports)
         yield Run(problem.name, solver, configuration, error, seconds / call.count, seconds / call.count)
 
 
@@ -135,11 +206,11 @@ def print_goals(references: list[Reference], quick: bool) -> None:
         if not reference.problem.discs or reference.problem.name.startswith("clipped"):
             continue
         row = [reference.problem.name]
-        for kind in (field_ours.Batch, field_ours.Single):
+        for kind in (Batch, Single):
             call = kind(reference.problem, None, 1e-9)
             seconds, readings = repeat(call, 0.1 if quick else 0.5, least=1 if quick else 3)
-            row += [show_time(seconds / call.count), f"{field_ours.error(readings, reference.ports):.1e}"]
-        sheet = field_ours.Map(reference.problem)
+            row += [show_time(seconds / call.count), f"{largest_error(readings, reference.ports):.1e}"]
+        sheet = Map(reference.problem)
         seconds, _ = repeat(sheet, 0.0, least=1)
         rows.append([*row, f"{show_time(seconds)} for {sheet.count}"])
     print("\nThe solver's own choice of order at tolerance 1e-9, and a map of discs all over the sheet")
