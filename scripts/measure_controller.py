@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass
 
 from coneskin.core.errors import ConeSkinError, RobotTimeout
 from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.ur.heartbeat_registers import HeartbeatRegisters, program_lines
+from coneskin.robot.ur.heartbeat_registers import HeartbeatRegisters, heartbeat_lines
 from coneskin.robot.ur.rtde_connection import RtdeConnection
 from coneskin.robot.ur.speed_slider import set_slider
 from coneskin.robot.ur.stop_sockets import StopSockets
@@ -166,7 +166,7 @@ def _slider(rig: _Rig) -> list[Measurement]:
 def _watchdog(rig: _Rig) -> Measurement:
     with HeartbeatRegisters(rig.host) as heartbeat:
         heartbeat.write(1)
-        rig.move(program_lines(10.0))
+        rig.move(heartbeat_lines(10.0))
         for count in range(2, 12):
             heartbeat.write(count)
             rig.until(lambda: False, 0.02)

@@ -16,7 +16,7 @@ from bench.report import head
 from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds
 from coneskin.robot.arm.kinematics import point_jacobian
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
-from coneskin.robot.reaction.retreat import LEAST_PROGRESS, RetreatPlan, plan_retreat
+from coneskin.robot.reaction.retreat import MIN_PROGRESS, RetreatPlan, plan_retreat
 from coneskin.robot.reaction.types import ArmState, Reaction
 from tests.support.retreat_simulation import follow, joints_within, touch
 
@@ -70,7 +70,7 @@ def followed(runs: int) -> None:
 def objectives(runs: int) -> None:
     print(
         "at the touch, for 1 m/s wanted; only where the direction can be followed at all "
-        f"(at least {100 * LEAST_PROGRESS:.0f} % of the speed)"
+        f"(at least {100 * MIN_PROGRESS:.0f} % of the speed)"
     )
     print(f"{'touched':10} {'across / along':>23} {'':>23} {'joint speeds rad/s':>20}")
     print(f"{'':10} {'three rows med':>15} {'p95':>7} {'one row med':>15} {'p95':>7} {'three max':>11} {'one max':>8}")

@@ -26,7 +26,7 @@ from .model import ArmModel, Joints
 __all__ = ["nearest", "solutions"]
 
 #: share of the reach by which a pose may be beyond it and still count as on the border; rounding of the pose itself
-_BORDER = 1e-9
+_BORDER_SHARE = 1e-9
 #: sine of q5 below which the axes of joints 4 and 6 are parallel, and the pose determines only the sum of their angles
 _WRIST_SINGULAR = 1e-9
 
@@ -52,7 +52,7 @@ def solutions(model: ArmModel, flange: Pose, q6_if_free: float = 0.0) -> list[Jo
     px, py, pz = flange.translation
     o5x, o5y, o5z = px - d6 * r02, py - d6 * r12, pz - d6 * r22
     reach = math.hypot(o5x, o5y)
-    if reach < abs(d4) * (1.0 - _BORDER):
+    if reach < abs(d4) * (1.0 - _BORDER_SHARE):
         return []
     opening = math.acos(max(-1.0, min(1.0, d4 / reach))) if reach > 0.0 else 0.0
     heading = math.atan2(o5y, o5x)
@@ -76,7 +76,7 @@ def solutions(model: ArmModel, flange: Pose, q6_if_free: float = 0.0) -> list[Jo
             x = o4x * c1 + o4y * s1
             y = o5z + d5 * (r20 * s6 + r21 * c6) - d1
             c3 = (x * x + y * y - a2 * a2 - a3 * a3) / (2.0 * a2 * a3)
-            if abs(c3) > 1.0 + _BORDER:
+            if abs(c3) > 1.0 + _BORDER_SHARE:
                 continue
             bend = math.acos(max(-1.0, min(1.0, c3)))
             for elbow in (1.0, -1.0):

@@ -43,7 +43,7 @@ LINK_INDEX: Mapping[str, int] = MappingProxyType(
 )
 
 #: arm -> shift of the mesh along the joint axis [m] of upper_arm, forearm, wrist_1, wrist_2, wrist_3; wrist_3 along y
-_OFFSETS = {
+_TUBE_OFFSETS = {
     "UR3": (0.1198, 0.0275, -0.085, -0.083, -0.082, -0.002),
     "UR5": (0.13585, 0.0165, -0.093, -0.095, -0.0818, 0.0),
     "UR10": (0.220941, 0.049042, -0.1149, -0.1158, -0.0922, 0.001),
@@ -56,17 +56,17 @@ _OFFSETS = {
     "UR30": (0.260, 0.043, -0.0775, -0.0749, -0.07, 0.0),
 }
 
-_QUARTER = math.pi / 2.0  # rad
-_ALONG_THE_ARM = (_QUARTER, 0.0, -_QUARTER)  # upper arm and forearm: the mesh's z axis runs along the link
+_QUARTER_TURN = math.pi / 2.0  # rad
+_ALONG_THE_ARM = (_QUARTER_TURN, 0.0, -_QUARTER_TURN)  # upper arm and forearm: the mesh's z axis runs along the link
 #: link -> roll, pitch and yaw of its mesh in the URDF frame [rad]
-_TURNED = {
+_TURNED_FRAME = {
     "base": (0.0, 0.0, math.pi),
     "shoulder": (0.0, 0.0, math.pi),
     "upper_arm": _ALONG_THE_ARM,
     "forearm": _ALONG_THE_ARM,
-    "wrist_1": (_QUARTER, 0.0, 0.0),
+    "wrist_1": (_QUARTER_TURN, 0.0, 0.0),
     "wrist_2": (0.0, 0.0, 0.0),
-    "wrist_3": (_QUARTER, 0.0, 0.0),
+    "wrist_3": (_QUARTER_TURN, 0.0, 0.0),
 }
 
 
@@ -86,13 +86,13 @@ def link_mesh(model: ArmModel, link: str) -> Pose:
         KinematicsError: there is no such link, or the meshes of the arm are not known.
     """
     name = _name(link)
-    offsets = _OFFSETS.get(model.name)
+    offsets = _TUBE_OFFSETS.get(model.name)
     if offsets is None:
-        raise KinematicsError(f"meshes are known for {', '.join(_OFFSETS)}, got the arm {model.name!r}")
+        raise KinematicsError(f"meshes are known for {', '.join(_TUBE_OFFSETS)}, got the arm {model.name!r}")
     index = LINK_INDEX[name]
     along = offsets[index - 2] if index >= 2 else 0.0
     aside = offsets[5] if index == 6 else 0.0
-    return Pose.from_xyz_rpy((0.0, aside, along), _TURNED[name])
+    return Pose.from_xyz_rpy((0.0, aside, along), _TURNED_FRAME[name])
 
 
 def dh_link(model: ArmModel, link: str) -> Pose:

@@ -17,10 +17,10 @@ __all__ = ["ZERO_VELOCITY", "ArmModel", "Joints"]
 #: one number for each joint, from the base on
 Joints = tuple[float, float, float, float, float, float]
 
-_ZEROS: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_SIX_ZEROS: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 #: joint speeds of an arm at rest [rad/s]
-ZERO_VELOCITY: Joints = _ZEROS
+ZERO_VELOCITY: Joints = _SIX_ZEROS
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class ArmModel:
     joint_lower: Joints
     joint_upper: Joints
     joint_speed: Joints
-    theta: Joints = _ZEROS
+    theta: Joints = _SIX_ZEROS
     family: str = ""
 
     def __post_init__(self) -> None:
@@ -65,10 +65,10 @@ class ArmModel:
 
     def calibrated(
         self,
-        delta_a: Sequence[float] = _ZEROS,
-        delta_d: Sequence[float] = _ZEROS,
-        delta_alpha: Sequence[float] = _ZEROS,
-        delta_theta: Sequence[float] = _ZEROS,
+        delta_a: Sequence[float] = _SIX_ZEROS,
+        delta_d: Sequence[float] = _SIX_ZEROS,
+        delta_alpha: Sequence[float] = _SIX_ZEROS,
+        delta_theta: Sequence[float] = _SIX_ZEROS,
     ) -> ArmModel:
         """Return the arm with the factory calibration of one robot (``calibration.conf`` on its controller).
 

@@ -13,12 +13,12 @@ from coneskin.geometry.pose import Vector
 
 from .model import ArmModel
 
-__all__ = ["PARTS", "PartPair", "clearance_needed", "close_pairs", "segment_distance"]
+__all__ = ["PartPair", "clearance_needed", "close_pairs", "segment_distance"]
 
 #: names of the parts between the corners of the skeleton, from the base on
-PARTS = ("base", "shoulder", "upper arm", "elbow", "forearm", "wrist 1", "wrist 2", "wrist 3")
+_PART_NAMES = ("base", "shoulder", "upper arm", "elbow", "forearm", "wrist 1", "wrist 2", "wrist 3")
 #: pairs of parts that can meet; neighbours cannot, and a forearm folds beside its upper arm, not onto it
-_PAIRS = tuple((a, b) for a in (0, 1, 2) for b in (4, 5, 6, 7) if (a, b) != (2, 4) and (a, b) != (2, 5))
+_PART_PAIRS = tuple((a, b) for a in (0, 1, 2) for b in (4, 5, 6, 7) if (a, b) != (2, 4) and (a, b) != (2, 5))
 
 
 def clearance_needed(model: ArmModel) -> float:
@@ -46,7 +46,7 @@ class PartPair(NamedTuple):
     @property
     def why(self) -> str:
         """Sentence about the pair for a person."""
-        first, second = PARTS[self.first], PARTS[self.second]
+        first, second = _PART_NAMES[self.first], _PART_NAMES[self.second]
         return f"the {second} would come within {1e3 * self.distance:.0f} mm of the {first}, axis to axis"
 
     def distance_in(self, corners: Sequence[Vector]) -> float:
@@ -64,7 +64,7 @@ def close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[PartPair]:
     """
     least = clearance_needed(model)
     pairs = (
-        PartPair(a, b, segment_distance(corners[a], corners[a + 1], corners[b], corners[b + 1])) for a, b in _PAIRS
+        PartPair(a, b, segment_distance(corners[a], corners[a + 1], corners[b], corners[b + 1])) for a, b in _PART_PAIRS
     )
     return [pair for pair in pairs if pair.distance < least]
 

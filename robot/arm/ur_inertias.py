@@ -26,7 +26,7 @@ from .ur_models import arm_model
 
 __all__ = ["arm_inertia"]
 
-_ROTOR = 0.1 / 150.0  # kg m^2 of reflected inertia for each N m of highest torque
+_ROTOR_PER_TORQUE = 0.1 / 150.0  # kg m^2 of reflected inertia for each N m of highest torque
 
 #: mass [kg]; centre x, y, z [m]; tensor xx, xy, xz, yy, yz, zz [kg m^2], about the centre, in the DH frame
 _Row = tuple[float, Vector, tuple[float, float, float, float, float, float]]
@@ -42,7 +42,7 @@ def _pin(along: float, across: float) -> tuple[float, float, float, float, float
     return across, 0.0, 0.0, along, 0.0, across
 
 
-_UR5E: tuple[_Row, ...] = (
+_UR5E_LINKS: tuple[_Row, ...] = (
     (3.761, (0.0, -0.02561, 0.00193), (0.0070021, 7.3e-7, -1.053e-5, 0.00648091, 0.00049994, 0.00657286)),
     (8.058, (0.2125, 0.0, 0.11336), (0.01505885, -5.4e-5, 5.63e-6, 0.33388086, -1.81e-6, 0.33247207)),
     (2.846, (0.15, 0.0, 0.0265), (0.00399632, -1.365e-5, 0.00137272, 0.07879254, -6.6e-6, 0.0784851)),
@@ -50,7 +50,7 @@ _UR5E: tuple[_Row, ...] = (
     (1.3, (0.0, 0.0018, 0.01634), (0.00135617, -2.74e-6, 4.44e-6, 0.00127827, -5.048e-5, 0.00096614)),
     (0.365, (0.0, 0.0, -0.001159), (0.00018694, 6e-8, -1.7e-7, 0.00018908, -9.2e-7, 0.00025756)),
 )
-_LINKS: dict[str, tuple[_Row, ...]] = {
+_LINK_TABLE: dict[str, tuple[_Row, ...]] = {
     "UR3": (
         (2.0, (0.0, -0.02, 0.0), _pin(0.005625, 0.008093167)),
         (3.42, (0.13, 0.0, 0.1157), _rod(0.00961875, 0.021728492)),
@@ -83,8 +83,8 @@ _LINKS: dict[str, tuple[_Row, ...]] = {
         (0.805, (0.0, 0.0, 0.01), (0.0006059, -6e-7, -6e-7, 0.0005837, -2.71e-5, 0.0003831)),
         (0.261, (0.0, 0.0, -0.02), (0.000108, -1e-7, -1e-7, 0.0001086, -2e-7, 0.0001371)),
     ),
-    "UR5e": _UR5E,
-    "UR7e": _UR5E,
+    "UR5e": _UR5E_LINKS,
+    "UR7e": _UR5E_LINKS,
     "UR10e": (
         (7.369, (0.021, 0.0, 0.027), (0.03408, 0.00002, -0.00425, 0.03529, 0.00008, 0.02156)),
         (13.051, (0.38, 0.0, 0.158), (0.02814, 0.00005, -0.01561, 0.77068, 0.00002, 0.76943)),
@@ -125,7 +125,7 @@ def _torque(large: float, elbow: float, wrist: float) -> Joints:
 
 
 #: highest torque of base and shoulder, elbow, wrists [N m]
-_TORQUES = {
+_JOINT_TORQUES = {
     "UR3": _torque(56.0, 28.0, 12.0),
     "UR5": _torque(150.0, 150.0, 28.0),
     "UR10": _torque(330.0, 150.0, 56.0),
@@ -153,12 +153,13 @@ def arm_inertia(model: ArmModel | str) -> ArmInertia:
 
 @functools.cache
 def _inertia(name: str) -> ArmInertia:
-    if name not in _LINKS:
-        raise KinematicsError(f"inertias are known for {', '.join(_LINKS)}, got the arm {name!r}")
+    if name not in _LINK_TABLE:
+        raise KinematicsError(f"inertias are known for {', '.join(_LINK_TABLE)}, got the arm {name!r}")
     links = tuple(
         LinkInertia(mass, centre, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
-        for mass, centre, (xx, xy, xz, yy, yz, zz) in _LINKS[name]
+        for mass, centre, (xx, xy, xz, yy, yz, zz) in _LINK_TABLE[name]
     )
-    a, b, c, d, e, f = torque = _TORQUES[name]
-    rotor = (_ROTOR * a, _ROTOR * b, _ROTOR * c, _ROTOR * d, _ROTOR * e, _ROTOR * f)
+    a, b, c, d, e, f = torque = _JOINT_TORQUES[name]
+    per = _ROTOR_PER_TORQUE
+    rotor = (per * a, per * b, per * c, per * d, per * e, per * f)
     return ArmInertia(links, torque, rotor)

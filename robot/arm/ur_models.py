@@ -22,7 +22,7 @@ from .model import ArmModel, Joints
 
 __all__ = ["MODEL_NAMES", "arm_model"]
 
-_QUARTER = math.pi / 2.0  # rad
+_QUARTER_TURN = math.pi / 2.0  # rad
 
 
 def arm_model(name: str) -> ArmModel:
@@ -31,7 +31,7 @@ def arm_model(name: str) -> ArmModel:
     Raises:
         KinematicsError: there is no such arm; the message lists all.
     """
-    found = _MODELS.get(re.sub(r"[\s_-]", "", name).lower())
+    found = _MODEL_TABLE.get(re.sub(r"[\s_-]", "", name).lower())
     if found is None:
         raise KinematicsError(f"arm must be one of {', '.join(MODEL_NAMES)}, got {name!r}")
     return found
@@ -50,7 +50,7 @@ def _arm(name: str, lengths: tuple[float, ...], speeds: Joints, wrist_3_limit: f
         name=name,
         a=(0.0, a2, a3, 0.0, 0.0, 0.0),
         d=(d1, 0.0, 0.0, d4, d5, d6),
-        alpha=(_QUARTER, 0.0, 0.0, _QUARTER, -_QUARTER, 0.0),
+        alpha=(_QUARTER_TURN, 0.0, 0.0, _QUARTER_TURN, -_QUARTER_TURN, 0.0),
         joint_lower=(-upper[0], -upper[1], -upper[2], -upper[3], -upper[4], -upper[5]),
         joint_upper=upper,
         joint_speed=speeds,
@@ -59,26 +59,26 @@ def _arm(name: str, lengths: tuple[float, ...], speeds: Joints, wrist_3_limit: f
 
 
 #: highest joint speeds of each size of arm [rad/s]
-_SMALL = _deg(180, 180, 180, 360, 360, 360)
-_MEDIUM = _deg(180, 180, 180, 180, 180, 180)
-_LARGE = _deg(120, 120, 180, 180, 180, 180)
-_HEAVY = _deg(120, 120, 150, 210, 210, 210)
+_SMALL_SPEEDS = _deg(180, 180, 180, 360, 360, 360)
+_MEDIUM_SPEEDS = _deg(180, 180, 180, 180, 180, 180)
+_LARGE_SPEEDS = _deg(120, 120, 180, 180, 180, 180)
+_HEAVY_SPEEDS = _deg(120, 120, 150, 210, 210, 210)
 
-_MODELS = {
+_MODEL_TABLE = {
     arm.name.lower(): arm
     for arm in (  # d1, a2, a3, d4, d5, d6 [m]
-        _arm("UR3", (0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819), _SMALL, math.inf),
-        _arm("UR5", (0.089159, -0.425, -0.39225, 0.10915, 0.09465, 0.0823), _MEDIUM),
-        _arm("UR10", (0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922), _LARGE),
-        _arm("UR3e", (0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921), _SMALL, math.inf),
-        _arm("UR5e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM),
-        _arm("UR7e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM),
-        _arm("UR10e", (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), _LARGE),
-        _arm("UR16e", (0.1807, -0.4784, -0.36, 0.17415, 0.11985, 0.11655), _LARGE),
-        _arm("UR20", (0.2363, -0.8620, -0.7287, 0.2010, 0.1593, 0.1543), _HEAVY),
-        _arm("UR30", (0.2363, -0.6370, -0.5037, 0.2010, 0.1593, 0.1543), _HEAVY),
+        _arm("UR3", (0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819), _SMALL_SPEEDS, math.inf),
+        _arm("UR5", (0.089159, -0.425, -0.39225, 0.10915, 0.09465, 0.0823), _MEDIUM_SPEEDS),
+        _arm("UR10", (0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922), _LARGE_SPEEDS),
+        _arm("UR3e", (0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921), _SMALL_SPEEDS, math.inf),
+        _arm("UR5e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
+        _arm("UR7e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
+        _arm("UR10e", (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
+        _arm("UR16e", (0.1807, -0.4784, -0.36, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
+        _arm("UR20", (0.2363, -0.8620, -0.7287, 0.2010, 0.1593, 0.1543), _HEAVY_SPEEDS),
+        _arm("UR30", (0.2363, -0.6370, -0.5037, 0.2010, 0.1593, 0.1543), _HEAVY_SPEEDS),
     )
 }
 
 #: names that ``arm_model`` knows
-MODEL_NAMES = tuple(arm.name for arm in _MODELS.values())
+MODEL_NAMES = tuple(arm.name for arm in _MODEL_TABLE.values())

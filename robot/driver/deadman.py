@@ -27,7 +27,7 @@ _LAST_WHILE = 1.5  # s for the last stop and for disconnecting, once a channel h
 _LOCK_TIMEOUT = 1.8  # s that a library may keep Python's lock
 _START_LOCK_TIMEOUT = 10.0  # s for the same while it connects, before anything can move
 _LOCK_PERIOD = 0.3  # s between two settings of that timer
-_ALIVE = StatusReport("alive").encode()
+_HEARTBEAT_MESSAGE = StatusReport("alive").encode()
 
 
 class Deadman:
@@ -86,7 +86,7 @@ class Deadman:
         """Send the heartbeat, or end the process, as is due."""
         now = self._clock()
         if now <= self._works_until:
-            self._guard.send(_ALIVE)
+            self._guard.send(_HEARTBEAT_MESSAGE)
         if any(channel.hung_up() for channel in self._channels):
             self.end_soon()
         if self._ends_at is not None and now >= self._ends_at:

@@ -31,9 +31,9 @@ REPORT_PERIOD = 0.03  #: s between two of the driver process, the guard watchdog
 HEARTBEAT_TIMEOUT = 0.5  #: s without one after which the guard counts as dead; delays of 0.1 s occur under load
 SETPOINT_TIMEOUT = 0.1  #: s without a ``SetJointVelocity``, sent every 4 ms while the guard itself moves the arm
 
-_ONE = struct.Struct("<d")
-_SEVEN = struct.Struct("<7d")
-_NUMBER = struct.Struct("<Q")
+_ONE_DOUBLE = struct.Struct("<d")
+_SEVEN_DOUBLES = struct.Struct("<7d")
+_ONE_NUMBER = struct.Struct("<Q")
 
 
 class StopProgram(NamedTuple):
@@ -47,7 +47,7 @@ class StopProgram(NamedTuple):
 
     def encode(self) -> bytes:
         """Return the message."""
-        return b"S" + _ONE.pack(self.deceleration)
+        return b"S" + _ONE_DOUBLE.pack(self.deceleration)
 
 
 class SetJointVelocity(NamedTuple):
@@ -63,7 +63,7 @@ class SetJointVelocity(NamedTuple):
 
     def encode(self) -> bytes:
         """Return the message."""
-        return b"V" + _SEVEN.pack(*self.qd, self.acceleration)
+        return b"V" + _SEVEN_DOUBLES.pack(*self.qd, self.acceleration)
 
 
 class EndReaction(NamedTuple):
@@ -77,7 +77,7 @@ class EndReaction(NamedTuple):
 
     def encode(self) -> bytes:
         """Return the message."""
-        return b"H" + _ONE.pack(self.deceleration)
+        return b"H" + _ONE_DOUBLE.pack(self.deceleration)
 
 
 class Release(NamedTuple):
@@ -91,7 +91,7 @@ class Release(NamedTuple):
 
     def encode(self) -> bytes:
         """Return the message."""
-        return b"C" + _NUMBER.pack(self.number)
+        return b"C" + _ONE_NUMBER.pack(self.number)
 
 
 class Heartbeat(NamedTuple):
@@ -110,7 +110,7 @@ class Shutdown(NamedTuple):
         return b"F"
 
 
-_WORDS: dict[bytes, Heartbeat | Shutdown] = {word.encode(): word for word in (Heartbeat(), Shutdown())}
+_WORD_COMMANDS: dict[bytes, Heartbeat | Shutdown] = {word.encode(): word for word in (Heartbeat(), Shutdown())}
 GuardCommand = StopProgram | SetJointVelocity | EndReaction | Release | Heartbeat | Shutdown
 
 
@@ -147,14 +147,14 @@ def decode_command(message: bytes) -> GuardCommand:
     letter, body = message[:1], message[1:]
     try:
         if letter == b"V":
-            *qd, acceleration = _SEVEN.unpack(body)
+            *qd, acceleration = _SEVEN_DOUBLES.unpack(body)
             return SetJointVelocity((qd[0], qd[1], qd[2], qd[3], qd[4], qd[5]), acceleration)
         if letter == b"C":
-            return Release(*_NUMBER.unpack(body))
+            return Release(*_ONE_NUMBER.unpack(body))
         if letter in (b"S", b"H"):
-            return (StopProgram if letter == b"S" else EndReaction)(*_ONE.unpack(body))
+            return (StopProgram if letter == b"S" else EndReaction)(*_ONE_DOUBLE.unpack(body))
     except struct.error as exc:
         raise ValueError(f"a command of the guard is damaged: {message!r}") from exc
-    if message in _WORDS:
-        return _WORDS[message]
+    if message in _WORD_COMMANDS:
+        return _WORD_COMMANDS[message]
     raise ValueError(f"not a command of the guard: {message!r}")

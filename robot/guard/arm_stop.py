@@ -8,7 +8,7 @@ from coneskin.robot.driver.messages import EndReaction, StopProgram
 from coneskin.robot.driver.state import ControllerState
 from coneskin.robot.driver.stop_path import StopPath, UseStopPath
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.robot.stop.standstill import WATCH, StandstillWatch
+from coneskin.robot.stop.standstill import WATCH_DURATION, StandstillWatch
 from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
 from .signals.contact import Contact
@@ -213,7 +213,7 @@ class ArmStop:
         """Let the arm stand: at once where no other program can start, else to the end of a watch."""
         self.why = why
         watched = self._others_move or self.escalation.unconfirmed(state)
-        self.watch.begin(state.time, WATCH if watched else 0.0)
+        self.watch.begin(state.time, WATCH_DURATION if watched else 0.0)
 
     def latched(self, state: ControllerState, out: Outputs) -> bool:
         """Tell whether the arm has kept standing for long enough to be called latched, and report that it is."""

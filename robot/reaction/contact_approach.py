@@ -21,7 +21,7 @@ from .types import ContactOnLink
 
 __all__ = ["ContactApproach"]
 
-_BLIND = 4.0  # times as far any point may move while the place of a touch is not certain: that takes 2 frames or more
+_BLIND_RATIO = 4.0  # to ``press``: way of any point while a touch has no certain place, which takes 2 frames or more
 
 
 @dataclass(slots=True)
@@ -90,7 +90,7 @@ class ContactApproach:
             else:
                 touch.blind += bound
             way = touch.made + self._stop(approach, qd)
-            if (way > self._press or touch.blind > _BLIND * self._press) and not self.exceeded:
+            if (way > self._press or touch.blind > _BLIND_RATIO * self._press) and not self.exceeded:
                 self.exceeded, self.way = contact.number, max(way, touch.blind)
         if speeds:
             self.speed = max(speeds)

@@ -31,7 +31,7 @@ __all__ = [
 
 
 _MIN_APPROACH_SPEED = 0.02  # rad/s; a slower arm has not run into anything
-_STOOD = "the arm stood when it was touched"
+_STOOD_REASON = "the arm stood when it was touched"
 
 
 class ReactionMotion(Protocol):
@@ -115,7 +115,7 @@ def plan_reaction_motion(
         if reaction.on_clamp == "comply":
             return _comply(model, reaction, state, space)
         if reaction.on_clamp == "path":
-            back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD
+            back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD_REASON
             return f"{why}; no way back: {back}" if isinstance(back, str) else back
         return why
     plan = plan_retreat(model, at_touch, contacts, reaction, space, ArmSweep.begin(model, state.q))
@@ -123,7 +123,7 @@ def plan_reaction_motion(
         return RetreatMotion(plan)
     if reaction.fallback != "path":
         return plan.reason
-    back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD
+    back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD_REASON
     return f"{plan.reason}; no way back: {back}" if isinstance(back, str) else back
 
 

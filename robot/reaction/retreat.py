@@ -27,12 +27,12 @@ from coneskin.robot.arm.workspace import Workspace
 from .sweep import ArmSweep
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
-__all__ = ["DISTANCE_TOLERANCE", "LEAST_PROGRESS", "RetreatPlan", "plan_retreat", "retreat_step"]
+__all__ = ["DISTANCE_TOLERANCE", "MIN_PROGRESS", "RetreatPlan", "plan_retreat", "retreat_step"]
 
 #: part of the wanted speed that a retreat must reach; otherwise it is not begun, or ends. In a regular place it is the
 #: squared cosine of the angle between the wanted motion and the nearest possible one: 0.25 is 60 deg, where the point
 #: slides 1.7 times as far along the obstacle as it gets away from it.
-LEAST_PROGRESS = 0.25
+MIN_PROGRESS = 0.25
 #: distance that may be missing at the end of a retreat [m]
 DISTANCE_TOLERANCE = 0.5e-3
 _ROOM_TOLERANCE = 2e-3  # m of the arm's way that may be missing; its speed is bounded by more than it has
@@ -168,7 +168,7 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         why = f"a point of the arm has moved {most:g} mm, as far as arm_distance_mm lets it"
         return Done(f"{why}, before the touched one had moved {wanted_way:g} mm", progress)
     locked: list[int] = []
-    while away >= LEAST_PROGRESS:
+    while away >= MIN_PROGRESS:
         speed, clipped = _speed(reaction, limits, speeds, away, left, room)
         wanted = [speed * value for value in speeds]
         blocked = limits.blocked(q, state.qd, wanted)
@@ -251,7 +251,7 @@ def _progress(track: _Track, q: Sequence[float]) -> float:
 
 def _why_not(plan: RetreatPlan, locked: Sequence[int], away: float, damping: float) -> str:
     joints = ", ".join(str(i + 1) for i in sorted(locked))
-    part = f"{100.0 * away:.0f} % of the wanted speed could be reached, {100.0 * LEAST_PROGRESS:.0f} % is the least"
+    part = f"{100.0 * away:.0f} % of the wanted speed could be reached, {100.0 * MIN_PROGRESS:.0f} % is the least"
     if locked:
         return f"no feasible motion with joint {joints} at its limit: {part}"
     if len(plan.tracks) > 1:

@@ -12,7 +12,7 @@ from .types import KINDS, Reaction
 
 __all__ = ["Rule", "RuleSet"]
 
-_MOVING = ("comply", "retreat")
+_MOVING_KINDS = ("comply", "retreat")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class RuleSet:
     @property
     def move(self) -> bool:
         """True where one of them may move the arm away."""
-        return not self.kinds.isdisjoint(_MOVING)
+        return not self.kinds.isdisjoint(_MOVING_KINDS)
 
     def without_motion(self) -> RuleSet:
         """Return these rules with a stop, and its deceleration, where one of them moves the arm away."""
@@ -104,4 +104,4 @@ class RuleSet:
 
 
 def _still(reaction: Reaction) -> Reaction:
-    return replace(reaction, kind="stop", fallback="stop") if reaction.kind in _MOVING else reaction
+    return replace(reaction, kind="stop", fallback="stop") if reaction.kind in _MOVING_KINDS else reaction

@@ -11,7 +11,7 @@ from coneskin.robot.arm.skeleton import skeleton
 
 __all__ = ["ArmSweep"]
 
-_THICKNESS = 0.06  # m from the middle line of a link to its surface
+_LINK_RADIUS = 0.06  # m from the middle line of a link to its surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,4 +43,4 @@ class ArmSweep:
         if turn == 0.0:
             return 0.0
         corners = skeleton(self.model, q)
-        return max(math.dist(a, b) for a, b in zip(corners, self.corners, strict=True)) + _THICKNESS * turn
+        return max(math.dist(a, b) for a, b in zip(corners, self.corners, strict=True)) + _LINK_RADIUS * turn

@@ -23,7 +23,7 @@ from .stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
 __all__ = ["BLIND_TIMEOUT", "BackupStop"]
 
-_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE)
+_STOP_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE)
 _STRONGEST_FIRST = (StopPath.PROTECTIVE, StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER)
 _REOPEN_PERIOD = 0.05  # s between two attempts to open what is missing
 BLIND_TIMEOUT = 2.0  #: s without a state after which a stop is given up, and the reader opened anew
@@ -91,7 +91,7 @@ class BackupStop:
         gentle = self._deceleration if deceleration is None else deceleration
         limits = self._limits
         self.read()
-        paths = _STRONGEST_FIRST if strongest else _PATHS
+        paths = _STRONGEST_FIRST if strongest else _STOP_PATHS
         if not self._use(paths[0], gentle):
             self._use(StopPath.COMMAND, gentle)
         now = start = self._clock()

@@ -12,13 +12,14 @@ from coneskin.robot.driver.state import ControllerState
 
 from .stop_monitor import STANDSTILL_SAMPLES
 
-__all__ = ["WATCH", "StandstillMonitor", "StandstillWatch"]
+__all__ = ["WATCH_DURATION", "StandstillMonitor", "StandstillWatch"]
 
-WATCH = 0.7  #: s; programs that start anew after up to 0.3 s, and the time a controller needs to start and to move one
+#: s; programs that start anew after up to 0.3 s, and the time a controller needs to start and to move one
+WATCH_DURATION = 0.7
 _MAX_SPEED = 0.05  # rad/s; faster is a motion, and under a touch any speed is
 _MAX_DRIFT = 0.02  # rad; farther is a motion, however slow
 _MAX_TOUCHED_DRIFT = 0.002  # rad, summed over the joints: 2 mm at a metre's reach, while anything touches the skin
-_NOISE = 0.0005  # rad, summed over the joints; what measured positions may differ by while the arm stands
+_POSITION_NOISE = 0.0005  # rad, summed over the joints; what measured positions may differ by while the arm stands
 _MAX_STARTS = 3  # of programs during one watch, from which on a loop starts them that will move the arm sooner or later
 _MAX_RESTARTS = 2  # motions of a stopped arm, from which on it is stopped by the strongest path; touched, one is enough
 
@@ -70,7 +71,7 @@ class StandstillMonitor:
         return (
             self._moving >= STANDSTILL_SAMPLES
             or max(map(abs, self._drift)) > _MAX_DRIFT
-            or here > max(_NOISE, _MAX_TOUCHED_DRIFT - self._before)
+            or here > max(_POSITION_NOISE, _MAX_TOUCHED_DRIFT - self._before)
         )
 
 

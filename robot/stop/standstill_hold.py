@@ -8,7 +8,7 @@ from collections.abc import Callable
 from coneskin.robot.driver.protocol import PayloadReader
 
 from .backup_stop import BLIND_TIMEOUT, BackupStop
-from .standstill import WATCH, StandstillWatch
+from .standstill import WATCH_DURATION, StandstillWatch
 
 __all__ = ["StandstillHold"]
 
@@ -52,7 +52,7 @@ class StandstillHold:
         self.failed = not self._stop.stop(deceleration, over, self._watch.insists)
         self._due = self._clock() + _REPEAT_PERIOD
         if not self.failed:
-            self._watch.begin(self._clock(), WATCH)
+            self._watch.begin(self._clock(), WATCH_DURATION)
 
     def look(self, over: Callable[[], bool] = lambda: False) -> bool:
         """Look at the arm, and stop it where it moves. To be called continuously.

@@ -34,7 +34,7 @@ from .standstill_hold import StandstillHold
 
 __all__ = ["GuardWatchdog", "main"]
 
-_STEP = 0.01  # s between two looks
+_POLL_PERIOD = 0.01  # s between two looks
 
 
 class GuardWatchdog:
@@ -60,7 +60,7 @@ class GuardWatchdog:
 
     def run(self) -> None:
         """Serve until the guard has left and the arm stands."""
-        while self.step(_STEP):
+        while self.step(_POLL_PERIOD):
             pass
 
     def step(self, timeout: float) -> bool:

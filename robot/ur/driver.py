@@ -69,9 +69,9 @@ class _UrDriver:
         return HeartbeatRegisters(host)
 
     def heartbeat_lines(self, frequency: float) -> str:
-        from .heartbeat_registers import program_lines
+        from .heartbeat_registers import heartbeat_lines
 
-        return program_lines(frequency)
+        return heartbeat_lines(frequency)
 
     def decode_heartbeat(self, payload: bytes) -> int:
         from .heartbeat_registers import decode_echo

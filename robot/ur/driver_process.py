@@ -41,10 +41,10 @@ from .ur_rtde import UrArm, stop_time
 
 __all__ = ["DriverProcess", "main"]
 
-_MOTIONS = (StopProgram, EndReaction, SetJointVelocity)
+_MOTION_COMMANDS = (StopProgram, EndReaction, SetJointVelocity)
 _START_TIMEOUT = 3.0  # s for the controller to start the control program again
-_MOVE_STEP = 0.005  # s between two looks at a move whose end the program waits for
-_IDLE_STEP = 0.01  # s between two rounds; a message is served at once
+_MOVE_POLL_PERIOD = 0.005  # s between two looks at a move whose end the program waits for
+_IDLE_POLL_PERIOD = 0.01  # s between two rounds; a message is served at once
 _KICK_PERIOD = 0.02  # s; well within the watchdog's period, and no load for the controller
 
 
@@ -93,7 +93,7 @@ class DriverProcess:
         """Serve until one of the channels ends, or until ``end``; then stop the arm."""
         self._guard.send(StatusReport("ready").encode())
         try:
-            while not self._quit and self.step(_MOVE_STEP if self._waiting else _IDLE_STEP):
+            while not self._quit and self.step(_MOVE_POLL_PERIOD if self._waiting else _IDLE_POLL_PERIOD):
                 pass
         finally:
             self._on_end()
@@ -132,7 +132,7 @@ class DriverProcess:
     def _take_guard(self, now: float) -> None:
         """Serve what the guard has sent."""
         commands = [decode_command(message) for message in self._guard.receive()]
-        newest = max((n for n, command in enumerate(commands) if isinstance(command, _MOTIONS)), default=0)
+        newest = max((n for n, command in enumerate(commands) if isinstance(command, _MOTION_COMMANDS)), default=0)
         for number, command in enumerate(commands):
             if isinstance(command, SetJointVelocity) and number < newest:
                 continue  # a newer motion command has overtaken it

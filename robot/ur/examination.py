@@ -19,20 +19,23 @@ from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.examination import ExaminationScope
 
-from . import heartbeat_registers, speed_slider
+from .heartbeat_registers import HEARTBEAT_INPUTS
+from .speed_slider import SLIDER_INPUTS
 from .model_check import check_model, read_pose
 from .rtde_connection import PORT, RtdeConnection
-from .setpoint_program import REGISTERS
+from .setpoint_program import SETPOINT_INPUTS
 from .state_reader import StateReader, decode_state
 
 __all__ = ["examine"]
 
-_TIMEOUT = 1.5  # s for connecting, and for each reply
-_DASHBOARD, _SCRIPT = 29999, 30003  # TCP ports
-_LISTEN = 1.0  # s of states
-_PERIOD, _GAP = 0.0025, 0.025  # s: the median between two states, and the longest; half of arm_silence_ms
-_CONTROL = ("input_int_register_0", *(f"input_double_register_{number}" for number in range(6)))  # of ur_rtde
-_FREE = "end the other program; or disable EtherNet/IP, PROFINET and MODBUS in the controller's Installation, Fieldbus"
+_REPLY_TIMEOUT = 1.5  # s for connecting, and for each reply
+_DASHBOARD_PORT, _SCRIPT_PORT = 29999, 30003  # TCP ports
+_LISTEN_TIME = 1.0  # s of states
+_MAX_PERIOD, _MAX_GAP = 0.0025, 0.025  # s: the median between two states, and the longest; half of arm_silence_ms
+_CONTROL_INPUTS = ("input_int_register_0", *(f"input_double_register_{number}" for number in range(6)))  # of ur_rtde
+_FREE_REMEDY = (
+    "end the other program; or disable EtherNet/IP, PROFINET and MODBUS in the controller's Installation, Fieldbus"
+)
 
 
 def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
@@ -44,7 +47,7 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
         scope: what the scene needs of it.
     """
     try:
-        with RtdeConnection(host, _TIMEOUT):
+        with RtdeConnection(host, _REPLY_TIMEOUT):
             found = [Finding("arm, RTDE", "ok", f"{host}:{PORT} answers")]
     except ConeSkinError as exc:
         rest = ("model", "state", "registers", "latency", "dashboard")
@@ -55,7 +58,7 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
     found += _tried("arm, model", lambda: _model(arm, host))
     found += _tried("arm, state", lambda: list(_state(host)))
     found += _dashboard(host)
-    found += _port("arm, script port", host, _SCRIPT)
+    found += _port("arm, script port", host, _SCRIPT_PORT)
     found += list(_registers(host, scope))
     return found
 
@@ -68,7 +71,7 @@ def _tried(item: str, look: Callable[[], list[Finding]]) -> list[Finding]:
 
 
 def _model(arm: ArmModel, host: str) -> list[Finding]:
-    pose = read_pose(host, _TIMEOUT)
+    pose = read_pose(host, _REPLY_TIMEOUT)
     if pose is None:
         return [Finding("arm, model", "not tried", "an old controller, which does not report its TCP's offset")]
     try:
@@ -81,9 +84,9 @@ def _model(arm: ArmModel, host: str) -> list[Finding]:
 def _state(host: str) -> Iterator[Finding]:
     """Look at the newest state, and at the times at which states come."""
     times: list[float] = []
-    with StateReader(host, _TIMEOUT) as reader:
-        state = reader.wait(_TIMEOUT)
-        end = time.monotonic() + _LISTEN
+    with StateReader(host, _REPLY_TIMEOUT) as reader:
+        state = reader.wait(_REPLY_TIMEOUT)
+        end = time.monotonic() + _LISTEN_TIME
         while (now := time.monotonic()) < end:
             wait_readable([reader], end - now)
             for payload in reader.read():
@@ -98,18 +101,19 @@ def _state(host: str) -> Iterator[Finding]:
     yield Finding("arm, safety", "bad" if stopped else "ok", value, "", remedy)
     steps = [b - a for a, b in pairwise(times)]
     if len(steps) < 20:
-        yield Finding("arm, latency", "bad", f"{len(times)} states in {_LISTEN:g} s", "500 a second", "a wired network")
+        value = f"{len(times)} states in {_LISTEN_TIME:g} s"
+        yield Finding("arm, latency", "bad", value, "500 a second", "a wired network")
         return
     middle, longest = statistics.median(steps), max(steps)
-    verdict: Verdict = "ok" if middle <= _PERIOD and longest <= _GAP else "warning"
+    verdict: Verdict = "ok" if middle <= _MAX_PERIOD and longest <= _MAX_GAP else "warning"
     remedy = "" if verdict == "ok" else "a cable of its own, no wireless network, a quieter computer"
     value = f"a state each {1e3 * middle:.2f} ms (median), the longest gap {1e3 * longest:.1f} ms"
-    yield Finding("arm, latency", verdict, value, f"{1e3 * _PERIOD:g} ms, {1e3 * _GAP:g} ms", remedy)
+    yield Finding("arm, latency", verdict, value, f"{1e3 * _MAX_PERIOD:g} ms, {1e3 * _MAX_GAP:g} ms", remedy)
 
 
 def _port(item: str, host: str, port: int) -> list[Finding]:
     try:
-        socket.create_connection((host, port), _TIMEOUT).close()
+        socket.create_connection((host, port), _REPLY_TIMEOUT).close()
     except OSError as exc:
         why = f"{host}:{port}: {exc.strerror or exc}"
         return [Finding(item, "bad", why, "it answers", "enable it: Settings, Security, Services")]
@@ -120,7 +124,7 @@ def _dashboard(host: str) -> list[Finding]:
     """Ask the dashboard for the version and whether the controller is in remote control."""
     item = "arm, dashboard"
     try:
-        with socket.create_connection((host, _DASHBOARD), _TIMEOUT) as sock:
+        with socket.create_connection((host, _DASHBOARD_PORT), _REPLY_TIMEOUT) as sock:
             lines = sock.makefile("rw", encoding="utf-8", newline="\n")
             lines.readline()  # the welcome
             answers = []
@@ -129,7 +133,7 @@ def _dashboard(host: str) -> list[Finding]:
                 lines.flush()
                 answers.append(lines.readline().strip())
     except OSError as exc:
-        why = f"{host}:{_DASHBOARD}: {exc.strerror or exc}"
+        why = f"{host}:{_DASHBOARD_PORT}: {exc.strerror or exc}"
         return [Finding(item, "bad", why, "it answers", "enable it: Settings, Security, Services")]
     version, remote = answers
     found = [Finding(item, "ok", version or "it answers")]
@@ -142,10 +146,10 @@ def _dashboard(host: str) -> list[Finding]:
 def _registers(host: str, scope: ExaminationScope) -> Iterator[Finding]:
     """Ask for the inputs that the scene needs, and give them back."""
     wanted: list[tuple[str, bool, Sequence[str]]] = [
-        ("ur_rtde's registers", scope.control, _CONTROL),
-        ("the speed slider", scope.slider, speed_slider.INPUTS),
-        ("the setpoints' registers", scope.setpoints, REGISTERS),
-        ("the heartbeat's register", scope.heartbeat, heartbeat_registers.INPUTS),
+        ("ur_rtde's registers", scope.control, _CONTROL_INPUTS),
+        ("the speed slider", scope.slider, SLIDER_INPUTS),
+        ("the setpoints' registers", scope.setpoints, SETPOINT_INPUTS),
+        ("the heartbeat's register", scope.heartbeat, HEARTBEAT_INPUTS),
     ]
     for what, needed, names in wanted:
         item = f"arm, {what}"
@@ -153,9 +157,9 @@ def _registers(host: str, scope: ExaminationScope) -> Iterator[Finding]:
             yield Finding(item, "not tried", "this scene does not need them")
             continue
         try:
-            with RtdeConnection(host, _TIMEOUT) as connection:
+            with RtdeConnection(host, _REPLY_TIMEOUT) as connection:
                 connection.ask_inputs(names)
         except ConeSkinError as exc:
-            yield Finding(item, "bad", str(exc), "no other client has them", _FREE)
+            yield Finding(item, "bad", str(exc), "no other client has them", _FREE_REMEDY)
         else:
             yield Finding(item, "ok", "free")

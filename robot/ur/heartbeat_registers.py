@@ -11,25 +11,25 @@ from __future__ import annotations
 from . import rtde_codec as rtde
 from .rtde_connection import RtdeConnection
 
-__all__ = ["INPUTS", "HeartbeatRegisters", "decode_echo", "program_lines"]
+__all__ = ["HEARTBEAT_INPUTS", "HeartbeatRegisters", "decode_echo", "heartbeat_lines"]
 
-_NUMBER = 46  # of both registers; 47 and the doubles from 40 on belong to the setpoints
+_HEARTBEAT_REGISTER = 46  # of both registers; 47 and the doubles from 40 on belong to the setpoints
 #: the controller's name of the register that is written
-INPUTS = (f"input_int_register_{_NUMBER}",)
-_OUTPUT = (f"output_int_register_{_NUMBER}",)
-_FREQUENCY = 50.0  # Hz of the echo
-_OUT = rtde.Recipe(_OUTPUT)
+HEARTBEAT_INPUTS = (f"input_int_register_{_HEARTBEAT_REGISTER}",)
+_HEARTBEAT_OUTPUTS = (f"output_int_register_{_HEARTBEAT_REGISTER}",)
+_HEARTBEAT_FREQUENCY = 50.0  # Hz of the echo
+_HEARTBEAT_RECIPE = rtde.Recipe(_HEARTBEAT_OUTPUTS)
 
 
-def program_lines(frequency: float) -> str:
+def heartbeat_lines(frequency: float) -> str:
     """Return the lines of URScript that go to the beginning of a program.
 
     Args:
         frequency: the program is ended where no count comes for 1 / frequency [Hz].
     """
     return (
-        f'rtde_set_watchdog("{INPUTS[0]}", {frequency:g}, "stop")\n'
-        f"write_output_integer_register({_NUMBER}, read_input_integer_register({_NUMBER}))\n"
+        f'rtde_set_watchdog("{HEARTBEAT_INPUTS[0]}", {frequency:g}, "stop")\n'
+        f"write_output_integer_register({_HEARTBEAT_REGISTER}, read_input_integer_register({_HEARTBEAT_REGISTER}))\n"
     )
 
 
@@ -39,7 +39,7 @@ def decode_echo(payload: bytes) -> int:
     Raises:
         RobotConnectionError: the payload has another length.
     """
-    (count,) = _OUT.unpack(payload)
+    (count,) = _HEARTBEAT_RECIPE.unpack(payload)
     assert isinstance(count, int)
     return count
 
@@ -53,11 +53,11 @@ class HeartbeatRegisters(RtdeConnection):
         RobotTimeout: on entering, where the controller does not answer.
     """
 
-    _in = rtde.Recipe(INPUTS)
+    _in = rtde.Recipe(HEARTBEAT_INPUTS)
 
     def __enter__(self) -> HeartbeatRegisters:
         super().__enter__()
-        self._in = self.claim("the heartbeat's register", _OUTPUT, INPUTS, _FREQUENCY)
+        self._in = self.claim("the heartbeat's register", _HEARTBEAT_OUTPUTS, HEARTBEAT_INPUTS, _HEARTBEAT_FREQUENCY)
         return self
 
     def write(self, count: int) -> bool:

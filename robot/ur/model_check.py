@@ -20,10 +20,10 @@ from .rtde_connection import RtdeConnection
 
 __all__ = ["ArmPose", "check_model", "flange_distance", "read_pose"]
 
-NAMES = ("actual_q", "actual_TCP_pose", "tcp_offset")
+_POSE_NAMES = ("actual_q", "actual_TCP_pose", "tcp_offset")
 #: distance that the flange may be from where the model has it [m]; calibration makes a millimetre or two, another model
 #: of the family centimetres
-TOLERANCE = 0.01
+_FLANGE_TOLERANCE = 0.01
 
 
 class ArmPose(NamedTuple):
@@ -49,7 +49,7 @@ def read_pose(host: str, timeout: float = 2.0) -> ArmPose | None:
     """
     with RtdeConnection(host, timeout) as connection:
         try:
-            recipe = connection.ask_outputs(NAMES, 10.0)
+            recipe = connection.ask_outputs(_POSE_NAMES, 10.0)
         except RobotRefused:
             return None
         connection.start()
@@ -69,9 +69,9 @@ def check_model(arm: ArmModel, pose: ArmPose, host: str) -> None:
         RobotRefused: the flange is not where the model has it; the message names the model that fits, if one does.
     """
     distance = flange_distance(arm, pose)
-    if distance <= TOLERANCE:
+    if distance <= _FLANGE_TOLERANCE:
         return
-    fits = [name for name in MODEL_NAMES if flange_distance(arm_model(name), pose) <= TOLERANCE]
+    fits = [name for name in MODEL_NAMES if flange_distance(arm_model(name), pose) <= _FLANGE_TOLERANCE]
     raise RobotRefused(
         f"the arm at {host} is no {arm.name}: its flange is {1e3 * distance:.0f} mm from where a {arm.name} would have "
         f"it; " + (f"it is where a {' or '.join(fits)} has it: correct arm.model" if fits else "no model fits")

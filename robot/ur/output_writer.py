@@ -17,9 +17,9 @@ from .rtde_connection import RtdeConnection
 
 __all__ = ["RtdeOutputWriter"]
 
-_ANALOG = ("mask", "type", "0", "1")
+_ANALOG_WORDS = ("mask", "type", "0", "1")
 _ANALOG_TYPES = {"current": 0, "voltage": 1}
-_REGISTERS = (*range(18, 23), *range(42, 47))  # those that ur_rtde leaves to users
+_USER_REGISTERS = (*range(18, 23), *range(42, 47))  # those that ur_rtde leaves to users
 
 
 class RtdeOutputWriter:
@@ -91,7 +91,7 @@ class RtdeOutputWriter:
             )
         bit = 1 << number
         values = (bit, _ANALOG_TYPES[kind] * bit, ratio if number == 0 else 0.0, ratio if number == 1 else 0.0)
-        names = tuple(f"standard_analog_output_{word}" for word in _ANALOG)
+        names = tuple(f"standard_analog_output_{word}" for word in _ANALOG_WORDS)
         self._write(names, values)
 
     def set_register(self, number: int, value: int | float) -> None:
@@ -105,7 +105,7 @@ class RtdeOutputWriter:
             ValueError: it is not one of these registers, or does not hold the value.
             RobotRefused, RobotConnectionError, RobotTimeout: as ``set_digital``.
         """
-        if number not in _REGISTERS:
+        if number not in _USER_REGISTERS:
             raise ValueError(f"a register for users has the number 18 to 22 or 42 to 46, got {number}")
         kind = "int" if isinstance(value, int) else "double"
         self._write((f"input_{kind}_register_{number}",), (value,))

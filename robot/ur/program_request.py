@@ -10,14 +10,14 @@ from coneskin.robot.driver.waypoint import Waypoint
 
 from .ur_rtde import MIN_ACCELERATION, MOVE_L_DECELERATION, SERVO_DECELERATION, UrArm, stop_time
 
-__all__ = ["RequestOutcome", "carry_out", "stop_acceleration"]
+__all__ = ["carry_out", "stop_acceleration"]
 
 _ANSWER_TIME = 0.5  # s for the controller to take a tool or a payload, or to answer a question
 _PATH_TIME = 3.0  # s for the controller to start its program again with a path in it
-_LONGEST_DURATION = 10.0  # s for which a speed or a position may hold
+_MAX_DURATION = 10.0  # s for which a speed or a position may hold
 
 
-class RequestOutcome(NamedTuple):
+class _RequestOutcome(NamedTuple):
     """What a request has led to.
 
     Attributes:
@@ -35,7 +35,7 @@ class RequestOutcome(NamedTuple):
 
 def carry_out(
     arm: UrArm, request: dict[str, Any], work: Callable[[float], None], restart: Callable[[bool], None]
-) -> RequestOutcome:
+) -> _RequestOutcome:
     """Start what a program asks for, or answer it.
 
     Args:
@@ -56,7 +56,7 @@ def carry_out(
             work(stop_time(MOVE_L_DECELERATION if straight else acceleration))  # it first ends what is under way
             target = request["q"] if move in ("move_j", "move_l_fk") else request["pose"]
             getattr(arm, move)(target, request["speed"], acceleration)
-            return RequestOutcome(True, waits=wait)
+            return _RequestOutcome(True, waits=wait)
         case "move_path":
             waypoints = [Waypoint.from_message(message) for message in request["waypoints"]]
             if not waypoints:
@@ -65,22 +65,22 @@ def carry_out(
             restart(False)
             arm.move_path(waypoints)
             restart(True)
-            return RequestOutcome(True, waits=wait)
+            return _RequestOutcome(True, waits=wait)
         case "speed_j" | "speed_l" as move:
             duration, acceleration = _duration(request), stop_acceleration(request)
             work(stop_time(min(acceleration, MOVE_L_DECELERATION)))
             getattr(arm, move)(request["qd" if move == "speed_j" else "twist"], acceleration)
-            return RequestOutcome(True, holds=duration)
+            return _RequestOutcome(True, holds=duration)
         case "servo_j" | "servo_l" as move:
             duration = _duration(request)
             work(stop_time(SERVO_DECELERATION))
             target = request["q" if move == "servo_j" else "pose"]
             getattr(arm, move)(target, float(request.get("lookahead", 0.1)), float(request.get("gain", 300.0)))
-            return RequestOutcome(True, holds=duration)
+            return _RequestOutcome(True, holds=duration)
         case "wait":
-            return RequestOutcome(waits=arm.moving())
+            return _RequestOutcome(waits=arm.moving())
         case "progress":
-            return RequestOutcome(answer={"waypoint": arm.waypoint(), "mode": arm.mode.value})
+            return _RequestOutcome(answer={"waypoint": arm.waypoint(), "mode": arm.mode.value})
     work(_ANSWER_TIME)
     match request["do"]:
         case "set_tcp":
@@ -88,10 +88,10 @@ def carry_out(
         case "set_payload":
             arm.set_payload(request["mass"], request["centre"])
         case "ask":
-            return RequestOutcome(answer={"value": arm.ask(request["what"], *request["values"])})
+            return _RequestOutcome(answer={"value": arm.ask(request["what"], *request["values"])})
         case other:
             raise ValueError(f"the arm cannot {other!r}")
-    return RequestOutcome()
+    return _RequestOutcome()
 
 
 def stop_acceleration(request: dict[str, Any]) -> float:
@@ -109,6 +109,6 @@ def stop_acceleration(request: dict[str, Any]) -> float:
 def _duration(request: dict[str, Any]) -> float:
     """Return for how long a speed or a position holds [s]."""
     duration = float(request["duration"])
-    if not 0.0 < duration <= _LONGEST_DURATION:
-        raise ValueError(f"duration must be above 0 and at most {_LONGEST_DURATION:g} s, got {duration:g} s")
+    if not 0.0 < duration <= _MAX_DURATION:
+        raise ValueError(f"duration must be above 0 and at most {_MAX_DURATION:g} s, got {duration:g} s")
     return duration

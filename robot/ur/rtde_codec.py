@@ -79,8 +79,8 @@ def pack(kind: int, payload: bytes = b"") -> bytes:
     return HEADER.pack(size, kind) + payload
 
 
-_KINDS = {int(kind): kind for kind in PacketKind}
-_KIND = re.compile(b"[" + bytes(_KINDS) + b"]")
+_PACKET_KINDS = {int(kind): kind for kind in PacketKind}
+_KIND_BYTE = re.compile(b"[" + bytes(_PACKET_KINDS) + b"]")
 
 
 def split(buffer: bytes) -> tuple[list[Packet], bytes]:
@@ -100,9 +100,9 @@ def split(buffer: bytes) -> tuple[list[Packet], bytes]:
     position, end = 0, len(buffer)
     while end - position >= HEADER.size:
         size, code = HEADER.unpack_from(buffer, position)
-        kind = _KINDS.get(code)
+        kind = _PACKET_KINDS.get(code)
         if size < HEADER.size or kind is None:
-            found = _KIND.search(buffer, position + HEADER.size)
+            found = _KIND_BYTE.search(buffer, position + HEADER.size)
             position = found.start() - HEADER.size + 1 if found else end - HEADER.size + 1
             continue
         if position + size > end:

@@ -17,7 +17,7 @@ from . import rtde_codec as rtde
 __all__ = ["PORT", "RtdeConnection"]
 
 PORT = 30004
-_CHECK = (
+_CHECK_ADVICE = (
     "check the address (arm.host), that the controller is on, that RTDE is enabled on it (Settings, Security, "
     "Services), and that it is in remote control"
 )
@@ -51,7 +51,7 @@ class RtdeConnection:
             raise self._silent() from exc
         except OSError as exc:
             raise RobotConnectionError(
-                f"cannot reach the controller {self.host}:{PORT}: {exc.strerror or exc}; {_CHECK}"
+                f"cannot reach the controller {self.host}:{PORT}: {exc.strerror or exc}; {_CHECK_ADVICE}"
             ) from exc
         self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if self._ask(rtde.pack_version_request(), rtde.PacketKind.PROTOCOL_VERSION) != b"\x01":
@@ -183,7 +183,7 @@ class RtdeConnection:
                 if not data:
                     raise RobotConnectionError(
                         f"the controller {self.host}:{PORT} has closed the connection during set-up, so perhaps "
-                        f"something else answers there; {_CHECK}"
+                        f"something else answers there; {_CHECK_ADVICE}"
                     )
                 packets, self._rest = rtde.split(self._rest + data)
                 for packet in packets:
@@ -199,9 +199,11 @@ class RtdeConnection:
             if isinstance(exc, RobotConnectionError):
                 raise
             raise RobotConnectionError(
-                f"the controller {self.host}:{PORT} is gone: {exc.strerror or exc}; {_CHECK}"
+                f"the controller {self.host}:{PORT} is gone: {exc.strerror or exc}; {_CHECK_ADVICE}"
             ) from exc
         return reply
 
     def _silent(self) -> RobotTimeout:
-        return RobotTimeout(f"no answer from the controller {self.host}:{PORT} within {self._timeout:g} s; {_CHECK}")
+        return RobotTimeout(
+            f"no answer from the controller {self.host}:{PORT} within {self._timeout:g} s; {_CHECK_ADVICE}"
+        )

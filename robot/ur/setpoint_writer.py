@@ -11,7 +11,7 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint
 
 from . import rtde_codec as rtde
-from .setpoint_program import REGISTERS, register_values
+from .setpoint_program import SETPOINT_INPUTS, _register_values
 from .state_reader import StateReader
 
 __all__ = ["RegisterWriter"]
@@ -24,7 +24,7 @@ class RegisterWriter(StateReader):
         RobotRefused: on entering, where another client has taken one of the registers.
     """
 
-    _in = rtde.Recipe(REGISTERS)
+    _in = rtde.Recipe(SETPOINT_INPUTS)
 
     def __enter__(self) -> RegisterWriter:
         super().__enter__()
@@ -33,12 +33,12 @@ class RegisterWriter(StateReader):
 
     def write(self, setpoint: JointVelocitySetpoint) -> bool:
         """Send a setpoint without waiting; return whether the system took the bytes."""
-        return self.send(self._in, register_values(setpoint))
+        return self.send(self._in, _register_values(setpoint))
 
     def _ask_for(self) -> None:
         super()._ask_for()
         try:
-            self._in = self.ask_inputs(REGISTERS)
+            self._in = self.ask_inputs(SETPOINT_INPUTS)
         except RobotRefused as exc:
             raise RobotRefused(
                 f"to move an arm that another program moves, the guard needs registers of {self.host}: {exc}; "

@@ -11,13 +11,13 @@ from coneskin.core.errors import ConeSkinError, RobotConnectionError
 from . import rtde_codec as rtde
 from .rtde_connection import RtdeConnection
 
-__all__ = ["INPUTS", "RtdeSpeedSlider", "decode_fraction", "set_slider"]
+__all__ = ["SLIDER_INPUTS", "RtdeSpeedSlider", "decode_fraction", "set_slider"]
 
-_OUTPUT = ("target_speed_fraction",)
+_SLIDER_OUTPUTS = ("target_speed_fraction",)
 #: the controller's names of what is written
-INPUTS = ("speed_slider_mask", "speed_slider_fraction")
-_FREQUENCY = 50.0  # Hz; enough to know where a person has put the slider
-_OUT = rtde.Recipe(_OUTPUT)
+SLIDER_INPUTS = ("speed_slider_mask", "speed_slider_fraction")
+_SLIDER_FREQUENCY = 50.0  # Hz; enough to know where a person has put the slider
+_SLIDER_RECIPE = rtde.Recipe(_SLIDER_OUTPUTS)
 
 
 def decode_fraction(payload: bytes) -> float:
@@ -26,7 +26,7 @@ def decode_fraction(payload: bytes) -> float:
     Raises:
         RobotConnectionError: the payload has another length, or the position is not from 0 to 1.
     """
-    (fraction,) = _OUT.unpack(payload)
+    (fraction,) = _SLIDER_RECIPE.unpack(payload)
     assert isinstance(fraction, float)
     if not 0.0 <= fraction <= 1.0:
         raise RobotConnectionError(f"target_speed_fraction must be from 0 to 1, got {fraction!r}")
@@ -46,11 +46,11 @@ class RtdeSpeedSlider(RtdeConnection):
         RobotTimeout: on entering, where the controller does not answer.
     """
 
-    _in = rtde.Recipe(INPUTS)
+    _in = rtde.Recipe(SLIDER_INPUTS)
 
     def __enter__(self) -> RtdeSpeedSlider:
         super().__enter__()
-        self._in = self.claim("the speed slider", _OUTPUT, INPUTS, _FREQUENCY)
+        self._in = self.claim("the speed slider", _SLIDER_OUTPUTS, SLIDER_INPUTS, _SLIDER_FREQUENCY)
         return self
 
     def set(self, fraction: float) -> bool:
@@ -71,6 +71,6 @@ def set_slider(host: str, fraction: float, timeout: float) -> bool:
     """
     try:
         with RtdeConnection(host, timeout) as connection:
-            return connection.send(connection.ask_inputs(INPUTS), (1, fraction))
+            return connection.send(connection.ask_inputs(SLIDER_INPUTS), (1, fraction))
     except ConeSkinError:
         return False

@@ -17,11 +17,11 @@ from .rtde_connection import RtdeConnection
 
 __all__ = ["RECIPE", "StateReader", "decode_state"]
 
-_NAMES = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
-_CURRENTS = ("actual_current", "target_current")
+_STATE_NAMES = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
+_CURRENT_NAMES = ("actual_current", "target_current")
 #: the variables that the reader asks for
-RECIPE = rtde.Recipe((*_NAMES, *_CURRENTS))
-_WITHOUT_CURRENTS = rtde.Recipe(_NAMES)  # of recordings made before the reader asked for them
+RECIPE = rtde.Recipe((*_STATE_NAMES, *_CURRENT_NAMES))
+_WITHOUT_CURRENTS = rtde.Recipe(_STATE_NAMES)  # of recordings made before the reader asked for them
 _SAFETY_STOPS = 0b11111111100  # bits 2 to 10: protective, recovery, safeguard, emergency, violation, fault, stopped
 _PROGRAM_RUNNING = 2  # value of runtime_state
 _ARM_RUNNING = 7  # value of robot_mode: powered, brakes released

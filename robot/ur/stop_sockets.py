@@ -28,14 +28,14 @@ __all__ = ["StopSockets"]
 
 _REOPEN_TIMEOUT = 0.2  # s for each port; a stop over the other one waits meanwhile
 _SLIDER_TIMEOUT = 0.2  # s for connecting, and for each reply, where the slider is used
-_PROTECTIVE = """def coneskin_stop():
+_PROTECTIVE_PROGRAM = """def coneskin_stop():
   protective_stop()
 end
 sec coneskin_protective():
   protective_stop()
 end
 """
-_PORTS = {"program": 30003, "command": 29999}  # stop path -> TCP port: script interface, dashboard
+_STOP_PORTS = {"program": 30003, "command": 29999}  # stop path -> TCP port: script interface, dashboard
 
 
 class StopSockets:
@@ -56,7 +56,7 @@ class StopSockets:
 
     def __enter__(self) -> StopSockets:
         try:
-            for name, port in _PORTS.items():
+            for name, port in _STOP_PORTS.items():
                 self._open_ones[name] = self._open(port)
         except BaseException:
             self.close()
@@ -114,7 +114,7 @@ class StopSockets:
 
             return set_slider(self.host, 0.0, _SLIDER_TIMEOUT)
         if path is StopPath.PROTECTIVE:
-            return self.run(_PROTECTIVE)
+            return self.run(_PROTECTIVE_PROGRAM)
         return self.run(f"def coneskin_stop():\n  stopj({deceleration:.3f})\nend\n")
 
     def follow(self, program: SetpointProgram) -> bool:
@@ -130,7 +130,7 @@ class StopSockets:
     def reopen(self) -> bool:
         """Open again what has been closed, at most 0.2 s for each; return whether any was opened."""
         opened = False
-        for name, port in _PORTS.items():
+        for name, port in _STOP_PORTS.items():
             if name not in self._open_ones:
                 with suppress(RobotConnectionError):
                     self._open_ones[name] = self._open(port, min(self._timeout, _REOPEN_TIMEOUT))

@@ -36,9 +36,9 @@ MOVE_L_DECELERATION = 10.0  #: rad/s2, of the stop before a straight move
 SERVO_DECELERATION = 2.0  #: rad/s2, of the stop before servo positions
 MIN_ACCELERATION = 0.1  #: rad/s2 or m/s2
 _STOP_MARGIN = 0.3  # s for a stop to begin and to be confirmed
-_FASTEST = 3.5  # rad/s, of any joint; a stop takes this divided by the deceleration at most
+_MAX_JOINT_SPEED = 3.5  # rad/s, of any joint; a stop takes this divided by the deceleration at most
 _NO_TOOL = [0.0, 0.0, 1e-12, 0.0, 0.0, 0.0]  # m and rad; the wheel sends a packet of a wrong size for exact zeros
-_LONGEST_STOP = 3.0  # s; ur_rtde waiting longer for a stop counts as a hang, however gentle the stop is
+_MAX_STOP_TIME = 3.0  # s; ur_rtde waiting longer for a stop counts as a hang, however gentle the stop is
 
 #: questions to the controller that move nothing, by the wheel's names
 QUESTIONS = (
@@ -51,7 +51,7 @@ QUESTIONS = (
 
 def stop_time(deceleration: float) -> float:
     """Return how long a stop with this deceleration [rad/s2] may keep ur_rtde busy [s]."""
-    return min(_FASTEST / max(deceleration, MIN_ACCELERATION), _LONGEST_STOP) + _STOP_MARGIN
+    return min(_MAX_JOINT_SPEED / max(deceleration, MIN_ACCELERATION), _MAX_STOP_TIME) + _STOP_MARGIN
 
 
 class Mode(Enum):

@@ -21,16 +21,16 @@ from .rtde_variables import VARIABLES
 
 __all__ = ["RtdeVariableReader"]
 
-_READING = (
+_READING_NAMES = (
     *("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_speed", "actual_TCP_force"),
     *("robot_mode", "safety_mode", "target_speed_fraction", "runtime_state"),
     *("actual_digital_input_bits", "actual_digital_output_bits"),
     *("standard_analog_input0", "standard_analog_input1", "tool_analog_input0", "tool_analog_input1"),
     *("standard_analog_output0", "standard_analog_output1"),
 )
-_USUAL = (*_READING, "safety_status_bits", "robot_status_bits", "target_q", "target_qd", "speed_scaling")
-_FRESH = 0.1  # s; an older packet is waited out
-_LOOK_PERIOD = 0.1  # s in which the thread notices that it is to end
+_USUAL_NAMES = (*_READING_NAMES, "safety_status_bits", "robot_status_bits", "target_q", "target_qd", "speed_scaling")
+_FRESH_TIME = 0.1  # s; an older packet is waited out
+_POLL_PERIOD = 0.1  # s in which the thread notices that it is to end
 _PROGRAM_RUNNING = 2  # value of runtime_state
 #: robot_mode and safety_mode as Universal Robots' RTDE guide names them
 _ROBOT_MODES = {
@@ -62,14 +62,14 @@ class RtdeVariableReader:
         self._asking = threading.Lock()  # one thread opens the connection anew
         self._news = threading.Condition()
         self._connection: RtdeConnection | None = None
-        self._recipe = rtde.Recipe(_USUAL)
+        self._recipe = rtde.Recipe(_USUAL_NAMES)
         self._thread: threading.Thread | None = None
         self._newest: tuple[float, rtde.Recipe, bytes] | None = None  # when it was read
         self._error: ConeSkinError | None = None
         self._closing = False
 
     def __enter__(self) -> Self:
-        self._open(_USUAL)
+        self._open(_USUAL_NAMES)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -113,7 +113,9 @@ class RtdeVariableReader:
                 self._open(self._recipe.names)
         recipe, payload = self._fresh()
         values: dict[str, Any] = dict(zip(recipe.names, recipe.unpack(payload), strict=True))
-        timestamp, q, qd, pose, speed, force, mode, safety, fraction, runtime, *rest = (values[n] for n in _READING)
+        timestamp, q, qd, pose, speed, force, mode, safety, fraction, runtime, *rest = (
+            values[n] for n in _READING_NAMES
+        )
         return ArmReading(
             timestamp,
             q,
@@ -158,7 +160,7 @@ class RtdeVariableReader:
     def _run(self, connection: RtdeConnection, recipe: rtde.Recipe) -> None:
         try:
             while not self._closing:
-                wait_readable([connection], _LOOK_PERIOD)
+                wait_readable([connection], _POLL_PERIOD)
                 if payloads := connection.read():
                     with self._news:
                         self._newest = (self._clock(), recipe, payloads[-1])
@@ -172,7 +174,7 @@ class RtdeVariableReader:
         """Return the newest payload, which is not old; wait for it where need be."""
         end = self._clock() + self._timeout
         with self._news:
-            while self._newest is None or self._clock() - self._newest[0] > _FRESH:
+            while self._newest is None or self._clock() - self._newest[0] > _FRESH_TIME:
                 if self._error is not None:
                     self._thread = None  # the next question opens the connection anew
                     raise RobotConnectionError(f"the state of the arm cannot be read: {self._error}") from self._error

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.ur.heartbeat_registers import program_lines
+from coneskin.robot.ur.heartbeat_registers import heartbeat_lines
 from coneskin.session.session import guard
 from coneskin.testing.scenes import GOAL, START
 
@@ -20,7 +20,7 @@ from .test_external_control import PATIENT, send  # noqa: E402
 
 MOVES = f"while True:\n    movej({GOAL}, a=4, v=1)\n    movej({START}, a=4, v=1)\n  end\nend\n"
 WITHOUT = f"def users():\n  {MOVES}"
-WITH = f"def users():\n  {program_lines(4.0).replace(chr(10), chr(10) + '  ')}{MOVES}"
+WITH = f"def users():\n  {heartbeat_lines(4.0).replace(chr(10), chr(10) + '  ')}{MOVES}"
 REQUIRED = {**PATIENT, "[arm]": '[arm]\ncontroller_heartbeat = "required"'}
 
 
@@ -56,7 +56,7 @@ def test_a_motion_that_ur_rtde_sends_with_the_lines_ends_when_the_network_is_cut
         "sys.stdin.readline()\n"
         "control.sendCustomScriptFunction('guarded_move', sys.argv[2])\n"
     )
-    command = [sys.executable, "-c", code, controller.host, f"{program_lines(4.0)}movej({GOAL}, a=4, v=1)\n"]
+    command = [sys.executable, "-c", code, controller.host, f"{heartbeat_lines(4.0)}movej({GOAL}, a=4, v=1)\n"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as user:
         try:
             assert user.stdout.readline() == "connected\n"

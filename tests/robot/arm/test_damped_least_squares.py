@@ -15,7 +15,7 @@ from coneskin.robot.arm.damped_least_squares import (
     damping_squared,
     stacked_speeds,
 )
-from coneskin.robot.reaction.retreat import LEAST_PROGRESS
+from coneskin.robot.reaction.retreat import MIN_PROGRESS
 
 from ..arms import units
 
@@ -113,7 +113,7 @@ def test_several_points_do_as_well_as_the_quadratic_program() -> None:
         best = np.linalg.solve(root.T, np.linalg.solve(root, along.T) @ forces + free)
         # Touches are held one by one and none is let go: a little slower than the best, where the best is fast enough
         # for a retreat to be begun at all.
-        if np.mean(along @ best) >= LEAST_PROGRESS:
+        if np.mean(along @ best) >= MIN_PROGRESS:
             assert np.mean(along @ speeds) >= np.mean(along @ best) - 0.05
             begun += 1
         assert np.min(along @ speeds) >= -1e-7  # 1e-9 of terms that sum to some 10 m/s

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.joint_limits import JointLimits
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.self_collision import PARTS, PartPair, clearance_needed, close_pairs, segment_distance
+from coneskin.robot.arm.self_collision import _PART_NAMES, PartPair, clearance_needed, close_pairs, segment_distance
 from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import TablePlane, Workspace
@@ -85,8 +85,8 @@ def test_an_arm_as_people_use_it_does_not_touch_itself():
 def test_a_wrist_at_the_base_is_named():
     (pair, *_) = close_pairs(ARM, skeleton(ARM, folded()))
     assert isinstance(pair, PartPair)
-    assert PARTS[pair.second].startswith(("wrist", "forearm"))
-    assert f"within {1e3 * pair.distance:.0f} mm of the {PARTS[pair.first]}" in pair.why
+    assert _PART_NAMES[pair.second].startswith(("wrist", "forearm"))
+    assert f"within {1e3 * pair.distance:.0f} mm of the {_PART_NAMES[pair.first]}" in pair.why
 
 
 def folded():

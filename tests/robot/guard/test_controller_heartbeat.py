@@ -3,7 +3,7 @@
 import pytest
 
 from coneskin.robot.guard.controller_heartbeat import COUNT_PERIOD, ControllerHeartbeat, heartbeat_count
-from coneskin.robot.ur.heartbeat_registers import decode_echo, program_lines
+from coneskin.robot.ur.heartbeat_registers import decode_echo, heartbeat_lines
 from coneskin.robot.ur.rtde_codec import Recipe
 
 
@@ -47,7 +47,7 @@ def test_the_count_is_never_zero_and_fits_a_register():
 
 
 def test_the_lines_use_the_register_that_is_written_and_report_it():
-    text = program_lines(4.0)
+    text = heartbeat_lines(4.0)
     assert text.splitlines() == [
         'rtde_set_watchdog("input_int_register_46", 4, "stop")',
         "write_output_integer_register(46, read_input_integer_register(46))",

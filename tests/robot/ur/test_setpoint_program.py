@@ -10,7 +10,7 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.rtde_connection import RtdeConnection
-from coneskin.robot.ur.setpoint_program import REGISTERS, program_text, register_values
+from coneskin.robot.ur.setpoint_program import SETPOINT_INPUTS, program_text, _register_values
 from coneskin.robot.ur.setpoint_writer import RegisterWriter
 from coneskin.robot.ur.state_reader import StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
@@ -25,7 +25,7 @@ def bench():
     made = Bench()
 
     def write(setpoint):
-        made.controller.write_inputs(dict(zip(REGISTERS, register_values(setpoint), strict=True)))
+        made.controller.write_inputs(dict(zip(SETPOINT_INPUTS, _register_values(setpoint), strict=True)))
 
     made.write = write
     return made
@@ -75,7 +75,7 @@ def test_silence_ends_it_by_the_watchdog(bench):
     assert bench.controller.runtime.name == "PLAYING"
     run(bench, 0.02)
     assert bench.controller.runtime.name == "STOPPING"  # until the arm stands
-    assert bench.events("stopped")[-1]["reason"] == f"watchdog of {REGISTERS[0]}"
+    assert bench.events("stopped")[-1]["reason"] == f"watchdog of {SETPOINT_INPUTS[0]}"
     run(bench, 0.5)
     assert bench.controller.runtime.name == "STOPPED"
     assert speeds(bench) == pytest.approx(ZERO_VELOCITY)
