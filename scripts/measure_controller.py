@@ -17,10 +17,9 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 from coneskin.core.errors import ConeSkinError, RobotTimeout
-from coneskin.robot.driver.stop_path import StopPath
-from coneskin.robot.ur.heartbeat_registers import HeartbeatRegisters, heartbeat_lines
+from coneskin.robot.driver.values import StopPath
+from coneskin.robot.ur.input_writers import HeartbeatRegisters, heartbeat_lines, set_slider
 from coneskin.robot.ur.rtde_connection import RtdeConnection
-from coneskin.robot.ur.speed_slider import set_slider
 from coneskin.robot.ur.stop_sockets import StopSockets
 
 _NAMES = ("timestamp", "actual_qd", "runtime_state", "safety_status_bits", "output_int_register_47")

@@ -42,10 +42,10 @@ FLOORS = (
 #: the only files that may import each heavy dependency, as globs
 HOMES = {
     "serial": ("skin/sources/serial_port.py",),
-    "rtde_control": ("robot/ur/control_program.py",),
-    "rtde_receive": ("robot/ur/control_program.py",),
-    "rtde_io": ("robot/ur/control_program.py",),
-    "dashboard_client": ("robot/ur/control_program.py",),
+    "rtde_control": ("robot/ur/ur_rtde.py",),
+    "rtde_receive": ("robot/ur/ur_rtde.py",),
+    "rtde_io": ("robot/ur/ur_rtde.py",),
+    "dashboard_client": ("robot/ur/ur_rtde.py",),
     "trimesh": ("geometry/mesh.py",),
     "embreex": ("geometry/mesh.py",),
     "collada": ("geometry/mesh.py",),
@@ -86,13 +86,13 @@ HOT = {
     "skin/detection": "stream detector events",
     "skin/detection/frame": "contact_matrix reading timing untouched",
     "skin/detection/place": "touch_place place_estimate single_contact seam_contact",
-    "robot/arm": "kinematics compiled_kinematics damped_least_squares joint_limits",
+    "robot/arm": "kinematics compiled_kinematics damped_least_squares workspace",
     "robot/reaction": "retreat types",
     "robot/guard": "core arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop state_age "
     "signals/contact signals/journal",
     "robot/guard/motion": "motion_away reaction_motion",
     "robot/stop": "stop_monitor",
-    "robot/ur": "driver_process state_reader control_program ur_rtde",
+    "robot/ur": "driver_process state_reader ur_rtde",
 }
 
 MOST_LINES = 500  # of a file

@@ -21,7 +21,7 @@ VIRTUAL = {
     "coneskin.skin.virtual.pseudo_terminal",
 }
 FIELD = {"coneskin.skin.field", "coneskin.skin.virtual.field_contacts"}
-KINEMATICS = {"coneskin.robot.arm.link_frames", "coneskin.robot.arm.compiled_kinematics"}
+KINEMATICS = {"coneskin.robot.arm.kinematics", "coneskin.robot.arm.compiled_kinematics"}
 SIMULATOR = {"coneskin.robot.sim.machine.controller", "coneskin.robot.sim.process", "coneskin.robot.sim.server"}
 CALIBRATION = {
     "coneskin.commissioning.calibration",
@@ -74,12 +74,12 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
         | VIRTUAL
         | FIELD
         | SIMULATOR
-        | {"coneskin.session.session", "coneskin.robot.ur.ur_rtde", "coneskin.robot.arm.link_frames"},
+        | {"coneskin.session.session", "coneskin.robot.ur.ur_rtde", "coneskin.robot.arm.kinematics"},
     ),
     "double cone, its touches scripted": (
         DOUBLE_CONE,
         _BUILD,
-        {*LOADED, "coneskin.robot.arm.link_frames", "coneskin.skin.virtual.scripted_touch"},
+        {*LOADED, "coneskin.robot.arm.kinematics", "coneskin.skin.virtual.scripted_touch"},
         HEAVY
         | VIRTUAL
         | FIELD
@@ -102,7 +102,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "stop": (
         _STOP,
         _BUILD,
-        {*LOADED, "coneskin.robot.arm.link_frames", "coneskin.robot.reaction.types"},
+        {*LOADED, "coneskin.robot.arm.kinematics", "coneskin.robot.reaction.types"},
         {"coneskin.robot.arm.compiled_kinematics"}
         | HEAVY
         | VIRTUAL
@@ -166,7 +166,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
             "coneskin.robot.ur.stop_sockets",
             "coneskin.robot.guard.motion.reaction_motion",
             "coneskin.robot.ur.rtde_codec",
-            "coneskin.robot.ur.speed_slider",
+            "coneskin.robot.ur.input_writers",
             "coneskin.robot.ur.state_reader",
         },
     ),
@@ -197,8 +197,7 @@ def test_a_scene_without_an_arm_loads_no_kinematics_and_no_reaction(tmp_path: Pa
 @pytest.mark.parametrize("scene", [_STOP, _NO_MESH_FRAME], ids=["a stop", "a retreat without a commissioning"])
 def test_a_reaction_that_only_stops_loads_no_retreat(scene: str, tmp_path: Path) -> None:
     unneeded = {"guard.motion.reaction_motion", "reaction.motion", "reaction.retreat"}
-    unneeded |= {"reaction.admittance", "reaction.backtrack", "arm.workspace", "ur.setpoint_program"}
-    unneeded |= {"ur.setpoint_writer"}
+    unneeded |= {"reaction.admittance", "reaction.backtrack", "arm.workspace", "ur.input_writers"}
     loaded = modules(scene, _BUILD, tmp_path / "scene.toml", "")
     assert not {f"coneskin.robot.{name}" for name in unneeded} & loaded
 

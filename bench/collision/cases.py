@@ -8,8 +8,7 @@ import random
 from dataclasses import dataclass
 
 from coneskin.geometry.pose import Vector
-from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-from coneskin.robot.arm.link_frames import dh_mesh
+from coneskin.robot.arm.kinematics import dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.build import SensorOnArm, place_on_arm

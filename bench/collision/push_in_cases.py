@@ -11,8 +11,7 @@ from functools import cache
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose, Vector
-from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
+from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.skin.sensor import Sensor

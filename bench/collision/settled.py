@@ -18,7 +18,7 @@ from bench.report import head
 from coneskin.core.recording.block import Block
 from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
 from coneskin.impact.simulation.impact_outcome import CLAMP_TIME
-from coneskin.robot.arm.ur_inertias import arm_inertia
+from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_event
 
 from .cases import RUN_UP_ACCELERATION, draw

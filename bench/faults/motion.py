@@ -14,10 +14,9 @@ from coneskin.core.errors import ConeSkinError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
+from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.ur.driver import UR_DRIVER
 
 from .setup import give_precedence

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.impact.permissible_speed.contact_course import ContactCourse
+from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.ur_inertias import arm_inertia
 
 from .pushes import CONE, HORIZON, LINK, MODEL, RADIUS, SERVO, Push
 

@@ -20,11 +20,9 @@ from coneskin.impact.permissible_speed.speed_map import contact_at
 from coneskin.impact.permissible_speed.speed_search import ForceLimits
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.robot.arm.inertia import effective_mass, mass_matrix
-from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
+from coneskin.robot.arm.inertia import arm_inertia, effective_mass, mass_matrix
+from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.model import Joints
-from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.skin.materials import Padding
 

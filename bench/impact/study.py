@@ -19,8 +19,7 @@ import numpy as np
 from bench.report import head, quantile
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.robot.arm.inertia import effective_mass
-from coneskin.robot.arm.ur_inertias import arm_inertia
+from coneskin.robot.arm.inertia import arm_inertia, effective_mass
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.skin.materials import Padding
 

@@ -14,7 +14,7 @@ from coneskin.core.recording.block import Block
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.messages import StatusReport
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import StopPath
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.loop import GuardLoop, GuardPorts

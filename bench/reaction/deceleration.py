@@ -3,7 +3,7 @@
     python -m bench deceleration [--positions 2000] [--json]
 
 A joint that turns alone can be braked with (torque - what gravity and the payload take) / (what it turns): the torques
-and inertias of coneskin.robot.arm.ur_inertias, the payload as a point at the flange. The worse direction counts: down.
+and inertias of coneskin.robot.arm.inertia, the payload as a point at the flange. The worse direction counts: down.
 Beside it what Universal Robots measured for a stop of category 0, which is the worst case of one position: 183 deg/s,
 arm stretched out, highest payload (user manuals UR5/CB3 3.4.5 and UR3/CB3 3.10, appendix A): speed over stopping time.
 """
@@ -16,9 +16,8 @@ import math
 import random
 
 from bench.report import head, quantile
-from coneskin.robot.arm.inertia import GRAVITY, joint_torques, mass_matrix
+from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
-from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
 
 PAYLOAD = {"UR3": 3.0, "UR5": 5.0, "UR10": 10.0, "UR3e": 3.0, "UR5e": 5.0, "UR10e": 12.5, "UR16e": 16.0, "UR20": 20.0}

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 from bench.report import head
 from coneskin.impact.simulation.collision_run import Waypoints
-from coneskin.robot.driver.setpoint import SetSpeedSlider
+from coneskin.robot.driver.values import SetSpeedSlider
 from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds, SurfaceSpeeds
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.sim.mock_arm import MockArm

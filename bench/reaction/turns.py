@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import ConeSkinError
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import StopPath
 from coneskin.robot.guard.signals.journal import BlockKind, decode_event
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.stop.stop_monitor import StopMonitor

@@ -1,4 +1,4 @@
-"""Inertia of an arm: what its links weigh, and the mass that a contact on it feels.
+"""Inertia of an arm: what its links weigh, the mass that a contact on it feels, and the table of the UR family.
 
     symbol    meaning
     M         joint-space mass matrix [kg m^2]: kinetic energy = qd^T M qd / 2
@@ -10,10 +10,23 @@
 Source: Khatib, "Inertial properties in robotic manipulation: an object-level framework", IJRR 14 (1995), eq. 9: the
 effective mass is 1 / (n^T J M^-1 J^T n). The joints are free in it; held joints make an arm heavier, never lighter.
 Torques: the recursion of Luh, Walker and Paul, as in Siciliano et al., *Robotics*, chapter 7.5.
+
+Sources of the table:
+    Masses, centres of mass and tensors: ``physical_parameters.yaml`` of Universal_Robots_ROS2_Description (commit
+    3426d67; it quotes Universal Robots, "DH Parameters for calculations of kinematics and dynamics"), there in the URDF
+    frames, here in the DH frames of that article. The UR3 and UR5 have no published tensors: theirs are those of solid
+    cylinders of the published mass, as in that file. The tensors that it gives for the UR30 are the UR16e's, digit for
+    digit, with which an upper arm of 28.5 kg would turn as one of 10; so shoulder and wrists have the UR20's tensors,
+    whose masses are the same, and upper arm and forearm the UR20's, scaled by mass and by length squared (ours).
+    The UR7e has the UR5e's.
+    Torques: Universal Robots, "Max. joint torques", as collected in ``joint_limits.yaml`` there.
+    Rotors: not published. 0.1 kg m^2 at every joint, as MuJoCo Menagerie's UR5e has it (``universal_robots_ur5e``,
+    armature), scaled with the joint's highest torque over 150 N m, because larger joints have larger motors (assumed).
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,8 +36,9 @@ from coneskin.geometry.pose import Vector
 
 from .kinematics import JOINTS, link_poses, point_jacobian
 from .model import ArmModel, Joints
+from .ur_models import arm_model
 
-__all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "effective_mass", "joint_torques", "mass_matrix"]
+__all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "effective_mass", "joint_torques", "mass_matrix"]
 
 GRAVITY = 9.82  #: of an arm that stands upright [m/s^2]; as a UR controller has it until it is told another
 
@@ -207,3 +221,142 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+_ROTOR_PER_TORQUE = 0.1 / 150.0  # kg m^2 of reflected inertia for each N m of highest torque
+
+#: mass [kg]; centre x, y, z [m]; tensor xx, xy, xz, yy, yz, zz [kg m^2], about the centre, in the DH frame
+_Row = tuple[float, Vector, tuple[float, float, float, float, float, float]]
+
+
+def _rod(along: float, across: float) -> tuple[float, float, float, float, float, float]:
+    """Return the tensor of a cylinder along x."""
+    return along, 0.0, 0.0, across, 0.0, across
+
+
+def _pin(along: float, across: float) -> tuple[float, float, float, float, float, float]:
+    """Return the tensor of a cylinder along y."""
+    return across, 0.0, 0.0, along, 0.0, across
+
+
+_UR5E_LINKS: tuple[_Row, ...] = (
+    (3.761, (0.0, -0.02561, 0.00193), (0.0070021, 7.3e-7, -1.053e-5, 0.00648091, 0.00049994, 0.00657286)),
+    (8.058, (0.2125, 0.0, 0.11336), (0.01505885, -5.4e-5, 5.63e-6, 0.33388086, -1.81e-6, 0.33247207)),
+    (2.846, (0.15, 0.0, 0.0265), (0.00399632, -1.365e-5, 0.00137272, 0.07879254, -6.6e-6, 0.0784851)),
+    (1.37, (0.0, -0.0018, 0.01634), (0.00165491, -2.82e-6, -4.38e-6, 0.00135962, 0.00010157, 0.00126279)),
+    (1.3, (0.0, 0.0018, 0.01634), (0.00135617, -2.74e-6, 4.44e-6, 0.00127827, -5.048e-5, 0.00096614)),
+    (0.365, (0.0, 0.0, -0.001159), (0.00018694, 6e-8, -1.7e-7, 0.00018908, -9.2e-7, 0.00025756)),
+)
+_LINK_TABLE: dict[str, tuple[_Row, ...]] = {
+    "UR3": (
+        (2.0, (0.0, -0.02, 0.0), _pin(0.005625, 0.008093167)),
+        (3.42, (0.13, 0.0, 0.1157), _rod(0.00961875, 0.021728492)),
+        (1.26, (0.05, 0.0, 0.0238), _rod(0.00354375, 0.006546809)),
+        (0.8, (0.0, 0.0, 0.01), _pin(0.00225, 0.001610642)),
+        (0.8, (0.0, 0.0, 0.01), _pin(0.00225, 0.001572174)),
+        (0.35, (0.0, 0.0, -0.02), (0.000136267, 0.0, 0.0, 0.000136267, 0.0, 0.0001792)),
+    ),
+    "UR5": (
+        (3.7, (0.0, -0.02561, 0.00193), _pin(0.01040625, 0.014972358)),
+        (8.393, (0.2125, 0.0, 0.11336), _rod(0.0151074, 0.133885835)),
+        (2.33, (0.15, 0.0, 0.0265), _rod(0.004095, 0.031216804)),
+        (1.219, (0.0, -0.0018, 0.01634), _pin(0.0021942, 0.00201389)),
+        (1.219, (0.0, 0.0018, 0.01634), _pin(0.0021942, 0.00183104)),
+        (0.1879, (0.0, 0.0, -0.001159), (8.062476e-5, 0.0, 0.0, 8.062476e-5, 0.0, 0.000132117)),
+    ),
+    "UR10": (
+        (7.1, (0.021, 0.0, 0.027), (0.03408, 0.00002, -0.00425, 0.03529, 0.00008, 0.02156)),
+        (12.7, (0.38, 0.0, 0.158), (0.02814, 0.00005, -0.01561, 0.77068, 0.00002, 0.76943)),
+        (4.27, (0.24, 0.0, 0.068), (0.01014, 0.00008, 0.00916, 0.30928, 0.0, 0.30646)),
+        (2.0, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
+        (2.0, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
+        (0.365, (0.0, 0.0, -0.026), (0.0004, 0.0, 0.0, 0.00041, 0.0, 0.00034)),
+    ),
+    "UR3e": (
+        (1.98, (0.0, -0.02, 0.0), (0.0027657, 9.6e-6, -1.49e-5, 0.0021501, 0.0001873, 0.0025626)),
+        (3.4445, (0.13, 0.0, 0.1157), (0.0042623, -4.09e-5, -0.001496, 0.0460284, -1.29e-5, 0.0448947)),
+        (1.437, (0.05, 0.0, 0.0238), (0.0010511, 0.0, -3.31e-5, 0.0113396, 2.2e-6, 0.0110895)),
+        (0.871, (0.0, 0.0, 0.01), (0.0008174, -5e-7, 2.1e-6, 0.0006844, 6.17e-5, 0.0005497)),
+        (0.805, (0.0, 0.0, 0.01), (0.0006059, -6e-7, -6e-7, 0.0005837, -2.71e-5, 0.0003831)),
+        (0.261, (0.0, 0.0, -0.02), (0.000108, -1e-7, -1e-7, 0.0001086, -2e-7, 0.0001371)),
+    ),
+    "UR5e": _UR5E_LINKS,
+    "UR7e": _UR5E_LINKS,
+    "UR10e": (
+        (7.369, (0.021, 0.0, 0.027), (0.03408, 0.00002, -0.00425, 0.03529, 0.00008, 0.02156)),
+        (13.051, (0.38, 0.0, 0.158), (0.02814, 0.00005, -0.01561, 0.77068, 0.00002, 0.76943)),
+        (3.989, (0.24, 0.0, 0.068), (0.01014, 0.00008, 0.00916, 0.30928, 0.0, 0.30646)),
+        (2.1, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
+        (1.98, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
+        (0.615, (0.0, 0.0, -0.026), (0.0004, 0.0, 0.0, 0.00041, 0.0, 0.00034)),
+    ),
+    "UR16e": (
+        (7.369, (0.0, -0.016, 0.03), (0.03351, 0.00002, -0.00001, 0.03374, 0.00374, 0.021)),
+        (10.45, (0.302, 0.0, 0.16), (0.02796, -0.0001, -0.0072, 0.47558, 0.00003, 0.47635)),
+        (4.321, (0.194, 0.0, 0.065), (0.01091, 0.00006, 0.01012, 0.1206, 0.00001, 0.11714)),
+        (2.18, (0.0, -0.009, 0.011), (0.00609, -0.00001, 0.0, 0.00245, 0.00083, 0.00579)),
+        (2.033, (0.0, 0.018, 0.012), (0.00389, -0.00001, 0.0, 0.00219, -0.00045, 0.00363)),
+        (0.907, (0.0, 0.0, -0.044), (0.00117, 0.0, 0.0, 0.00118, 0.0, 0.00084)),
+    ),
+    "UR20": (
+        (16.343, (0.0, -0.061, 0.0062), (0.08866, -0.00011, -0.00011, 0.07632, 0.0072, 0.08418)),
+        (29.632, (0.5226, 0.0, 0.2098), (0.1467, 0.00019, -0.05163, 4.6659, 0.00004, 4.6348)),
+        (7.879, (0.3234, 0.0, 0.0604), (0.02612, -0.00005, -0.02898, 0.75763, -0.00001, 0.75327)),
+        (3.054, (0.0, -0.0026, 0.0393), (0.00555, -0.00001, -0.00002, 0.00537, 0.00036, 0.00402)),
+        (3.126, (0.0, 0.0024, 0.0379), (0.00586, -0.00001, -0.00002, 0.00578, -0.00037, 0.00427)),
+        (0.926, (0.0, 0.0, -0.0293), (0.00092, 0.0, 0.0, 0.00091, 0.0, 0.00117)),
+    ),
+    "UR30": (
+        (16.343, (-0.0001, -0.06, 0.0069), (0.08866, -0.00011, -0.00011, 0.07632, 0.0072, 0.08418)),
+        (28.542, (0.3894, 0.0, 0.2103), (0.1413, 0.0, -0.0367, 2.4542, 0.0, 2.4379)),
+        (7.156, (0.2257, 0.0, 0.0629), (0.02372, 0.0, -0.01819, 0.32877, 0.0, 0.32688)),
+        (3.054, (0.0, -0.0048, 0.0353), (0.00555, -0.00001, -0.00002, 0.00537, 0.00036, 0.00402)),
+        (3.126, (0.0, 0.0046, 0.0341), (0.00586, -0.00001, -0.00002, 0.00578, -0.00037, 0.00427)),
+        (0.926, (0.0, 0.0, -0.0293), (0.00092, 0.0, 0.0, 0.00091, 0.0, 0.00117)),
+    ),
+}
+
+
+def _torque(large: float, elbow: float, wrist: float) -> Joints:
+    return large, large, elbow, wrist, wrist, wrist
+
+
+#: highest torque of base and shoulder, elbow, wrists [N m]
+_JOINT_TORQUES = {
+    "UR3": _torque(56.0, 28.0, 12.0),
+    "UR5": _torque(150.0, 150.0, 28.0),
+    "UR10": _torque(330.0, 150.0, 56.0),
+    "UR3e": _torque(54.0, 28.0, 9.0),
+    "UR5e": _torque(150.0, 150.0, 28.0),
+    "UR7e": _torque(150.0, 150.0, 28.0),
+    "UR10e": _torque(330.0, 150.0, 54.0),
+    "UR16e": _torque(330.0, 150.0, 54.0),
+    "UR20": _torque(738.0, 433.0, 107.0),
+    "UR30": _torque(738.0, 433.0, 107.0),
+}
+
+
+def arm_inertia(model: ArmModel | str) -> ArmInertia:
+    """Return the inertia of an arm, without any tool.
+
+    Args:
+        model: the arm, or its name as ``arm_model`` takes it.
+
+    Raises:
+        KinematicsError: there is no such arm, or its inertia is not known.
+    """
+    return _inertia(arm_model(model).name if isinstance(model, str) else model.name)
+
+
+@functools.cache
+def _inertia(name: str) -> ArmInertia:
+    if name not in _LINK_TABLE:
+        raise KinematicsError(f"inertias are known for {', '.join(_LINK_TABLE)}, got the arm {name!r}")
+    links = tuple(
+        LinkInertia(mass, centre, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+        for mass, centre, (xx, xy, xz, yy, yz, zz) in _LINK_TABLE[name]
+    )
+    a, b, c, d, e, f = torque = _JOINT_TORQUES[name]
+    per = _ROTOR_PER_TORQUE
+    rotor = (per * a, per * b, per * c, per * d, per * e, per * f)
+    return ArmInertia(links, torque, rotor)

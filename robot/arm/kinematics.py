@@ -1,4 +1,4 @@
-"""Forward kinematics of an arm, and the Jacobian of points on its links. Plain floats, readable.
+"""Forward kinematics of an arm, the Jacobian of points on its links, and the frames of links and meshes. Plain floats.
 
 `compiled_kinematics` generates the same for one link of one arm where microseconds count, and is tested against this.
 
@@ -9,19 +9,55 @@
               column i = z_{i-1} x (p - o_{i-1})
 
 Source: Spong, Hutchinson, Vidyasagar, *Robot Modeling and Control*, chapters 3.2 (standard DH) and 4.6 (Jacobian).
+
+A sensor on a mesh moves with its link. Three frames belong to each link, and they are not the same:
+
+    DH frame     what ``kinematics`` computes: at the *far* end of the link, after Tx(a) Rx(alpha)
+    URDF frame   ``upper_arm_link`` and the like: on the link's own joint axis, before Tx(a) Rx(alpha)
+    mesh frame   the coordinates in ``upperarm.stl``: turned, and shifted along the joint axis, by the <origin> of the
+                 link's <visual> and <collision>, which differs between arms
+
+    p_dh = dh_link(model, "upper_arm").apply(link_mesh(model, "upper_arm").apply(p_mesh))
+    p_base = link_pose(model, q, LINK_INDEX["upper_arm"]).apply(p_dh)
+
+The base is the controller's base frame; the URDF's ``base_link`` is turned by half a turn about z against it
+(``base_link_inertia`` and ``base`` are not).
+
+In a calibrated arm the frames 2 and 3 of the table may be hundreds of metres away along nearly parallel axes. Upper arm
+and forearm are then placed where the arm really is: from the start of joint 2's axis to the point where the next axis
+crosses the plane normal to it, as ur_calibration of Universal_Robots_ROS2_Driver does for the URDF.
+
+Sources of the frames, in Universal_Robots_ROS2_Description, releases 2.4.5 to 4.2.0: ``ur_macro.xacro`` (rotations),
+``physical_parameters.yaml`` (shoulder_offset, elbow_offset) and ``visual_parameters.yaml`` (visual_offset,
+visual_offset_xyz, lately mesh_offset). The later one counts where they differ: by 2 mm at the wrists of the UR3, 1 mm
+or less elsewhere.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 
 from .model import ArmModel, Joints
 
-__all__ = ["JOINTS", "cos_sin", "flange_jacobian", "forward", "link_pose", "link_poses", "point_jacobian"]
+__all__ = [
+    "JOINTS",
+    "LINK_INDEX",
+    "cos_sin",
+    "dh_link",
+    "dh_mesh",
+    "flange_jacobian",
+    "forward",
+    "link_index",
+    "link_mesh",
+    "link_pose",
+    "link_poses",
+    "point_jacobian",
+]
 
 JOINTS = 6  #: number of joints
 
@@ -140,3 +176,125 @@ def _rows(columns: list[Vector]) -> tuple[Joints, Joints, Joints]:
     a, b, c, d, e, f = columns + [(0.0, 0.0, 0.0)] * (JOINTS - len(columns))
     x, y, z = ((a[k], b[k], c[k], d[k], e[k], f[k]) for k in range(3))
     return x, y, z
+
+
+#: DH frame that moves with a link, by the link's name in the URDF (without ``_link``)
+LINK_INDEX: Mapping[str, int] = MappingProxyType(
+    {"base": 0, "shoulder": 1, "upper_arm": 2, "forearm": 3, "wrist_1": 4, "wrist_2": 5, "wrist_3": 6}
+)
+
+#: arm -> shift of the mesh along the joint axis [m] of upper_arm, forearm, wrist_1, wrist_2, wrist_3; wrist_3 along y
+_TUBE_OFFSETS = {
+    "UR3": (0.1198, 0.0275, -0.085, -0.083, -0.082, -0.002),
+    "UR5": (0.13585, 0.0165, -0.093, -0.095, -0.0818, 0.0),
+    "UR10": (0.220941, 0.049042, -0.1149, -0.1158, -0.0922, 0.001),
+    "UR3e": (0.120, 0.027, -0.104, -0.08535, -0.0921, 0.0),
+    "UR5e": (0.138, 0.007, -0.127, -0.0997, -0.0989, -0.0005),
+    "UR7e": (0.138, 0.007, -0.127, -0.0997, -0.0989, -0.0005),
+    "UR10e": (0.1762, 0.0393, -0.135, -0.12, -0.1168, -0.0005),
+    "UR16e": (0.1762, 0.0393, -0.135, -0.12, -0.1168, -0.0005),
+    "UR20": (0.260, 0.043, -0.0775, -0.0749, -0.07, 0.0),
+    "UR30": (0.260, 0.043, -0.0775, -0.0749, -0.07, 0.0),
+}
+
+_QUARTER_TURN = math.pi / 2.0  # rad
+_ALONG_THE_ARM = (_QUARTER_TURN, 0.0, -_QUARTER_TURN)  # upper arm and forearm: the mesh's z axis runs along the link
+#: link -> roll, pitch and yaw of its mesh in the URDF frame [rad]
+_TURNED_FRAME = {
+    "base": (0.0, 0.0, math.pi),
+    "shoulder": (0.0, 0.0, math.pi),
+    "upper_arm": _ALONG_THE_ARM,
+    "forearm": _ALONG_THE_ARM,
+    "wrist_1": (_QUARTER_TURN, 0.0, 0.0),
+    "wrist_2": (0.0, 0.0, 0.0),
+    "wrist_3": (_QUARTER_TURN, 0.0, 0.0),
+}
+
+
+def link_index(link: str) -> int:
+    """Return the index of the DH frame that moves with a link; "upperarm", "upper_arm", "upper-arm_link" are the same.
+
+    Raises:
+        KinematicsError: there is no such link; the message lists all.
+    """
+    return LINK_INDEX[_name(link)]
+
+
+def link_mesh(model: ArmModel, link: str) -> Pose:
+    """Return the pose of the mesh frame in the URDF frame of a link: p_urdf = link_mesh(...).apply(p_mesh).
+
+    Raises:
+        KinematicsError: there is no such link, or the meshes of the arm are not known.
+    """
+    name = _name(link)
+    offsets = _TUBE_OFFSETS.get(model.name)
+    if offsets is None:
+        raise KinematicsError(f"meshes are known for {', '.join(_TUBE_OFFSETS)}, got the arm {model.name!r}")
+    index = LINK_INDEX[name]
+    along = offsets[index - 2] if index >= 2 else 0.0
+    aside = offsets[5] if index == 6 else 0.0
+    return Pose.from_xyz_rpy((0.0, aside, along), _TURNED_FRAME[name])
+
+
+def dh_link(model: ArmModel, link: str) -> Pose:
+    """Return the pose of the URDF frame of a link in its DH frame: p_dh = dh_link(...).apply(p_urdf).
+
+    Raises:
+        KinematicsError: there is no such link.
+    """
+    name = _name(link)
+    index = LINK_INDEX[name]
+    if index == 0:
+        return Pose()
+    if name not in ("upper_arm", "forearm"):
+        # the URDF frame is after Rz(q) Tz(d), the DH frame after Tx(a) Rx(alpha) as well
+        return _passive(model, index - 1, 0.0).inverse()
+    start = 0.0 if name == "upper_arm" else _crossing(model, 1, 0.0)[1]
+    angle, _ = _crossing(model, index - 1, start)
+    # the URDF frame is at the link's start, turned so that its -x axis points at where the next axis crosses
+    return _passive(model, index - 1, model.d[index - 1] - start).inverse() @ _about_z(angle)
+
+
+def dh_mesh(model: ArmModel, link: str) -> Pose:
+    """Return the pose of the mesh frame in the DH frame of a link: p_dh = dh_mesh(...).apply(p_mesh).
+
+    Raises:
+        KinematicsError: there is no such link, or the meshes of the arm are not known.
+    """
+    return dh_link(model, link) @ link_mesh(model, link)
+
+
+def _crossing(model: ArmModel, i: int, start: float) -> tuple[float, float]:
+    """Return the point where the axis of the next joint crosses a plane normal to this joint's axis.
+
+    Args:
+        model: the arm.
+        i: index of the row of the DH table.
+        start: position of the plane along this joint's axis, from the origin of the frame before [m].
+
+    Returns:
+        azimuth of the crossing about this joint's axis, less half a turn [rad], and its position along the next axis
+        from the origin of the frame after [m].
+    """
+    cos_alpha, sin_alpha = cos_sin(model.alpha[i])
+    along = -(model.d[i] - start) / cos_alpha
+    return math.atan2(along * sin_alpha, -model.a[i]), along
+
+
+def _passive(model: ArmModel, i: int, d: float) -> Pose:
+    """Return Tz(d) Tx(a) Rx(alpha) of a row of the DH table."""
+    c, s = cos_sin(model.alpha[i])
+    return Pose(((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)), (model.a[i], 0.0, d))
+
+
+def _about_z(angle: float) -> Pose:
+    c, s = math.cos(angle), math.sin(angle)
+    return Pose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+
+
+def _name(link: str) -> str:
+    plain = "".join(ch for ch in link.lower().removesuffix("_link") if ch.isalnum())
+    for name in LINK_INDEX:
+        if plain == name.replace("_", ""):
+            return name
+    raise KinematicsError(f"link must be one of {', '.join(LINK_INDEX)}, got {link!r}")

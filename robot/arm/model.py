@@ -73,7 +73,7 @@ class ArmModel:
         """Return the arm with the factory calibration of one robot (``calibration.conf`` on its controller).
 
         Joints 2, 3 and 4 are almost parallel, so their delta_d may be tens of metres and cancel in the sum. Frames 2
-        and 3 are then far from the arm, which ``link_frames`` takes into account.
+        and 3 are then far from the arm, which `dh_link` takes into account.
 
         Args:
             delta_a: added to a [m], 6 numbers.

@@ -1,18 +1,221 @@
-"""Room that the arm has while it moves away from a touch: above the table, and clear of its own links. Pure."""
+"""Room of an arm during a reaction: limits of its joints, its own links, the table, and how far it has swept. Pure.
+
+Links are thick lines along those of `skeleton`, which are the axes of the tubes in the meshes.
+"""
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from coneskin.geometry.pose import Vector
 
-from .joint_limits import REACTION_TIME
-from .model import ArmModel
-from .self_collision import close_pairs
-from .skeleton import skeleton
+from .kinematics import LINK_INDEX, dh_mesh, link_poses
+from .model import ArmModel, Joints
+from .ur_models import MODEL_NAMES, arm_model
 
-__all__ = ["TablePlane", "Workspace"]
+__all__ = [
+    "MARGIN",
+    "REACTION_TIME",
+    "ArmSweep",
+    "JointLimits",
+    "PartPair",
+    "TablePlane",
+    "Workspace",
+    "clearance_needed",
+    "close_pairs",
+    "reach",
+    "segment_distance",
+    "skeleton",
+]
+
+#: distance kept from a joint's limit [rad]
+MARGIN = 0.02
+#: time until a command acts: two controller cycles, the network, and one cycle to see it [s]
+REACTION_TIME = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """Limits of the joints, with a margin.
+
+    Attributes:
+        lower: lowest joint positions, margin included [rad].
+        upper: highest joint positions, margin included [rad].
+        speed: highest joint speeds [rad/s].
+        braking: deceleration available to a joint [rad/s^2].
+        reach: upper bound of the distance of any point of the bare arm from each joint's axis [m].
+    """
+
+    lower: Joints
+    upper: Joints
+    speed: Joints
+    braking: float
+    reach: Joints
+
+    @classmethod
+    def of(cls, model: ArmModel, braking: float) -> JointLimits:
+        """Return the limits of an arm whose joints brake with a deceleration [rad/s^2]."""
+        lower, upper = model.joint_lower, model.joint_upper
+        return cls(
+            lower=_six([limit + MARGIN for limit in lower]),
+            upper=_six([limit - MARGIN for limit in upper]),
+            speed=model.joint_speed,
+            braking=braking,
+            reach=reach(model),
+        )
+
+    def blocked(self, q: Sequence[float], qd: Sequence[float], wanted: Sequence[float]) -> list[int]:
+        """Return the indices of joints that could no longer brake before their limit if they moved as wanted.
+
+        Args:
+            q: joint positions [rad].
+            qd: present joint speeds [rad/s].
+            wanted: wanted joint speeds [rad/s]; may be shorter than q, the joints beyond stand.
+        """
+        found = []
+        for i, speed in enumerate(wanted):
+            if speed > 0.0:
+                room = self.upper[i] - q[i]
+                fast = qd[i] if qd[i] > speed else speed
+            elif speed < 0.0:
+                room = q[i] - self.lower[i]
+                fast = -qd[i] if -qd[i] > -speed else -speed
+            else:
+                continue
+            if not fast * (REACTION_TIME + fast / (2.0 * self.braking)) <= room:
+                found.append(i)
+        return found
+
+
+def reach(model: ArmModel) -> Joints:
+    """Return an upper bound of the distance of any point of the bare arm from each joint's axis [m].
+
+    It is that of the nominal arm, because a calibrated table has frames that are not on the arm, plus 10 cm for the
+    thickness of the links and the calibration.
+    """
+    nominal = arm_model(model.name) if model.name in MODEL_NAMES else model
+    steps = [math.hypot(a, d) for a, d in zip(nominal.a, nominal.d, strict=True)]
+    # a joint's own d lies along its axis
+    return _six([abs(a) + sum(steps[i + 1 :]) + 0.1 for i, a in enumerate(nominal.a)])
+
+
+def _six(values: Sequence[float]) -> Joints:
+    first, second, third, fourth, fifth, sixth = values
+    return first, second, third, fourth, fifth, sixth
+
+
+def skeleton(model: ArmModel, q: Sequence[float]) -> list[Vector]:
+    """Return the corners of a line from base to flange, in the base frame [m], at joint positions q [rad].
+
+    Upper arm and forearm lie beside the line between the origins of the DH table; their place is that of their meshes.
+    """
+    poses = link_poses(model, q)
+    corners: list[Vector] = [poses[0].translation, poses[1].translation]
+    for link, begin, end in _tubes(model):
+        corners += [poses[link].apply(begin), poses[link].apply(end)]
+    return [*corners, *(pose.translation for pose in poses[4:])]
+
+
+@functools.lru_cache(maxsize=32)
+def _tubes(model: ArmModel) -> tuple[tuple[int, Vector, Vector], ...]:
+    """Return index of the DH frame, and both ends of the axis in it [m], of upper arm and forearm."""
+    tubes = []
+    for name, length in (("upper_arm", abs(model.a[1])), ("forearm", abs(model.a[2]))):
+        mesh = dh_mesh(model, name)
+        tubes.append((LINK_INDEX[name], mesh.translation, mesh.apply((0.0, 0.0, length))))
+    return tuple(tubes)
+
+
+#: names of the parts between the corners of the skeleton, from the base on
+_PART_NAMES = ("base", "shoulder", "upper arm", "elbow", "forearm", "wrist 1", "wrist 2", "wrist 3")
+#: pairs of parts that can meet; neighbours cannot, and a forearm folds beside its upper arm, not onto it
+_PART_PAIRS = tuple((a, b) for a in (0, 1, 2) for b in (4, 5, 6, 7) if (a, b) != (2, 4) and (a, b) != (2, 5))
+
+
+def clearance_needed(model: ArmModel) -> float:
+    """Return the distance of two axes below which the arm counts as touching itself [m].
+
+    The wrist's joints are about as thick as d5 is long, its fifth joint offset, and no tube of the family is thicker:
+    43 mm of radius against d5 / 2 = 50 mm on the UR5e's upper arm, 54 against 58 on the UR10's (their meshes).
+    """
+    return model.d[4]
+
+
+class PartPair(NamedTuple):
+    """PartPair of parts that are close to each other.
+
+    Attributes:
+        first: index of the part nearer to the base.
+        second: index of the other part.
+        distance: distance of their axes [m].
+    """
+
+    first: int
+    second: int
+    distance: float
+
+    @property
+    def why(self) -> str:
+        """Sentence about the pair for a person."""
+        first, second = _PART_NAMES[self.first], _PART_NAMES[self.second]
+        return f"the {second} would come within {1e3 * self.distance:.0f} mm of the {first}, axis to axis"
+
+    def distance_in(self, corners: Sequence[Vector]) -> float:
+        """Return the distance of the same two parts in another skeleton [m]."""
+        a, b = self.first, self.second
+        return segment_distance(corners[a], corners[a + 1], corners[b], corners[b + 1])
+
+
+def close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[PartPair]:
+    """Return the pairs of parts that are closer than ``clearance_needed``.
+
+    Args:
+        model: the arm.
+        corners: its skeleton [m].
+    """
+    least = clearance_needed(model)
+    pairs = (
+        PartPair(a, b, segment_distance(corners[a], corners[a + 1], corners[b], corners[b + 1])) for a, b in _PART_PAIRS
+    )
+    return [pair for pair in pairs if pair.distance < least]
+
+
+def segment_distance(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
+    """Return the least distance between the line segments a b and c d [m]; either may be a point.
+
+    The distance is convex along each segment, so the least one is between an end and its foot on the other segment, or
+    where both feet are inside. All are tried, so that parallel segments need no case of their own.
+    """
+    best = min(_to_segment(a, c, d), _to_segment(b, c, d), _to_segment(c, a, b), _to_segment(d, a, b))
+    u, v, w = _minus(b, a), _minus(d, c), _minus(a, c)
+    uu, uv, vv, uw, vw = _dot(u, u), _dot(u, v), _dot(v, v), _dot(u, w), _dot(v, w)
+    det = uu * vv - uv * uv
+    if det <= 0.0:
+        return best  # parallel, or a point: the least distance is at a corner
+    s, t = (uv * vw - vv * uw) / det, (uu * vw - uv * uw) / det
+    if not (0.0 < s < 1.0 and 0.0 < t < 1.0):
+        return best
+    x, y, z = (w[k] + s * u[k] - t * v[k] for k in range(3))
+    return min(best, math.sqrt(x * x + y * y + z * z))
+
+
+def _to_segment(p: Vector, a: Vector, b: Vector) -> float:
+    along, from_a = _minus(b, a), _minus(p, a)
+    length = _dot(along, along)
+    share = min(1.0, max(0.0, _dot(from_a, along) / length)) if length > 0.0 else 0.0
+    return math.dist(p, (a[0] + share * along[0], a[1] + share * along[1], a[2] + share * along[2]))
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,3 +284,38 @@ class Workspace:
         if self.table is not None and low and self.table.entered(here, there):
             return f"the table at {1e3 * self.table.height:g} mm is in the way"
         return next((pair.why for pair in near if pair.distance < pair.distance_in(here)), "")
+
+
+_LINK_RADIUS = 0.06  # m from the middle line of a link to its surface
+
+
+@dataclass(frozen=True, slots=True)
+class ArmSweep:
+    """Place of the whole arm when a motion began.
+
+    Attributes:
+        model: the arm.
+        q: joint positions then [rad].
+        corners: of its middle line then, in the base frame [m].
+    """
+
+    model: ArmModel
+    q: Joints
+    corners: tuple[Vector, ...]
+
+    @classmethod
+    def begin(cls, model: ArmModel, q: Joints) -> ArmSweep:
+        """Return the sweep of a motion that begins at joint positions q [rad]."""
+        return cls(model, q, tuple(skeleton(model, q)))
+
+    def distance(self, q: Joints) -> float:
+        """Return an upper bound of how far any point of the bare arm is from where it was [m].
+
+        A point between two corners moves no farther than the farther one of them; one off the middle line moves in
+        addition by its distance from it times the angle.
+        """
+        turn = sum(abs(a - b) for a, b in zip(q, self.q, strict=True))
+        if turn == 0.0:
+            return 0.0
+        corners = skeleton(self.model, q)
+        return max(math.dist(a, b) for a, b in zip(corners, self.corners, strict=True)) + _LINK_RADIUS * turn

@@ -8,19 +8,16 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Mapping
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 from coneskin.core.finding import Finding
 from coneskin.robot.arm.model import ArmModel
 
-from .arm_reading import ArmReading
-from .examination import ExaminationScope
-from .setpoint import JointVelocitySetpoint, SetpointProgram
-from .state import ControllerState
-from .stop_path import StopPath
+from .values import ArmReading, ControllerState, JointVelocitySetpoint, SetpointProgram, StopPath
 
 __all__ = [
     "ArmDriver",
+    "ExaminationScope",
     "HeartbeatWriter",
     "OutputWriter",
     "PayloadReader",
@@ -29,6 +26,15 @@ __all__ = [
     "StopConnections",
     "VariableReader",
 ]
+
+
+class ExaminationScope(NamedTuple):
+    """What a scene needs of a controller."""
+
+    control: bool  #: a program of ours moves the arm
+    slider: bool  #: the guard takes the speed slider
+    setpoints: bool  #: the guard moves the arm away although another program moves it
+    heartbeat: bool  #: a program on the controller may depend on the guard's heartbeat
 
 
 class PayloadReader(Protocol):

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from coneskin.robot.driver.messages import EndReaction, StopProgram
-from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.driver.stop_path import StopPath, UseStopPath
+from coneskin.robot.driver.values import ControllerState, StopPath, UseStopPath
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.standstill import WATCH_DURATION, StandstillWatch
 from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor

@@ -21,8 +21,7 @@ from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver
-from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import ControllerState, StopPath
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import Done, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import StopPath
 from coneskin.robot.stop.limits import MonitoringLimits
 
 if TYPE_CHECKING:

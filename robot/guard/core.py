@@ -30,7 +30,7 @@ from .signals.contact import Contact, GuardedSensor
 from .signals.journal import BlockKind, EventName, Outputs, decode_loss, emit
 
 if TYPE_CHECKING:
-    from coneskin.robot.driver.state import ControllerState
+    from coneskin.robot.driver.values import ControllerState
 
     from .arm_supervisor import ArmSupervisor
 

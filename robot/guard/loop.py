@@ -19,8 +19,7 @@ from coneskin.core.errors import ConeSkinError, SkinTimeout
 from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.driver.messages import HEARTBEAT_PERIOD, Heartbeat, Shutdown, StopProgram
 from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SetpointWriter, SpeedSlider, StopConnections
-from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
-from coneskin.robot.driver.stop_path import StopPath, UseStopPath
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.skin.sources.source import Source, SourceReopening
 
 from .controller_heartbeat import heartbeat_count

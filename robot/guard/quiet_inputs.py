@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from coneskin.robot.driver.state import ControllerState
+    from coneskin.robot.driver.values import ControllerState
 
     from .arm_supervisor import ArmSupervisor
 

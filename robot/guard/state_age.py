@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 
 __all__ = ["ControllerClock", "StateAge"]
 

@@ -16,11 +16,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
-from coneskin.robot.arm.workspace import Workspace
+from coneskin.robot.arm.workspace import ArmSweep, Workspace
 
 from .contact_supervision import opposed
 from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
-from .sweep import ArmSweep
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
 __all__ = ["DAMPING", "AdmittanceState", "admittance_step", "begin_admittance", "wanted_speed"]

@@ -12,9 +12,8 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from coneskin.robot.arm.joint_limits import REACTION_TIME, JointLimits
 from coneskin.robot.arm.model import ArmModel, Joints
-from coneskin.robot.arm.workspace import Workspace
+from coneskin.robot.arm.workspace import REACTION_TIME, JointLimits, Workspace
 
 from .types import ArmState, Done, JointVelocity, Reaction
 

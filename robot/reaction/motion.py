@@ -11,13 +11,12 @@ from dataclasses import replace
 from typing import Protocol
 
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.workspace import Workspace
+from coneskin.robot.arm.workspace import ArmSweep, Workspace
 
 from .admittance import AdmittanceState, admittance_step, begin_admittance
 from .backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
 from .contact_supervision import clamped
 from .retreat import RetreatPlan, plan_retreat, retreat_step
-from .sweep import ArmSweep
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
 __all__ = [

@@ -20,11 +20,9 @@ from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.compiled_kinematics import compile_contact
 from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds, damping_squared, stacked_speeds
-from coneskin.robot.arm.joint_limits import REACTION_TIME, JointLimits
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.workspace import Workspace
+from coneskin.robot.arm.workspace import REACTION_TIME, ArmSweep, JointLimits, Workspace
 
-from .sweep import ArmSweep
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
 __all__ = ["DISTANCE_TOLERANCE", "MIN_PROGRESS", "RetreatPlan", "plan_retreat", "retreat_step"]

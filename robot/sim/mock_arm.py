@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import EndReaction, Release, SetJointVelocity, StatusReport, StopProgram
-from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
-from coneskin.robot.driver.stop_path import StopPath, UseStopPath
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.ur.rtde_codec import Recipe
 from coneskin.robot.ur.state_reader import RECIPE

@@ -1,4 +1,4 @@
-"""Backup stop: it stops an arm by one stop path after the other until it is measured standing, without a guard.
+"""Stop of an arm that has lost its guard, by one stop path after the other, and its hold at standstill.
 
 The first stop goes out through whatever connection is open, before anything that may block; what is missing is opened
 meanwhile, the reader of states too. Without any state the arm cannot be seen to stand: then a stop ends after a while,
@@ -15,13 +15,13 @@ from contextlib import suppress
 from coneskin.core.channel import wait_readable
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.protocol import ArmDriver, PayloadReader, StopConnections
-from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import ControllerState, StopPath
 
 from .limits import MonitoringLimits
+from .standstill import WATCH_DURATION, StandstillWatch
 from .stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
-__all__ = ["BLIND_TIMEOUT", "BackupStop"]
+__all__ = ["BLIND_TIMEOUT", "BackupStop", "StandstillHold"]
 
 _STOP_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE)
 _STRONGEST_FIRST = (StopPath.PROTECTIVE, StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER)
@@ -175,3 +175,73 @@ class BackupStop:
         if taken and path is StopPath.PROTECTIVE:
             self._quiet_until = now + PROTECTIVE_PATIENCE * self._limits.escalate
         return taken
+
+
+_REPEAT_PERIOD = 1.0  # s between two stops while no state comes
+
+
+class StandstillHold:
+    """Hold of one arm at standstill. A person who pushes or jogs the arm is left alone: no program runs then.
+
+    Args:
+        backup_stop: of the arm.
+        standstill: joint speed below which the arm stands [rad/s].
+        clock: monotonic seconds.
+
+    Attributes:
+        stands: True where the arm was seen standing for a whole watch after the newest stop, and ever since.
+        failed: True where the newest stop was given up before the arm was seen standing, or where its state has been
+            missing for so long since then that it would be given up.
+    """
+
+    def __init__(self, backup_stop: BackupStop, standstill: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._stop = backup_stop
+        self._clock = clock
+        self._watch = StandstillWatch(standstill)
+        self._due: float | None = None  # None until the first stop
+        self.stands = self.failed = False
+
+    @property
+    def reader(self) -> PayloadReader | None:
+        """Connection that tells of new states; None while there is none."""
+        return self._stop.reader
+
+    def rest(self) -> None:
+        """Take what has come and do nothing more: the arm is guarded."""
+        self._stop.read()
+
+    def begin(self, deceleration: float | None = None, over: Callable[[], bool] = lambda: False) -> None:
+        """Stop the arm now; ``look`` then watches whether it stands. Arguments as of ``BackupStop.stop``."""
+        self._watch.end()
+        self.stands = False
+        self.failed = not self._stop.stop(deceleration, over, self._watch.insists)
+        self._due = self._clock() + _REPEAT_PERIOD
+        if not self.failed:
+            self._watch.begin(self._clock(), WATCH_DURATION)
+
+    def look(self, over: Callable[[], bool] = lambda: False) -> bool:
+        """Look at the arm, and stop it where it moves. To be called continuously.
+
+        Returns:
+            whether there is an outcome to report: ``stands`` has become true, or a stop has failed.
+        """
+        states = self._stop.read()
+        moved = sum(self._watch.moved(state, True) for state in states) > 0  # every state has to be taken
+        if self._due is not None and self._stop.states_missing():
+            self.stands = False
+            if self._clock() < self._due:
+                return False
+            self._stop.repeat()
+            self._due = self._clock() + _REPEAT_PERIOD
+            self.failed = self.failed or self._stop.states_missing(BLIND_TIMEOUT)
+            return False
+        if moved or not self._watch.under_way:
+            self.begin(over=over)
+            return self.failed
+        self.failed = False
+        if self.stands:
+            return False
+        self.stands = self._watch.confirmed
+        if not self.stands:
+            self._stop.insist()
+        return self.stands

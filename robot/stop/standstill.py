@@ -8,7 +8,7 @@ system holds it.
 from __future__ import annotations
 
 from coneskin.robot.arm.model import Joints
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 
 from .stop_monitor import STANDSTILL_SAMPLES
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import StopPath
 
 __all__ = ["PROTECTIVE_PATIENCE", "STANDSTILL_SAMPLES", "StopMonitor"]
 

@@ -28,9 +28,8 @@ from coneskin.robot.driver.messages import (
 from coneskin.robot.driver.protocol import PayloadReader
 from coneskin.robot.driver.registry import load_driver
 
-from .backup_stop import BackupStop
+from .backup_stop import BackupStop, StandstillHold
 from .limits import MonitoringLimits
-from .standstill_hold import StandstillHold
 
 __all__ = ["GuardWatchdog", "main"]
 

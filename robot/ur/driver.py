@@ -1,6 +1,6 @@
 """Driver of Universal Robots arms, as ``coneskin.robot.driver.protocol`` describes one.
 
-What a scene does not need is not imported: setpoints and speed slider have modules of their own.
+What a scene does not need is not imported, such as the writers of inputs.
 """
 
 from __future__ import annotations
@@ -10,19 +10,15 @@ from typing import TYPE_CHECKING, ClassVar
 
 from coneskin.core.finding import Finding
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.driver.examination import ExaminationScope
-from coneskin.robot.driver.protocol import ArmDriver
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.protocol import ArmDriver, ExaminationScope
+from coneskin.robot.driver.values import StopPath
 
 from .state_reader import StateReader, decode_state
 from .stop_sockets import StopSockets
 
 if TYPE_CHECKING:
-    from .heartbeat_registers import HeartbeatRegisters
-    from .output_writer import RtdeOutputWriter
-    from .setpoint_writer import RegisterWriter
-    from .speed_slider import RtdeSpeedSlider
-    from .variable_reader import RtdeVariableReader
+    from .input_writers import HeartbeatRegisters, RegisterWriter, RtdeSpeedSlider
+    from .program_io import RtdeOutputWriter, RtdeVariableReader
 
 __all__ = ["UR_DRIVER"]
 
@@ -40,7 +36,7 @@ class _UrDriver:
     decode_state = staticmethod(decode_state)
 
     def decode_speed_fraction(self, payload: bytes) -> float:
-        from .speed_slider import decode_fraction
+        from .input_writers import decode_fraction
 
         return decode_fraction(payload)
 
@@ -54,37 +50,37 @@ class _UrDriver:
         return StateReader(host, timeout)
 
     def setpoint_writer(self, host: str) -> RegisterWriter:
-        from .setpoint_writer import RegisterWriter
+        from .input_writers import RegisterWriter
 
         return RegisterWriter(host)
 
     def speed_slider(self, host: str) -> RtdeSpeedSlider:
-        from .speed_slider import RtdeSpeedSlider
+        from .input_writers import RtdeSpeedSlider
 
         return RtdeSpeedSlider(host)
 
     def heartbeat_writer(self, host: str) -> HeartbeatRegisters:
-        from .heartbeat_registers import HeartbeatRegisters
+        from .input_writers import HeartbeatRegisters
 
         return HeartbeatRegisters(host)
 
     def heartbeat_lines(self, frequency: float) -> str:
-        from .heartbeat_registers import heartbeat_lines
+        from .input_writers import heartbeat_lines
 
         return heartbeat_lines(frequency)
 
     def decode_heartbeat(self, payload: bytes) -> int:
-        from .heartbeat_registers import decode_echo
+        from .input_writers import decode_echo
 
         return decode_echo(payload)
 
     def variable_reader(self, host: str) -> RtdeVariableReader:
-        from .variable_reader import RtdeVariableReader
+        from .program_io import RtdeVariableReader
 
         return RtdeVariableReader(host)
 
     def output_writer(self, host: str) -> RtdeOutputWriter:
-        from .output_writer import RtdeOutputWriter
+        from .program_io import RtdeOutputWriter
 
         return RtdeOutputWriter(host)
 

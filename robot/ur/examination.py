@@ -17,13 +17,11 @@ from coneskin.core.channel import wait_readable
 from coneskin.core.errors import ConeSkinError, RobotRefused
 from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.driver.examination import ExaminationScope
+from coneskin.robot.driver.protocol import ExaminationScope
 
-from .heartbeat_registers import HEARTBEAT_INPUTS
-from .speed_slider import SLIDER_INPUTS
+from .input_writers import HEARTBEAT_INPUTS, SETPOINT_INPUTS, SLIDER_INPUTS
 from .model_check import check_model, read_pose
 from .rtde_connection import PORT, RtdeConnection
-from .setpoint_program import SETPOINT_INPUTS
 from .state_reader import StateReader, decode_state
 
 __all__ = ["examine"]

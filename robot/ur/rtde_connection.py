@@ -1,6 +1,6 @@
 """RTDE connection to a controller: set-up with a time limit, then data without waiting.
 
-Its users decide what is read and written: ``state_reader``, ``setpoint_writer``, ``speed_slider``, ``model_check``.
+Its users decide what is read and written: ``state_reader``, ``input_writers``, ``program_io``, ``model_check``.
 """
 
 from __future__ import annotations
@@ -8,9 +8,10 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Sequence
+from typing import Self
 
 from coneskin.core.channel import wait_readable
-from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.core.errors import RobotConnectionError, RobotTimeout
 
 from . import rtde_codec as rtde
 
@@ -44,7 +45,7 @@ class RtdeConnection:
         self._rest = b""
         self._waiting: list[bytes] = []
 
-    def __enter__(self) -> RtdeConnection:
+    def __enter__(self) -> Self:
         try:
             self._sock = socket.create_connection((self.host, PORT), self._timeout)
         except TimeoutError as exc:
@@ -83,26 +84,6 @@ class RtdeConnection:
             RobotRefused: it does not know one of them, or another client has taken it.
         """
         return self._recipe(rtde.pack_inputs_request(names), rtde.PacketKind.INPUTS, names)
-
-    def claim(self, what: str, outputs: Sequence[str], inputs: Sequence[str], frequency_hz: float) -> rtde.Recipe:
-        """Ask for outputs and inputs, start, and return the recipe of the inputs.
-
-        Args:
-            what: the inputs are, for people.
-            outputs: variables that the controller sends.
-            inputs: variables that it takes from here.
-            frequency_hz: of the outputs [Hz].
-
-        Raises:
-            RobotRefused: another client has taken one of the inputs, or the controller does not know a variable.
-        """
-        try:
-            self.ask_outputs(outputs, frequency_hz)
-            recipe = self.ask_inputs(inputs)
-        except RobotRefused as exc:
-            raise RobotRefused(f"the guard cannot have {what} of {self.host}: {exc}") from exc
-        self.start()
-        return recipe
 
     def start(self) -> None:
         """Let the data flow; from now on nothing waits."""

@@ -8,9 +8,10 @@ the time at which it was read.
 from __future__ import annotations
 
 import math
+from typing import Self
 
 from coneskin.core.errors import RobotConnectionError
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 
 from . import rtde_codec as rtde
 from .rtde_connection import RtdeConnection
@@ -75,7 +76,7 @@ class StateReader(RtdeConnection):
         RobotTimeout: on entering, where it does not answer.
     """
 
-    def __enter__(self) -> StateReader:
+    def __enter__(self) -> Self:
         super().__enter__()
         self._ask_for()
         self.start()

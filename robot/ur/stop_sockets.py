@@ -21,8 +21,7 @@ import socket
 from contextlib import suppress
 
 from coneskin.core.errors import RobotConnectionError
-from coneskin.robot.driver.setpoint import SetpointProgram
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import SetpointProgram, StopPath
 
 __all__ = ["StopSockets"]
 
@@ -110,7 +109,7 @@ class StopSockets:
         if path is StopPath.COMMAND:
             return self._send("command", b"stop\n")
         if path is StopPath.SLIDER:
-            from .speed_slider import set_slider
+            from .input_writers import set_slider
 
             return set_slider(self.host, 0.0, _SLIDER_TIMEOUT)
         if path is StopPath.PROTECTIVE:
@@ -119,7 +118,7 @@ class StopSockets:
 
     def follow(self, program: SetpointProgram) -> bool:
         """Start the program that follows setpoints, without waiting; return whether the system took the bytes."""
-        from .setpoint_program import program_text
+        from .input_writers import program_text
 
         return self.run(program_text(program))
 

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from .geometry.sector import roll_up as roll_up
     from .geometry.sector import unroll as unroll
     from .robot.arm.ur_models import arm_model as arm_model
-    from .robot.driver.waypoint import Waypoint as Waypoint
+    from .robot.driver.values import Waypoint as Waypoint
     from .robot.guard.signals.journal import EventName as EventName
     from .robot.guard.signals.journal import GuardEvent as GuardEvent
     from .robot.reaction.rules import Rule as Rule
@@ -96,7 +96,7 @@ _PUBLIC = {
     "geometry.sector": "Sector roll_up unroll",
     "runs.replay.run": "Run read_run",
     "robot.arm.ur_models": "arm_model",
-    "robot.driver.waypoint": "Waypoint",
+    "robot.driver.values": "Waypoint",
     "robot.guard.signals.journal": "EventName GuardEvent",
     "robot.reaction.rules": "Rule",
     "robot.reaction.types": "Reaction",

@@ -14,8 +14,7 @@ from coneskin.core.recording.block import Block
 from coneskin.robot.driver import registry
 from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.driver.registry import load_driver
-from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.driver.stop_path import StopPath, UseStopPath
+from coneskin.robot.driver.values import ControllerState, StopPath, UseStopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.reaction.types import Reaction

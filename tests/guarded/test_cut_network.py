@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.ur.heartbeat_registers import heartbeat_lines
+from coneskin.robot.ur.input_writers import heartbeat_lines
 from coneskin.session.session import guard
 from coneskin.testing.scenes import GOAL, START
 

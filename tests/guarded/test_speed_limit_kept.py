@@ -16,7 +16,7 @@ pytestmark = pytest.mark.long
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
 
 from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
-from coneskin.robot.ur.speed_slider import set_slider  # noqa: E402
+from coneskin.robot.ur.input_writers import set_slider  # noqa: E402
 
 PERSONS = 0.8
 

@@ -13,7 +13,7 @@ import rtde_control
 import rtde_io
 import rtde_receive
 
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import StopPath
 from coneskin.robot.ur.stop_sockets import StopSockets
 from coneskin.robot.ur.ur_rtde import UrArm
 

@@ -16,7 +16,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.messages import Release
-from coneskin.robot.driver.stop_path import INTERNAL_PATHS
+from coneskin.robot.driver.values import INTERNAL_PATHS
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner

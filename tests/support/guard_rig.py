@@ -8,13 +8,12 @@ from coneskin.core.recording.block import Block
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
+from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import TablePlane
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.protocol import ArmDriver
-from coneskin.robot.driver.stop_path import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
+from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner

@@ -6,8 +6,7 @@ import random
 import struct
 from collections.abc import Callable
 
-from coneskin.robot.ur.rtde_codec import PacketKind
-from coneskin.robot.ur.rtde_variables import VARIABLES
+from coneskin.robot.ur.rtde_codec import VARIABLES, PacketKind
 
 __all__ = ["SERVICES", "malformed_packet"]
 

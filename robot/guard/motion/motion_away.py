@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.signals.contact import TouchRecord
 from coneskin.robot.guard.signals.journal import Outputs
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction

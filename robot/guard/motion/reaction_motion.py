@@ -12,8 +12,7 @@ from collections.abc import Sequence
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
 from coneskin.robot.arm.workspace import TablePlane, Workspace
 from coneskin.robot.driver.messages import SetJointVelocity
-from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState, JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
 from coneskin.robot.guard.signals.journal import EventName, Outputs, describe_way, emit
 from coneskin.robot.reaction.backtrack import PathHistory

@@ -7,7 +7,7 @@ later ones are compared with, as the level of a touch is. The push of the touch 
 
 from __future__ import annotations
 
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 
 __all__ = ["MAX_RISE", "JointCurrentMonitor"]
 

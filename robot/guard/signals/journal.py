@@ -21,8 +21,7 @@ from coneskin.core.text import read_json
 
 if TYPE_CHECKING:
     from coneskin.robot.driver.messages import EndReaction, Release, SetJointVelocity, StopProgram
-    from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
-    from coneskin.robot.driver.stop_path import UseStopPath
+    from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, UseStopPath
 
 __all__ = [
     "INPUTS",

@@ -15,8 +15,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from coneskin.robot.arm.model import ArmModel, Joints
-from coneskin.robot.driver.setpoint import SetSpeedSlider
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState, SetSpeedSlider
 from coneskin.robot.guard.signals.journal import EventName, Outputs, emit
 
 from .permissible_speeds import PermissibleSpeeds, SurfaceSpeeds

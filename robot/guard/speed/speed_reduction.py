@@ -14,9 +14,7 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.driver.setpoint import SetSpeedSlider
-from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import ControllerState, SetSpeedSlider, StopPath
 from coneskin.robot.guard.signals.journal import EventName, Outputs, emit
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -24,7 +22,7 @@ from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
 if TYPE_CHECKING:  # a scene without a slow reaction does not load it
     from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
-    from coneskin.robot.reaction.contact_approach import ContactApproach
+    from coneskin.robot.reaction.contact_supervision import ContactApproach
 
 __all__ = ["CLEAR_TIME", "ReducedSpeedTouch", "SpeedReduction"]
 
@@ -134,7 +132,7 @@ class SpeedReduction:
         self._model = model
         if used:  # here, so that no touch waits for it
             from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
-            from coneskin.robot.reaction.contact_approach import ContactApproach
+            from coneskin.robot.reaction.contact_supervision import ContactApproach
 
             self._approach_of, self._monitor_of = ContactApproach, JointCurrentMonitor
         self.approach: ContactApproach | None = None

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
 from coneskin.robot.sim.urscript.values import values_of
-from coneskin.robot.ur.rtde_codec import Value
-from coneskin.robot.ur.rtde_variables import VARIABLES
+from coneskin.robot.ur.rtde_codec import VARIABLES, Value
 
 __all__ = ["CURRENT", "INPUTS", "VOLTAGE", "ClientInputs", "InputWatchdog", "Terminals", "digital_outputs"]
 

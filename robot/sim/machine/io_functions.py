@@ -12,7 +12,7 @@ from collections.abc import Container
 from typing import Any
 
 from coneskin.robot.sim.urscript.values import ScriptError, number, show
-from coneskin.robot.ur.rtde_variables import VARIABLES
+from coneskin.robot.ur.rtde_codec import VARIABLES
 
 from .inputs_outputs import CURRENT, VOLTAGE
 from .script_host import ScriptHost

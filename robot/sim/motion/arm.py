@@ -18,10 +18,9 @@ from typing import Protocol
 
 from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.inertia import joint_torques, mass_matrix
+from coneskin.robot.arm.inertia import arm_inertia, joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
-from coneskin.robot.arm.ur_inertias import arm_inertia
 
 from .plant import KinematicPlant, PlantState
 

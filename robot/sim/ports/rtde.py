@@ -21,8 +21,18 @@ from coneskin.robot.sim.machine.inputs_outputs import INPUTS
 from coneskin.robot.sim.machine.states import MOVING, RobotMode, Runtime, Version, robot_bits, safety_bits
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.urscript.values import values_of
-from coneskin.robot.ur.rtde_codec import IN_USE, NOT_FOUND, Packet, PacketKind, Recipe, Value, pack, split, split_names
-from coneskin.robot.ur.rtde_variables import VARIABLES
+from coneskin.robot.ur.rtde_codec import (
+    IN_USE,
+    NOT_FOUND,
+    VARIABLES,
+    Packet,
+    PacketKind,
+    Recipe,
+    Value,
+    pack,
+    split,
+    split_names,
+)
 
 __all__ = ["RtdeOutputs", "RtdeSession", "available"]
 

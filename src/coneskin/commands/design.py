@@ -20,7 +20,7 @@ from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.design.sheets.summary import small_active_area
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
-from coneskin.robot.arm.link_frames import LINK_INDEX
+from coneskin.robot.arm.kinematics import LINK_INDEX
 from coneskin.robot.sim.machine.states import DEFAULT_MODEL
 from coneskin.scene.tables.sensor_keys import DOUBLE_CONE_KEYS
 from coneskin.skin.electronics import shunt_ohms

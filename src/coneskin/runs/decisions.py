@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import Release, SetJointVelocity, decode_command
-from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider
-from coneskin.robot.driver.stop_path import UseStopPath
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, UseStopPath
 from coneskin.robot.guard.signals.journal import (
     INPUTS,
     SESSION_EVENTS,

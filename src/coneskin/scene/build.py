@@ -80,7 +80,7 @@ def withheld_motion(scene: Scene) -> str:
 def _arm(scene: Scene) -> ArmSupervisor:
     from coneskin.robot.arm.ur_models import arm_model
     from coneskin.robot.driver.registry import load_driver
-    from coneskin.robot.driver.stop_path import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
+    from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.reaction.rules import RuleSet
 
@@ -156,7 +156,7 @@ def _planner(scene: Scene, arm: ArmModel) -> ReactionPlanner:
 def _compile_links(scene: Scene, arm: ArmModel) -> None:
     """Compile the kinematics of the scene's links: 2 ms each, for which the first touch must not wait."""
     from coneskin.robot.arm.compiled_kinematics import compile_contact
-    from coneskin.robot.arm.link_frames import link_index
+    from coneskin.robot.arm.kinematics import link_index
 
     for link in scene.links:
         if index := link_index(link.name):
@@ -230,7 +230,7 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, NDArray[np.float64]] | Non
     for link in scene.links:
         index, dh_mesh_frame, dh_frame, arm = 0, Pose(), Pose(), None
         if scene.arm is not None:
-            from coneskin.robot.arm.link_frames import dh_link, dh_mesh, link_index
+            from coneskin.robot.arm.kinematics import dh_link, dh_mesh, link_index
             from coneskin.robot.arm.ur_models import arm_model
 
             index, arm = link_index(link.name), arm_model(scene.arm.model)

@@ -22,7 +22,7 @@ def check_links(scene: Scene, problems: list[str]) -> None:
 
     Lengths and limits need a known arm; names are the same for all arms.
     """
-    from coneskin.robot.arm.link_frames import LINK_INDEX, link_index
+    from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
     from coneskin.robot.arm.ur_models import arm_model
 
     arm = None if scene.arm is None else arm_model(scene.arm.model)

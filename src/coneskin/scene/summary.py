@@ -137,7 +137,7 @@ def _reaction(reaction: Reaction) -> str:
 
 
 def _conditions(rule: Rule) -> str:
-    from coneskin.robot.arm.link_frames import LINK_INDEX
+    from coneskin.robot.arm.kinematics import LINK_INDEX
 
     said = []
     if rule.link is not None:

@@ -106,7 +106,7 @@ def _placing(scene: Scene) -> Iterator[str]:
 
 def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
     """Compare the sensors of a tube with its axis and its neighbour."""
-    from coneskin.robot.arm.link_frames import LINK_INDEX, link_index
+    from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
     from coneskin.robot.arm.ur_models import arm_model
 
     name = next(known for known, number in LINK_INDEX.items() if number == link_index(link.name))
@@ -145,7 +145,7 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
 
 def _tube_distance(arm: ArmModel) -> float:
     """Return the distance between the axes of upper arm and forearm, along the axis of the elbow [m]."""
-    from coneskin.robot.arm.link_frames import link_mesh
+    from coneskin.robot.arm.kinematics import link_mesh
 
     return abs(link_mesh(arm, "upper_arm").translation[2] - link_mesh(arm, "forearm").translation[2])
 
@@ -153,7 +153,7 @@ def _tube_distance(arm: ArmModel) -> float:
 def _mesh_frame(link: LinkScene, arm: ArmModel) -> Pose:
     """Return the pose of the link's frame of the scene in the frame of its mesh."""
     from coneskin.geometry.pose import Pose
-    from coneskin.robot.arm.link_frames import dh_mesh, link_mesh
+    from coneskin.robot.arm.kinematics import dh_mesh, link_mesh
 
     if link.frame == "mesh":
         return Pose()

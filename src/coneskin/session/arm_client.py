@@ -13,7 +13,7 @@ from coneskin.core.channel import Channel, decode_json, encode_json, wait_readab
 from coneskin.core.errors import KinematicsError, RobotConnectionError, RobotRefused
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.registry import load_driver
-from coneskin.robot.driver.waypoint import Waypoint
+from coneskin.robot.driver.values import Waypoint
 
 if TYPE_CHECKING:
     from coneskin.robot.driver.protocol import OutputWriter, VariableReader

@@ -23,7 +23,7 @@ from .event_log import EventLog
 from .outcome import NOT_CONFIRMED, STANDS, reasons
 
 if TYPE_CHECKING:
-    from coneskin.robot.stop.standstill_hold import StandstillHold
+    from coneskin.robot.stop.backup_stop import StandstillHold
     from coneskin.scene.values.scene import Scene
 
 __all__ = ["FallbackStop", "GuardMonitor", "stop_settings"]
@@ -210,9 +210,8 @@ class FallbackStop:
 
     def _open(self) -> StandstillHold:
         if self._hold is None:
-            from coneskin.robot.stop.backup_stop import BackupStop
+            from coneskin.robot.stop.backup_stop import BackupStop, StandstillHold
             from coneskin.robot.stop.limits import MonitoringLimits
-            from coneskin.robot.stop.standstill_hold import StandstillHold
 
             settings = self._settings
             limits = MonitoringLimits(**settings["monitoring"])

@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.driver.waypoint import Waypoint
+from coneskin.robot.driver.values import Waypoint
 
 from .arm_client import ArmClient
 

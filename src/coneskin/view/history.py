@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from coneskin.geometry.pose import Vector
     from coneskin.robot.arm.model import Joints
-    from coneskin.robot.driver.state import ControllerState
+    from coneskin.robot.driver.values import ControllerState
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 

@@ -15,8 +15,7 @@ from coneskin.commissioning.misreadings import RIGHT, Place, misfit
 from coneskin.commissioning.touching import Mark
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.kinematics import link_pose, link_poses
-from coneskin.robot.arm.link_frames import dh_mesh
+from coneskin.robot.arm.kinematics import dh_mesh, link_pose, link_poses
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene

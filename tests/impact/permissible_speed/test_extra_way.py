@@ -22,9 +22,8 @@ from coneskin.impact.permissible_speed.limits_file import BodyRegion, MeasuredRe
 from coneskin.impact.permissible_speed.speed_map import contact_at
 from coneskin.impact.permissible_speed.speed_search import ForceLimits
 from coneskin.impact.permissible_speed.two_mass_contact import StruckBody
-from coneskin.robot.arm.inertia import mass_matrix
+from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.materials import Padding

@@ -19,9 +19,8 @@ from coneskin.impact.permissible_speed.speed_map import contact_at
 from coneskin.impact.permissible_speed.speed_search import ForceLimits
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.robot.arm.inertia import effective_mass
+from coneskin.robot.arm.inertia import arm_inertia, effective_mass
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
 from tests.support.guard_rig import CONE, LINK, MODEL

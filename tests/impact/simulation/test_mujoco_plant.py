@@ -8,10 +8,8 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose, Vector
-from coneskin.robot.arm.inertia import effective_mass, mass_matrix
-from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
-from coneskin.robot.arm.ur_inertias import arm_inertia
+from coneskin.robot.arm.inertia import arm_inertia, effective_mass, mass_matrix
+from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import KinematicsError
-from coneskin.robot.arm.inertia import GRAVITY, effective_mass, joint_torques, mass_matrix
+from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, effective_mass, joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import point_jacobian
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 
 #: published weights [kg]: user manuals, "Weight", cable not counted

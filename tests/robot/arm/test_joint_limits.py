@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.joint_limits import MARGIN, REACTION_TIME, JointLimits, reach
 from coneskin.robot.arm.kinematics import link_poses
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.workspace import MARGIN, REACTION_TIME, JointLimits, reach
 
 from ..arms import FAR_UR10, arms, joints
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import KinematicsError
-from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.link_frames import LINK_INDEX, dh_link, dh_mesh, link_index, link_mesh
+from coneskin.robot.arm.kinematics import LINK_INDEX, dh_link, dh_mesh, link_index, link_mesh, link_pose
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from tests.support.paths import SHARED_DATA

@@ -7,12 +7,19 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.joint_limits import JointLimits
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.self_collision import _PART_NAMES, PartPair, clearance_needed, close_pairs, segment_distance
-from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.arm.workspace import TablePlane, Workspace
+from coneskin.robot.arm.workspace import (
+    _PART_NAMES,
+    JointLimits,
+    PartPair,
+    TablePlane,
+    Workspace,
+    clearance_needed,
+    close_pairs,
+    segment_distance,
+    skeleton,
+)
 from coneskin.robot.reaction.retreat import plan_retreat, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 

@@ -3,8 +3,7 @@
 import pytest
 
 from coneskin.robot.driver.messages import StopProgram
-from coneskin.robot.driver.setpoint import SetSpeedSlider
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import SetSpeedSlider, StopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction

@@ -4,8 +4,7 @@ import pytest
 
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import EndReaction
-from coneskin.robot.driver.setpoint import SetpointProgram, SetSpeedSlider
-from coneskin.robot.driver.stop_path import StopPath, UseStopPath
+from coneskin.robot.driver.values import SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.rules import Rule

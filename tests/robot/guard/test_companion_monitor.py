@@ -5,7 +5,7 @@ import random
 import pytest
 
 from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import StopPath
 from coneskin.robot.guard.companion_monitor import HeartbeatMonitor
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact

@@ -3,7 +3,7 @@
 import pytest
 
 from coneskin.robot.guard.controller_heartbeat import COUNT_PERIOD, ControllerHeartbeat, heartbeat_count
-from coneskin.robot.ur.heartbeat_registers import decode_echo, heartbeat_lines
+from coneskin.robot.ur.input_writers import decode_echo, heartbeat_lines
 from coneskin.robot.ur.rtde_codec import Recipe
 
 

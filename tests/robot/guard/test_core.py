@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import EndReaction, SetJointVelocity, StatusReport, StopProgram
-from coneskin.robot.driver.stop_path import INTERNAL_PATHS, StopPath
+from coneskin.robot.driver.values import INTERNAL_PATHS, StopPath
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent

@@ -8,7 +8,7 @@ import pytest
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.reaction.contact_approach import ContactApproach
+from coneskin.robot.reaction.contact_supervision import ContactApproach
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch

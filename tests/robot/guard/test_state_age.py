@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.robot.driver.messages import SetJointVelocity
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.guard.state_age import ControllerClock, StateAge

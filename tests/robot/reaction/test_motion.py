@@ -8,12 +8,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.arm.joint_limits import MARGIN
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.arm.skeleton import skeleton
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.arm.workspace import TablePlane, Workspace
+from coneskin.robot.arm.workspace import MARGIN, TablePlane, Workspace, skeleton
 from coneskin.robot.reaction.admittance import DAMPING, admittance_step, begin_admittance, wanted_speed
 from coneskin.robot.reaction.backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
 from coneskin.robot.reaction.motion import RetreatMotion

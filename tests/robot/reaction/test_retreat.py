@@ -9,10 +9,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.arm.joint_limits import MARGIN
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.workspace import MARGIN
 from coneskin.robot.reaction.retreat import DISTANCE_TOLERANCE, RetreatPlan, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from tests.support.pinocchio_arm import pin_jacobian

@@ -7,14 +7,13 @@ import random
 import pytest
 
 from coneskin.geometry.pose import Vector
-from coneskin.robot.arm.kinematics import link_poses
-from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
+from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_poses
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.workspace import ArmSweep
 from coneskin.robot.reaction.admittance import begin_admittance
 from coneskin.robot.reaction.motion import AdmittanceMotion
 from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_step
-from coneskin.robot.reaction.sweep import ArmSweep
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 from ..retreat_cases import six

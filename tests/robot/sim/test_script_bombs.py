@@ -20,8 +20,14 @@ from coneskin.robot.sim.process import free_host
 from coneskin.robot.sim.server import _MAX_CLIENTS, PORTS, Server
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs, translate
 from coneskin.robot.sim.urscript.values import ScriptError
-from coneskin.robot.ur.rtde_codec import PacketKind, pack, pack_inputs_request, pack_outputs_request, pack_start_request
-from coneskin.robot.ur.rtde_variables import VARIABLES
+from coneskin.robot.ur.rtde_codec import (
+    VARIABLES,
+    PacketKind,
+    pack,
+    pack_inputs_request,
+    pack_outputs_request,
+    pack_start_request,
+)
 
 _POSE = "p[0.4, 0.1, 0.5, 0, 3, 0]"
 BOMBS = {

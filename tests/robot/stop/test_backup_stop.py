@@ -3,11 +3,10 @@
 import pytest
 
 from coneskin.core.errors import RobotConnectionError
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import StopPath
 from coneskin.robot.stop import backup_stop as module
-from coneskin.robot.stop.backup_stop import BackupStop
+from coneskin.robot.stop.backup_stop import BackupStop, StandstillHold
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.robot.stop.standstill_hold import StandstillHold
 from coneskin.robot.ur.driver import UR_DRIVER
 from coneskin.robot.ur.state_reader import RECIPE
 

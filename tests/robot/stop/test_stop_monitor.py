@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coneskin.robot.driver.stop_path import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
+from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES, StopMonitor
 
 ALL = INTERNAL_PATHS

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 from coneskin.core.channel import decode_json, encode_json
-from coneskin.robot.driver.waypoint import Waypoint
+from coneskin.robot.driver.values import Waypoint
 from coneskin.robot.ur.ur_rtde import UrArm
 
 

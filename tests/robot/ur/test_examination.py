@@ -4,7 +4,7 @@ import pytest
 
 from coneskin.core.finding import Finding
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.driver.examination import ExaminationScope
+from coneskin.robot.driver.protocol import ExaminationScope
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.examination import examine
 from coneskin.robot.ur.rtde_connection import RtdeConnection

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.ur.rtde_codec import (
+    VARIABLES,
     PacketKind,
     Recipe,
     Value,
@@ -22,7 +23,6 @@ from coneskin.robot.ur.rtde_codec import (
     split_names,
     unpack_types,
 )
-from coneskin.robot.ur.rtde_variables import VARIABLES
 
 LAW = settings(max_examples=200)
 PACKETS = st.lists(st.tuples(st.sampled_from(list(PacketKind)), st.binary(max_size=60)), max_size=8)

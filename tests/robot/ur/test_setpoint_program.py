@@ -7,11 +7,10 @@ import pytest
 
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.ur.input_writers import SETPOINT_INPUTS, RegisterWriter, _register_values, program_text
 from coneskin.robot.ur.rtde_connection import RtdeConnection
-from coneskin.robot.ur.setpoint_program import SETPOINT_INPUTS, program_text, _register_values
-from coneskin.robot.ur.setpoint_writer import RegisterWriter
 from coneskin.robot.ur.state_reader import StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
 from tests.robot.sim.machine.test_controller import Bench

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import StopPath
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur import rtde_codec, rtde_connection
 from coneskin.robot.ur.state_reader import RECIPE, StateReader, decode_state

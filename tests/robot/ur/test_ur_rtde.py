@@ -3,9 +3,8 @@
 import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
-from coneskin.robot.driver.waypoint import Waypoint
-from coneskin.robot.ur.control_program import rtde_errors
-from coneskin.robot.ur.ur_rtde import Mode
+from coneskin.robot.driver.values import Waypoint
+from coneskin.robot.ur.ur_rtde import Mode, rtde_errors
 
 from .fake_wheel import arm, stops
 

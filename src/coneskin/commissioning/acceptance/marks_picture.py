@@ -77,7 +77,7 @@ def _draw_sheet(axes: Any, item: SensorMarks, first: int) -> None:
 def _draw_arm(axes: Any, item: SensorMarks, placed: SensorOnArm, q: Sequence[float], first: int) -> None:
     """Draw the sensor's link as it stands in the base frame, with the marks and their normals."""
     from coneskin.robot.arm.kinematics import link_pose
-    from coneskin.robot.arm.skeleton import skeleton
+    from coneskin.robot.arm.workspace import skeleton
 
     assert placed.model is not None
     cone, base_link = item.sensor.frustum, link_pose(placed.model, q, placed.link)

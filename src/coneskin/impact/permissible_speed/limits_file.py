@@ -17,7 +17,7 @@ from typing import Any
 from coneskin.core.errors import ConeSkinError, SceneError
 from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check
-from coneskin.robot.arm.link_frames import link_index
+from coneskin.robot.arm.kinematics import link_index
 from coneskin.scene.tables.keys import MAX_SIZE
 
 from .speed_search import ForceLimits

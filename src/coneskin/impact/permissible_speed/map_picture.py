@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
-from coneskin.robot.arm.link_frames import LINK_INDEX
+from coneskin.robot.arm.kinematics import LINK_INDEX
 from coneskin.skin.materials import Padding
 
 from .speed_map import LEVERS, SpeedMap, contact_at

@@ -274,7 +274,7 @@ def _check(scene: Scene, limits: LimitsFile) -> None:
             )
     if scene.arm is not None:
         for item in scene.links:
-            from coneskin.robot.arm.link_frames import link_index
+            from coneskin.robot.arm.kinematics import link_index
 
             index = link_index(item.name)
             if index and item.sensors and not any(not r.links or index in r.links for r in limits.regions):

@@ -25,8 +25,7 @@ from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.messages import Release
-from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetSpeedSlider
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetSpeedSlider, StopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm

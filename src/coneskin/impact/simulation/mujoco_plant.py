@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from coneskin.core.errors import MissingExtra
 from coneskin.geometry.pose import Vector
+from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_inertias import arm_inertia
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
 

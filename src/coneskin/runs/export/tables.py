@@ -23,7 +23,7 @@ from coneskin.runs.replay.event_details import QUANTITIES
 from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame, FrameDecoder
 
 if TYPE_CHECKING:
-    from coneskin.robot.driver.state import ControllerState
+    from coneskin.robot.driver.values import ControllerState
     from coneskin.runs.replay.run import Run
 
 __all__ = [

@@ -12,7 +12,7 @@ from coneskin.core.errors import RecordingError, RobotConnectionError
 from coneskin.core.picture_file import write_picture
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.registry import load_driver
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent, stopping_contact
 from coneskin.scene.values.scene import Scene
 
@@ -201,8 +201,8 @@ def _draw_arm(
     word: str,
 ) -> None:
     from coneskin.robot.arm.kinematics import link_pose
-    from coneskin.robot.arm.skeleton import skeleton
     from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.arm.workspace import skeleton
 
     assert scene.arm is not None
     arm = arm_model(scene.arm.model)

@@ -105,7 +105,7 @@ def read_reaction(table: Mapping[str, Any], problems: list[str]) -> tuple[Reacti
 
 def _rule(row: Mapping[str, Any], where: str, default: Reaction, problems: list[str]) -> Rule | None:
     """Read one rule; what it does not set is as in [reaction]."""
-    from coneskin.robot.arm.link_frames import link_index
+    from coneskin.robot.arm.kinematics import link_index
     from coneskin.robot.reaction.rules import Rule
 
     before = len(problems)

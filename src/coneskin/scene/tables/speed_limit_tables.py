@@ -144,7 +144,7 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
         recorded: it comes from a recording, and was checked when the guard began.
         problems: every mistake is added here.
     """
-    from coneskin.robot.arm.link_frames import link_index
+    from coneskin.robot.arm.kinematics import link_index
 
     limit = scene.speed_limit
     if limit is None:

@@ -1,7 +1,7 @@
 """Solids of triangles that belong to a link: surfaces of revolution, the arm built from them, and bodies beside it.
 
 Where the axes of an arm are is exact. How thick a part is, is drawn from the wrist's offset d5, to which the joints of
-the family are in proportion (``self_collision`` has the measured numbers). A tube never stands out of a sheet on it.
+the family are in proportion (measured in ``robot/arm/workspace.py``). A tube never stands out of a sheet on it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.geometry.pose import Pose, Vector
-from coneskin.robot.arm.link_frames import LINK_INDEX, dh_mesh
+from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.model import ArmModel
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ def arm_solids(model: ArmModel, slimmest: Mapping[int, float] | None = None) -> 
     """Return the solids of an arm, each in the DH frame that it moves with.
 
     Args:
-        model: the arm; one whose meshes ``link_frames`` knows.
+        model: the arm; one whose meshes ``dh_mesh`` knows.
         slimmest: index of a link -> radius that its tube must not exceed [m], because a sheet lies on it.
 
     Raises:

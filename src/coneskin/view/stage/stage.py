@@ -201,7 +201,7 @@ def _link_meshes(scene: Scene, model: ArmModel) -> list[Solid]:
             import numpy as np
 
             from coneskin.geometry.mesh import load_mesh
-            from coneskin.robot.arm.link_frames import dh_mesh, link_index
+            from coneskin.robot.arm.kinematics import dh_mesh, link_index
 
             mesh = load_mesh(link.mesh).moved(dh_mesh(model, link.name))
             faces = np.asarray(mesh.faces)

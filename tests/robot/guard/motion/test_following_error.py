@@ -1,6 +1,6 @@
 """The monitor of a motion of ours: what ends it at once, what after a while, and what it lets pass."""
 
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.motion.reaction_motion import FollowingErrorMonitor
 from coneskin.robot.reaction.types import JointVelocity
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from coneskin.robot.driver.state import ControllerState
+from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.joint_current import MAX_RISE, JointCurrentMonitor
 from coneskin.robot.reaction.types import Reaction

@@ -6,8 +6,7 @@ import pytest
 
 from coneskin.robot.arm.workspace import TablePlane
 from coneskin.robot.driver.messages import SetJointVelocity
-from coneskin.robot.driver.setpoint import JointVelocitySetpoint, SetpointProgram
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, StopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
@@ -194,7 +193,7 @@ def test_back_along_the_path_where_the_place_is_not_known():
     assert event["complete"] is True
     assert back.arm.q[1:] == pytest.approx(was[1:], abs=1e-6)  # only joint 1 had moved
     # brakes from 1 rad/s at 10 rad/s2: 0.05 rad; 80 mm at the arm's reach, which bounds the way of every point
-    from coneskin.robot.arm.joint_limits import reach
+    from coneskin.robot.arm.workspace import reach
 
     assert was[0] + 0.05 + 0.012 - back.arm.q[0] == pytest.approx(0.079 / reach(MODEL)[0], abs=0.01)
 

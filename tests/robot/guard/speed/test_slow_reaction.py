@@ -6,14 +6,13 @@ import pytest
 
 from coneskin.core.errors import RobotConnectionError
 from coneskin.robot.driver.messages import SetJointVelocity, StopProgram
-from coneskin.robot.driver.setpoint import SetSpeedSlider
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import SetSpeedSlider, StopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.sim.mock_arm import SLIDER
-from coneskin.robot.ur.speed_slider import decode_fraction
+from coneskin.robot.ur.input_writers import decode_fraction
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from tests.support.guard_rig import GuardRig, felt, make_core, touch
 from tests.support.sweep import sweep

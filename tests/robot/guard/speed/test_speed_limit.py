@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from coneskin.impact.simulation.collision_run import Waypoints
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-from coneskin.robot.driver.setpoint import SetSpeedSlider
+from coneskin.robot.driver.values import SetSpeedSlider
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds, SurfaceSpeeds

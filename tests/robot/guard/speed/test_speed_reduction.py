@@ -4,9 +4,7 @@ import pytest
 
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.driver.setpoint import SetSpeedSlider
-from coneskin.robot.driver.state import ControllerState
-from coneskin.robot.driver.stop_path import StopPath
+from coneskin.robot.driver.values import ControllerState, SetSpeedSlider, StopPath
 from coneskin.robot.guard.speed.speed_reduction import CLEAR_TIME, ReducedSpeedTouch, SpeedReduction
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits

@@ -11,8 +11,15 @@ from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.inputs_outputs import INPUTS
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.ports.rtde import RtdeOutputs, RtdeSession, available
-from coneskin.robot.ur.rtde_codec import PacketKind, Recipe, pack, pack_inputs_request, pack_outputs_request, split
-from coneskin.robot.ur.rtde_variables import VARIABLES
+from coneskin.robot.ur.rtde_codec import (
+    VARIABLES,
+    PacketKind,
+    Recipe,
+    pack,
+    pack_inputs_request,
+    pack_outputs_request,
+    split,
+)
 from tests.support.paths import ROOT
 
 
