@@ -95,7 +95,7 @@ class CaptureWindow:
 LENGTHS = {36: 1, 40: 2, 52: 2}
 EDGE = MAX_LENGTH  #: bytes at either end of a capture that may belong to a frame that is cut
 _LENGTH_AT = 3  # offset of the length in a frame
-_TEXT = frozenset({9, 10, 13, *range(32, 127)})
+_TEXT_BYTES = frozenset({9, 10, 13, *range(32, 127)})
 
 
 class FoundFrames(NamedTuple):
@@ -158,7 +158,7 @@ def sync_places(data: bytes, sync: bytes = SYNC) -> tuple[list[int], int, float]
 
 def printable_share(data: bytes) -> float:
     """Return the share of the bytes that are printable ASCII, tabs or line ends."""
-    return sum(byte in _TEXT for byte in data) / len(data) if data else 0.0
+    return sum(byte in _TEXT_BYTES for byte in data) / len(data) if data else 0.0
 
 
 def short_hex(data: bytes, count: int = 12) -> str:

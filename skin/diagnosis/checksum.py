@@ -16,18 +16,18 @@ from .cause import Cause, Diagnosis
 
 __all__ = ["crc16", "find_checksum"]
 
-_RIGHT = 0x1021  # polynomial of CRC-16/XMODEM
-_POLYNOMIALS = (_RIGHT, 0x8005, 0x3D65, 0x8BB7, 0xA097, 0xC867, 0x0589, 0x5935, 0x8D95)
-_NAMES = {0x8005: "0x8005 (MODBUS, ARC, USB)", 0x3D65: "0x3D65 (DNP)", 0x8BB7: "0x8BB7 (T10-DIF)"}
-_RANGES = {
+_RIGHT_POLYNOMIAL = 0x1021  # polynomial of CRC-16/XMODEM
+_KNOWN_POLYNOMIALS = (_RIGHT_POLYNOMIAL, 0x8005, 0x3D65, 0x8BB7, 0xA097, 0xC867, 0x0589, 0x5935, 0x8D95)
+_POLYNOMIAL_NAMES = {0x8005: "0x8005 (MODBUS, ARC, USB)", 0x3D65: "0x3D65 (DNP)", 0x8BB7: "0x8BB7 (T10-DIF)"}
+_RANGE_WORDS = {
     0: "",
     2: "it leaves out the sync bytes",
     3: "it leaves out sync and version",
     4: "it leaves out sync, version and length",
 }
-_STARTS = (0xFFFF, 0x1D0F, 0xB2AA, 0x800D, 0x89EC, 0x554D)
-_FRAMES = 8  # that are compared
-_ENOUGH = 0.9  # share of the frames that must agree
+_START_VALUES = (0xFFFF, 0x1D0F, 0xB2AA, 0x800D, 0x89EC, 0x554D)
+_COMPARED_FRAMES = 8  # that are compared
+_AGREEING_SHARE = 0.9  # share of the frames that must agree
 
 
 def crc16(data: bytes, polynomial: int, start: int = 0, reflected: bool = False) -> int:
@@ -63,7 +63,7 @@ def find_checksum(frames: Sequence[bytes]) -> Diagnosis:
         if found := search(bodies, tails):
             return found
     distinct = list(dict.fromkeys(zip(bodies, tails, strict=True)))
-    if found := _find_crc(distinct[: _FRAMES + 1]):
+    if found := _find_crc(distinct[: _COMPARED_FRAMES + 1]):
         return found
     body, tail = distinct[0]
     right = crc_hqx(body, 0).to_bytes(2, "big").hex(" ").upper()
@@ -86,7 +86,7 @@ def _find_stale(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | 
     }
     for words, mix in parts.items():
         hits = sum(crc_hqx(mix(old, new) + tail, 0) == 0 for old, new, tail in pairs)
-        if hits >= _ENOUGH * len(pairs):
+        if hits >= _AGREEING_SHARE * len(pairs):
             return Diagnosis(Cause.CRC_STALE, f"the checksum {words}")
     return None
 
@@ -103,7 +103,7 @@ def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | No
         "a CRC of 8 bits": _crc8,
     }
     pairs = list(zip(bodies, tails, strict=True))
-    for (words, kind), start in product(kinds.items(), _RANGES):
+    for (words, kind), start in product(kinds.items(), _RANGE_WORDS):
         hits = [0, 0, 0, 0]
         for body, tail in pairs:
             value = kind(body[start:]) & 0xFFFF
@@ -112,7 +112,7 @@ def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | No
             hits[0] += tail in (wide, wide[::-1])
             hits[1] += low == tail[0] and tail[1] == tails[0][1]
             hits[2] += low == tail[1] and tail[0] == tails[0][0]
-        if max(hits) >= _ENOUGH * len(pairs) and len(pairs) >= 3:
+        if max(hits) >= _AGREEING_SHARE * len(pairs) and len(pairs) >= 3:
             return Diagnosis(Cause.CHECKSUM_KIND, f"the checksum is {words}, not a CRC of 16 bits")
     return None
 
@@ -146,7 +146,7 @@ def _find_crc(frames: Sequence[tuple[bytes, bytes]]) -> Diagnosis | None:
     if len(frames) < 4:
         return None
     (body0, tail0), *others = frames
-    for polynomial, padded, reflected in product(_POLYNOMIALS, (b"", b"\0\0"), (False, True)):
+    for polynomial, padded, reflected in product(_KNOWN_POLYNOMIALS, (b"", b"\0\0"), (False, True)):
         orders = {"big", "little"}
         for body, tail in others:
             change = bytes(a ^ b for a, b in zip(body0, body, strict=True)).lstrip(b"\0") + padded
@@ -178,15 +178,17 @@ def _describe(body: bytes, tail: bytes, found: _Found) -> Diagnosis:
     """Name every parameter that differs from CRC-16/XMODEM, the gravest first."""
     polynomial, padded, reflected, order = found
     seen: list[tuple[Cause, str]] = []
-    if polynomial != _RIGHT:
-        seen.append((Cause.CRC_POLYNOMIAL, f"its polynomial is {_NAMES.get(polynomial, f'0x{polynomial:04X}')}"))
+    if polynomial != _RIGHT_POLYNOMIAL:
+        seen.append(
+            (Cause.CRC_POLYNOMIAL, f"its polynomial is {_POLYNOMIAL_NAMES.get(polynomial, f'0x{polynomial:04X}')}")
+        )
     if reflected:
         seen.append((Cause.CRC_REFLECTED, "its bits are reflected (as KERMIT, X-25 and MODBUS have them)"))
     if padded:
         seen.append((Cause.CRC_RANGE, "it was taken over its own two bytes as well, while they were 0"))
     start, value, inverted = _find_start(body + bytes(2 * padded), int.from_bytes(tail, order), polynomial, reflected)
     if start:
-        seen.append((Cause.CRC_RANGE, _RANGES[start]))
+        seen.append((Cause.CRC_RANGE, _RANGE_WORDS[start]))
     if value is None:
         seen.append((Cause.CRC_START, "its start value is another one"))
     elif value or inverted:
@@ -200,9 +202,9 @@ def _describe(body: bytes, tail: bytes, found: _Found) -> Diagnosis:
 def _find_start(message: bytes, wanted: int, polynomial: int, reflected: bool) -> tuple[int, int | None, bool]:
     """Return where a CRC's message begins, its start value (None where no known one fits), whether it is inverted."""
     for values, inverted, start in (
-        *(((0,), False, start) for start in _RANGES),
-        *((_STARTS, inverted, start) for start in _RANGES for inverted in (False, True)),
-        *(((0,), True, start) for start in _RANGES),
+        *(((0,), False, start) for start in _RANGE_WORDS),
+        *((_START_VALUES, inverted, start) for start in _RANGE_WORDS for inverted in (False, True)),
+        *(((0,), True, start) for start in _RANGE_WORDS),
     ):
         for value in values:
             if crc16(message[start:], polynomial, value, reflected) ^ 0xFFFF * inverted == wanted:

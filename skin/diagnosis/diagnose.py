@@ -10,18 +10,16 @@ from coneskin.skin.wire import MAX_LENGTH, Frame, FrameDecoder
 
 from .capture import Capture, FoundFrames, find_frames, printable_share, short_hex
 from .cause import Cause, Diagnosis
-from .foreign_stream import find_constant, find_protocol, find_text, first_line
+from .foreign_stream import find_baud, find_coding, find_constant, find_protocol, find_text, first_line
 from .frame_numbers import find_wrong_numbers, measure_numbers
-from .frame_shape import find_foreign_sync, find_shape
-from .line_coding import find_baud, find_coding
+from .frame_shape import find_damage, find_foreign_sync, find_shape
 from .measurements import current_remarks, find_big_endian, find_status, find_wrong_measurements
-from .stream_damage import find_damage
 
 __all__ = ["diagnose"]
 
-_FEW = 64  # bytes, of which nothing can be said
-_STOPPED = 0.7  # s without a byte
-_SHAPE = 1 << 13  # newest bytes in which the shape is looked for
+_FEW_BYTES = 64  # bytes, of which nothing can be said
+_STOPPED_TIME = 0.7  # s without a byte
+_SHAPE_LENGTH = 1 << 13  # newest bytes in which the shape is looked for
 _MIN_FRAMES = 3
 _MIN_COVERED = 0.02  # share of the bytes that are valid frames; fewer are chance
 
@@ -45,7 +43,7 @@ def diagnose(capture: Capture, sensors: Sequence[Sensor] = (), baud: int | None 
         named = find_damage(data, found) or _find_in_frames(capture, found, sensors)
     else:
         named = _find_without_frames(capture, data, baud)
-    if capture.timed and capture.silence > _STOPPED:
+    if capture.timed and capture.silence > _STOPPED_TIME:
         return _stopped(capture, data, named)
     return named
 
@@ -62,7 +60,7 @@ def _stopped(capture: Capture, data: bytes, before: Diagnosis) -> Diagnosis:
 def _find_without_frames(capture: Capture, data: bytes, baud: int | None) -> Diagnosis:
     """Name the cause where hardly any frame is valid."""
     rate = len(data) / capture.duration if capture.duration > 0.0 else math.inf  # of a file, whose bytes have no times
-    newest = data[-_SHAPE:]
+    newest = data[-_SHAPE_LENGTH:]
     decoder = FrameDecoder()
     decoder.feed(newest)
     if decoder.unknown_versions >= _MIN_FRAMES:
@@ -80,7 +78,7 @@ def _find_without_frames(capture: Capture, data: bytes, baud: int | None) -> Dia
     )
     if named:
         return named
-    if len(data) < _FEW:
+    if len(data) < _FEW_BYTES:
         return Diagnosis(Cause.FEW_BYTES, f"only {len(data)} bytes have come: {short_hex(data)}")
     how_many = f"{rate:.0f} bytes a second" if math.isfinite(rate) else f"{len(data)} bytes"
     what = f"{how_many} come, but no frame: {short_hex(newest[-MAX_LENGTH:])}"

@@ -15,13 +15,13 @@ from .cause import Cause, Diagnosis
 __all__ = ["FrameNumbers", "find_wrong_numbers", "measure_numbers"]
 
 _MIN_FRAMES = 8
-_SHARE = 0.9  # of the steps that must be of one kind
+_STEADY_SHARE = 0.9  # of the steps that must be of one kind
 _MIN_RATE = 100.0  # Hz
 _CLOCK_TOLERANCE = 0.015  # of its speed; a ceramic resonator is off by 0.005
 _HELD_BACK = 0.012  # s from one group of frames to the next, where the frames themselves are closer
-_LOST = 0.02  # share of frames
-_TURNS = 3
-_PARTS = 6  # of the time, in each of which some frame is quick
+_LOST_SHARE = 0.02  # share of frames
+_LINE_TURNS = 3
+_TIME_PARTS = 6  # of the time, in each of which some frame is quick
 _MIN_TIME = 0.25  # s over which the clocks can be compared
 
 
@@ -76,7 +76,7 @@ def _slope(ticks: Sequence[int], times: Sequence[float]) -> float:
     spread = math.fsum((time - mean_time) ** 2 for time in times)
     slope = math.fsum((t - mean_time) * (c - mean_clock) for t, c in zip(times, clocks, strict=True)) / spread
     third = count // 3
-    for _ in range(_TURNS if third else 0):
+    for _ in range(_LINE_TURNS if third else 0):
         if not slope > 0.0:
             break
         lag = [time - clock / slope for time, clock in zip(times, clocks, strict=True)]
@@ -121,7 +121,7 @@ def _find_sequence(frames: Sequence[Frame], sensors: int) -> Diagnosis | None:
     steps = [(b.sequence - a.sequence) & 0xFFFF for a, b in itertools.pairwise(frames)]
     (step, count), *_ = Counter(steps).most_common(1)
     share = count / len(steps)
-    if step == 0 and share >= _SHARE:
+    if step == 0 and share >= _STEADY_SHARE:
         return Diagnosis(Cause.SEQUENCE_STANDS, f"the sequence stands at {frames[-1].sequence}")
     if step == 1 and share >= 0.5:
         if max(frame.sequence for frame in frames) == 0xFF and 0xFF01 in steps:
@@ -130,9 +130,9 @@ def _find_sequence(frames: Sequence[Frame], sensors: int) -> Diagnosis | None:
     forward = [step for step in steps if 0 < step < 0x8000]
     if len(forward) < 0.7 * len(steps) or max(forward) > 4096:
         return Diagnosis(Cause.SEQUENCE_RANDOM, f"the sequence does not count: {_listing(frames)}")
-    if share >= _SHARE and step == sensors:
+    if share >= _STEADY_SHARE and step == sensors:
         return Diagnosis(Cause.SEQUENCE_SHARED, f"the {sensors} sensors share one sequence, which goes up by {step}")
-    if share >= _SHARE:
+    if share >= _STEADY_SHARE:
         return Diagnosis(Cause.SEQUENCE_STEPS, f"the sequence goes up by {step} from frame to frame")
     return None
 
@@ -182,11 +182,11 @@ def _steady_ratio(ticks: Sequence[int], times: Sequence[float], ratio: float) ->
         times: when each frame came, host clock [s].
         ratio: over the whole time; returned where most parts agree with it.
     """
-    if len(times) < _PARTS * _MIN_FRAMES:
+    if len(times) < _TIME_PARTS * _MIN_FRAMES:
         return ratio
     clocks = itertools.accumulate(ticks, initial=0)
     lag = [time - 1e-6 * clock for time, clock in zip(times, clocks, strict=True)]
-    edges = [len(lag) * part // _PARTS for part in range(_PARTS + 1)]
+    edges = [len(lag) * part // _TIME_PARTS for part in range(_TIME_PARTS + 1)]
     quickest = [min(range(a, b), key=lag.__getitem__) for a, b in itertools.pairwise(edges)]
     speeds = sorted((lag[b] - lag[a]) / max(times[b] - times[a], 1e-6) for a, b in itertools.pairwise(quickest))
     middle = speeds[len(speeds) // 2]
@@ -194,7 +194,7 @@ def _steady_ratio(ticks: Sequence[int], times: Sequence[float], ratio: float) ->
 
 
 def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Diagnosis | None:
-    if numbers.missing > _LOST:
+    if numbers.missing > _LOST_SHARE:
         return Diagnosis(Cause.FRAMES_LOST, f"{100.0 * numbers.missing:.1f} % of the frames never come")
     if numbers.rate < _MIN_RATE:
         return Diagnosis(Cause.RATE_LOW, f"a sensor sends only {numbers.rate:.1f} frames a second")

@@ -1,27 +1,29 @@
-"""Shape of what looks like frames and is not valid: sync, header, length, padding, and then the checksum."""
+"""Shape of frames: what is wrong with all of them, or what damages some of them on the way."""
 
 from __future__ import annotations
 
 import itertools
+from binascii import crc_hqx
 from collections import Counter
 from collections.abc import Sequence
 
 from coneskin.skin.wire import MAX_LENGTH, SYNC, VERSIONS
 
-from .capture import LENGTHS, short_hex, sync_places
+from .capture import LENGTHS, FoundFrames, count_frames, printable_share, short_hex, sync_places
 from .cause import Cause, Diagnosis
 from .checksum import crc16, find_checksum
+from .foreign_stream import first_line, undo_newlines, undo_slip
 
-__all__ = ["find_foreign_sync", "find_shape"]
+__all__ = ["find_damage", "find_foreign_sync", "find_shape"]
 
 _MIN_STARTS = 4  # that look like a frame's beginning
-_SHARE = 0.6  # of them that must agree
-_SAMPLES = 48  # frames that are compared
+_AGREEING_SHARE = 0.6  # of them that must agree
+_SAMPLE_COUNT = 48  # frames that are compared
 _WIRE_BUFFERS = (32, 64)  # bytes; buffers of common libraries
-_RIGHT = 0x1021
+_RIGHT_POLYNOMIAL = 0x1021
 _LAST_FIELD = 2  # bytes of the CRC
 _MIN_LENGTH, _MAX_PERIOD = 8, 80
-_PERIODIC = 0.35  # share of the bytes that equal the one a frame before
+_PERIODIC_SHARE = 0.35  # share of the bytes that equal the one a frame before
 _HEADER_PLACES = (2, 3)
 
 
@@ -32,11 +34,11 @@ def find_shape(data: bytes) -> Diagnosis | None:
         return None
     headers = Counter(data[at + 2 : at + 4] for at in places if at + 4 <= len(data))
     header, count = headers.most_common(1)[0]
-    if count < _SHARE * headers.total() or len(header) < 2:
+    if count < _AGREEING_SHARE * headers.total() or len(header) < 2:
         return None
     version, length = header
     frames = [data[at : at + period] for at in places if data[at + 2 : at + 4] == header and at + period <= len(data)]
-    if share < _SHARE:
+    if share < _AGREEING_SHARE:
         # the frames of one length may have something between them
         period = length if length in LENGTHS else 0
         frames = [
@@ -44,7 +46,7 @@ def find_shape(data: bytes) -> Diagnosis | None:
         ]
         if not period:
             return None
-    frames = frames[-_SAMPLES:]
+    frames = frames[-_SAMPLE_COUNT:]
     if version in VERSIONS and LENGTHS.get(length) == version:
         if period == length:
             return _find_padding(frames, length) or find_checksum(frames)
@@ -82,7 +84,7 @@ def _wrong_size(frames: Sequence[bytes], version: int, length: int, period: int)
 
 def _valid_alone(frames: Sequence[bytes]) -> bool:
     """Tell whether the frames have a right checksum for the length that they have."""
-    return bool(frames) and all(crc16(frame, _RIGHT) == 0 for frame in frames[-4:])
+    return bool(frames) and all(crc16(frame, _RIGHT_POLYNOMIAL) == 0 for frame in frames[-4:])
 
 
 def _find_padding(frames: Sequence[bytes], length: int) -> Diagnosis | None:
@@ -106,7 +108,7 @@ def find_foreign_sync(data: bytes) -> Diagnosis | None:
     """Find frames that begin with other bytes, by their regularity."""
     for sync, cause, words in ((SYNC[::-1], Cause.SYNC_SWAPPED, "the sync bytes come as 3A C5, exchanged"),):
         places, period, share = sync_places(data, sync)
-        if len(places) >= _MIN_STARTS and share >= _SHARE and _MIN_LENGTH <= period <= MAX_LENGTH:
+        if len(places) >= _MIN_STARTS and share >= _AGREEING_SHARE and _MIN_LENGTH <= period <= MAX_LENGTH:
             return Diagnosis(cause, words)
     period = _find_period(data)
     if not period:
@@ -135,4 +137,89 @@ def _find_period(data: bytes) -> int:
         same = sum(map(int.__eq__, piece, piece[step:])) / pairs
         if same > best + 0.02:  # a multiple of the period repeats as well
             best, period = same, step
-    return period if best >= _PERIODIC else 0
+    return period if best >= _PERIODIC_SHARE else 0
+
+
+_FLOW_BYTES = {0x11, 0x13}
+_MAX_REPAIRS = 24  # damaged frames that are looked at
+_LOST_SHARE = 0.005  # share of the bytes that may be lost without a word
+_SAME_SHARE = 0.8  # share of what lies between frames that must be the same
+
+
+def find_damage(data: bytes, found: FoundFrames) -> Diagnosis | None:
+    """Say what damages the frames of a capture, or stands between them; None where hardly anything does."""
+    if found.covered >= 1.0 - _LOST_SHARE or not found.gaps:
+        return None
+    share = f"{100.0 * (1.0 - found.covered):.1f} % of the bytes are no frames"
+    for cause, words, undo in (
+        (Cause.NEWLINES, "each 0A in a frame has become 0D 0A", undo_newlines),
+        (Cause.SLIP, "the frames are wrapped in SLIP", undo_slip),
+    ):
+        frames, covered = count_frames(undo(data))
+        if frames > len(found.frames) and covered > found.covered + 0.5 * (1.0 - found.covered):
+            return Diagnosis(cause, f"{share}: {words}")
+    between = b"".join(found.gaps)
+    if SYNC not in between:
+        gap, count = Counter(found.gaps).most_common(1)[0]
+        if count >= _SAME_SHARE * len(found.gaps) and len(gap) <= 8:
+            return Diagnosis(Cause.EXTRA_BYTES, f"{short_hex(gap)} stands between the frames")
+        if printable_share(between) > 0.9:
+            return Diagnosis(Cause.TEXT, f"text stands between the frames: {first_line(between)!r}")
+    broken = _broken_frames(found.gaps)
+    if (repaired := _repair(broken)) is not None:
+        return Diagnosis(repaired[0], f"{share}: {repaired[1]}")
+    whole = [piece for piece in broken if len(piece) == piece[3]]
+    if sum(len(piece) < piece[3] for piece in broken) > 0.5 * len(broken):
+        return Diagnosis(Cause.BYTES_LOST, f"{share}: frames are shorter than they say")
+    if len(whole) >= 8 and len(whole) > 2 * len(found.frames):
+        named = find_checksum(whole)
+        if named.cause not in (Cause.CRC_UNKNOWN, Cause.CRC_CONSTANT):
+            return named
+    if whole and len(whole) >= 0.5 * len(found.gaps):
+        return Diagnosis(Cause.DAMAGED, f"{share}: {len(whole)} frames of the right length have a wrong checksum")
+    if printable_share(between) > 0.9:
+        return Diagnosis(Cause.TEXT, f"text stands between the frames: {first_line(between)!r}")
+    return Diagnosis(Cause.DAMAGED, f"{share}, such as {short_hex(max(found.gaps, key=len))}")
+
+
+def _broken_frames(gaps: Sequence[bytes]) -> list[bytes]:
+    """Return the pieces that begin as a frame does, each up to the next such beginning."""
+    pieces = []
+    for gap in gaps:
+        at = gap.find(SYNC)
+        while at >= 0:
+            end = gap.find(SYNC, at + 2)
+            piece = gap[at : end if end >= 0 else len(gap)]
+            if len(piece) >= 8 and LENGTHS.get(piece[3]) == piece[2]:
+                pieces.append(piece)
+            at = end
+    return pieces
+
+
+def _repair(broken: Sequence[bytes]) -> tuple[Cause, str] | None:
+    """Find which byte is missing in frames that are one byte too short."""
+    short = [piece for piece in broken if len(piece) == piece[3] - 1][:_MAX_REPAIRS]
+    if len(short) < 2 or len(short) < 0.5 * min(len(broken), _MAX_REPAIRS):
+        return None
+    votes: Counter[int] = Counter()
+    for piece in short:
+        votes.update(set(_missing_bytes(piece)))
+    in_flow = sum(votes[byte] for byte in _FLOW_BYTES)
+    (byte, count), *_ = votes.most_common(1) or [(-1, 0)]
+    if in_flow >= 0.7 * len(short) and count <= in_flow:
+        return Cause.FLOW_CONTROL, "the bytes 11 and 13 are missing from the frames"
+    if byte == 0 and count >= 0.7 * len(short):
+        return Cause.ZEROS_LOST, "the byte 00 is missing from the frames"
+    return Cause.BYTES_LOST, "frames are one byte too short"
+
+
+def _missing_bytes(piece: bytes) -> list[int]:
+    """Return each byte that makes the checksum right where it is put in somewhere."""
+    found = []
+    for place in range(2, len(piece) + 1):
+        before, behind = piece[:place], piece[place:]
+        start = crc_hqx(before, 0)
+        for byte in (0x11, 0x13, 0x00, 0x0A, 0x0D):
+            if crc_hqx(bytes((byte,)) + behind, start) == 0:
+                found.append(byte)
+    return found

@@ -27,17 +27,17 @@ MEASURED = (
     *("angular_a", "angular_b", "angular_current"),
     *("touch_supply", "radial_supply", "angular_supply"),
 )
-_FIRST = Frame._fields.index(MEASURED[0])
-_SUPPLY = MEASURED.index("touch_supply")
-_RADIAL, _ANGULAR = MEASURED.index("radial_current"), MEASURED.index("angular_current")
-_GUIDES = tuple(MEASURED.index(name) for name in ("radial_c", "radial_d", "angular_a", "angular_b"))
+_FIRST_MEASURED = Frame._fields.index(MEASURED[0])
+_SUPPLY_AT = MEASURED.index("touch_supply")
+_RADIAL_AT, _ANGULAR_AT = MEASURED.index("radial_current"), MEASURED.index("angular_current")
+_GUIDE_PLACES = tuple(MEASURED.index(name) for name in ("radial_c", "radial_d", "angular_a", "angular_b"))
 _MIN_FRAMES = 8
 _STUCK_FRAMES = 400  # in a row with the same reading
-_REMARKABLE = 0.05  # of a drive current; layers vary by more, which a guard learns and a design does not know
-_UNTOUCHED = 0.03  # of the supply, on both guides of the touch phase together
-_NEAR = 0.06  # a reading is another one
-_FULL = (255, 1023, 4095, 16383, 65535)
-_STATUS = {
+_REMARKABLE_SHARE = 0.05  # of a drive current; layers vary by more, which a guard learns and a design does not know
+_UNTOUCHED_SHARE = 0.03  # of the supply, on both guides of the touch phase together
+_NEAR_SHARE = 0.06  # a reading is another one
+_FULL_SCALES = (255, 1023, 4095, 16383, 65535)
+_STATUS_NAMES = {
     Status.SUPPLY: "SUPPLY",
     Status.ADC: "ADC",
     Status.OVERRUN: "OVERRUN",
@@ -91,7 +91,7 @@ def find_big_endian(frames: Sequence[Frame]) -> Diagnosis | None:
 
 
 def _measured(frame: Frame) -> tuple[int, ...]:
-    return frame[_FIRST : _FIRST + len(MEASURED)]  # type: ignore[return-value]  # integers, all of them
+    return frame[_FIRST_MEASURED : _FIRST_MEASURED + len(MEASURED)]  # type: ignore[return-value]  # integers, all of them
 
 
 def _turn2(value: int) -> int:
@@ -113,7 +113,7 @@ def find_status(frames: Sequence[Frame]) -> Diagnosis | None:
         return Diagnosis(Cause.RESTARTS, f"the device has started {restarts} times in {len(frames)} frames")
     if sum(bool(frame.status & Status.RESERVED) for frame in frames) > 0.1 * len(frames):
         return Diagnosis(Cause.STATUS_RESERVED, f"the status is 0x{frames[-1].status:02X}, with its reserved bit")
-    for bit, name in _STATUS.items():
+    for bit, name in _STATUS_NAMES.items():
         if sum(bool(frame.status & bit) for frame in frames) > 0.1 * len(frames):
             return Diagnosis(Cause.STATUS, f"the device reports {name} in its status")
     return None
@@ -147,7 +147,7 @@ def _find_scaling(columns: _Columns, sensor: Sensor | None) -> Diagnosis | None:
     top = max(counts)
     bits = 12 if sensor is None else sensor.electronics.adc_bits
     full = (1 << bits) - 1
-    if all(len({*column}) == 1 for column in columns) and min(counts) == top and top in _FULL:
+    if all(len({*column}) == 1 for column in columns) and min(counts) == top and top in _FULL_SCALES:
         return Diagnosis(Cause.SATURATED, f"every reading is {top}")
     if top <= full:
         return None
@@ -163,9 +163,9 @@ def _find_scaling(columns: _Columns, sensor: Sensor | None) -> Diagnosis | None:
 
 
 def _find_zero(columns: _Columns) -> Diagnosis | None:
-    if max(columns[_SUPPLY]) == 0:
+    if max(columns[_SUPPLY_AT]) == 0:
         return Diagnosis(Cause.SUPPLY_ZERO, "the supply reads 0 in every frame")
-    radial, angular = max(columns[_RADIAL]) <= 2, max(columns[_ANGULAR]) <= 2
+    radial, angular = max(columns[_RADIAL_AT]) <= 2, max(columns[_ANGULAR_AT]) <= 2
     if radial and angular:
         return Diagnosis(Cause.CURRENTS_ZERO, "both drive currents read 0 in every frame")
     if radial:
@@ -185,7 +185,7 @@ def _find_stuck(columns: _Columns) -> Diagnosis | None:
     """Find a reading without noise: each of those that the detector's STUCK looks at must have some."""
     if len(columns[0]) < _STUCK_FRAMES:
         return None
-    for k in (_RADIAL, _ANGULAR, _SUPPLY, _SUPPLY + 1, _SUPPLY + 2):
+    for k in (_RADIAL_AT, _ANGULAR_AT, _SUPPLY_AT, _SUPPLY_AT + 1, _SUPPLY_AT + 2):
         if len({*columns[k][-_STUCK_FRAMES:]}) == 1:
             return Diagnosis(Cause.NO_NOISE, f"{MEASURED[k]} has not changed in {_STUCK_FRAMES} frames")
     return None
@@ -200,27 +200,27 @@ def _find_unexpected(columns: _Columns, sensor: Sensor) -> Diagnosis | None:
     parts, bounds = sensor.electronics, sensor.bounds
     expected = expected_counts(sensor)
     middles = [_middle(column) for column in columns]
-    supply, wanted = middles[_SUPPLY], expected[_SUPPLY]
+    supply, wanted = middles[_SUPPLY_AT], expected[_SUPPLY_AT]
     said = f"the supply reads {supply:.0f} counts, the scene expects {wanted}"
     if not bounds.supply_low <= supply <= bounds.supply_high:
-        for k, middle in enumerate(middles[:_SUPPLY]):
+        for k, middle in enumerate(middles[:_SUPPLY_AT]):
             if abs(middle - wanted) < 0.03 * wanted:
                 return Diagnosis(Cause.FIELD_ORDER, f"{said}, and {MEASURED[k]} reads {middle:.0f}")
-        if abs(supply - 1e3 * parts.supply_volts) < _NEAR * supply:
+        if abs(supply - 1e3 * parts.supply_volts) < _NEAR_SHARE * supply:
             return Diagnosis(Cause.MILLIVOLTS, f"{said}; these are the millivolts of {parts.supply_volts:g} V")
         for bits in range(8, 17):
-            if bits != parts.adc_bits and abs(supply / wanted * 2.0 ** (parts.adc_bits - bits) - 1.0) < _NEAR:
+            if bits != parts.adc_bits and abs(supply / wanted * 2.0 ** (parts.adc_bits - bits) - 1.0) < _NEAR_SHARE:
                 return Diagnosis(Cause.CONVERTER_BITS, f"{said}: as a converter of {bits} bits, not {parts.adc_bits}")
         return Diagnosis(Cause.SUPPLY_OFF, said)
-    radial, angular = middles[_RADIAL] / expected[_RADIAL], middles[_ANGULAR] / expected[_ANGULAR]
-    turned = middles[_RADIAL] / expected[_ANGULAR], middles[_ANGULAR] / expected[_RADIAL]
+    radial, angular = middles[_RADIAL_AT] / expected[_RADIAL_AT], middles[_ANGULAR_AT] / expected[_ANGULAR_AT]
+    turned = middles[_RADIAL_AT] / expected[_ANGULAR_AT], middles[_ANGULAR_AT] / expected[_RADIAL_AT]
     if all(abs(part - 1.0) < 0.1 for part in turned) and abs(radial - 1.0) > 0.2 and abs(angular - 1.0) > 0.2:
-        what = f"the currents read {middles[_RADIAL]:.0f} and {middles[_ANGULAR]:.0f} counts"
+        what = f"the currents read {middles[_RADIAL_AT]:.0f} and {middles[_ANGULAR_AT]:.0f} counts"
         return Diagnosis(
-            Cause.PHASES_EXCHANGED, f"{what}, the scene expects {expected[_RADIAL]} and {expected[_ANGULAR]}"
+            Cause.PHASES_EXCHANGED, f"{what}, the scene expects {expected[_RADIAL_AT]} and {expected[_ANGULAR_AT]}"
         )
     limits = sensor.thresholds
-    for name, part, k in (("radial", radial, _RADIAL), ("angular", angular, _ANGULAR)):
+    for name, part, k in (("radial", radial, _RADIAL_AT), ("angular", angular, _ANGULAR_AT)):
         if not limits.current_low <= part <= limits.current_high:
             what = (
                 f"the drive current of the {name} phase reads {middles[k]:.0f} counts, the scene expects {expected[k]}"
@@ -238,20 +238,20 @@ def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
     """
     columns, expected = list(zip(*map(_measured, frames), strict=True)), expected_counts(sensor)
     found = []
-    for name, k in (("radial", _RADIAL), ("angular", _ANGULAR)):
+    for name, k in (("radial", _RADIAL_AT), ("angular", _ANGULAR_AT)):
         off = _middle(columns[k]) / max(expected[k], 1) - 1.0
-        if abs(off) > _REMARKABLE:
+        if abs(off) > _REMARKABLE_SHARE:
             found.append(f"{name} current {100.0 * off:+.0f} % of the design's: see coneskin doctor")
     return found
 
 
 def _find_floating(columns: _Columns) -> Diagnosis | None:
     """Find guides that wander although nothing touches the sensor."""
-    supply = _middle(columns[_SUPPLY])
-    untouched = [c + d < _UNTOUCHED * supply for c, d in zip(columns[0], columns[1], strict=True)]
+    supply = _middle(columns[_SUPPLY_AT])
+    untouched = [c + d < _UNTOUCHED_SHARE * supply for c, d in zip(columns[0], columns[1], strict=True)]
     if sum(untouched) < _MIN_FRAMES:
         return None
-    for k in _GUIDES:
+    for k in _GUIDE_PLACES:
         column = sorted(itertools.compress(columns[k], untouched))
         spread = column[int(0.95 * (len(column) - 1))] - column[int(0.05 * (len(column) - 1))]
         if spread > max(0.02 * supply, 12.0):
