@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-from .wire import FRAME_LENGTH, SYNC
+from .wire import FRAME_LENGTH, FRAME_LENGTHS, SYNC, VERSION
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,14 +15,13 @@ if TYPE_CHECKING:
 
 __all__ = ["FrameBatch", "find_frames"]
 
-_LENGTHS = ((1, FRAME_LENGTH), (2, 40), (2, 52))  # version and bytes of a frame; docs/look-up/wire-format.md
-#: offset of each 16-bit field in a frame [bytes]; version 1 has one supply for all phases
+#: offset of each 16-bit field in a frame [bytes]; the shortest has one supply for all phases
 _OFFSETS = {
     **{"device": 4, "sequence": 8, "touch_c": 14, "touch_d": 16, "touch_current": 18},
     **{"radial_c": 20, "radial_d": 22, "radial_current": 24},
     **{"angular_a": 26, "angular_b": 28, "angular_current": 30, "touch_supply": 32},
 }
-_SUPPLIES = {"radial_supply": 34, "angular_supply": 36}  # of version 2
+_SUPPLIES = {"radial_supply": 34, "angular_supply": 36}  # of the longer ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +64,7 @@ class FrameBatch:
         import numpy as np
 
         if name in _SUPPLIES:
-            return self._word(np.where(self.bytes[self.starts + 2] == 1, _OFFSETS["touch_supply"], _SUPPLIES[name]))
+            return self._word(np.where(self.lengths == FRAME_LENGTH, _OFFSETS["touch_supply"], _SUPPLIES[name]))
         return self._word(_OFFSETS[name])
 
     def of(self, device: int, sensor: int) -> NDArray[np.bool_]:
@@ -96,8 +95,8 @@ def find_frames(data: bytes) -> FrameBatch:
     starts = np.flatnonzero((values[:-1] == SYNC[0]) & (values[1:] == SYNC[1])) if len(values) > 1 else np.arange(0)
     starts = starts[starts + FRAME_LENGTH <= len(values)]
     found, lengths = [], []
-    for version, length in _LENGTHS:
-        here = starts[(values[starts + 2] == version) & (values[starts + 3] == length)]
+    for length in FRAME_LENGTHS:
+        here = starts[(values[starts + 2] == VERSION) & (values[starts + 3] == length)]
         here = here[here + length <= len(values)]
         if len(here):
             here = here[_remainders(np.lib.stride_tricks.sliding_window_view(values, length)[here]) == 0]
@@ -112,7 +111,7 @@ def _regular(values: NDArray[np.uint8]) -> FrameBatch | None:
     """Return the frames where nothing else stands before the last of them and all are of one layout, else None."""
     import numpy as np
 
-    if len(values) < FRAME_LENGTH or bytes(values[:2]) != SYNC or (values[2], values[3]) not in _LENGTHS:
+    if len(values) < FRAME_LENGTH or bytes(values[:3]) != SYNC + bytes((VERSION,)) or values[3] not in FRAME_LENGTHS:
         return None
     length = int(values[3])
     count = len(values) // length

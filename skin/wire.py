@@ -1,9 +1,9 @@
-"""Wire format, versions 1 and 2: frames with a checksum, and a decoder that finds them in any stream.
+"""Wire format: frames with a checksum, in three lengths, and a decoder that finds them in any stream.
 
-Layout, meaning of each field and reasons are in docs/look-up/wire-format.md. In short: sync, version, length,
-device, sensor, status, sequence, device clock, three phases of (guide, guide, drive current), supply, CRC. Version 1
-measures the supply once in a frame; version 2 once in each phase and, in its longer form, the driven electrodes' own
-potentials as well.
+The layout, the meaning of each field and the reasons are in docs/look-up/wire-format.md. In short: sync, version,
+length, device, sensor, status, sequence, device clock, three phases of (guide, guide, drive current), supply, CRC. The
+shortest frame measures the supply once; the others measure it in each phase, and the longest one the driven
+electrodes' own potentials as well.
 
 Bytes in, values out: nothing here knows ports, time or sensors, and noise never raises.
 """
@@ -18,9 +18,10 @@ from typing import Final, NamedTuple
 __all__ = [
     "DRIVEN_HEAD",
     "FRAME_LENGTH",
+    "FRAME_LENGTHS",
     "MAX_LENGTH",
     "SYNC",
-    "VERSIONS",
+    "VERSION",
     "DrivenPotentials",
     "Frame",
     "FrameDecoder",
@@ -30,8 +31,9 @@ __all__ = [
 ]
 
 SYNC: Final = b"\xc5\x3a"
-VERSIONS: Final = (1, 2)  #: that can be read and written
-FRAME_LENGTH: Final = 36  #: bytes of a frame of version 1; one of version 2 has 40, or 52 with the driven potentials
+VERSION: Final = 1  #: of the format
+FRAME_LENGTHS: Final = (36, 40, 52)  #: bytes: one supply; that of each phase; with the driven potentials too
+FRAME_LENGTH: Final = FRAME_LENGTHS[0]  #: bytes of the shortest frame
 #: Bytes; no version, present or future, is longer, so a false start in noise delays a good frame by less than a frame.
 MAX_LENGTH: Final = 64
 _MIN_LENGTH: Final = 8  # bytes; sync, version, length, at least two of content, CRC
@@ -64,7 +66,7 @@ class DrivenPotentials(NamedTuple):
 class Frame(NamedTuple):
     """One measurement of one sensor, in the numbers of the wire (integers, counts of the converter)."""
 
-    version: int  #: of the format, 1 or 2
+    length: int  #: bytes on the wire, one of FRAME_LENGTHS
     device: int  #: which electronics, 0..65535
     sensor: int  #: which sensor of that electronics, 0..255
     status: int  #: bits of Status
@@ -80,38 +82,35 @@ class Frame(NamedTuple):
     angular_b: int  #: angular phase: guide B
     angular_current: int  #: angular phase: drive current, through C and D
     touch_supply: int  #: the supply that drives the electrodes, through the same converter, in the touch phase
-    radial_supply: int  #: the same in the radial phase; version 1 measures it once for all three
+    radial_supply: int  #: the same in the radial phase; the shortest frame has one for all three
     angular_supply: int  #: the same in the angular phase
-    driven: DrivenPotentials | None = None  #: version 2 only: where the leads' voltage drop is measured too
+    driven: DrivenPotentials | None = None  #: longest frame only: where the leads' voltage drop is measured too
 
 
 class _Layout(NamedTuple):
-    """The bytes of one version in one length."""
+    """The bytes of one length."""
 
+    header: bytes
     length: int
     read: Struct  #: sync, length and CRC are checked, not carried
     write: Struct  #: all but the CRC
 
 
-def _layout(version: int, counts: int) -> tuple[bytes, _Layout]:
-    write = Struct(f"<2sBBHBBHI{counts}H")
-    layout = _Layout(write.size + 2, Struct(f"<2xBxHBBHI{counts}H2x"), write)
-    return SYNC + bytes((version, layout.length)), layout
+def _layout(length: int) -> _Layout:
+    counts = (length - 16) // 2
+    read, write = Struct(f"<3xBHBBHI{counts}H2x"), Struct(f"<2sBBHBBHI{counts}H")
+    return _Layout(SYNC + bytes((VERSION, length)), length, read, write)
 
 
 _SUPPLY_AT: Final = Frame._fields.index("touch_supply")
 _DRIVEN_AT: Final = Frame._fields.index("driven")
-(_HEADER_1, _LAYOUT_1), (_HEADER_2, _LAYOUT_2), (_HEADER_2_DRIVEN, _LAYOUT_2_DRIVEN) = (
-    _layout(1, 10),
-    _layout(2, 12),
-    _layout(2, 18),
-)
-DRIVEN_HEAD: Final = _HEADER_2_DRIVEN  #: first bytes of a frame with the driven potentials
-_LAYOUTS: Final = {_HEADER_1: _LAYOUT_1, _HEADER_2: _LAYOUT_2, _HEADER_2_DRIVEN: _LAYOUT_2_DRIVEN}
+_ONE_SUPPLY, _THREE_SUPPLIES, _WITH_DRIVEN = map(_layout, FRAME_LENGTHS)
+DRIVEN_HEAD: Final = _WITH_DRIVEN.header  #: first bytes of a frame with the driven potentials
+_LAYOUTS: Final = {layout.header: layout for layout in (_ONE_SUPPLY, _THREE_SUPPLIES, _WITH_DRIVEN)}
 
 
 def encode(frame: Frame) -> bytes:
-    """Turn a frame into its bytes: 36 of version 1; 40 of version 2, 52 where it has the driven potentials.
+    """Turn a frame into its bytes.
 
     Args:
         frame: every field within the range of its width.
@@ -120,22 +119,23 @@ def encode(frame: Frame) -> bytes:
         the bytes, CRC included.
 
     Raises:
-        ValueError: the frame is of an unknown version, a field does not fit its width, or its version cannot carry it:
-            version 1 has one supply for all phases and no driven potentials.
+        ValueError: the length is none of FRAME_LENGTHS, a field does not fit its width, or a frame of this length does
+            not carry it.
     """
     *values, driven = frame
-    if frame.version == 1:
-        if not frame.touch_supply == frame.radial_supply == frame.angular_supply or driven is not None:
-            raise ValueError(f"version 1 carries one supply for all phases and no driven potentials: {frame}")
-        header, layout, values = _HEADER_1, _LAYOUT_1, values[: _SUPPLY_AT + 1]
-    elif frame.version != 2:
-        raise ValueError(f"frame.version must be 1 or 2, got {frame.version}")
-    elif driven is None:
-        header, layout = _HEADER_2, _LAYOUT_2
-    else:
-        header, layout, values = _HEADER_2_DRIVEN, _LAYOUT_2_DRIVEN, [*values, *driven]
+    if frame.length not in FRAME_LENGTHS:
+        raise ValueError(f"frame.length must be one of 36, 40, 52 bytes, got {frame.length}")
+    if (driven is not None) != (frame.length == _WITH_DRIVEN.length):
+        raise ValueError(f"a frame of 52 bytes, and no other, carries the driven potentials: {frame}")
+    layout = _THREE_SUPPLIES
+    if driven is not None:
+        layout, values = _WITH_DRIVEN, [*values, *driven]
+    elif frame.length == FRAME_LENGTH:
+        if not frame.touch_supply == frame.radial_supply == frame.angular_supply:
+            raise ValueError(f"a frame of 36 bytes carries one supply for all phases: {frame}")
+        layout, values = _ONE_SUPPLY, values[: _SUPPLY_AT + 1]
     try:
-        body = layout.write.pack(SYNC, header[2], header[3], *values[1:])
+        body = layout.write.pack(SYNC, VERSION, *values)
     except Exception as error:  # struct.error names neither field nor value
         raise ValueError(f"a field does not fit its width on the wire ({error}): {frame}") from error
     return body + crc_hqx(body, 0).to_bytes(2, "big")
@@ -149,7 +149,7 @@ def frame_at(data: bytes, offset: int = 0) -> Frame | None:
         offset: where the frame starts [bytes].
 
     Returns:
-        the frame, or None if no valid frame of a known version starts there.
+        the frame, or None if no valid frame starts there.
     """
     layout = _LAYOUTS.get(data[offset : offset + 4])
     if layout is None:
@@ -163,10 +163,10 @@ def frame_at(data: bytes, offset: int = 0) -> Frame | None:
 def _read(layout: _Layout, data: bytes, offset: int) -> Frame:
     """Return the frame of a checked piece."""
     values = layout.read.unpack_from(data, offset)
-    if layout is _LAYOUT_1:
+    if layout is _ONE_SUPPLY:
         supply = values[_SUPPLY_AT]
         return Frame._make((*values, supply, supply, None))
-    if layout is _LAYOUT_2:
+    if layout is _THREE_SUPPLIES:
         return Frame._make((*values, None))
     return Frame._make((*values[:_DRIVEN_AT], DrivenPotentials._make(values[_DRIVEN_AT:])))
 
@@ -248,7 +248,7 @@ class FrameDecoder:
                 break
             version, length = data[at + 2], data[at + 3]
             layout = _LAYOUTS.get(data[at : at + 4])
-            plausible = layout is not None if version in VERSIONS else _MIN_LENGTH <= length <= MAX_LENGTH
+            plausible = layout is not None if version == VERSION else _MIN_LENGTH <= length <= MAX_LENGTH
             if plausible and end - at < length:
                 break
             if plausible and not crc_hqx(data[at : at + length], 0):

@@ -26,6 +26,7 @@ from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
+from coneskin.skin.wire import FRAME_LENGTHS
 
 from .fault_kinds import FaultCase, draw_kind
 
@@ -126,8 +127,8 @@ def play(number: int) -> Outcome:
     rng = random.Random(f"fault {number}")
     sensor = sensor_of(rng)
     begins = rng.randint(*BEGINS)
-    version = rng.choice((1, 2, 3))  # 3: version 2 with the driven electrodes' potentials
-    case = draw_kind(rng, number, sensor, begins, driven=version == 3)
+    length = rng.choice(FRAME_LENGTHS)
+    case = draw_kind(rng, number, sensor, begins, driven=length == FRAME_LENGTHS[-1])
     touch = touch_of(rng, sensor, begins, case)
 
     def skin(faults: FaultInjection, duration: float) -> VirtualSkin:
@@ -139,8 +140,7 @@ def play(number: int) -> Outcome:
             model="ladder",
             duration=duration,
             imperfections=Imperfections(noise_counts=case.noise),
-            wire_version=min(version, 2),
-            driven_potentials=version == 3,
+            frame_length=length,
         )
 
     ends = max(1e-3 * begins, touch.start if touch else 0.0) + 1e-3 * NAMED

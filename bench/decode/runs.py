@@ -69,7 +69,7 @@ class Sitting:
 
 
 def packet(sequence: int, counts: list[int]) -> bytes:
-    """Return the bytes of a frame of version 1, device 0, sensor 0."""
+    """Return the bytes of a frame of 36 bytes, device 0, sensor 0."""
     head = (0x3AC5, 1, 36, 0, 0, 0, sequence & 0xFFFF, round(1e6 * FRAME_PERIOD * sequence) & 0xFFFFFFFF)
     body = _BODY.pack(*head, *counts)
     return body + crc_hqx(body, 0).to_bytes(2, "big")

@@ -46,10 +46,10 @@ def held_sheets(contacts: Sequence[LayerContact]) -> str:
 
 def rates(programs: BoardPrograms) -> list[list[str]]:
     rows = []
-    for name, wire, driven in (("version 1", 1, 0), ("version 2, short", 2, 0), ("version 2, long (usual)", 2, 1)):
+    for name, length in (("36 bytes", 36), ("40 bytes", 40), ("52 bytes (usual)", 52)):
         row = []
         for bits in range(4):
-            told = [f"wire_version={wire}", f"driven={driven}", f"extra_bits={bits}", "rate_hz=1000"]
+            told = [f"frame_length={length}", f"extra_bits={bits}", "rate_hz=1000"]
             commands = [f"{0.02 + 0.03 * k} port {line}" for k, line in enumerate(told)]
             frames = FrameDecoder().feed(run_board(programs, SENSOR, 1.0, commands=commands).data)
             last = max(number for number, frame in enumerate(frames) if frame.sequence == 0)  # all is set from here on

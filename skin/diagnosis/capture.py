@@ -14,7 +14,6 @@ from coneskin.skin.wire import MAX_LENGTH, SYNC, Frame, frame_at
 
 __all__ = [
     "EDGE",
-    "LENGTHS",
     "Capture",
     "CaptureWindow",
     "FoundFrames",
@@ -91,8 +90,6 @@ class CaptureWindow:
         return Capture(tuple(self._pieces), now, timed, self._since)
 
 
-#: Length of a whole frame [bytes] -> its version.
-LENGTHS = {36: 1, 40: 2, 52: 2}
 EDGE = MAX_LENGTH  #: bytes at either end of a capture that may belong to a frame that is cut
 _LENGTH_AT = 3  # offset of the length in a frame
 _TEXT_BYTES = frozenset({9, 10, 13, *range(32, 127)})

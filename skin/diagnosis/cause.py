@@ -45,7 +45,7 @@ class Cause(Enum):
     SYNC_SWAPPED = "send the sync bytes in the order C5 3A: written as one 16-bit number it is 0x3AC5"
     WORDS_SWAPPED = "send each 16-bit word with its low byte first"
     SYNC_OTHER = "begin each frame with C5 3A"
-    VERSION = "set byte 2, the version, to 1 or 2, or update coneskin if the firmware is newer"
+    VERSION = "set byte 2, the version, to 1, or update coneskin if the firmware is newer"
     HEADER_SWAPPED = "byte 2 is the version and byte 3 the length: exchange them"
     LENGTH_BYTE = "byte 3 counts the whole frame, sync and CRC included"
     FRAME_SIZE = "compare the fields with the table in docs/look-up/wire-format.md, one by one"

@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import MAX_LENGTH, Frame, FrameDecoder
+from coneskin.skin.wire import FRAME_LENGTH, MAX_LENGTH, Frame, FrameDecoder, encode
 
 from .capture import Capture, FoundFrames, find_frames, printable_share, short_hex
 from .cause import Cause, Diagnosis
 from .foreign_stream import find_baud, find_coding, find_constant, find_protocol, find_text, first_line
 from .frame_numbers import find_wrong_numbers, measure_numbers
-from .frame_shape import find_damage, find_foreign_sync, find_shape
+from .frame_shape import find_damage, find_foreign_sync, find_padding, find_shape
 from .measurements import current_remarks, find_big_endian, find_status, find_wrong_measurements
 
 __all__ = ["diagnose"]
@@ -21,6 +21,7 @@ _FEW_BYTES = 64  # bytes, of which nothing can be said
 _STOPPED_TIME = 0.7  # s without a byte
 _SHAPE_LENGTH = 1 << 13  # newest bytes in which the shape is looked for
 _MIN_FRAMES = 3
+_SAMPLE_COUNT = 48  # longer frames in which padding is looked for: a padded one of 36 bytes is as long
 _MIN_COVERED = 0.02  # share of the bytes that are valid frames; fewer are chance
 
 
@@ -106,7 +107,8 @@ def _find_in_frames(capture: Capture, found: FoundFrames, sensors: Sequence[Sens
     for key, (frames, at) in by_sensor.items():
         name = f"device {key[0]}, sensor {key[1]}"
         sensor = known.get(key)
-        named = find_status(frames) or find_big_endian(frames)
+        longer = [encode(frame) for frame in frames[-_SAMPLE_COUNT:] if frame.length > FRAME_LENGTH]
+        named = find_padding(longer) or find_status(frames) or find_big_endian(frames)
         if named is None and sensors and sensor is None:
             listing = ", ".join(f"{device}/{number}" for device, number in known)
             named = Diagnosis(Cause.UNKNOWN_SENSOR, f"frames come from {name}; the scene expects {listing}")

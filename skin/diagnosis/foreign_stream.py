@@ -10,9 +10,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import groupby, product
 
-from coneskin.skin.wire import SYNC
+from coneskin.skin.wire import FRAME_LENGTHS, SYNC, VERSION
 
-from .capture import LENGTHS, Capture, count_frames, printable_share, short_hex
+from .capture import Capture, count_frames, printable_share, short_hex
 from .cause import Cause, Diagnosis
 from .checksum import crc16
 
@@ -35,7 +35,7 @@ BAUD_RATES = (
     *(921600, 1000000, 1500000, 2000000, 3000000),
 )
 #: Beginnings of a frame; where a fast sender leaves little of them, with the commonest numbers of device and sensor.
-_FRAME_HEADERS = tuple(SYNC + bytes((version, length)) for length, version in LENGTHS.items())
+_FRAME_HEADERS = tuple(SYNC + bytes((VERSION, length)) for length in FRAME_LENGTHS)
 _NUMBERED_HEADERS = tuple(
     header + numbers for header in _FRAME_HEADERS for numbers in (bytes(4), b"\1\0\0\0", b"\0\0\1\0")
 )

@@ -7,14 +7,14 @@ from binascii import crc_hqx
 from collections import Counter
 from collections.abc import Sequence
 
-from coneskin.skin.wire import MAX_LENGTH, SYNC, VERSIONS
+from coneskin.skin.wire import FRAME_LENGTHS, MAX_LENGTH, SYNC, VERSION
 
-from .capture import LENGTHS, FoundFrames, count_frames, printable_share, short_hex, sync_places
+from .capture import FoundFrames, count_frames, printable_share, short_hex, sync_places
 from .cause import Cause, Diagnosis
 from .checksum import crc16, find_checksum
 from .foreign_stream import first_line, undo_newlines, undo_slip
 
-__all__ = ["find_damage", "find_foreign_sync", "find_shape"]
+__all__ = ["find_damage", "find_foreign_sync", "find_padding", "find_shape"]
 
 _MIN_STARTS = 4  # that look like a frame's beginning
 _AGREEING_SHARE = 0.6  # of them that must agree
@@ -40,39 +40,38 @@ def find_shape(data: bytes) -> Diagnosis | None:
     frames = [data[at : at + period] for at in places if data[at + 2 : at + 4] == header and at + period <= len(data)]
     if share < _AGREEING_SHARE:
         # the frames of one length may have something between them
-        period = length if length in LENGTHS else 0
+        period = length if length in FRAME_LENGTHS else 0
         frames = [
             data[at : at + period] for at in places if data[at + 2 : at + 4] == header and at + period <= len(data)
         ]
         if not period:
             return None
     frames = frames[-_SAMPLE_COUNT:]
-    if version in VERSIONS and LENGTHS.get(length) == version:
+    if version == VERSION and length in FRAME_LENGTHS:
         if period == length:
-            return _find_padding(frames, length) or find_checksum(frames)
-        return _wrong_size(frames, version, length, period)
-    if (length, version) in {(1, 36), (2, 40), (2, 52)}:
+            return find_padding(frames) or find_checksum(frames)
+        return _wrong_size(frames, length, period)
+    if length == VERSION and version in FRAME_LENGTHS:
         what = f"bytes 2 and 3 are {version} and {length}: version and length are exchanged"
         return Diagnosis(Cause.HEADER_SWAPPED, what)
-    if version in VERSIONS and LENGTHS.get(period) == version:
-        what = f"byte 3 says {length} bytes, but the frames of version {version} are {period} bytes long"
+    if version == VERSION and period in FRAME_LENGTHS:
+        what = f"byte 3 says {length} bytes, but the frames are {period} bytes long"
         return Diagnosis(Cause.LENGTH_BYTE, what)
-    if version in VERSIONS:
-        return _wrong_size(frames, version, length, period)
-    what = f"the version in byte 2 is {version}; versions {' and '.join(map(str, VERSIONS))} can be read"
+    if version == VERSION:
+        return _wrong_size(frames, length, period)
+    what = f"the version in byte 2 is {version}; version {VERSION} can be read"
     return Diagnosis(Cause.VERSION, what)
 
 
-def _wrong_size(frames: Sequence[bytes], version: int, length: int, period: int) -> Diagnosis:
+def _wrong_size(frames: Sequence[bytes], length: int, period: int) -> Diagnosis:
     """Name why frames are not as long as they should be."""
-    wanted = [size for size, of_version in LENGTHS.items() if of_version == version]
-    right = length if length in wanted else min(wanted, key=lambda size: abs(size - period))
+    right = length if length in FRAME_LENGTHS else min(FRAME_LENGTHS, key=lambda size: (abs(size - period), -size))
     if frames and not any(0 in frame for frame in frames) and len(frames) >= _MIN_STARTS:
         what = f"the frames end after {period} bytes, and no byte of them is 0"
         return Diagnosis(Cause.ZEROS_LOST, what)
-    if found := _find_padding(frames, right):
+    if found := find_padding(frames):
         return found
-    said = f"they are {period} bytes long; one of version {version} has {' or '.join(map(str, wanted))}"
+    said = f"they are {period} bytes long; one has 36, 40 or 52"
     if period == right - _LAST_FIELD and not _valid_alone(frames):
         return Diagnosis(Cause.CRC_MISSING, f"the frames come without a checksum: {said}")
     if period in _WIRE_BUFFERS and period < right:
@@ -87,7 +86,7 @@ def _valid_alone(frames: Sequence[bytes]) -> bool:
     return bool(frames) and all(crc16(frame, _RIGHT_POLYNOMIAL) == 0 for frame in frames[-4:])
 
 
-def _find_padding(frames: Sequence[bytes], length: int) -> Diagnosis | None:
+def find_padding(frames: Sequence[bytes]) -> Diagnosis | None:
     """Find the two bytes that a compiler puts before the clock of a struct that is not packed."""
     whole = [frame for frame in frames if len(frame) >= 16]
     if len(whole) < _MIN_STARTS:
@@ -98,8 +97,9 @@ def _find_padding(frames: Sequence[bytes], length: int) -> Diagnosis | None:
     middle = steps[len(steps) // 2]
     steady = sum(0.7 * middle <= step <= 1.3 * middle for step in steps) >= 0.7 * len(steps)
     if stands and steady and 0 < middle < 1 << 24:
-        size = len(whole[0])
-        what = f"the struct is padded: two bytes stand before the clock, and frames have {size} bytes, not {length}"
+        size = len(whole[0])  # of the struct, with two bytes more at its end
+        right = max((length for length in FRAME_LENGTHS if length < size), default=FRAME_LENGTHS[0])
+        what = f"the struct is padded: two bytes stand before the clock, and frames have {size} bytes, not {right}"
         return Diagnosis(Cause.PADDING, what)
     return None
 
@@ -120,7 +120,7 @@ def find_foreign_sync(data: bytes) -> Diagnosis | None:
         version_at, length_at = ((phase + place) % period for place in _HEADER_PLACES)
         version, length = fixed[version_at][0], fixed[length_at][0]
         constant = all(fixed[(phase + k) % period][1] >= 0.9 * total[(phase + k) % period] for k in range(4))
-        if constant and LENGTHS.get(length) == version and period == length:
+        if constant and version == VERSION and length in FRAME_LENGTHS and period == length:
             sync = bytes(fixed[(phase + k) % period][0] for k in range(2))
             return Diagnosis(Cause.SYNC_OTHER, f"the frames begin with {short_hex(sync)}, not C5 3A")
     return None
@@ -190,7 +190,7 @@ def _broken_frames(gaps: Sequence[bytes]) -> list[bytes]:
         while at >= 0:
             end = gap.find(SYNC, at + 2)
             piece = gap[at : end if end >= 0 else len(gap)]
-            if len(piece) >= 8 and LENGTHS.get(piece[3]) == piece[2]:
+            if len(piece) >= 8 and piece[2] == VERSION and piece[3] in FRAME_LENGTHS:
                 pieces.append(piece)
             at = end
     return pieces

@@ -172,7 +172,7 @@ class ErrorMap:
 
 
 def decode_errors(
-    model: FieldModel, u: ArrayLike, phi: ArrayLike, radius: ArrayLike, conductance: ArrayLike = math.inf
+    model: FieldModel, u: Floats, phi: Floats, radius: ArrayLike, conductance: ArrayLike = math.inf
 ) -> tuple[Floats, Floats]:
     """Return decoded minus true (u [m], phi [rad]) by the paper's equations 20 and 24 from each guide pair's mean.
 

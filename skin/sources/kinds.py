@@ -64,14 +64,15 @@ SOURCE_KINDS: dict[str, SourceKind] = {
             seed: seed of the noise
             model: `field`: the exact field in both sheets, so that an extended contact reads with its area error.
                 `ladder`: ideal resistors, without numpy
-            wire_version: version of the wire format that it sends
+            frame_length: bytes of a frame: 36 with one supply, 40 with that of each phase, 52 with the driven
+                electrodes' own potentials as well
             wires: electrodes on the terminals A, B, C, D. Another order is a wrong wiring, to try `coneskin doctor`
             touch: scripted touches, each under `[[source.touch]]`
             """,
             Key("rate_hz", float, 1000.0, low=1.0, high=10_000.0),
             Key("seed", int, 0, low=0, high=2**31),
             Key("model", str, "field", choices=("field", "ladder")),
-            Key("wire_version", int, 1, low=1, high=2),
+            Key("frame_length", int, 36, choices=(36, 40, 52)),
             Key("wires", str, "ABCD", choices=tuple(map("".join, permutations("ABCD")))),
             Key("touch", dict, ()),
         ),

@@ -228,7 +228,7 @@ def frame_of(head: tuple[int, int, int, int, int, int], counts: Mapping[str, int
     """Return the frame of these readings.
 
     Args:
-        head: version, device, sensor, status, sequence, clock.
+        head: length, device, sensor, status, sequence, clock.
         counts: by the names of ConverterInputs; without the driven potentials where the frame carries none.
     """
     driven = DrivenPotentials._make(counts[name] for name in _DRIVEN) if _DRIVEN[0] in counts else None

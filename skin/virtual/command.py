@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import VERSIONS
+from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS
 
 from .fault_injection import FaultInjection
 from .imperfections import Imperfections
@@ -35,7 +35,7 @@ example:
   Print the path of a serial port. Once a program opens it, the skin sends 1000 frames a second. It is touched from
   1.0 s to 1.5 s at u = 200 mm, phi = 90 deg with 5 N, and from 3 s to 4 s at another place with 10 N.
 
-  coneskin sim-skin --touch grip:1:2:200:90 --touch seam:3:4:200:15 --wire-version 2
+  coneskin sim-skin --touch grip:1:2:200:90 --touch seam:3:4:200:15 --frame-length 40
   A hand closes around the link; a palm presses on both sides of the seam, 15 deg from each edge.
 
   coneskin sim-skin --touch 1:3:100..300:90
@@ -108,8 +108,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--duration-s", type=float, default=math.inf, help="end the stream after this time (default: never)")
     add("--output", metavar="FILE", help="write the bytes to this file as fast as possible; - is standard output")
-    add("--wire-version", type=int, choices=VERSIONS, default=1, help="version of the wire format (default 1)")
-    add("--driven-potentials", action="store_true", help="send the driven electrodes' own potentials (version 2)")
+    add(
+        "--frame-length",
+        type=int,
+        choices=FRAME_LENGTHS,
+        default=FRAME_LENGTH,
+        help="bytes of a frame: 36 with one supply, 40 with that of each phase, 52 with the driven electrodes' own "
+        "potentials too (default 36)",
+    )
     add("--link", metavar="PATH", help="make this path a link to the port, and remove it at the end")
     add("--now", action="store_true", help="start the script at once, not when the port is opened")
     add("--json", action="store_true", help="report in JSON, one object per line")
@@ -138,8 +144,7 @@ def run(args: argparse.Namespace) -> int:
         faults=FaultInjection(**dict(args.fault)),
         model=args.model,
         duration=args.duration_s,
-        wire_version=args.wire_version,
-        driven_potentials=args.driven_potentials,
+        frame_length=args.frame_length,
     )
     return play_skin(skin, output=args.output, link=args.link, at_once=args.now, as_json=args.json)
 

@@ -13,7 +13,7 @@ import random
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import Status, encode
+from coneskin.skin.wire import FRAME_LENGTHS, Status, encode
 
 from .circuit import ConverterInputs, LayerContact, frame_of, measure
 from .ladder import ResistorLadder
@@ -70,7 +70,7 @@ class PlaceFrames:
         status |= 0 if self._started else Status.RESTARTED
         self._started = True
         clock = int(time * 1e6) & 0xFFFFFFFF
-        frame = frame_of((2, sensor.device_id, sensor.sensor_id, status, self.sequence, clock), counts)
+        frame = frame_of((FRAME_LENGTHS[1], sensor.device_id, sensor.sensor_id, status, self.sequence, clock), counts)
         self.sequence = (self.sequence + 1) & 0xFFFF
         return encode(frame._replace(driven=None))
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import VERSIONS, DrivenPotentials, Frame
+from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS, DrivenPotentials, Frame
 
 from .circuit import ContactModel, ConverterInputs, LayerContact, Matrix, frame_of, measure
 from .fault_injection import FaultInjection, FaultyLine
@@ -54,13 +54,13 @@ class VirtualSkin:
         model: how the sheets look from their electrodes: "field", exactly (needs numpy and scipy), "ladder", as ideal
             resistors, or a model of your own.
         duration: when the device goes away [s]; infinite by default.
-        wire_version: of the wire format, 1 or 2.
-        driven_potentials: its frames carry the driven electrodes' own potentials; only in version 2.
+        frame_length: bytes of its frames: 36 with one supply, 40 with that of each phase, 52 with the driven
+            electrodes' own potentials as well.
         wires: electrodes on the terminals A, B, C, D; another order is a wrong wiring.
 
     Raises:
-        SensorError: no sensor, a rate that is not positive, an unknown model or version, a fault of a reading that the
-            version does not carry, or a touch of a sensor that is not here.
+        SensorError: no sensor, a rate that is not positive, an unknown model or length, a fault of a reading that its
+            frames do not carry, or a touch of a sensor that is not here.
     """
 
     def __init__(
@@ -74,8 +74,7 @@ class VirtualSkin:
         faults: FaultInjection | None = None,
         model: ContactModel | str = "field",
         duration: float = math.inf,
-        wire_version: int = 1,
-        driven_potentials: bool = False,
+        frame_length: int = FRAME_LENGTH,
         wires: str = RIGHT_WIRES,
     ) -> None:
         self.sensors = (sensors,) if isinstance(sensors, Sensor) else tuple(sensors)
@@ -92,13 +91,13 @@ class VirtualSkin:
         sheets = _model(model) if isinstance(model, str) else model
         self.model = sheets if wires == RIGHT_WIRES else RewiredSheets(sheets, wires)
         self.duration = duration
-        self.wire_version = wire_version
-        self.driven_potentials = driven_potentials
-        self._channels = _channels(wire_version, driven_potentials)
+        self.frame_length = frame_length
+        self._channels = _channels(frame_length)
         stuck = self.faults.stuck_channel
-        if stuck not in (*self._channels, "supply", "all") or (wire_version == 1 and stuck == "touch_supply"):
+        one_supply = frame_length == FRAME_LENGTH
+        if stuck not in (*self._channels, "supply", "all") or (one_supply and stuck == "touch_supply"):
             raise SensorError(
-                f"faults.stuck_channel {stuck} is no reading of its own in these frames: see wire_version"
+                f"faults.stuck_channel {stuck} is no reading of its own in these frames: see frame_length"
             )
         self._touches: dict[str, list[PlacedTouch]] = {sensor.name: [] for sensor in self.sensors}
         self._ahead: dict[str, list[tuple[_Scenes, list[Matrix]]]] = {}
@@ -153,7 +152,7 @@ class VirtualSkin:
                 volts = self._volts(sensor, (start + step, start + 2.0 * step, start + 3.0 * step), index)
                 counts = self._convert(sensor, volts, rng)
                 clock = int((start + step) * 1e6 * self.imperfections.clock_ratio) & 0xFFFFFFFF
-                head = (self.wire_version, sensor.device_id, sensor.sensor_id, 0, cycle & 0xFFFF, clock)
+                head = (self.frame_length, sensor.device_id, sensor.sensor_id, 0, cycle & 0xFFFF, clock)
                 yield start + 3.0 * step, frame_of(head, counts)
                 index += 1
             cycle += 1
@@ -244,22 +243,19 @@ class VirtualSkin:
             if real.noise_counts:
                 count += rng.gauss(0.0, real.noise_counts)
             counts[name] = min(max(round(count), 0), full)
-        if self.wire_version == 1:
+        if self.frame_length == FRAME_LENGTH:
             counts["radial_supply"] = counts["angular_supply"] = counts["touch_supply"]
         return counts
 
 
-def _channels(wire_version: int, driven_potentials: bool) -> tuple[str, ...]:
-    """Return the readings that a frame of a version carries, in the order in which they are made."""
-    if wire_version not in VERSIONS or (driven_potentials and wire_version == 1):
-        raise SensorError(
-            "wire_version must be 1 or 2, and 2 where the driven potentials are sent, got "
-            f"{wire_version!r}{' with them' if driven_potentials else ''}"
-        )
+def _channels(frame_length: int) -> tuple[str, ...]:
+    """Return the readings that a frame of a length carries, in the order in which they are made."""
+    if frame_length not in FRAME_LENGTHS:
+        raise SensorError(f"frame_length must be one of 36, 40, 52 bytes, got {frame_length!r}")
     names = ConverterInputs._fields
-    if wire_version == 1:
+    if frame_length == FRAME_LENGTH:
         return names[: names.index("touch_supply") + 1]
-    return names if driven_potentials else names[: -len(DrivenPotentials._fields)]
+    return names if frame_length == FRAME_LENGTHS[-1] else names[: -len(DrivenPotentials._fields)]
 
 
 def _model(name: str) -> ContactModel:

@@ -105,8 +105,8 @@ def test_it_is_a_source_and_its_bytes_are_frames_and_nothing_else(port):
     assert [frame.sequence for frame in frames] == list(range(frames[0].sequence, frames[0].sequence + len(frames)))
 
 
-@pytest.mark.parametrize(("line", "length"), [(b"wire_version=1\n", FRAME_LENGTH), (b"driven=0\n", 40)])
-def test_it_sends_the_version_that_it_is_told_over_the_same_port(board, port, line, length):
+@pytest.mark.parametrize(("line", "length"), [(b"frame_length=36\n", FRAME_LENGTH), (b"frame_length=40\n", 40)])
+def test_it_sends_the_length_that_it_is_told_over_the_same_port(board, port, line, length):
     read(port, 52)
     writer = os.open(board.path, os.O_WRONLY | os.O_NOCTTY)
     try:

@@ -7,7 +7,7 @@ import subprocess
 import pytest
 
 from coneskin.skin.firmware.boards import firmware_folder
-from coneskin.skin.wire import DrivenPotentials, Frame, FrameDecoder, encode
+from coneskin.skin.wire import FRAME_LENGTHS, DrivenPotentials, Frame, FrameDecoder, encode
 from tests.support.firmware.emulated_board import BoardPrograms, run_board
 from tests.support.firmware.firmware_build import build_sketch, missing_tools
 
@@ -39,20 +39,20 @@ int main(void) {
 
 
 def drawn_frames():
-    """50 frames: of both versions and all lengths, three of them with the extremes of each field."""
+    """50 frames: of all lengths, three of them with the extremes of each field."""
     draw = random.Random(36)
     for number in range(50):
-        version, driven = ((1, False), (2, False), (2, True))[number % 3]
+        length = FRAME_LENGTHS[number % 3]
         extreme = {0: 0, 1: 1, 2: 1, 3: 1, 4: 0, 5: 0}.get(number)
 
         def pick(top, extreme=extreme):
             return draw.randint(0, top) if extreme is None else extreme * top
 
-        head = [version, pick(0xFFFF), pick(0xFF), pick(0x7F), pick(0xFFFF), pick(0xFFFFFFFF)]
+        head = [length, pick(0xFFFF), pick(0xFF), pick(0x7F), pick(0xFFFF), pick(0xFFFFFFFF)]
         counts = [pick(0xFFFF) for _ in range(12)]
-        if version == 1:
+        if length == 36:
             counts[10] = counts[11] = counts[9]
-        yield Frame(*head, *counts, DrivenPotentials(*(pick(0xFFFF) for _ in range(6))) if driven else None)
+        yield Frame(*head, *counts, DrivenPotentials(*(pick(0xFFFF) for _ in range(6))) if length == 52 else None)
 
 
 def row_of(frame):
@@ -77,9 +77,9 @@ def header(tmp_path):
     rows = []
     for frame, _ in frames_of_file():
         *values, driven = frame
-        version, device, sensor, status, sequence, clock = values[:6]
+        length, device, sensor, status, sequence, clock = values[:6]
         counts = [*values[6:], *(driven or ())]
-        head = f"{version}, {int(driven is not None)}, {device}, {sensor}, {status}, {sequence}, {clock}UL"
+        head = f"{length}, {device}, {sensor}, {status}, {sequence}, {clock}UL"
         rows.append(f"  {{{head}, {{{', '.join(map(str, counts))}}}}},")
     text = ['#include "coneskin_frame.h"', "static const ConeskinFrame VECTORS[] PROGMEM = {", *rows, "};", ""]
     (tmp_path / "vectors.h").write_text("\n".join(text), encoding="ascii")

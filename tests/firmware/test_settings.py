@@ -26,8 +26,8 @@ def test_it_tells_what_it_is_and_what_it_is_set_to(programs, sensor):
     words = dict(word.split("=") for word in line.split()[1:])
     assert words["board"] == "uno"
     assert words["adc_bits"] == "11"
-    assert {key: words[key] for key in ("device", "sensor", "wire_version", "driven", "rate_hz")} == {
-        **{"device": "0", "sensor": "0", "wire_version": "2", "driven": "1", "rate_hz": "200"}
+    assert {key: words[key] for key in ("device", "sensor", "frame_length", "rate_hz")} == {
+        **{"device": "0", "sensor": "0", "frame_length": "52", "rate_hz": "200"}
     }
 
 
@@ -41,7 +41,7 @@ def test_a_setting_that_is_saved_survives_a_power_cut_and_one_that_is_not_does_n
     assert len(starts) == 5  # power, three lines, power
 
 
-@pytest.mark.parametrize("line", ["rate_hz=5000", "rate_hz=", "rate_hz=2x", "colour=3", "nonsense"])
+@pytest.mark.parametrize("line", ["rate_hz=5000", "rate_hz=", "rate_hz=2x", "frame_length=38", "colour=3", "nonsense"])
 def test_a_line_that_it_does_not_understand_changes_nothing(programs, sensor, line):
     data = run_board(programs, sensor, 0.25, commands=[f"0.02 port {line}"]).data
     assert b"coneskin: not understood" in data
@@ -71,15 +71,15 @@ def test_a_supply_that_sags_is_in_the_status(programs, sensor):
     assert all(frame.status & Status.SUPPLY for frame in frames[42:])
 
 
-@pytest.mark.parametrize("wire_version", [1, 2])
-def test_the_other_polarity_reads_the_same_place(programs, sensor, wire_version):
+@pytest.mark.parametrize("frame_length", [36, 52])
+def test_the_other_polarity_reads_the_same_place(programs, sensor, frame_length):
     other = Sensor(sensor.frustum, electronics=sensor.electronics, polarity=Polarity("A", "D"))
-    lines = ["0.02 port a_positive=1", "0.05 port d_positive=1", f"0.08 port wire_version={wire_version}"]
+    lines = ["0.02 port a_positive=1", "0.05 port d_positive=1", f"0.08 port frame_length={frame_length}"]
     frames = frames_of(run_board(programs, sensor, 0.9, [TOUCH], lines))
     last = max(number for number, frame in enumerate(frames) if frame.status & Status.RESTARTED)
     stream = TouchStream([other])
     events = [event for k, frame in enumerate(frames[last:]) for event in stream.feed(encode(frame), 5e-3 * k)]
     (touch,) = [event for event in events if isinstance(event, TouchBegan)]
-    # the leads of the ends that are now at ground are the pins', and version 1 has one supply for all phases: a bound
+    # the leads of the ends that are now at ground are the pins', and 36 bytes have one supply for all phases: a bound
     assert touch.u == pytest.approx(TOUCH.u, abs=6e-3)
     assert 0.0375 * touch.phi == pytest.approx(0.0375 * TOUCH.phi, abs=6e-3)

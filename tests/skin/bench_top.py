@@ -37,4 +37,4 @@ def measured(
         if name in Frame._fields
     }
 
-    return frame_of((1, sensor.device_id, sensor.sensor_id, 0, 0, 0), counts)._replace(**changes)
+    return frame_of((36, sensor.device_id, sensor.sensor_id, 0, 0, 0), counts)._replace(**changes)

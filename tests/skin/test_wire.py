@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.wire import (
-    FRAME_LENGTH,
+    FRAME_LENGTHS,
     MAX_LENGTH,
     SYNC,
-    VERSIONS,
+    VERSION,
     DrivenPotentials,
     Frame,
     FrameDecoder,
@@ -25,32 +25,27 @@ from tests.support.paths import ROOT
 
 from .bench_top import UR10, measured
 
-LENGTHS = {(1, False): FRAME_LENGTH, (2, False): 40, (2, True): 52}  # bytes, by version and driven potentials
 counts = st.integers(0, 0xFFFF)
 heads = st.tuples(counts, st.integers(0, 255), st.integers(0, 255), counts, st.integers(0, 0xFFFFFFFF))
 drivens = st.builds(DrivenPotentials, *[counts] * 6)
 frames_1 = st.builds(
-    lambda head, nine, supply: Frame(1, *head, *nine, *[supply] * 3), heads, st.tuples(*[counts] * 9), counts
+    lambda head, nine, supply: Frame(36, *head, *nine, *[supply] * 3), heads, st.tuples(*[counts] * 9), counts
 )
 frames_2 = st.builds(
-    lambda head, twelve, driven: Frame(2, *head, *twelve, driven),
+    lambda head, twelve, driven: Frame(40 if driven is None else 52, *head, *twelve, driven),
     heads,
     st.tuples(*[counts] * 12),
     st.none() | drivens,
 )
 frames = frames_1 | frames_2
-PLAIN = Frame(1, 7, 1, 0, 5, 123456, *range(1000, 1010), 1009, 1009)
+PLAIN = Frame(36, 7, 1, 0, 5, 123456, *range(1000, 1010), 1009, 1009)
 #: one frame in each layout
 EVERY = (
     PLAIN,
-    Frame(2, 7, 1, 0, 5, 123456, *range(1000, 1012)),
-    Frame(2, 7, 1, 0, 5, 123456, *range(1000, 1012), DrivenPotentials(*range(1012, 1018))),
+    Frame(40, 7, 1, 0, 5, 123456, *range(1000, 1012)),
+    Frame(52, 7, 1, 0, 5, 123456, *range(1000, 1012), DrivenPotentials(*range(1012, 1018))),
 )
-each_layout = pytest.mark.parametrize("frame", EVERY, ids=("1", "2", "2 driven"))
-
-
-def length_of(frame: Frame) -> int:
-    return LENGTHS[frame.version, frame.driven is not None]
+each_layout = pytest.mark.parametrize("frame", EVERY, ids=("36", "40", "52"))
 
 
 def crc_by_hand(data: bytes) -> int:
@@ -73,9 +68,9 @@ def test_the_checksum_by_hand_is_the_published_one():
 
 _HEAD = (0x1234, 5, 0x40, 0x0A0B, 0x01020304)
 DOCUMENTED = (
-    Frame(1, *_HEAD, *range(0x0100, 0x010A), 0x0109, 0x0109),
-    Frame(2, *_HEAD, *range(0x0100, 0x010C)),
-    Frame(2, *_HEAD, *range(0x0100, 0x010C), DrivenPotentials(*range(0x010C, 0x0112))),
+    Frame(36, *_HEAD, *range(0x0100, 0x010A), 0x0109, 0x0109),
+    Frame(40, *_HEAD, *range(0x0100, 0x010C)),
+    Frame(52, *_HEAD, *range(0x0100, 0x010C), DrivenPotentials(*range(0x010C, 0x0112))),
 )
 
 
@@ -84,12 +79,12 @@ def test_layout_byte_by_byte():
     head, nine = "3412 05 40 0b0a 04030201", "0001 0101 0201 0301 0401 0501 0601 0701 0801"
     for frame, sync, rest in (
         (DOCUMENTED[0], "c53a 01 24", "0901"),
-        (DOCUMENTED[1], "c53a 02 28", "0901 0a01 0b01"),
-        (DOCUMENTED[2], "c53a 02 34", "0901 0a01 0b01 0c01 0d01 0e01 0f01 1001 1101"),
+        (DOCUMENTED[1], "c53a 01 28", "0901 0a01 0b01"),
+        (DOCUMENTED[2], "c53a 01 34", "0901 0a01 0b01 0c01 0d01 0e01 0f01 1001 1101"),
     ):
         by_hand = bytes.fromhex(f"{sync}{head}{nine}{rest}".replace(" ", ""))
         assert encode(frame) == sealed(by_hand)
-        assert len(encode(frame)) == length_of(frame)
+        assert len(encode(frame)) == frame.length
 
 
 def test_the_documented_bytes_are_the_encoded_ones():
@@ -119,7 +114,7 @@ pieces = st.lists(
         frames.map(encode),
         st.binary(max_size=50),
         st.just(SYNC),
-        st.sampled_from([SYNC + bytes((version, length)) for (version, _), length in LENGTHS.items()]),
+        st.sampled_from([SYNC + bytes((VERSION, length)) for length in FRAME_LENGTHS]),
         st.just(SYNC + bytes((3, MAX_LENGTH))),
         frames.map(encode).flatmap(lambda data: st.integers(0, 52).map(lambda cut: data[:cut])),
     ),
@@ -138,7 +133,7 @@ def test_the_frames_do_not_depend_on_how_the_stream_is_cut(parts, data):
     assert found == expected
     for name in ("frames", "bytes_skipped", "crc_errors", "unknown_versions", "pending"):
         assert getattr(pieced, name) == getattr(whole, name), name
-    assert sum(map(length_of, expected)) + whole.bytes_skipped + whole.pending == len(stream)
+    assert sum(frame.length for frame in expected) + whole.bytes_skipped + whole.pending == len(stream)
 
 
 @given(st.binary(max_size=200), frames, frames, frames)
@@ -174,7 +169,7 @@ def test_noise_never_raises_and_gives_nothing():
 def test_every_error_of_one_two_or_three_bits_is_detected():
     # The CRC is linear: an error passes if and only if its bits' residues cancel. All 24 million triples by sets.
     residues = []
-    length = max(LENGTHS.values())  # a shorter frame's errors are among them
+    length = FRAME_LENGTHS[-1]  # a shorter frame's errors are among them
     for bit in range(length * 8):
         error = bytearray(length)
         error[bit // 8] |= 0x80 >> bit % 8
@@ -187,7 +182,7 @@ def test_every_error_of_one_two_or_three_bits_is_detected():
 
 @each_layout
 def test_every_burst_up_to_16_bits_is_detected(frame):
-    good, length = encode(frame), length_of(frame)
+    good, length = encode(frame), frame.length
     number = int.from_bytes(good, "big")
     rng = random.Random(2)
     for start in range(length * 8 - 16):
@@ -202,7 +197,7 @@ def test_a_damaged_frame_is_counted_and_its_successor_is_not_lost(frame):
     damaged[20] ^= 4
     decoder = FrameDecoder()
     assert decoder.feed(bytes(damaged) + encode(frame)) == [frame]
-    assert (decoder.crc_errors, decoder.bytes_skipped, decoder.frames) == (1, length_of(frame), 1)
+    assert (decoder.crc_errors, decoder.bytes_skipped, decoder.frames) == (1, frame.length, 1)
 
 
 @pytest.mark.parametrize("length", [8, 40, MAX_LENGTH])
@@ -216,10 +211,9 @@ def test_a_version_of_the_future_is_skipped_whole_and_counted(length):
     assert decoder.bytes_skipped == 0 == decoder.crc_errors
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_a_known_version_of_another_length_is_no_frame(version):
+def test_the_known_version_with_another_length_is_no_frame():
     decoder = FrameDecoder()
-    assert decoder.feed(sealed(SYNC + bytes((version, 38)) + bytes(32))) == []
+    assert decoder.feed(sealed(SYNC + bytes((VERSION, 38)) + bytes(32))) == []
     assert decoder.unknown_versions == 0
 
 
@@ -228,7 +222,7 @@ def test_frames_of_all_layouts_may_follow_each_other():
     assert FrameDecoder().feed(stream) == list(EVERY * 3)
 
 
-def test_version_1_gives_its_supply_in_every_phase():
+def test_the_shortest_frame_gives_its_supply_in_every_phase():
     read = frame_at(encode(PLAIN))
     assert (read.touch_supply, read.radial_supply, read.angular_supply, read.driven) == (1009, 1009, 1009, None)
 
@@ -236,10 +230,10 @@ def test_version_1_gives_its_supply_in_every_phase():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"version": 3}, "version must be 1 or 2, got 3"),
+        ({"length": 38}, "length must be one of 36, 40, 52 bytes, got 38"),
         ({"touch_c": 70000}, "does not fit its width"),
-        ({"radial_supply": 1}, "version 1 carries one supply"),
-        ({"driven": EVERY[2].driven}, "version 1 carries one supply"),
+        ({"radial_supply": 1}, "36 bytes carries one supply"),
+        ({"driven": EVERY[2].driven}, "52 bytes, and no other, carries the driven potentials"),
     ],
 )
 def test_what_cannot_be_encoded_is_refused(change, words):

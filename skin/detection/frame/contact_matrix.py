@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import Frame
+from coneskin.skin.wire import FRAME_LENGTH, Frame
 
 __all__ = ["ContactMatrix", "FrameInversion", "FrameNoise", "MatrixNoise"]
 
@@ -204,7 +204,7 @@ class FrameNoise:
         x_1, x_2, y_1, y_2 = i1 * supply1, mix1 * supply2, mix2 * supply1, i2 * supply2
         a_1, a_2 = i1 * along * sign1, mix1 * cross * sign2
         r_1, r_2 = mix2 * cross * sign1, i2 * around * sign2
-        if frame.version == 1:  # one supply for both phases
+        if frame.length == FRAME_LENGTH:  # one supply for both phases
             x_1, y_1, a_1, r_1, x_2, y_2, a_2, r_2 = x_1 + x_2, y_1 + y_2, a_1 + a_2, r_1 + r_2, 0.0, 0.0, 0.0, 0.0
         weight1, weight2 = along * along, around * around
         weight1, weight2 = weight1 / (weight1 + weight2), weight2 / (weight1 + weight2)

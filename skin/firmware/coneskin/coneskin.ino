@@ -18,7 +18,7 @@ const uint8_t VERSION = 1;
 // ---- Settings -----------------------------------------------------------------------------------------------------
 
 enum Setting : uint8_t {
-  DEVICE, SENSOR, WIRE_VERSION, DRIVEN, EXTRA_BITS, RATE_HZ, SETTLE_US, SUPPLY_PERMILLE, A_POSITIVE, D_POSITIVE, SETTINGS
+  DEVICE, SENSOR, FRAME_LENGTH, EXTRA_BITS, RATE_HZ, SETTLE_US, SUPPLY_PERMILLE, A_POSITIVE, D_POSITIVE, SETTINGS
 };
 
 struct SettingRow {
@@ -31,8 +31,8 @@ const uint8_t MOST_EXTRA_BITS = CONVERTER.bits > 12 ? 16 - CONVERTER.bits : 4;  
 const SettingRow ROWS[SETTINGS] = {
   {"device", 0, 65535, 0},
   {"sensor", 0, 255, 0},
-  {"wire_version", 1, 2, 2},
-  {"driven", 0, 1, CONVERTER.driven},  // version 2 only: send the driven electrodes' own potentials as well
+  // bytes: 36 with one supply, 40 with that of each phase, 52 with the driven electrodes' own potentials as well
+  {"frame_length", 36, 52, CONVERTER.frame_length},
   // n: the sum of 2^n conversions stands for a reading, which has n bits more
   {"extra_bits", 0, MOST_EXTRA_BITS, CONVERTER.extra_bits},
   {"rate_hz", 20, 1000, CONVERTER.rate_hz},  // slower, and the watchdog would bite
@@ -127,8 +127,8 @@ void read_phase(uint8_t guide, uint8_t supply, uint8_t driven, Electrode guide1,
   frame.counts[guide] = read_channel(CONVERTER.sense[guide1]);
   frame.counts[guide + 1] = read_channel(CONVERTER.sense[guide2]);
   frame.counts[guide + 2] = read_channel(CONVERTER.current);
-  if (frame.version == 2 || supply == CONESKIN_TOUCH_SUPPLY) frame.counts[supply] = read_channel(CONVERTER.supply);
-  if (frame.version == 2 && frame.driven) {
+  if (frame.length > 36 || supply == CONESKIN_TOUCH_SUPPLY) frame.counts[supply] = read_channel(CONVERTER.supply);
+  if (frame.length == 52) {
     frame.counts[driven] = read_channel(CONVERTER.sense[driven1]);
     frame.counts[driven + 1] = read_channel(CONVERTER.sense[driven2]);
   }
@@ -177,7 +177,7 @@ uint8_t status_bits(bool late) {
   if (converter_failed) status |= CONESKIN_ADC;
   converter_failed = false;
   const uint16_t expected = (uint32_t)full_count() * settings[SUPPLY_PERMILLE] / 1000;
-  const uint8_t phases = frame.version == 1 ? 1 : 3;
+  const uint8_t phases = frame.length == 36 ? 1 : 3;
   for (uint8_t k = 0; k < phases; k++) {
     const uint16_t supply = frame.counts[CONESKIN_TOUCH_SUPPLY + k];
     if (supply < expected - expected / 8 || supply > expected + expected / 8) status |= CONESKIN_SUPPLY;
@@ -192,8 +192,7 @@ uint8_t status_bits(bool late) {
 uint32_t next_us;  // when the next frame is due
 
 void restart_frames() {
-  frame.version = settings[WIRE_VERSION];
-  frame.driven = settings[DRIVEN];
+  frame.length = settings[FRAME_LENGTH];
   frame.device = settings[DEVICE];
   frame.sensor = settings[SENSOR];
   frame.sequence = 0;
@@ -229,11 +228,13 @@ bool change_setting(char *line) {
   char *end;
   const long number = strtol(value, &end, 10);
   if (end == value || *end) return false;
-  for (uint8_t k = 0; k < SETTINGS; k++)
+  for (uint8_t k = 0; k < SETTINGS; k++) {
+    if (k == FRAME_LENGTH && number != 36 && number != 40 && number != 52) continue;
     if (!strcmp(line, ROWS[k].name) && number >= ROWS[k].low && number <= ROWS[k].high) {
       settings[k] = number;
       return true;
     }
+  }
   return false;
 }
 

@@ -49,18 +49,18 @@ struct Converter {
   uint8_t bits;
   uint16_t millivolts;  // of its highest count
   uint8_t sense[4], current, supply;
-  uint16_t extra_bits, driven, rate_hz, supply_permille;  // usual settings with it
+  uint16_t extra_bits, frame_length, rate_hz, supply_permille;  // usual settings with it
   bool slow;            // the self-test reads one electrode a frame, not four
 };
 
 // Channel n of an ADS1x15 is input n % 4 of the chip at address 0x48 + n / 4.
 // clang-format off
 #if CONESKIN_ADS == 0
-const Converter CONVERTER = {"built-in", BOARD.bits, 3300, {BOARD.sense[0], BOARD.sense[1], BOARD.sense[2], BOARD.sense[3]}, BOARD.current, BOARD.supply, 1, 1, 200, 758, false};
+const Converter CONVERTER = {"built-in", BOARD.bits, 3300, {BOARD.sense[0], BOARD.sense[1], BOARD.sense[2], BOARD.sense[3]}, BOARD.current, BOARD.supply, 1, 52, 200, 758, false};
 #elif CONESKIN_ADS == 1015
-const Converter CONVERTER = {"ads1015", 11, 4096, {0, 1, 2, 3}, 4, 5, 0, 0, 80, 610, true};
+const Converter CONVERTER = {"ads1015", 11, 4096, {0, 1, 2, 3}, 4, 5, 0, 40, 80, 610, true};
 #elif CONESKIN_ADS == 1115
-const Converter CONVERTER = {"ads1115", 15, 4096, {0, 1, 2, 3}, 4, 5, 0, 0, 40, 610, true};
+const Converter CONVERTER = {"ads1115", 15, 4096, {0, 1, 2, 3}, 4, 5, 0, 40, 40, 610, true};
 #else
 #error "CONESKIN_ADS must be 0, 1015 or 1115."
 #endif

@@ -1,8 +1,8 @@
-/* Frames of the coneskin wire format, versions 1 and 2, for any firmware: C99, no library, no memory of its own.
+/* Frames of the coneskin wire format, for any firmware: C99, no library, no memory of its own.
 
    The layout and its reasons are in docs/look-up/wire-format.md; the 50 frames of frame_vectors.csv, beside this folder, tell
-   whether a copy or a translation of this file is right. A frame is 36 bytes (version 1), 40 (version 2), or 52
-   (version 2 with the driven electrodes' own potentials). Everything is little endian but for the CRC. */
+   whether a copy or a translation of this file is right. A frame has 36 bytes, 40 (with the supply
+   of each phase), or 52 (with the driven electrodes' own potentials as well). Everything is little endian but for the CRC. */
 #ifndef CONESKIN_FRAME_H
 #define CONESKIN_FRAME_H
 
@@ -27,15 +27,14 @@ enum {
   CONESKIN_TOUCH_C, CONESKIN_TOUCH_D, CONESKIN_TOUCH_CURRENT,
   CONESKIN_RADIAL_C, CONESKIN_RADIAL_D, CONESKIN_RADIAL_CURRENT,
   CONESKIN_ANGULAR_A, CONESKIN_ANGULAR_B, CONESKIN_ANGULAR_CURRENT,
-  CONESKIN_TOUCH_SUPPLY,                           /* version 1 ends here: one supply for all phases */
-  CONESKIN_RADIAL_SUPPLY, CONESKIN_ANGULAR_SUPPLY, /* version 2 ends here, in its short form */
+  CONESKIN_TOUCH_SUPPLY,                           /* 36 bytes end here: one supply for all phases */
+  CONESKIN_RADIAL_SUPPLY, CONESKIN_ANGULAR_SUPPLY, /* 40 bytes end here */
   CONESKIN_TOUCH_A, CONESKIN_TOUCH_B, CONESKIN_RADIAL_A, CONESKIN_RADIAL_B, CONESKIN_ANGULAR_C, CONESKIN_ANGULAR_D,
   CONESKIN_COUNTS
 };
 
 typedef struct {
-  uint8_t version;   /* 1 or 2 */
-  uint8_t driven;    /* not 0: with the driven potentials; version 2 only */
+  uint8_t length;    /* bytes of the frame: 36, 40 or 52 */
   uint16_t device;   /* which electronics */
   uint8_t sensor;    /* which of its sensors */
   uint8_t status;    /* bits of the first table */
@@ -64,13 +63,12 @@ static inline uint8_t *coneskin_put16(uint8_t *at, uint16_t value) {
 
 /* Write a frame into a buffer of CONESKIN_LONGEST_FRAME bytes; return how many there are. */
 static inline size_t coneskin_encode(const ConeskinFrame *frame, uint8_t *out) {
-  const uint8_t counts = frame->version == 1 ? 10 : frame->driven ? CONESKIN_COUNTS : 12;
-  const uint8_t length = (uint8_t)(14 + 2 * counts + 2);
+  const uint8_t counts = (uint8_t)((frame->length - 16) / 2);
   uint8_t *at = out;
   *at++ = 0xC5;
   *at++ = 0x3A;
-  *at++ = frame->version;
-  *at++ = length;
+  *at++ = 1; /* version of the format */
+  *at++ = frame->length;
   at = coneskin_put16(at, frame->device);
   *at++ = frame->sensor;
   *at++ = frame->status;
@@ -81,7 +79,7 @@ static inline size_t coneskin_encode(const ConeskinFrame *frame, uint8_t *out) {
   const uint16_t crc = coneskin_crc(out, (size_t)(at - out));
   *at++ = (uint8_t)(crc >> 8); /* the CRC alone is sent high byte first: then the CRC over all bytes is 0 */
   *at++ = (uint8_t)(crc & 0xFF);
-  return length;
+  return frame->length;
 }
 
 #endif

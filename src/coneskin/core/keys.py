@@ -59,7 +59,7 @@ class Key:
         default: value of a missing key, in SI; ``...`` for a mandatory key.
         low: smallest value allowed, in the unit of the file.
         high: largest value allowed, in the unit of the file.
-        choices: words allowed.
+        choices: words or whole numbers allowed.
         length: number of items in a list.
         above: True if low itself is not allowed.
         or_zero: True if 0 is allowed below low.
@@ -73,7 +73,7 @@ class Key:
     default: Any = ...
     low: float = -math.inf
     high: float = math.inf
-    choices: Sequence[str] = ()
+    choices: Sequence[str | int] = ()
     length: int | None = None
     above: bool = False
     or_zero: bool = False
@@ -104,7 +104,7 @@ class Key:
     def bounds(self) -> str:
         """Range for people: "1 to 500", "above 0 to 360", "A, B"; empty without one."""
         if self.choices:
-            return ", ".join(self.choices)
+            return ", ".join(map(str, self.choices))
         low, high = math.isfinite(self.low), math.isfinite(self.high)
         start = "above " if self.above else "0 or " if self.or_zero else "" if high else "at least "
         end = f"{self.high}" if self.kind is int else f"{self.high:g}"
@@ -214,17 +214,15 @@ def _convert(key: Key, value: Any, where: str, report: Callable[[str], None]) ->
         if isinstance(value, bool) or not isinstance(value, int) or not key.low <= value <= key.high:
             report(f"{where} must be a whole number {_range(key, '')}, got {_show(value)}")
             return None
-        return value
-    if key.kind is dict:
+    elif key.kind is dict:
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             report(f"{where} must be a list of tables, in double brackets, got {_show(value)}")
             return None
-        return value
-    if not isinstance(value, key.kind):
+    elif not isinstance(value, key.kind):
         report(f"{where} must be {'text' if key.kind is str else 'true or false'}, got {_show(value)}")
         return None
     if key.choices and value not in key.choices:
-        report(f"{where} must be one of {', '.join(key.choices)}, got {_show(value)}")
+        report(f"{where} must be one of {', '.join(map(str, key.choices))}, got {_show(value)}")
         return None
     return value
 

@@ -43,7 +43,7 @@ def virtual_skin(scene: Scene, script: bool = True, pressed: bool = False) -> Vi
         rate_hz=scene.source.settings["rate"],
         seed=scene.source.settings["seed"],
         model=scene.source.settings["model"],
-        wire_version=scene.source.settings["wire_version"],
+        frame_length=scene.source.settings["frame_length"],
         wires=scene.source.settings["wires"],
     )
 

@@ -43,14 +43,14 @@ def test_the_tables_hold_what_was_recorded_with_units_in_the_names(collision: Ru
     assert tables["slider"]["fraction"][0] == 1.0
 
 
-def test_frames_of_version_2_have_columns_for_what_version_1_has_not(collision: Run) -> None:
+def test_long_frames_have_columns_for_what_short_ones_have_not(collision: Run) -> None:
     block = next(block for block in collision.blocks if block.kind == BlockKind.SKIN)
     first = FrameDecoder().feed(block.payload)[0]
     driven = DrivenPotentials(1, 2, 3, 4, 5, 6)
-    data = encode(first) + encode(first._replace(version=2, driven=driven))
+    data = encode(first) + encode(first._replace(length=52, driven=driven))
     run = replace(collision, blocks=(block._replace(payload=data),))
     frames = run_tables(run)["frames"]
-    assert frames["version"] == [1, 2]
+    assert frames["length"] == [36, 52]
     assert frames["driven_angular_d_counts"] == [None, 6]
     assert {len(column) for column in frames.values()} == {2}
 

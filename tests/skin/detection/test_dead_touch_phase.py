@@ -47,7 +47,7 @@ class DeadPhaseBench:
                 scale = parts.current_full_scale if name.endswith("current") else parts.adc_volts
                 true = self._stuck * (name != "touch_current") if name in TOUCH_PHASE else value / scale * full
                 counts.append(min(max(round(true + self._rng.gauss(0.0, 0.7)), 0), full))
-            self.detector.feed(Frame(1, 0, 0, 0, self._count, 1000 * self._count, *counts[:12]), 1e-3 * self._count)
+            self.detector.feed(Frame(36, 0, 0, 0, self._count, 1000 * self._count, *counts[:12]), 1e-3 * self._count)
             self._count += 1
             if self.detector.touched or self.detector.fault is not None:
                 return k

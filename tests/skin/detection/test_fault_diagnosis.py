@@ -119,7 +119,7 @@ def test_no_place_is_certain_before_a_switch_that_is_stuck_is_named():
 def test_the_driven_potentials_name_an_open_wire_without_a_touch():
     faults = FaultInjection(wiring_after=BREAKS, wiring=WiringFaults(("A",)))
     assert [event.fault for event in faults_of(faults, ())[0]] == [Fault.OPEN_UPPER]
-    named = faults_of(faults, (), wire_version=2, driven_potentials=True)[0]
+    named = faults_of(faults, (), frame_length=52)[0]
     assert [event.fault for event in named] == [Fault.OPEN_UPPER, Fault.OPEN_A]
     assert named[-1].detail == "A open"
 

@@ -105,7 +105,7 @@ def test_a_guide_that_stays_driven_is_a_fault_after_three_frames():
     detector, events = Detector(sensor), []
     for number in range(1, 80):
         guide = 2900 if number > 70 else 0
-        frame = Frame(1, 0, 0, 0, number, 1000 * number, 0, 0, 0, guide, guide, 0, 0, 0, 0, 0, 0, 0)
+        frame = Frame(36, 0, 0, 0, number, 1000 * number, 0, 0, 0, guide, guide, 0, 0, 0, 0, 0, 0, 0)
         currents = {
             "radial_current": sensor.electronics.count_amperes(sensor.radial_amperes),
             "angular_current": sensor.electronics.count_amperes(sensor.angular_amperes),

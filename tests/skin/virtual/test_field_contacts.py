@@ -35,7 +35,7 @@ def through_the_electronics(sensor: Sensor, contact: LayerContact) -> Reading:
     volts = measure(sensor, (sheets, sheets, sheets))
     parts = sensor.electronics
     counts = {n: parts.count_amperes(v) if "current" in n else parts.count_volts(v) for n, v in volts._asdict().items()}
-    return read(sensor, frame_of((2, 0, 0, 0, 0, 0), counts))
+    return read(sensor, frame_of((52, 0, 0, 0, 0, 0), counts))
 
 
 @pytest.mark.parametrize("radius_mm", [1, 5, 10, 15, 20])

@@ -134,7 +134,7 @@ def test_every_count_is_that_of_the_full_field_model(lower):
     sensor = Sensor(CONE, lower_sheet_ohms=lower)
     real = Imperfections(noise_counts=0.0, settling_time=0.0)
     touches = [ScriptedTouch(0.002, 0.03, 0.05, 2.0), ScriptedTouch(0.01, 0.05, 0.09, 2.6, radius=0.005)]
-    skin = VirtualSkin(sensor, touches, imperfections=real, duration=0.1, wire_version=2, driven_potentials=True)
+    skin = VirtualSkin(sensor, touches, imperfections=real, duration=0.1, frame_length=52)
     model = FieldModel(SectorSheet.of_frustum(CONE), 1000.0, lower)
     compared = 0
     for number, frame in enumerate(frames_of(skin)):

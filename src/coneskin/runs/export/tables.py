@@ -42,7 +42,7 @@ Table = Mapping[str, list[Any]]
 #: begins a table anew and yields its pieces, each with the same columns; nothing where it has no rows
 Pieces = Callable[[], Iterator[Table]]
 _PIECE_ROWS = 1 << 14  # rows
-_IDENTIFIER_FIELDS = frozenset({"version", "device", "sensor", "status", "clock_us", "sequence"})  # the rest are counts
+_IDENTIFIER_FIELDS = frozenset({"length", "device", "sensor", "status", "clock_us", "sequence"})  # the rest are counts
 
 
 def run_tables(run: Run, progress: Progress = silent) -> dict[str, Table]:

@@ -43,7 +43,7 @@ def errors(shape: str, bits: int, radius: float, ka: float, off: float, places: 
             name: round(v * (ampere if name.endswith("current") else volt) + rng.gauss(0.0, NOISE))
             for name, v in inputs.items()
         }
-        frame = Frame(2, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]])
+        frame = Frame(40, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]])
         matrix = inversion.invert(frame)
         assert matrix is not None
         one = noise.of(matrix, frame, NOISE**2 + 1.0 / 12.0)

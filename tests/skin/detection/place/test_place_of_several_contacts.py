@@ -57,7 +57,7 @@ def readings(
         values = [x * (ampere if name.endswith("current") else volt) for name, x in inputs.items()]
         for _ in range(times):
             counts = [min(max(round(value + rng.gauss(0.0, NOISE)), 0), full) for value in values]
-            detector.feed(Frame(1, 0, 0, 0, count, 1000 * count, *counts[:12]), 1e-3 * count)
+            detector.feed(Frame(36, 0, 0, 0, count, 1000 * count, *counts[:12]), 1e-3 * count)
             count += 1
             if detector.reading_now is not None:
                 found.append(detector.reading_now)
