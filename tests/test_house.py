@@ -33,9 +33,8 @@ FLOORS = (
     "robot.sim scene",
     "impact.permissible_speed runs.replay session view.stage",
     "commissioning commissioning.line impact.simulation runs view",
-    "commands.terminal commissioning.acceptance commissioning.calibration commissioning.examination design.studio "
-    "runs.export",
-    "commands.demonstration runs.what_if",
+    "commissioning.acceptance commissioning.calibration commissioning.examination design.studio runs.export",
+    "runs.what_if",
     "commands",
     "impact robot testing",
 )
@@ -55,7 +54,7 @@ HOMES = {
     "rpack": ("geometry/drawing/nesting.py",),
     "pyarrow": ("src/coneskin/runs/export/parquet_file.py",),
     "distributed": ("src/coneskin/runs/what_if/batch.py",),
-    "argcomplete": ("src/coneskin/commands/shell_completion.py",),
+    "argcomplete": ("src/coneskin/cli.py",),
     "mujoco": ("src/coneskin/impact/simulation/mujoco_*.py",),
     "mcap": ("src/coneskin/runs/export/mcap_file.py",),
     "matplotlib": ("skin/field/pictures.py", "src/coneskin/core/picture_file.py", "src/coneskin/**/*picture*.py"),

@@ -21,9 +21,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bench.report import head, quantile
-from coneskin.commissioning.calibration.fit import fit_map
+from coneskin.commissioning.calibration.fit import KnownTouch, fit_map
 from coneskin.commissioning.calibration.marks import MARK_COUNTS, calibration_marks
-from coneskin.commissioning.calibration.refusals import KnownTouch
 from coneskin.commissioning.misreadings import Place
 from coneskin.core.errors import SkinError
 from coneskin.geometry.frustum import Frustum

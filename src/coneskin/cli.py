@@ -10,41 +10,94 @@ import os
 import sys
 from collections.abc import Sequence
 
-from coneskin.core.version import __version__
-
-from .commands.shell_completion import SHELLS, complete, completed_words, shell_code
-from .core.errors import ConeSkinError
+from .core.errors import ConeSkinError, MissingExtra
 from .core.text import printable
+from .core.version import __version__
 
-__all__ = ["COMMANDS", "main"]
+__all__ = [
+    "COMMANDS",
+    "main",
+]
 
+_SHELLS = ("bash", "zsh", "fish", "powershell")
+_COMPLETION_VARIABLE = "_ARGCOMPLETE"  # set by the code of the shell
+_LINE_VARIABLE = "COMP_LINE"  # what was typed so far
+
+
+def _completed_words() -> Sequence[str] | None:
+    """Return the words typed so far after the program's name, where a shell asks for a completion; else None."""
+    return os.environ.get(_LINE_VARIABLE, "").split()[1:] if _COMPLETION_VARIABLE in os.environ else None
+
+
+def _complete(parser: argparse.ArgumentParser) -> None:
+    """Answer the shell and end the process; return where argcomplete is not installed."""
+    try:
+        import argcomplete
+    except ImportError:
+        return
+    argcomplete.autocomplete(parser)
+
+
+def _shell_code(shell: str) -> str:
+    """Return what a shell runs at its start, so that it completes the words of `coneskin`.
+
+    Raises:
+        MissingExtra: argcomplete is not installed.
+    """
+    try:
+        from argcomplete.shell_integration import shellcode
+    except ImportError as exc:
+        raise MissingExtra("argcomplete", "completion in a shell", "completion") from exc
+    return str(shellcode(["coneskin"], shell=shell))
+
+
+#: heading -> its commands, each with what it does in plain words; its module follows from its name
+_GROUPS = {
+    "design a skin": {
+        "unroll": "unroll a truncated cone into its flat sheet: r1, r2, theta0",
+        "design": "design the sheets for a link: drawings to cut, a report, sensor.toml",
+        "studio": "design the sheets for a link in a browser",
+        "firmware": "write the sketch, the wiring and the parts list of a board that reads a sensor",
+        "field": "draw the electric field of a sensor",
+    },
+    "set it up": {
+        "init": "write the scene for a design, and name the next command",
+        "find-port": "find the port of a device: unplug it, then plug it in again",
+        "monitor": "show what arrives on a serial line, and what is wrong with it; needs no scene",
+        "doctor": "check a scene, its skin, its wires and its arm, and say how to mend each fault",
+        "calibrate": "calibrate a skin from touches at known points",
+        "commission": "test a mounted skin by touching marks, so that its arm may move away from touches",
+        "permissible": "compute the maximum speed of each part of the arm from your force limits",
+        "heartbeat": "print the lines that end a program on the controller when its guard is gone",
+    },
+    "guard an arm": {
+        "guard": "guard the arm of a scene",
+        "view": "show arm, skin and touches in a browser, live or recorded; not a safety display",
+        "demo": "watch a simulated arm stop and retreat when it is touched; needs no hardware",
+        "impact": "simulate the forces with which an arm hits the bodies of its scene",
+        "sim-ur": "simulate a UR controller for ur_rtde",
+        "sim-skin": "simulate a skin that sends the bytes of a real one",
+    },
+    "look into runs": {
+        "replay": "replay recorded runs, and compare what the guard decides",
+        "runs": "list, check, cut, compare, export and prune recorded runs",
+    },
+}
+_OTHER_MODULES = {"sim-ur": "coneskin.robot.sim.command", "sim-skin": "coneskin.skin.virtual.command"}
 #: command -> module with add_arguments(parser) and run(args), and its description
 COMMANDS = {
-    "demo": ("coneskin.commands.demo", "simulated arm and skin: touch, stop, retreat, replay; no hardware"),
-    "unroll": ("coneskin.commands.unroll", "the flat sector of a truncated cone: r1, r2, theta0"),
-    "design": ("coneskin.commands.design", "sheets for a link, ready to be cut: drawings, report, sensor.toml"),
-    "studio": ("coneskin.commands.studio", "design the sheets for a link in a browser: cones, handles, layers"),
-    "init": ("coneskin.commands.init", "write the scene for a design, and say the next command"),
-    "firmware": ("coneskin.commands.firmware", "the sketch of a board that reads a sensor, its wiring and its parts"),
-    "doctor": ("coneskin.commands.doctor", "examine skin, wires and arm of a scene; each finding with its remedy"),
-    "field": ("coneskin.commands.field", "draw the electric field of a sensor"),
-    "calibrate": ("coneskin.commands.calibrate", "touch known places of a skin, and take off what it reads wrongly"),
-    "commission": ("coneskin.commands.commission", "touch marks on a skin, so that its arm may move away from touches"),
-    "find-port": ("coneskin.commands.find_port", "find the port of a device: unplug it, and plug it in again"),
-    "monitor": ("coneskin.commands.monitor", "what arrives on a line, and what is wrong with it; no arm, no scene"),
-    "guard": ("coneskin.commands.guard", "guard the arm of a scene"),
-    "impact": ("coneskin.commands.impact", "the forces with which a scene's arm meets its bodies, in physics"),
-    "permissible": ("coneskin.commands.permissible", "how fast which part of a skinned arm may move, by your limits"),
-    "heartbeat": (
-        "coneskin.commands.heartbeat",
-        "lines with which a program on the controller ends if the guard is gone",
-    ),
-    "replay": ("coneskin.commands.replay", "run a recording again and compare"),
-    "runs": ("coneskin.commands.runs", "recorded runs: list, check, cut, compare, export"),
-    "view": ("coneskin.commands.view", "see arm, skin and touches in a browser, live or recorded; no safety display"),
-    "sim-ur": ("coneskin.robot.sim.command", "a simulated UR controller that ur_rtde connects to"),
-    "sim-skin": ("coneskin.skin.virtual.command", "a virtual skin that sends the bytes of a real one"),
+    name: (_OTHER_MODULES.get(name, f"coneskin.commands.{name.replace('-', '_')}"), text)
+    for commands in _GROUPS.values()
+    for name, text in commands.items()
 }
+
+
+def _listing() -> str:
+    """Return the commands by their groups, for the help."""
+    lines = []
+    for heading, commands in _GROUPS.items():
+        lines += [f"\n  {heading}:", *(f"    {name:<12}  {text}" for name, text in commands.items())]
+    return "\n".join(lines)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,33 +110,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    completing = completed_words()
+    completing = _completed_words()
     words = list(completing if completing is not None else sys.argv[1:] if arguments is None else arguments)
     if isinstance(sys.stdout, io.TextIOWrapper):  # the name of a file may be no text: it is written out, as on stderr
         sys.stdout.reconfigure(errors="backslashreplace")
     parser = argparse.ArgumentParser(
         prog="coneskin",
-        description="Touch-sensitive skin for robot arms: design it, guard an arm with it, replay its collisions. "
-        "Not a safety-rated device.",
+        usage="coneskin [-h] [--version] [--completion SHELL] COMMAND ...",
+        description="Touch-sensitive skin for robot arms: design it, guard an arm with it, replay its collisions.\n"
+        f"Not a safety-rated device.\n{_listing()}",
         epilog="example:\n  coneskin demo\n  coneskin unroll --radius1-mm 40 --radius2-mm 70 --height-mm 150",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "--completion", metavar="SHELL", choices=SHELLS, help=f"print what completes the words in {', '.join(SHELLS)}"
+        "--completion", metavar="SHELL", choices=_SHELLS, help=f"print the completion code of {', '.join(_SHELLS)}"
     )
     parser.add_argument("--version", action="version", version=f"coneskin {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    said = "one of the above; `coneskin COMMAND --help` explains it"
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, prog="coneskin", help=said)
     chosen = next((word for word in words if not word.startswith("-")), None)
     run = None
     for name, (module_name, help_text) in COMMANDS.items():
-        child = commands.add_parser(name, help=help_text, description=help_text[0].upper() + help_text[1:] + ".")
+        child = commands.add_parser(name, description=help_text[0].upper() + help_text[1:] + ".")
         if name == chosen:
             module = importlib.import_module(module_name)
             module.add_arguments(child)
             run = module.run
     if completing is not None:
-        complete(parser)
-    if words[:1] == ["--completion"] and words[1:2] and words[1] in SHELLS:
+        _complete(parser)
+    if words[:1] == ["--completion"] and words[1:2] and words[1] in _SHELLS:
         return _print_completion(words[1])
     if not words:
         parser.print_help(sys.stderr)
@@ -116,7 +171,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 def _print_completion(shell: str) -> int:
     try:
-        print(shell_code(shell), flush=True)
+        print(_shell_code(shell), flush=True)
     except ConeSkinError as exc:
         print(f"coneskin: {exc}", file=sys.stderr)
         return 1
@@ -126,7 +181,7 @@ def _print_completion(shell: str) -> int:
 
 
 def _lose_reader() -> int:
-    """Take that the reader of our output has gone, as head does; return the exit code."""
+    """Return the exit code where the reader of the output has gone, as head does."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 1
 

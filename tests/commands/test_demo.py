@@ -4,8 +4,7 @@ import time
 
 import pytest
 
-from coneskin.commands.demo import _Transcript
-from coneskin.commands.demonstration.report import hold_up
+from coneskin.commands.demo import _Transcript, hold_up
 from coneskin.core.recording.block import Block
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 

@@ -10,7 +10,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.commissioning.examination.doctor import Doctor
-from coneskin.commissioning.examination.wire_examination import WirePatch
+from coneskin.commissioning.examination.wires import WirePatch
 from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.sim.process import free_host
 from coneskin.scene.reader import load_scene

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.commands.demonstration.report import collision_facts, print_report
-from coneskin.commands.terminal.hints import print_hint
+from coneskin.commands.demo import collision_facts, print_report
+from coneskin.commands.terminal import print_hint
 from coneskin.runs.replay.run import Run
 from coneskin.scene.reader import parse_scene
 

@@ -7,13 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.commissioning.acceptance.marks import (
-    LEAST_MARKS,
-    LEAST_POWER,
-    azimuth_margin,
-    plan_marks,
-    slant_places,
-)
+from coneskin.commissioning.acceptance.marks import MIN_MARKS, MIN_POWER, azimuth_margin, plan_marks, slant_places
 from coneskin.commissioning.misreadings import (
     RIGHT,
     WRONG,
@@ -81,12 +75,12 @@ def test_every_misreading_misses_a_mark_by_twice_its_tolerance_wherever_the_shee
     plan = plan_marks(s, offered(s, first))
     if plan is None:  # then it is refused, and never passes
         return
-    assert len(plan) >= LEAST_MARKS
+    assert len(plan) >= MIN_MARKS
     marks = [mark.place for mark in plan]
     along, around = s.frustum.slant * np.linspace(-1.0, 1.0, 81), np.radians(np.arange(0.0, 360.0, 2.0))
     for wrong in WRONG:
         found = worst(s, marks, [misread(s, wrong, mark) for mark in marks], along, around)
-        assert found.min() >= LEAST_POWER - 1e-9, wrong.cause
+        assert found.min() >= MIN_POWER - 1e-9, wrong.cause
 
 
 @pytest.mark.parametrize(("radius1", "radius2", "height", "wrap"), KNOWN)
@@ -95,8 +89,8 @@ def test_the_sensors_of_our_pages_have_marks(radius1: float, radius2: float, hei
     sensor = Sensor(Frustum(radius1, radius2, height, math.radians(wrap)))
     plan = plan_marks(sensor, offered(sensor))
     assert plan is not None
-    assert len(plan) == LEAST_MARKS
-    assert power(sensor, [shifts(sensor, mark.place) for mark in plan]) >= LEAST_POWER
+    assert len(plan) == MIN_MARKS
+    assert power(sensor, [shifts(sensor, mark.place) for mark in plan]) >= MIN_POWER
 
 
 @pytest.mark.long
@@ -155,7 +149,7 @@ def test_marks_that_cannot_be_reached_are_replaced_as_long_as_the_rest_suffices(
     assert again is not None
     assert again[:2] == first[:2]
     assert not set(again) & set(first[2:])
-    assert power(FOREARM, [shifts(FOREARM, mark.place) for mark in again]) >= LEAST_POWER
+    assert power(FOREARM, [shifts(FOREARM, mark.place) for mark in again]) >= MIN_POWER
     one_row = [mark for mark in places if mark.u == places[0].u]
     assert plan_marks(FOREARM, one_row) is None, "a sheet that is mirrored along the link would pass"
     one_side = [mark for mark in places if abs(mark.phi - math.pi) < 0.3]

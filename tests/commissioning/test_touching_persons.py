@@ -12,11 +12,11 @@ import pytest
 
 from coneskin.commissioning import skin_watch
 from coneskin.commissioning.acceptance.commission import prepare
-from coneskin.commissioning.calibration.force_sequence import ForceSequence, SensorPresses
+from coneskin.commissioning.calibration.forces import ForceSequence, SensorPresses
 from coneskin.commissioning.calibration.marks import calibration_marks
-from coneskin.commissioning.calibration.touch_sequence import SensorTouches, TouchSequence
+from coneskin.commissioning.calibration.touches import SensorTouches, TouchSequence
 from coneskin.commissioning.examination.guided_touches import examine_touches, guided_touches
-from coneskin.commissioning.examination.wire_examination import examine_wires
+from coneskin.commissioning.examination.wires import examine_wires
 from coneskin.commissioning.touching import REQUESTS, Mark, Notice
 from coneskin.core.errors import ConeSkinError
 from coneskin.scene.reader import parse_scene

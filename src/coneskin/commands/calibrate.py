@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .terminal.person_at_terminal import LiveReading, Person
+from .terminal import LiveReading, Person
 
 if TYPE_CHECKING:
     from coneskin.commissioning.calibration.calibrate import CalibrationResult, Calibrator
@@ -27,8 +27,8 @@ nothing here moves it. The result is added to calibrations/device-<device>.json 
 names as its calibration; it applies once the sensor's table has `calibration = "calibrations"`. A commissioning made
 with another calibration is void. Exit code: 0 all sensors are calibrated, 1 not all, or not carried out.
 """
-_FOLDER = "calibrations"
-_MARKS = "marks on each sensor, to be measured (default: those that its design has printed on the cover, else 9)"
+_DEFAULT_FOLDER = "calibrations"
+_MARKS_HELP = "marks on each sensor, to be measured (default: those that its design has printed on the cover, else 9)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
     parser.add_argument("--by", default="", metavar="NAME", help="who touches; goes into the record")
-    parser.add_argument("--marks", type=int, choices=(4, 9, 16), default=0, help=_MARKS)
+    parser.add_argument("--marks", type=int, choices=(4, 9, 16), default=0, help=_MARKS_HELP)
     parser.add_argument(
         "--mark-error-mm",
         type=_mark_error,
@@ -141,7 +141,7 @@ def _write(args: argparse.Namespace, scene: Scene, results: list[CalibrationResu
         path = None
         if result.record is not None:
             device = result.touches.sensor.device_id
-            path = calibration_path(place or scene.folder / _FOLDER, device)
+            path = calibration_path(place or scene.folder / _DEFAULT_FOLDER, device)
             add_calibration(path, device, result.record)
         _show(result, path, place is None, args.json)
 
@@ -190,7 +190,7 @@ def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: 
     if record.forces_n:
         pairs = ", ".join(f"{n:g} N {x:.2f}" for n, x in zip(record.forces_n, record.force_levels, strict=True))
         print(f"  forces      level of {pairs}; a force that is read is known to {100.0 * record.force_error:.0f} %")
-    hint = f'; it applies once the table of {name} has calibration = "{_FOLDER}"' if unnamed else ""
+    hint = f'; it applies once the table of {name} has calibration = "{_DEFAULT_FOLDER}"' if unnamed else ""
     print(f"written to {path}{hint}; commission the skin again")
 
 

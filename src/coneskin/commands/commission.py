@@ -8,7 +8,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .terminal.person_at_terminal import LiveReading, Person
+from .terminal import LiveReading, Person
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

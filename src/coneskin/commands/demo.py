@@ -11,11 +11,13 @@ import argparse
 import contextlib
 import json
 import math
+import shlex
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import (
     Collision,
@@ -25,22 +27,220 @@ from coneskin.core.errors import (
     RobotConnectionError,
     RobotRefused,
 )
+from coneskin.core.text import read_json
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, describe_way
 from coneskin.scene.required_packages import has_physics_engine
 
-from .demonstration.report import collision_facts, hold_up, print_report
-from .demonstration.scene import FROM_DEG, TO_DEG, TOUCHED_U, leading_side, make_scene
+from .terminal import print_hint
 
 if TYPE_CHECKING:
     import socket
     from collections.abc import Callable
 
+    from coneskin.core.recording.block import Block
     from coneskin.impact.simulation.impact_outcome import ImpactOutcome
     from coneskin.robot.guard.signals.journal import GuardEvent
     from coneskin.runs.replay.run import Run
     from coneskin.scene.values.scene import Scene
     from coneskin.session.session import Session
 
-__all__ = ["add_arguments", "run"]
+__all__ = [
+    "add_arguments",
+    "collision_facts",
+    "hold_up",
+    "print_report",
+    "run",
+]
+
+#: the scene of the demo: the tube of the UR5e's forearm as ``coneskin design`` finds it. The limits of
+#: silence are long because a pseudo-terminal on a busy machine can stall for that long
+_SCENE_TEXT = """\
+[arm]
+model = "UR5e"
+host = "{host}"
+
+[[link]]
+name = "forearm"
+
+[[link.sensor]]
+id = 1
+name = "forearm skin"
+radius1_mm = 37.62
+radius2_mm = 37.30
+height_mm = 240
+xyz_mm = [0, -0.4, 100]
+
+[source]
+kind = "virtual"
+rate_hz = 500
+
+[reaction]
+kind = "{reaction}"
+deceleration_rad_s2 = 40      # this arm's motors can, folded as it is here: docs/safety.md
+distance_mm = 20              # and back what it moved while it stopped: the whole arm may go 100 mm
+
+[monitoring]                  # defaults: 50 ms each; a pseudo-terminal on a busy machine can stall for longer
+skin_silence_ms = 250
+skin_late_ms = 250
+arm_silence_ms = 250
+{more}"""
+#: with physics: servos follow 10 ms late, and what they do comes from one more process
+_FRAME_TIMEOUT = "escalate_ms = 100"
+#: what it runs into, half way; as heavy as a hand (ISO/TS 15066, table A.3), and much softer
+_BODY_TEXT = """
+[[body]]
+kind = "hand"
+xyz_mm = [{x:.1f}, {y:.1f}, {z:.1f}]
+radius_mm = {radius_mm:g}
+mass_kg = 0.6
+stiffness_n_per_mm = 2
+"""
+_LINK_RADIUS = 0.03  # m of that
+_TOUCHED_U = 0.13  #: m; slant distance of the touch from end 1
+_FROM_DEG = (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)  #: joint positions at the start
+_TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)  #: joint positions at the end
+
+
+def _make_scene(host: str, reaction: str, soft: bool, folder: Path) -> Scene:
+    """Return the scene of the demo.
+
+    Args:
+        host: address of its controller.
+        reaction: kind of its reaction.
+        soft: True where it runs into something soft; else a script touches it.
+        folder: that its files belong to.
+    """
+    from coneskin.scene.reader import parse_scene
+
+    text = _SCENE_TEXT.format(host=host, reaction=reaction, more=_FRAME_TIMEOUT if soft else "")
+    scene = parse_scene(text, "scene.toml", folder)
+    return parse_scene(text + _body_in_the_way(scene), "scene.toml", folder) if soft else scene
+
+
+def _body_in_the_way(scene: Scene) -> str:
+    """Return the table of a body that the sensor's leading side meets half way."""
+    from coneskin.robot.arm.kinematics import link_pose
+    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.scene.build import place_on_arm
+
+    (placed,) = place_on_arm(scene)
+    assert scene.arm is not None
+    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+    point, normal = placed.place(_TOUCHED_U, _leading_side(scene))
+    pose = link_pose(arm_model(scene.arm.model), middle, placed.link)
+    out = pose.rotate(normal)
+    x, y, z = (1e3 * (p + _LINK_RADIUS * n) for p, n in zip(pose.apply(point), out, strict=True))
+    return _BODY_TEXT.format(x=x, y=y, z=z, radius_mm=1e3 * _LINK_RADIUS)
+
+
+def _leading_side(scene: Scene) -> float:
+    """Return the azimuth of the sensor's leading side [rad]: there an obstacle would hit the arm."""
+    from coneskin.robot.arm.kinematics import link_pose, point_jacobian
+    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.scene.build import place_on_arm
+
+    (placed,) = place_on_arm(scene)
+    assert scene.arm is not None
+    arm = arm_model(scene.arm.model)
+    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+    qd = [math.radians(b - a) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+
+    def towards(phi: float) -> float:
+        point, normal = placed.place(_TOUCHED_U, phi)
+        rows = point_jacobian(arm, middle, placed.link, point)
+        n = link_pose(arm, middle, placed.link).rotate(normal)
+        return sum(n[k] * sum(j * v for j, v in zip(rows[k], qd, strict=True)) for k in range(3))
+
+    return max((math.radians(degree) for degree in range(360)), key=towards)
+
+
+_MAX_DELAY = 0.05  # s between two inputs of a kind that come 500 times a second: what a scene allows by default
+_STREAM_NAMES = {BlockKind.SKIN: "frames of the skin", BlockKind.ARM: "states of the arm"}
+
+
+def hold_up(blocks: Iterable[Block]) -> str:
+    """Return in words how long a busy computer held up what must not wait; empty where it did not.
+
+    Args:
+        blocks: of a recording.
+    """
+    longest: dict[str, float] = {}
+    newest: dict[int, float] = {}
+    for block in blocks:
+        if block.kind == BlockKind.OVERRUN:
+            name, late = "the guard", float(read_json(block.payload)["late"])
+        elif (kind := BlockKind(block.kind) if block.kind in _STREAM_NAMES else None) is not None:
+            name, late = _STREAM_NAMES[kind], block.time - newest.get(kind, block.time)
+            newest[kind] = block.time
+        else:
+            continue
+        longest[name] = max(longest.get(name, 0.0), late)
+    held = [f"{name} for {1e3 * late:.0f} ms" for name, late in longest.items() if late > _MAX_DELAY]
+    if not held:
+        return ""
+    return (
+        f"this computer was too busy: it held up {', '.join(held)} ({1e3 * _MAX_DELAY:.0f} ms are as much as a guard "
+        "should bear); end what else it does, and run the demo again"
+    )
+
+
+def collision_facts(run: Run, touched: float) -> dict[str, Any]:
+    """Return the times after the touch [ms], and what happened."""
+    events = run.events
+    contact = next((e for e in events if e.name == EventName.CONTACT), None)
+
+    def after(name: str) -> float | None:
+        event = next((e for e in events if e.name == name and contact and e.time >= contact.time), None)
+        return None if event is None else round(1e3 * (event.time - touched), 3)
+
+    commands = [b.time for b in run.blocks if b.kind == BlockKind.COMMAND and contact and b.time >= contact.time]
+    retreated = next((e for e in events if e.name == EventName.RETREATED), None)
+    placed = next((e for e in events if e.name == EventName.CONTACT_LOCATED), contact)
+    return {
+        "contacts": sum(e.name == EventName.CONTACT for e in events),
+        "frame_ms": after("contact"),
+        "command_ms": round(1e3 * (commands[0] - touched), 3) if commands else None,
+        "slower_ms": after("decelerating"),
+        "standstill_ms": after("standstill"),
+        "latched_ms": after("latched"),
+        "retreat_mm": None if retreated is None else round(1e3 * retreated.details["progress"], 2),
+        "way": None if retreated is None else describe_way(retreated.details),
+        "cut_short": retreated.details["why"] if retreated is not None and not retreated.details["complete"] else None,
+        "u_mm": None if placed is None else round(1e3 * placed.details["u"], 2),
+        "phi_deg": None if placed is None else round(math.degrees(placed.details["phi"]), 2),
+    }
+
+
+def print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
+    """Print the facts of a run in this folder, what its recording misses, and the next command.
+
+    Args:
+        facts: of ``collision_facts``, with forces, replay and picture.
+        folder: of the run.
+        missing: from the recording; empty where nothing is.
+    """
+    print("\nafter the touch began:")
+    for key, words in (
+        ("frame_ms", "frame over the threshold decoded"),
+        ("command_ms", "stop written to the driver process"),
+        ("slower_ms", "arm decelerating, as measured"),
+        ("standstill_ms", "standstill, as measured"),
+        ("latched_ms", "latched: standstill after the reaction"),
+    ):
+        value = facts[key]
+        print(f"  {'never' if value is None else f'{value:8.2f} ms'}  {words}")
+    if facts["peak_n"] is not None:
+        print(f"  {facts['peak_n']:8.1f} N   peak force on the body; {facts['clamp_n']:.1f} N at most 0.5 s later")
+    if facts["retreat_mm"] is not None:
+        print(f"  {facts['way']}, along the normal")
+    if facts["cut_short"] is not None:
+        print(f"  the retreat was NOT made as far as it was to: {facts['cut_short']}; on a quieter machine it is")
+    print("replay: " + ("the same events, bit by bit" if facts["same_in_replay"] else "NOT the same events"))
+    if missing:
+        print(f"recording: {missing}")
+    print(f"written to {folder}: run.rec, scene.toml, summary.json" + (", run.png" if facts["picture"] else ""))
+    print_hint(f"next: coneskin replay {shlex.quote(str(folder))} --events")
+
 
 _EXAMPLE = """\
 example:
@@ -50,8 +250,8 @@ example:
 exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
 """
 
-_SPEED = 1.0  # rad/s, of the leading joint
-_ACCELERATION = 2.0  # rad/s2, of the leading joint
+_JOINT_SPEED = 1.0  # rad/s, of the leading joint
+_JOINT_ACCELERATION = 2.0  # rad/s2, of the leading joint
 _TOUCH_DELAY = 0.9  # s after the start of the second move: in the middle of it, at full speed
 _EVENT_TIMEOUT = 2.0  # s for an event that has happened to be printed
 
@@ -83,7 +283,7 @@ def run(args: argparse.Namespace) -> int:
         raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
     host = args.host or free_host()
     soft = has_physics_engine()
-    scene = make_scene(host, args.reaction, soft, folder)
+    scene = _make_scene(host, args.reaction, soft, folder)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
 
     def say(line: str) -> None:
@@ -124,7 +324,7 @@ def _meet(scene: Scene, soft: bool, folder: Path, say: Callable[[str], None]) ->
     from coneskin.robot.sim.process import SimulatedController
 
     assert scene.arm is not None
-    start_q = [math.radians(q) for q in FROM_DEG]
+    start_q = [math.radians(q) for q in _FROM_DEG]
     with contextlib.ExitStack() as stack:
         plant = None
         if soft:
@@ -225,7 +425,7 @@ def _collide(
         transcript.line("the arm moves", after="activated")
         meanwhile(session)
         try:
-            session.arm.move_j([math.radians(q) for q in TO_DEG], _SPEED, _ACCELERATION)
+            session.arm.move_j([math.radians(q) for q in _TO_DEG], _JOINT_SPEED, _JOINT_ACCELERATION)
             print("coneskin demo: the arm arrived although it was touched", file=sys.stderr)
         except Collision as exc:
             transcript.line(f"the program gets Collision: {exc}", after="latched")
@@ -234,11 +434,11 @@ def _collide(
 def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
     """Touch the arm while it moves; return when the touch began [s]."""
     touches: list[float] = []
-    phi = leading_side(scene)
+    phi = _leading_side(scene)
     timers: list[threading.Timer] = []
 
     def touch_later(session: Session) -> None:
-        timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(session.touch(TOUCHED_U, phi, duration=0.15)))
+        timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(session.touch(_TOUCHED_U, phi, duration=0.15)))
         timer.start()
         timers.append(timer)
 

@@ -26,8 +26,7 @@ from coneskin.scene.tables.sensor_keys import DOUBLE_CONE_KEYS
 from coneskin.skin.electronics import shunt_ohms
 
 from .arguments.dimensions import add_key_options, given_keys, option_name
-from .terminal.ending_signals import ending_signals
-from .terminal.hints import print_hint
+from .terminal import ending_signals, print_hint
 
 __all__ = ["EXAMPLES", "add_arguments", "run"]
 

@@ -14,7 +14,7 @@ from coneskin.core.errors import SceneError
 from coneskin.core.text import painted
 
 from .simulated_arm import simulated_arm
-from .terminal.hints import print_hint
+from .terminal import print_hint
 
 if TYPE_CHECKING:
     from coneskin.commissioning.examination.doctor import Doctor
@@ -33,7 +33,7 @@ Nothing is moved, and nothing is guarded. What is not there is not tried, and sa
 mended by the scene, the change is shown and made after a "y" (--yes makes it unasked). Exit code: 0 nothing is bad, 1
 something is, or was mended: run it again.
 """
-_COLORS = {"ok": "green", "warning": "yellow", "bad": "red", "not tried": "blue"}
+_VERDICT_COLORS = {"ok": "green", "warning": "yellow", "bad": "red", "not tried": "blue"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             print(json.dumps(finding.as_message()), flush=True)
         else:
-            verdict = painted(finding.verdict, _COLORS[finding.verdict], sys.stdout)
+            verdict = painted(finding.verdict, _VERDICT_COLORS[finding.verdict], sys.stdout)
             print(finding.text.replace(finding.verdict, verdict, 1), flush=True)
 
     def ask(words: str) -> None:
@@ -82,7 +82,7 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
     Raises:
         SceneError: the scene is written in a way in which it cannot be changed, or cannot be written.
     """
-    from coneskin.commissioning.examination.scene_patch import diff_texts, set_sensor_keys
+    from coneskin.commissioning.examination.doctor import diff_texts, set_sensor_keys
     from coneskin.core.files import write_whole
     from coneskin.scene.reader import parse_scene
 

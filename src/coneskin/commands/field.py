@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_EPILOG = """\
+_EXAMPLE = """\
 example:
   coneskin field --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 300 -o field
   Draw the potential of both sheets while a contact presses on the middle, and two error maps: decoded minus true place
@@ -36,7 +36,7 @@ _PICTURES = ("potential_radial", "potential_angular", "error_u", "error_phi")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = "Solve the field of your sensor exactly: potential maps, error maps, resistances."
-    parser.epilog = _EPILOG
+    parser.epilog = _EXAMPLE
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}

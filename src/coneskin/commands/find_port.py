@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "find_port", "run"]
 
-_PERIOD = 0.2  # s between two looks at the list of ports
+_POLL_PERIOD = 0.2  # s between two looks at the list of ports
 
 _EXAMPLE = """\
 example:
@@ -90,7 +90,7 @@ def find_port(
                 f"no port has come within {timeout:g} s; try another cable (some only charge) and another USB port, "
                 "and see whether `dmesg` names the device"
             )
-        sleep(_PERIOD)
+        sleep(_POLL_PERIOD)
         if words := search.look(look()):
             say(words if search.found else f"{words}: {search.request}")
     return search.found

@@ -21,8 +21,7 @@ from coneskin.robot.guard.signals.journal import EventName
 from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
 
 from .simulated_arm import simulated_arm
-from .terminal.hints import print_hint
-from .terminal.typed_lines import typed_lines
+from .terminal import print_hint, typed_lines
 
 if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["add_arguments", "run"]
 
 _START_TIMEOUT = 20.0  # s for the guard to become active
-_QUIET = 0.3  # s without a line after which all earlier ones have been read
+_LINE_PAUSE = 0.3  # s without a line after which all earlier ones have been read
 
 _EXAMPLE = """\
 example:
@@ -272,7 +271,7 @@ class _Person:
         """Ignore what was typed before a person could know of the stop, and say so."""
         ignored = 0
         with contextlib.suppress(queue.Empty):
-            while self._lines.get(timeout=_QUIET):
+            while self._lines.get(timeout=_LINE_PAUSE):
                 ignored += 1
         if ignored:
             print(f"{ignored} line(s) typed before the arm was latched are ignored", file=sys.stderr, flush=True)

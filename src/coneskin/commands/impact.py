@@ -30,10 +30,10 @@ example:
 The scene needs an [arm], a [motion], skins and at least one [[body]] in the way of a skin (docs/do/impact.md).
 
 exit code: 0 if the arm met a body and the guard noticed it; 1 otherwise."""
-_REACTIONS = ("stop", "retreat", "comply", "slow")
-_UNGUARDED = ("force limit", "nothing")
-_WAYS = ("guard", *_REACTIONS, *_UNGUARDED)
-_COLUMNS = (
+_REACTION_NAMES = ("stop", "retreat", "comply", "slow")
+_NO_GUARD = ("force limit", "nothing")
+_STOP_WAYS = ("guard", *_REACTION_NAMES, *_NO_GUARD)
+_COLUMN_NAMES = (
     ("peak", 1.0, "N"),
     ("clamp", 1.0, "N"),
     ("impulse", 1.0, "Ns"),
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, help="scene file")
     parser.add_argument(
         "--ways",
-        default=",".join(_WAYS),
+        default=",".join(_STOP_WAYS),
         help="what protects the body: guard (as the scene says), a reaction, force limit, nothing (default: all)",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the skins' noise (default 0)")
@@ -72,13 +72,13 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({way: _plain(outcome) for way, outcome in found.items()}))
     else:
         _print(scenes, found)
-    guarded = [outcome for way, outcome in found.items() if way not in _UNGUARDED]
+    guarded = [outcome for way, outcome in found.items() if way not in _NO_GUARD]
     return 0 if all(outcome.peak > 0.0 and not math.isnan(outcome.noticed) for outcome in guarded) else 1
 
 
 def _check(scene: Scene, ways: list[str]) -> None:
     """Refuse a scene in which nothing can be met, and ways that do not exist."""
-    problems = [f"--ways: {way!r} is none of {', '.join(_WAYS)}" for way in ways if way not in _WAYS]
+    problems = [f"--ways: {way!r} is none of {', '.join(_STOP_WAYS)}" for way in ways if way not in _STOP_WAYS]
     needed = {
         "an [arm] that moves": scene.arm,
         "a [motion] to make": scene.motion,
@@ -92,7 +92,7 @@ def _check(scene: Scene, ways: list[str]) -> None:
 
 def _with_reaction(scene: Scene, way: str) -> Scene:
     """Return the scene with the reaction of a way; as it is where the way is none."""
-    if way not in _REACTIONS:
+    if way not in _REACTION_NAMES:
         return scene
     return replace(scene, reaction=replace(scene.default_reaction, kind=way), rules=())
 
@@ -102,7 +102,7 @@ def _collide(scene: Scene, way: str, args: argparse.Namespace) -> ImpactOutcome:
 
     assert scene.motion is not None
     motion = scene.motion
-    protection = "guard" if way in ("guard", *_REACTIONS) else way
+    protection = "guard" if way in ("guard", *_REACTION_NAMES) else way
     first, *rest = motion.waypoints
     run = CollisionRun(scene, scene.bodies, first, protection=protection, seed=args.seed)
     return run.run(Waypoints(rest, motion.speed, motion.acceleration), longest=args.longest_s)
@@ -117,16 +117,16 @@ def _print(scenes: dict[str, Scene], found: dict[str, ImpactOutcome]) -> None:
     from coneskin.scene.build import withheld_motion
 
     for way, scene in scenes.items():
-        if way not in _UNGUARDED and (why := withheld_motion(scene)):
+        if way not in _NO_GUARD and (why := withheld_motion(scene)):
             print(f"{way}: the arm only stops where it would move away: {why}")
     if not any(outcome.peak > 0.0 for outcome in found.values()):
         print("the skin met no body on the way: bare parts of the arm meet nothing in this simulation")
         return
     speed = max(outcome.approach for outcome in found.values())
     print(f"the surfaces meet at {speed:.2f} m/s")
-    print(f"{'':14}" + "".join(f"{f'{name} {unit}':>15}" for name, _, unit in _COLUMNS))
+    print(f"{'':14}" + "".join(f"{f'{name} {unit}':>15}" for name, _, unit in _COLUMN_NAMES))
     for way, outcome in found.items():
-        cells = (factor * getattr(outcome, name) for name, factor, _ in _COLUMNS)
+        cells = (factor * getattr(outcome, name) for name, factor, _ in _COLUMN_NAMES)
         print(f"{way:14}" + "".join(f"{'never' if math.isnan(cell) else f'{cell:.1f}':>15}" for cell in cells))
     print(
         "clamp: force 0.5 s after the first contact. Simulated, with assumed servos and padding: no safety assessment."

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import GeometryError, SceneError
 from coneskin.robot.sim.machine.states import DEFAULT_MODEL
 
-from .terminal.hints import print_hint
+from .terminal import print_hint
 
 if TYPE_CHECKING:
     from coneskin.design.first_scene import ArmAddress, DesignFolder

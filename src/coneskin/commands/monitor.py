@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_FIRST = 1.5  # s until the first diagnosis
+_FIRST_PERIOD = 1.5  # s until the first diagnosis
 _LINE_PERIOD, _SCREEN_PERIOD = 1.0, 0.25  # s
-_READ = 0.05  # s
+_READ_TIMEOUT = 0.05  # s
 _HOME, _CLEAR_LINE, _CLEAR_BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
 _CLEAR_SCREEN = "\x1b[2J"
 
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _shower(args: argparse.Namespace) -> Callable[[LineReport], None]:
     """Return what shows a report in the way that was asked for."""
-    from coneskin.commissioning.line.report_text import describe_line, describe_report, draw_screen
+    from coneskin.commissioning.line.line_monitor import describe_line, describe_report, draw_screen
 
     if args.json:
         return lambda report: print(json.dumps(describe_report(report)), flush=True)
@@ -107,7 +107,7 @@ def _play_file(line: Line, show: Callable[[LineReport], None]) -> LineReport:
     seen, due, now = None, 0.0, 0.0
     for now, data in line.pieces():
         if monitor is None:
-            monitor, due = LineMonitor(now, line.sensors, line.baud, timed=line.recorded), now + _FIRST
+            monitor, due = LineMonitor(now, line.sensors, line.baud, timed=line.recorded), now + _FIRST_PERIOD
         if now >= due:
             due = now + _LINE_PERIOD
             report = monitor.report(now)
@@ -130,11 +130,11 @@ def _listen(line: Line, args: argparse.Namespace, show: Callable[[LineReport], N
     with line.source as source:
         start = time.monotonic()
         monitor = LineMonitor(start, line.sensors, line.baud)
-        due, end = start + min(_FIRST, args.duration_s), start + args.duration_s
+        due, end = start + min(_FIRST_PERIOD, args.duration_s), start + args.duration_s
         try:
             while (now := time.monotonic()) < end:
                 with suppress(SkinTimeout):
-                    data = source.read(max(0.001, min(_READ, due - now)))
+                    data = source.read(max(0.001, min(_READ_TIMEOUT, due - now)))
                     monitor.feed(data, time.monotonic())
                 if (now := time.monotonic()) >= due:
                     show(monitor.report(now))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
 
-from .terminal.hints import print_hint
+from .terminal import print_hint
 
 if TYPE_CHECKING:
     from coneskin.impact.permissible_speed.speed_map import SpeedMap

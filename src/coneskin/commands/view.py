@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_NICE = 10  # by how much the page of a running guard steps back for it: no picture is worth a late stop
+_NICE_LEVEL = 10  # by how much the page of a running guard steps back for it: no picture is worth a late stop
 
 _EXAMPLE = """\
 examples:
@@ -142,7 +142,7 @@ def _follow(args: argparse.Namespace, stage: Stage, find: Callable[[], LiveRun |
     from coneskin.view.live_page import LivePage
 
     if hasattr(os, "nice"):
-        os.nice(_NICE)
+        os.nice(_NICE_LEVEL)
     with _server(args) as server, contextlib.closing(LivePage(server, stage, find)) as page:
         over = _announce(args, server)
         end = None if args.duration_s is None else time.monotonic() + args.duration_s

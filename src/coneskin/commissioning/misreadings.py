@@ -16,10 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "RIGHT",
-    "Misfit",
-    "Misreading",
     "Place",
-    "Tolerance",
     "explain",
     "misfit",
     "misread",
@@ -29,10 +26,10 @@ __all__ = [
     "tolerance",
 ]
 
-_TURN = 2.0 * math.pi  # rad
-_MOST_ALONG, _PART_ALONG = 0.020, 0.2  # m, and part of the slant: how well a person finds a mark along the link
-_MOST_AROUND, _PART_AROUND = math.radians(25.0), 0.2  # rad, and part of the wrap: the same about the link
-_LEAST_FOR_OFFSET = 3  # readings; fewer can be explained by an offset too easily
+_FULL_TURN = 2.0 * math.pi  # rad
+_MAX_ALONG, _PART_ALONG = 0.020, 0.2  # m, and part of the slant: how well a person finds a mark along the link
+_MAX_AROUND, _PART_AROUND = math.radians(25.0), 0.2  # rad, and part of the wrap: the same about the link
+_MIN_OFFSET_READINGS = 3  # readings; fewer can be explained by an offset too easily
 
 
 class Place(NamedTuple):
@@ -42,14 +39,14 @@ class Place(NamedTuple):
     phi: float  #: azimuth [rad]
 
 
-class Tolerance(NamedTuple):
+class _Tolerance(NamedTuple):
     """Difference between a mark and its reading that is allowed."""
 
     u: float  #: along the link [m]
     phi: float  #: about the link [rad]
 
 
-class Misreading(NamedTuple):
+class _Misreading(NamedTuple):
     """One way to read a place wrongly."""
 
     mirror_radial: bool  #: A for B
@@ -58,7 +55,7 @@ class Misreading(NamedTuple):
     cause: str  #: for people, after "it reads as if"
 
 
-class Misfit(NamedTuple):
+class _Misfit(NamedTuple):
     """Difference between readings and what a misreading would give, its best offset taken off."""
 
     u: float  #: offset along the link [m]
@@ -67,31 +64,31 @@ class Misfit(NamedTuple):
     largest: float  #: largest difference without the offset, in tolerances
 
 
-RIGHT = Misreading(False, False, False, "the sheet were")
+RIGHT = _Misreading(False, False, False, "the sheet were")
 WRONG = (
-    Misreading(True, False, False, "A and B were exchanged (their wires, or radial_positive)"),
-    Misreading(
+    _Misreading(True, False, False, "A and B were exchanged (their wires, or radial_positive)"),
+    _Misreading(
         False,
         True,
         False,
         "C and D were exchanged (their wires, or angular_positive), or the sheet's inner face were out",
     ),
-    Misreading(True, True, False, "A and B, and C and D, were exchanged, or the sheet lay end for end on the link"),
+    _Misreading(True, True, False, "A and B, and C and D, were exchanged, or the sheet lay end for end on the link"),
     *(
-        Misreading(a, c, True, "the wires of A and B were on C and D" + (", the other way round" if a or c else ""))
+        _Misreading(a, c, True, "the wires of A and B were on C and D" + (", the other way round" if a or c else ""))
         for a in (False, True)
         for c in (False, True)
     ),
 )
 
 
-def tolerance(sensor: Sensor) -> Tolerance:
+def tolerance(sensor: Sensor) -> _Tolerance:
     """Return how far from its mark a reading may be: 20 mm and 25 deg, less on a small sensor."""
     cone = sensor.frustum
-    return Tolerance(min(_MOST_ALONG, _PART_ALONG * cone.slant), min(_MOST_AROUND, _PART_AROUND * cone.wrap))
+    return _Tolerance(min(_MAX_ALONG, _PART_ALONG * cone.slant), min(_MAX_AROUND, _PART_AROUND * cone.wrap))
 
 
-def misread(sensor: Sensor, wrong: Misreading, place: Place) -> Place:
+def misread(sensor: Sensor, wrong: _Misreading, place: Place) -> Place:
     """Return what a sensor reads at a place when it reads so."""
     radial, angular = sensor.fractions(*place)
     if wrong.exchanged:
@@ -105,11 +102,11 @@ def misread(sensor: Sensor, wrong: Misreading, place: Place) -> Place:
 
 def miss(sensor: Sensor, mark: Place, read: Place) -> tuple[float, float]:
     """Return by how much a touch of a mark is read off it, along and around [m]."""
-    around = sensor.frustum.radius_at(mark.u) * math.remainder(read.phi - mark.phi, _TURN)
+    around = sensor.frustum.radius_at(mark.u) * math.remainder(read.phi - mark.phi, _FULL_TURN)
     return read.u - mark.u, around
 
 
-def misfit(sensor: Sensor, wrong: Misreading, marks: Sequence[Place], read: Sequence[Place]) -> Misfit:
+def misfit(sensor: Sensor, wrong: _Misreading, marks: Sequence[Place], read: Sequence[Place]) -> _Misfit:
     """Compare readings with what a misreading of the marks would give.
 
     Args:
@@ -123,20 +120,20 @@ def misfit(sensor: Sensor, wrong: Misreading, marks: Sequence[Place], read: Sequ
     for mark, reading in zip(marks, read, strict=True):
         expected = misread(sensor, wrong, mark)
         along.append(reading.u - expected.u)
-        around.append(math.remainder(reading.phi - expected.phi, _TURN))
+        around.append(math.remainder(reading.phi - expected.phi, _FULL_TURN))
     u, half_u = 0.5 * (min(along) + max(along)), 0.5 * (max(along) - min(along))
     phi, half_phi = _middle(around)
     largest = max(max(map(abs, along)) / allowed.u, max(map(abs, around)) / allowed.phi)
-    return Misfit(u, phi, max(half_u / allowed.u, half_phi / allowed.phi), largest)
+    return _Misfit(u, phi, max(half_u / allowed.u, half_phi / allowed.phi), largest)
 
 
 def _middle(angles: Sequence[float]) -> tuple[float, float]:
     """Return the middle of the smallest arc that holds all angles [rad], and half its length [rad]."""
-    ordered = sorted(angle % _TURN for angle in angles)
+    ordered = sorted(angle % _FULL_TURN for angle in angles)
     gaps = [(after - before, after) for before, after in pairwise(ordered)]
-    gap, start = max([*gaps, (ordered[0] + _TURN - ordered[-1], ordered[0])])
-    half = 0.5 * (_TURN - gap)
-    return math.remainder(start + half, _TURN), half
+    gap, start = max([*gaps, (ordered[0] + _FULL_TURN - ordered[-1], ordered[0])])
+    half = 0.5 * (_FULL_TURN - gap)
+    return math.remainder(start + half, _FULL_TURN), half
 
 
 def shifts(sensor: Sensor, place: Place) -> tuple[Place, ...]:
@@ -177,7 +174,7 @@ def explain(sensor: Sensor, marks: Sequence[Place], read: Sequence[Place]) -> st
     plain = [wrong.cause for wrong, fit in fits[1:] if fit.largest <= 1.0]
     if plain:
         return "it reads as if " + ", or as if ".join(dict.fromkeys(plain))
-    if len(marks) >= _LEAST_FOR_OFFSET:
+    if len(marks) >= _MIN_OFFSET_READINGS:
         wrong, fit = min(fits, key=lambda item: item[1].rest + (0.0 if item[0] is RIGHT else 0.5))
         if fit.rest <= 1.0:
             joint = " " if wrong is RIGHT else ", and it were "
@@ -185,7 +182,7 @@ def explain(sensor: Sensor, marks: Sequence[Place], read: Sequence[Place]) -> st
     return "no exchange of wires and no turn of the sheet explains it alone: was the right place touched?"
 
 
-def _offset(sensor: Sensor, fit: Misfit) -> str:
+def _offset(sensor: Sensor, fit: _Misfit) -> str:
     allowed, said = tolerance(sensor), []
     if abs(fit.phi) > 0.3 * allowed.phi:
         said.append(f"turned about the link by {-math.degrees(fit.phi):+.0f} deg (rpy_deg)")

@@ -17,7 +17,7 @@ from .misreadings import Place
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["REQUESTS", "Doubt", "Held", "Mark", "Notice", "Samples", "TouchJudge", "Touching"]
+__all__ = ["REQUESTS", "Doubt", "Held", "Mark", "Notice", "TouchJudge", "Touching"]
 
 Reading = TypeVar("Reading")
 REQUESTS = ("mark", "again", "press")  #: kinds of notice on which the person touches the skin
@@ -72,7 +72,7 @@ class Mark:
         return Notice("again", f"once more, {text}", details) if again else Notice("mark", text, details)
 
 
-class Samples:
+class _Samples:
     """Newest samples of a touch.
 
     Args:
@@ -146,7 +146,7 @@ class TouchJudge(Generic[Reading]):
         self.mark: Mark | None = None
         self.over = False
         self.incomplete = ""
-        self.samples = Samples(longest)
+        self.samples = _Samples(longest)
 
     @property
     def current(self) -> _Sensed:

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.commissioning.acceptance.mark_words import offer_marks, place_sensors
-from coneskin.commissioning.acceptance.marks import plan_marks
+from coneskin.commissioning.acceptance.marks import offer_marks, place_sensors, plan_marks
 from coneskin.commissioning.misreadings import RIGHT, Place, misfit
 from coneskin.commissioning.touching import Mark
 from coneskin.geometry.placed_frustum import PlacedFrustum

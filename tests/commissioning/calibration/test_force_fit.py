@@ -5,8 +5,7 @@ import re
 
 import pytest
 
-from coneskin.commissioning.calibration.force_fit import KnownPress, fit_forces
-from coneskin.commissioning.calibration.force_sequence import ForceSequence, SensorPresses
+from coneskin.commissioning.calibration.forces import ForceSequence, KnownPress, SensorPresses, fit_forces
 from coneskin.commissioning.calibration.marks import calibration_marks
 from coneskin.commissioning.touching import Touching
 from coneskin.core.errors import SceneError, SensorError, SkinError

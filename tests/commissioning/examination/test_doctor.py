@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from coneskin.commissioning.examination.doctor import Doctor
-from coneskin.commissioning.examination.scene_patch import set_sensor_keys
-from coneskin.commissioning.examination.wire_order import touch_places
+from coneskin.commissioning.examination.doctor import Doctor, set_sensor_keys
+from coneskin.commissioning.examination.wires import touch_places
 from coneskin.core.finding import Finding
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.detection.events import SkinFault, TouchMoved

@@ -6,7 +6,7 @@ from functools import cache
 
 import pytest
 
-from coneskin.commissioning.examination.wire_order import ORDERS, WIRINGS, TouchReadings, Wiring, identify, touch_places
+from coneskin.commissioning.examination.wires import ORDERS, WIRINGS, TouchReadings, Wiring, identify, touch_places
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor

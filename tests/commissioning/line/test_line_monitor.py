@@ -4,8 +4,14 @@ import math
 
 import pytest
 
-from coneskin.commissioning.line.line_monitor import LineMonitor, LineReport
-from coneskin.commissioning.line.report_text import describe_line, describe_report, draw_screen, draw_sheet
+from coneskin.commissioning.line.line_monitor import (
+    LineMonitor,
+    LineReport,
+    describe_line,
+    describe_report,
+    draw_screen,
+    draw_sheet,
+)
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.diagnosis.cause import Cause
 from coneskin.skin.sensor import Sensor

@@ -1,30 +1,101 @@
-"""Run of a commissioning: skin, arm and procedure together, and the record that comes of it."""
+"""Run of a commissioning: skin, procedure and an arm that must not move, and the record that comes of it."""
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
+from types import TracebackType
 from typing import TYPE_CHECKING
 
 from coneskin.commissioning.skin_watch import TouchSession
-from coneskin.core.errors import RobotRefused
+from coneskin.core.channel import wait_readable
+from coneskin.core.errors import RobotRefused, RobotTimeout
 from coneskin.core.version import __version__
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.driver.registry import load_driver
 from coneskin.scene.commissioning_record import CommissioningRecord, fingerprint
 from coneskin.scene.values.scene import Commissioning, Scene
 
-from .mark_words import offer_marks, place_sensors
+from .marks import offer_marks, place_sensors
 from .procedure import Procedure, SensorMarks
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from coneskin.commissioning.touching import Notice
+    from coneskin.robot.arm.model import Joints
+    from coneskin.scene.values.scene import ArmScene
     from coneskin.skin.detection.frame.reading import TouchReading
 
 __all__ = ["Commissioner", "commission_virtual_skin", "prepare"]
+
+_START_TIMEOUT = 3.0  # s for the first state
+_STATE_TIMEOUT = 1.0  # s without a state
+_MAX_MOTION = 0.02  # rad; the words for the marks are of one posture
+
+
+class _ArmWatch:
+    """States of one arm; opened in a ``with``.
+
+    Args:
+        arm: of the scene.
+
+    Attributes:
+        q: joint positions at the beginning [rad].
+    """
+
+    def __init__(self, arm: ArmScene) -> None:
+        model = arm_model(arm.model)
+        self._driver = load_driver(model.family)
+        self._driver.check_model(model, arm.host)
+        self._reader = self._driver.state_reader(arm.host)
+        self._heard = 0.0
+        self.q: Joints = (0.0,) * 6
+
+    def __enter__(self) -> _ArmWatch:
+        self._reader.__enter__()
+        end = time.monotonic() + _START_TIMEOUT
+        while not self._heard:
+            if time.monotonic() > end:
+                self._reader.close()
+                raise RobotTimeout(f"the controller has sent no state within {_START_TIMEOUT:g} s")
+            wait_readable([self._reader], 0.05)
+            self._read()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None) -> None:
+        self._reader.close()
+
+    def check(self) -> None:
+        """Raise where the arm has moved, or is not measured any more.
+
+        Raises:
+            RobotRefused: it has moved since the beginning.
+            RobotTimeout: its controller is silent.
+            RobotConnectionError: its controller is gone.
+        """
+        self._read()
+        if time.monotonic() - self._heard > _STATE_TIMEOUT:
+            raise RobotTimeout(f"the controller has sent no state for {_STATE_TIMEOUT:g} s")
+
+    def _read(self) -> None:
+        for payload in self._reader.read():
+            now = time.monotonic()
+            state = self._driver.decode_state(now, payload)
+            if not self._heard:
+                self.q = state.q
+            self._heard = now
+            off = max(abs(a - b) for a, b in zip(state.q, self.q, strict=True))
+            if off > _MAX_MOTION:
+                raise RobotRefused(
+                    f"the arm has moved, a joint by {off:.3f} rad: the marks were described for where it stood; begin "
+                    "again and leave it there"
+                )
+
 
 _SIMULATED_Q = (0.0, -math.pi / 2.0, math.pi / 2.0, -math.pi / 2.0, -math.pi / 2.0, 0.0)  # rad; no arm is asked
 _VIRTUAL_DURATION = 0.5  # s, of the touches of a virtual skin
@@ -126,9 +197,8 @@ class Commissioner(TouchSession):
             return None, lambda: None
         if self._q is not None or self.simulated:
             return self._q or _SIMULATED_Q, lambda: None
-        from .arm_watch import ArmWatch
 
-        watch = stack.enter_context(ArmWatch(self.scene.arm))
+        watch = stack.enter_context(_ArmWatch(self.scene.arm))
         return watch.q, watch.check
 
 

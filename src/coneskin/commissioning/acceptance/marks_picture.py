@@ -12,7 +12,7 @@ from coneskin.commissioning.sheet_picture import draw_sheet
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
 
-from .mark_words import place_sensors
+from .marks import place_sensors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_marks"]
 
-_MARK = "#c0392b"
-_POINTS = 61  # of a curve
+_MARK_COLOR = "#c0392b"
+_CURVE_POINTS = 61  # of a curve
 
 
 def draw_marks(scene: Scene, procedure: Procedure, q: Sequence[float] | None, path: Path) -> None:
@@ -69,8 +69,8 @@ def _draw_sheet(axes: Any, item: SensorMarks, first: int) -> None:
     draw_sheet(axes, cone)
     for number, mark in enumerate(item.plan, first):
         x, y = cone.flat_point(mark.u, mark.phi)
-        axes.plot([1e3 * x], [1e3 * y], "o", ms=17, mfc="white", mec=_MARK, mew=1.6)
-        axes.text(1e3 * x, 1e3 * y, str(number), color=_MARK, ha="center", va="center", fontsize=10)
+        axes.plot([1e3 * x], [1e3 * y], "o", ms=17, mfc="white", mec=_MARK_COLOR, mew=1.6)
+        axes.text(1e3 * x, 1e3 * y, str(number), color=_MARK_COLOR, ha="center", va="center", fontsize=10)
     axes.set_title(f"{item.sensor.name}: the flat sheet, seen from outside the link", fontsize=10)
 
 
@@ -82,16 +82,16 @@ def _draw_arm(axes: Any, item: SensorMarks, placed: SensorOnArm, q: Sequence[flo
     assert placed.model is not None
     cone, base_link = item.sensor.frustum, link_pose(placed.model, q, placed.link)
     for part in (0.0, 0.5, 1.0):
-        turns = [cone.wrap * k / (_POINTS - 1) for k in range(_POINTS)]
+        turns = [cone.wrap * k / (_CURVE_POINTS - 1) for k in range(_CURVE_POINTS)]
         ring = [base_link.apply(placed.frustum.point(part * cone.slant, phi)) for phi in turns]
         axes.plot(*zip(*ring, strict=True), lw=1.0, color="tab:green")
     length = 1.2 * max(cone.radius1, cone.radius2)
     for number, mark in enumerate(item.plan, first):
         point, normal = placed.place_in_base(mark.u, mark.phi, q)
         outside = [p + length * n for p, n in zip(point, normal, strict=True)]
-        axes.quiver(*outside, *(-n for n in normal), length=length, color=_MARK, lw=1.4)  # as the finger comes
+        axes.quiver(*outside, *(-n for n in normal), length=length, color=_MARK_COLOR, lw=1.4)  # as the finger comes
         tip = [p + 1.35 * length * n for p, n in zip(point, normal, strict=True)]
-        axes.text(*tip, str(number), color=_MARK, fontsize=11, ha="center", va="center")
+        axes.text(*tip, str(number), color=_MARK_COLOR, fontsize=11, ha="center", va="center")
     middle = base_link.apply(placed.frustum.centre(0.5 * cone.slant))
     reach = 0.5 * cone.slant + 2.0 * length
     corners = skeleton(placed.model, q)
@@ -113,7 +113,7 @@ def _draw_arm(axes: Any, item: SensorMarks, placed: SensorOnArm, q: Sequence[flo
 
 def _inside(start: Sequence[float], end: Sequence[float], middle: Sequence[float], reach: float) -> list[list[float]]:
     """Return the points of a line that lie in the drawn box: what is beyond would run over the labels of its axes."""
-    steps = [k / (_POINTS - 1) for k in range(_POINTS)]
+    steps = [k / (_CURVE_POINTS - 1) for k in range(_CURVE_POINTS)]
     points = [[a + step * (b - a) for a, b in zip(start, end, strict=True)] for step in steps]
     return [
         point if all(abs(x - m) <= reach for x, m in zip(point, middle, strict=True)) else [math.nan] * 3

@@ -15,11 +15,9 @@ from coneskin.core.version import __version__
 from coneskin.scene.values.calibration_file import CalibrationRecord, TouchResult, sensor_fingerprint
 
 from .fit import CalibrationFit, fit_map
-from .force_fit import fit_forces
-from .force_sequence import ForceSequence, SensorPresses
-from .marks import calibration_marks
-from .printed_marks import find_design, printed_marks
-from .touch_sequence import SensorTouches, TouchSequence
+from .forces import ForceSequence, SensorPresses, fit_forces
+from .marks import calibration_marks, find_design, printed_marks
+from .touches import SensorTouches, TouchSequence
 
 if TYPE_CHECKING:
     from coneskin.commissioning.touching import Mark, Notice

@@ -15,10 +15,116 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from coneskin.commissioning.misreadings import Place
+from coneskin.commissioning.misreadings import RIGHT, Place, explain, misfit
+from coneskin.core.errors import SkinError
 from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
 
-from .refusals import KnownTouch, check_bends, check_offsets_and_gains, check_touches
+if TYPE_CHECKING:
+    from coneskin.skin.sensor import Sensor
+
+__all__ = [
+    "MIN_TOUCHES",
+    "CalibrationFit",
+    "Errors",
+    "KnownTouch",
+    "agreeing",
+    "fit_map",
+]
+
+MIN_TOUCHES = 4  #: at different places
+_MIN_EXTENT = 0.3  # of the sheet, between the outermost of them
+
+
+class KnownTouch(NamedTuple):
+    """Touch of a known place."""
+
+    mark: Place  #: where it was
+    read: Place  #: what the sensor decoded there, without a place map
+
+
+def _check_touches(sensor: Sensor, touches: Sequence[KnownTouch]) -> None:
+    """Refuse touches that nothing can be fitted to, and those that a wiring or a mounting explains.
+
+    Raises:
+        SkinError: says what is missing, or the cause.
+    """
+    places = sorted({touch.mark for touch in touches})
+    along, around = [mark.u for mark in places], [mark.phi for mark in places]
+    cone = sensor.frustum
+    enough = len(places) >= MIN_TOUCHES
+    enough = (
+        enough
+        and max(along) - min(along) >= _MIN_EXTENT * cone.slant
+        and max(around) - min(around) >= _MIN_EXTENT * cone.wrap
+    )
+    if not enough:
+        got = ", ".join(f"{1e3 * mark.u:.0f} mm, {math.degrees(mark.phi):.0f} deg" for mark in places)
+        raise SkinError(
+            f"{sensor.name}: a calibration needs touches at {MIN_TOUCHES} places or more, the outermost of them "
+            f"{100 * _MIN_EXTENT:.0f} % of the sheet apart along and around; got {len(places)}: {got or 'none'}"
+        )
+    marks, read = [touch.mark for touch in touches], [touch.read for touch in touches]
+    if misfit(sensor, RIGHT, marks, read).rest > 1.0:
+        cause = explain(sensor, marks, read)
+        if cause.startswith("it reads as if"):
+            raise SkinError(f"{sensor.name} cannot be calibrated: {cause}; mend that, and begin again")
+
+
+def _check_offsets_and_gains(
+    sensor: Sensor, along: Sequence[float], around: Sequence[float], sheet_ohms: tuple[float, float] | None = None
+) -> None:
+    """Refuse offsets and gains that are no small error of this sheet.
+
+    Args:
+        sensor: that was touched.
+        along: offset and gain that would be fitted to the fraction along.
+        around: the same around.
+        sheet_ohms: what its untouched sheets have per square, if they are as large as the scene says [ohm].
+
+    Raises:
+        SkinError: says the likely mistake.
+    """
+    cone = sensor.frustum
+    sizes = cone.slant, cone.wrap * cone.radius_at(0.5 * cone.slant)
+    hint = ""
+    if sheet_ohms is not None:
+        hint = (
+            f" As large as the scene says, its untouched sheets would have {sheet_ohms[0]:.0f} and {sheet_ohms[1]:.0f} "
+            f"ohm per square; the scene says {sensor.upper_sheet_ohms:g} and {sensor.lower_sheet_ohms:g}"
+        )
+    for word, key, (offset, gain), size in zip(
+        ("along", "around"), ("height_mm", "wrap_deg"), (along, around), sizes, strict=True
+    ):
+        if abs(gain) > MAP_LIMITS[1]:
+            said = "short" if gain > 0.0 else "long"
+            raise SkinError(
+                f"{sensor.name} cannot be calibrated: it reads distances {word} {100.0 * abs(gain):.1f} % too {said}, "
+                f"and {100.0 * MAP_LIMITS[1]:g} % are allowed. Is it another sheet than the scene says ({key}), were "
+                "the marks measured from another edge than that of the active area, or has an electrode come off in "
+                f"part?{hint}"
+            )
+        if abs(offset) > MAP_LIMITS[0]:
+            raise SkinError(
+                f"{sensor.name} cannot be calibrated: it reads all places {1e3 * abs(offset) * size:.0f} mm off "
+                f"{word}, and {1e3 * MAP_LIMITS[0] * size:.0f} mm are allowed. Were the marks measured from another "
+                f"edge than that of the active area, or is the sheet turned or shifted on its link (xyz_mm, "
+                f"rpy_deg)?{hint}"
+            )
+
+
+def _check_bends(sensor: Sensor, along: Sequence[float], around: Sequence[float]) -> None:
+    """Refuse a map that bends places by more than any sheet of some quality does.
+
+    Raises:
+        SkinError: with the numbers.
+    """
+    for word, numbers in (("along", along), ("around", around)):
+        if any(abs(value) > most for value, most in zip(numbers, MAP_LIMITS, strict=True)):
+            raise SkinError(
+                f"{sensor.name} cannot be calibrated: it bends places {word} by more than a calibration takes off "
+                f"({', '.join(f'{value:+.3f}' for value in numbers)}): is the sheet torn, or far from uniform?"
+            )
+
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,18 +133,22 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["CalibrationFit", "Errors", "agreeing", "fit_map"]
 
 #: names of what is fitted to a fraction -> its number of terms, and by which factor it must predict better
-_MODELS = {"nothing": (0, 1.0), "offset": (1, 0.95), "offset and gain": (2, 0.95), "offset, gain and bend": (5, 0.7)}
-_LEAST_FOR_ROBUSTNESS = 6  # touches; among fewer none can be called wrong
-_MOST_WRONG = 0.25  # part of the touches that may be left out
-_DEVIATIONS = 3.5  # by which a touch that is left out misses what most others say
+_FIT_MODELS = {
+    "nothing": (0, 1.0),
+    "offset": (1, 0.95),
+    "offset and gain": (2, 0.95),
+    "offset, gain and bend": (5, 0.7),
+}
+_MIN_ROBUST = 6  # touches; among fewer none can be called wrong
+_MAX_WRONG = 0.25  # part of the touches that may be left out
+_MAX_DEVIATIONS = 3.5  # by which a touch that is left out misses what most others say
 _MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
-_APART = 0.3  # of a fraction, between two touches that a first line is laid through
-_EXPLAINED = 1.2  # mark errors; what marks that were placed so explain by themselves needs no map
-_NEGLIGIBLE = 0.02e-3  # m; a model that predicts so well needs no richer one
-_GRID = 21  # places along and around at which the error of the map is looked at
+_MIN_SPACING = 0.3  # of a fraction, between two touches that a first line is laid through
+_MARK_ERRORS = 1.2  # mark errors; what marks that were placed so explain by themselves needs no map
+_MIN_ERROR = 0.02e-3  # m; a model that predicts so well needs no richer one
+_GRID_POINTS = 21  # places along and around at which the error of the map is looked at
 
 
 class Errors(NamedTuple):
@@ -111,17 +221,17 @@ def fit_map(
         SkinError: there are too few touches, or the sensor reads so wrongly that it is another sheet, or is wired or
             mounted otherwise than it should be; the message says the likely cause.
     """
-    check_touches(sensor, touches)
+    _check_touches(sensor, touches)
     axes = _axes(sensor, touches)
     used = _agreeing(axes, mark_error)
     inside = [axis.pick(used) for axis in axes]
     affine = [_solve(axis, 2).tolist() for axis in inside]
-    check_offsets_and_gains(sensor, affine[0][:2], affine[1][:2], sheet_ohms)
+    _check_offsets_and_gains(sensor, affine[0][:2], affine[1][:2], sheet_ohms)
     chosen = [_choose(axis, mark_error) for axis in inside]
-    numbers = [_solve(axis, _MODELS[name][0]).tolist() for axis, name in zip(inside, chosen, strict=True)]
-    check_bends(sensor, *numbers)
+    numbers = [_solve(axis, _FIT_MODELS[name][0]).tolist() for axis, name in zip(inside, chosen, strict=True)]
+    _check_bends(sensor, *numbers)
     place_map = PlaceMap(sensor.frustum, tuple(numbers[0]), tuple(numbers[1]))
-    left = [_left_out(axis, _MODELS[name][0]) * axis.metres for axis, name in zip(inside, chosen, strict=True)]
+    left = [_left_out(axis, _FIT_MODELS[name][0]) * axis.metres for axis, name in zip(inside, chosen, strict=True)]
     every = [
         (axis.missing - axis.terms @ np.array(values)) * axis.metres for axis, values in zip(axes, numbers, strict=True)
     ]
@@ -198,14 +308,14 @@ def _left_out(axis: _Axis, count: int) -> Floats:
 def _choose(axis: _Axis, mark_error: float) -> str:
     """Return the richest model that predicts better than each simpler one by its factor."""
     best, error = "nothing", math.inf
-    if np.sqrt(np.mean((axis.missing * axis.metres) ** 2)) < _EXPLAINED * mark_error:
+    if np.sqrt(np.mean((axis.missing * axis.metres) ** 2)) < _MARK_ERRORS * mark_error:
         return best
-    for name, (count, factor) in _MODELS.items():
+    for name, (count, factor) in _FIT_MODELS.items():
         independent = np.linalg.matrix_rank(axis.terms[:, :count], tol=1e-3) if count else 0
         if len(axis.missing) < count + 2 or independent < count:
             continue
         found = float(np.sqrt(np.mean((_left_out(axis, count) * axis.metres) ** 2)))
-        if best == name or (found < factor * error and error > _NEGLIGIBLE):
+        if best == name or (found < factor * error and error > _MIN_ERROR):
             best, error = name, found
     return best
 
@@ -214,7 +324,7 @@ def _agreeing(axes: Sequence[_Axis], mark_error: float) -> NDArray[np.bool_]:
     """Return which touches agree with what most of them say, by offset and gain."""
     count = len(axes[0].missing)
     used = np.ones(count, bool)
-    if count < _LEAST_FOR_ROBUSTNESS:
+    if count < _MIN_ROBUST:
         return used
     rest = [np.abs(_least_median(axis)) for axis in axes]
     for _ in range(4):
@@ -222,8 +332,8 @@ def _agreeing(axes: Sequence[_Axis], mark_error: float) -> NDArray[np.bool_]:
             max(_MEDIAN_TO_SIGMA * (1.0 + 5.0 / (count - 2)) * float(np.median(part)), mark_error) for part in rest
         ]
         misses = np.maximum(*(part / scale for part, scale in zip(rest, scales, strict=True)))
-        most = int(_MOST_WRONG * count)
-        limit = max(_DEVIATIONS, float(np.sort(misses)[count - most - 1]))
+        most = int(_MAX_WRONG * count)
+        limit = max(_MAX_DEVIATIONS, float(np.sort(misses)[count - most - 1]))
         used = misses <= limit
         fitted = [_solve(axis.pick(used), 2) for axis in axes]
         rest = [
@@ -237,7 +347,7 @@ def _least_median(axis: _Axis) -> Floats:
     """Return what is missing [m] from the line through two touches that is nearest to most others (Rousseeuw 1984)."""
     at, best, least = axis.terms[:, 1], axis.missing * axis.metres, math.inf
     for i, j in combinations(range(len(at)), 2):
-        if abs(at[i] - at[j]) >= _APART:
+        if abs(at[i] - at[j]) >= _MIN_SPACING:
             gain = (axis.missing[j] - axis.missing[i]) / (at[j] - at[i])
             rest = (axis.missing - axis.missing[i] - gain * (at - at[i])) * axis.metres
             if (median := float(np.median(np.abs(rest)))) < least:
@@ -249,14 +359,14 @@ def _worst_error(sensor: Sensor, axes: Sequence[_Axis], models: Sequence[str], m
     cone, worst = sensor.frustum, 0.0
     covariances = []
     for axis, name in zip(axes, models, strict=True):
-        count = max(_MODELS[name][0], 2)  # an offset and a gain that were not fitted are not known any better
+        count = max(_FIT_MODELS[name][0], 2)  # an offset and a gain that were not fitted are not known any better
         rest = (axis.missing - axis.terms @ _solve(axis, count)) * axis.metres
         variance = max(float(rest @ rest) / max(len(rest) - count, 1), mark_error**2)
         weighed = axis.terms[:, :count] * axis.metres[:, None]
         covariances.append(variance * np.linalg.inv(weighed.T @ weighed))
-    for i in range(_GRID):
-        for j in range(_GRID):
-            u, phi = cone.slant * i / (_GRID - 1), cone.wrap * j / (_GRID - 1)
+    for i in range(_GRID_POINTS):
+        for j in range(_GRID_POINTS):
+            u, phi = cone.slant * i / (_GRID_POINTS - 1), cone.wrap * j / (_GRID_POINTS - 1)
             metres = cone.slant / _slope(sensor, u), cone.wrap * cone.radius_at(u)
             variance = 0.0
             for covariance, terms, metre in zip(

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .calibrate import CalibrationResult
-    from .refusals import KnownTouch
+    from .fit import KnownTouch
 
 __all__ = ["draw_residuals"]
 
-_BEFORE, _AFTER = "#888888", "#c0392b"
-_LONGEST = 0.12  # of the slant, of the longest arrow
-_SCALES = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+_BEFORE_COLOR, _AFTER_COLOR = "#888888", "#c0392b"
+_ARROW_PART = 0.12  # of the slant, of the longest arrow
+_ARROW_SCALES = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
 def draw_residuals(results: Sequence[CalibrationResult], path: Path) -> None:
@@ -55,15 +55,15 @@ def _draw(axes: Any, result: CalibrationResult) -> None:
     touches = [item.touches[number] for number in item.valid]
     before = [miss(item.sensor, *touch) for touch in touches]
     largest = max(math.hypot(*step) for step in before)
-    scale = max((value for value in _SCALES if value * largest <= _LONGEST * cone.slant), default=1)
+    scale = max((value for value in _ARROW_SCALES if value * largest <= _ARROW_PART * cone.slant), default=1)
     for number, (touch, step) in enumerate(zip(touches, before, strict=True)):
         left = None if fit is None else tuple(-value for value in fit.left[number])
         used = fit is None or fit.used[number]
         first = number == 0
-        _arrow(axes, cone, touch, step, scale, _BEFORE, "read, without a map" if first else "_")
+        _arrow(axes, cone, touch, step, scale, _BEFORE_COLOR, "read, without a map" if first else "_")
         if left is not None:
             label = "with a map fitted without this touch" if first else "_"
-            _arrow(axes, cone, touch, left, scale, _AFTER, label)
+            _arrow(axes, cone, touch, left, scale, _AFTER_COLOR, label)
         x, y = cone.flat_point(*touch.mark)
         axes.plot([1e3 * x], [1e3 * y], "o" if used else "x", ms=3, mfc="white", mec=OUTLINE)
     said = "refused" if fit is None else f"{1e3 * fit.before.rms:.2f} mm became {1e3 * fit.after.rms:.2f} mm (rms)"

@@ -1,8 +1,13 @@
-"""Examination of a scene's hardware, item by item: port, skin, wires, arm. Nothing is moved, and nothing is guarded."""
+"""Examination of a scene's hardware, item by item: port, skin, wires, arm; and the patch of a scene that mends it.
+
+Nothing is moved, and nothing is guarded.
+"""
 
 from __future__ import annotations
 
+import difflib
 import os
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -10,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from coneskin.commissioning.skin_watch import start_skin
-from coneskin.core.errors import ConeSkinError, SkinConnectionError, SkinTimeout
+from coneskin.core.errors import ConeSkinError, SceneError, SkinConnectionError, SkinTimeout
 from coneskin.core.finding import Finding
 from coneskin.scene.required_packages import missing_packages, required_packages
 from coneskin.scene.summary import missing_parts
@@ -18,9 +23,8 @@ from coneskin.scene.suspicions import suspicions
 from coneskin.skin.sources.kinds import is_simulated, open_source
 
 from .guided_touches import examine_touches, guided_touches
-from .skin_examination import examine_line, examine_sensor
-from .skin_statistics import SkinStatistics
-from .wire_examination import WirePatch, examine_wires
+from .skin_examination import SkinStatistics, examine_line, examine_sensor
+from .wires import WirePatch, examine_wires
 
 if TYPE_CHECKING:
     from coneskin.commissioning.touching import Mark, Notice
@@ -29,9 +33,9 @@ if TYPE_CHECKING:
     from coneskin.skin.sources.source import Source
     from coneskin.skin.wire import Frame
 
-    from .skin_statistics import SensorStatistics
+    from .skin_examination import SensorStatistics
 
-__all__ = ["Doctor", "Toucher"]
+__all__ = ["Doctor", "diff_texts", "set_sensor_keys"]
 
 _LISTEN_TIME = 2.0  # s of an untouched skin
 _READ_TIMEOUT = 0.05  # s
@@ -40,7 +44,7 @@ _TOUCH_TIMEOUT = 60.0  # s for a person to touch
 _TOUCH_FORCE, _TOUCH_TIME = 5.0, 3.0  # N and s, of the touches of a virtual skin
 
 
-class Toucher(Protocol):
+class _Toucher(Protocol):
     """What touches a virtual skin."""
 
     def touch(self, u: float, phi: float, force: float, duration: float, sensor: str) -> object:
@@ -124,7 +128,7 @@ class Doctor:
             except SkinConnectionError as exc:
                 self._note(Finding("skin, port", "bad", str(exc), "it stays open", "look at the plug and the cable"))
 
-    def examine_skin(self, source: Source, settings: Mapping[str, object], toucher: Toucher | None = None) -> None:
+    def examine_skin(self, source: Source, settings: Mapping[str, object], toucher: _Toucher | None = None) -> None:
         """Examine what an open source sends, untouched and touched.
 
         Args:
@@ -150,7 +154,7 @@ class Doctor:
             self._examine_wires(source, sensor, statistics, toucher)
 
     def _examine_wires(
-        self, source: Source, sensor: Sensor, untouched: SensorStatistics, toucher: Toucher | None
+        self, source: Source, sensor: Sensor, untouched: SensorStatistics, toucher: _Toucher | None
     ) -> None:
         if not self._touches:
             self._note(Finding(f"{sensor.name}, wires", "not tried", "no touches were asked for"))
@@ -257,3 +261,37 @@ def _collect(source: Source, duration: float, clock: Callable[[], float]) -> Ski
         except SkinTimeout:
             continue
     return seen
+
+
+_SENSOR_HEADER = re.compile(r"^\s*\[\[\s*link\s*\.\s*sensor\s*\]\]")
+_TABLE_HEADER = re.compile(r"^\s*\[")
+
+
+def set_sensor_keys(text: str, number: int, keys: Mapping[str, str]) -> str:
+    """Return the text of a scene in which a sensor has other keys.
+
+    Args:
+        text: of the scene file.
+        number: of the ``[[link.sensor]]``, from 0 in the order of the file.
+        keys: name -> value, a word; what the sensor's ``file`` says is overruled by it.
+
+    Raises:
+        SceneError: the text has no such table; it may be written in another way, as an inline table.
+    """
+    lines = text.splitlines(keepends=True)
+    headers = [at for at, line in enumerate(lines) if _SENSOR_HEADER.match(line)]
+    if number >= len(headers):
+        wanted = ", ".join(f'{key} = "{value}"' for key, value in keys.items())
+        raise SceneError([f"there is no [[link.sensor]] number {number + 1} to change: write {wanted} yourself"])
+    start = headers[number]
+    end = next((at for at in range(start + 1, len(lines)) if _TABLE_HEADER.match(lines[at])), len(lines))
+    body = [line for line in lines[start + 1 : end] if not any(re.match(rf"\s*{key}\s*=", line) for key in keys)]
+    new = [f'{key} = "{value}"\n' for key, value in keys.items()]
+    head = lines[start] if lines[start].endswith("\n") else lines[start] + "\n"
+    return "".join([*lines[:start], head, *new, *body, *lines[end:]])
+
+
+def diff_texts(old: str, new: str, name: str) -> str:
+    """Return what a patch changes, as ``diff -u`` shows it."""
+    lines = difflib.unified_diff(old.splitlines(), new.splitlines(), name, f"{name}, patched", n=2, lineterm="")
+    return "\n".join(lines)

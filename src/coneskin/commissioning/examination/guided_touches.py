@@ -22,8 +22,7 @@ from coneskin.skin.detection.frame.untouched import UntouchedCurrents
 from coneskin.skin.detection.self_test import FrameSelfTest
 from coneskin.skin.wire import Frame, FrameDecoder
 
-from .wire_examination import touch_words
-from .wire_order import TouchReadings, touch_places
+from .wires import TouchReadings, touch_places, touch_words
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor

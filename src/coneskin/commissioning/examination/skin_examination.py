@@ -2,32 +2,116 @@
 
 from __future__ import annotations
 
+import statistics
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.finding import Finding, Verdict
+from coneskin.skin.diagnosis.capture import CaptureWindow
 from coneskin.skin.diagnosis.diagnose import diagnose
-from coneskin.skin.wire import FRAME_LENGTH, Status
-
-from .skin_statistics import CHANNELS, SensorStatistics, SkinStatistics
+from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder, Status
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["examine_line", "examine_sensor"]
+__all__ = ["SensorStatistics", "SkinStatistics", "examine_line", "examine_sensor"]
+
+_CHANNELS = (
+    *("touch_c", "touch_d", "touch_current", "radial_c", "radial_d", "radial_current"),
+    *("angular_a", "angular_b", "angular_current", "touch_supply"),
+)
+_SEQUENCE_WRAP, _CLOCK_WRAP = 1 << 16, 1 << 32
+_MAX_FRAMES = 20_000  # frames that are kept of a sensor
+
+
+class SensorStatistics:
+    """Frames of one sensor.
+
+    Attributes:
+        frames: with the time at which each was read [s].
+        status: bits that any of them carried.
+    """
+
+    def __init__(self) -> None:
+        self.frames: list[tuple[float, Frame]] = []
+        self.status = 0
+
+    def add(self, time: float, frame: Frame) -> None:
+        """Take a frame."""
+        self.status |= frame.status
+        if len(self.frames) < _MAX_FRAMES:
+            self.frames.append((time, frame))
+
+    def steps(self) -> list[int]:
+        """Return by how much the sequence grew from frame to frame."""
+        return [(b.sequence - a.sequence) % _SEQUENCE_WRAP for (_, a), (_, b) in self._pairs()]
+
+    def device_time(self) -> float:
+        """Return the time between the first frame and the last by the device's clock [s]."""
+        return sum((b.clock_us - a.clock_us) % _CLOCK_WRAP for (_, a), (_, b) in self._pairs()) * 1e-6
+
+    def host_time(self) -> float:
+        """Return the same by this computer's clock [s]."""
+        return self.frames[-1][0] - self.frames[0][0]
+
+    def mean(self, channel: str) -> float:
+        """Return the mean of a reading [counts]."""
+        return statistics.fmean(self.values(channel))
+
+    def noise(self, channel: str) -> float:
+        """Return the standard deviation of a reading [counts]."""
+        return statistics.pstdev(self.values(channel))
+
+    def values(self, channel: str) -> Sequence[int]:
+        """Return a reading of every frame [counts]."""
+        return [getattr(frame, channel) for _, frame in self.frames]
+
+    def _pairs(self) -> list[tuple[tuple[float, Frame], tuple[float, Frame]]]:
+        return list(pairwise(self.frames))
+
+
+class SkinStatistics:
+    """Everything that came from one source.
+
+    Args:
+        start: when the listening began [s].
+
+    Attributes:
+        received: bytes.
+        window: the newest of them, for the diagnosis.
+        decoder: has counted what is no frame.
+        sensors: by device and sensor number.
+    """
+
+    def __init__(self, start: float) -> None:
+        self.received = 0
+        self.window = CaptureWindow(start)
+        self.decoder = FrameDecoder()
+        self.sensors: dict[tuple[int, int], SensorStatistics] = {}
+
+    def add(self, time: float, data: bytes) -> list[Frame]:
+        """Take bytes that were read at a time [s]; return the frames that they complete."""
+        self.received += len(data)
+        self.window.add(data, time)
+        frames = self.decoder.feed(data)
+        for frame in frames:
+            self.sensors.setdefault((frame.device, frame.sensor), SensorStatistics()).add(time, frame)
+        return frames
+
 
 _BITS_PER_BYTE = 10  # on a serial line: start, eight, stop
 _LINE_LOAD = 0.95  # part of a line's bytes that frames may take
 _GOOD_RATE, _LOW_RATE = 200.0, 100.0  # Hz, docs/look-up/wire-format.md
-_PATIENT = 4.0  # frames in the time after which the skin is silent: a scene that is made for so low a rate
-_CLOCK = 0.01  # part by which the device's clock may be off as far as a few seconds show it
-_LOST = 0.02  # part of the frames, as the detector allows
-_NEAR, _FAR = 1.25, 2.0  # factors between a current and the design's: remarkable, refused
-_QUIET = 0.01  # of the supply, on an untouched guide
-_SUPPLY = 0.10  # of the supply
-_NOISY = 8.0  # counts of 12 bits
-_STATUS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
+_FRAMES_PER_SILENCE = 4.0  # frames in the time after which the skin is silent: a scene that is made for so low a rate
+_CLOCK_ERROR = 0.01  # part by which the device's clock may be off as far as a few seconds show it
+_MAX_LOST = 0.02  # part of the frames, as the detector allows
+_NEAR_FACTOR, _FAR_FACTOR = 1.25, 2.0  # factors between a current and the design's: remarkable, refused
+_GUIDE_NOISE = 0.01  # of the supply, on an untouched guide
+_SUPPLY_ERROR = 0.10  # of the supply
+_MAX_NOISE = 8.0  # counts of 12 bits
+_STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 
 
 def examine_line(
@@ -102,17 +186,17 @@ def _rate(seen: SensorStatistics) -> float:
 
 def _timing(name: str, seen: SensorStatistics, drift: float, silence: float) -> list[Finding]:
     rate = _rate(seen)
-    enough = rate >= _LOW_RATE or rate * silence >= _PATIENT
+    enough = rate >= _LOW_RATE or rate * silence >= _FRAMES_PER_SILENCE
     verdict: Verdict = "ok" if rate >= _GOOD_RATE else "warning" if enough else "bad"
     remedy = "" if verdict == "ok" else "shorten the settling, raise the baud rate, or raise monitoring.skin_silence_ms"
     found = [Finding(f"{name}, rate", verdict, f"{rate:.0f} frames/s", "200 to 1000", remedy)]
     steps = seen.steps()
     lost = sum(step - 1 for step in steps if 0 < step < 1000) / max(sum(step for step in steps if step < 1000), 1)
-    verdict = "ok" if lost <= _LOST else "bad"
+    verdict = "ok" if lost <= _MAX_LOST else "bad"
     remedy = "" if verdict == "ok" else "the line is too slow or disturbed, or this computer too busy"
     found.append(Finding(f"{name}, lost", verdict, f"{100.0 * lost:.1f} % of the frames", "at most 2 %", remedy))
     ratio = seen.device_time() / max(seen.host_time(), 1e-6)
-    verdict = "ok" if abs(ratio - 1.0) <= max(_CLOCK, drift) else "bad"
+    verdict = "ok" if abs(ratio - 1.0) <= max(_CLOCK_ERROR, drift) else "bad"
     remedy = (
         "" if verdict == "ok" else "the frame's clock counts microseconds: correct the firmware's timer or prescaler"
     )
@@ -125,19 +209,19 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     name, parts = sensor.name, sensor.electronics
     expected = parts.supply_volts / parts.adc_volts * parts.full_count
     supply = seen.mean("touch_supply")
-    good = abs(supply - expected) <= _SUPPLY * expected
+    good = abs(supply - expected) <= _SUPPLY_ERROR * expected
     remedy = "" if good else "correct supply_v, adc_v and adc_bits of the sensor, or the supply itself"
     found = [
         Finding(f"{name}, supply", "ok" if good else "bad", f"{supply:.0f} counts", f"{expected:.0f} +- 10 %", remedy)
     ]
-    guides = [channel for channel in CHANNELS if not channel.endswith(("current", "supply"))]
+    guides = [channel for channel in _CHANNELS if not channel.endswith(("current", "supply"))]
     worst = max(guides, key=seen.mean)
     part = seen.mean(worst) / max(supply, 1.0)
-    good = part <= _QUIET
+    good = part <= _GUIDE_NOISE
     remedy = "" if good else "nothing may touch it now; else shield the wires, lower input_ohm, look for a short"
     value = f"at most {100.0 * part:.2f} % of the supply, on {worst}"
     found.append(Finding(f"{name}, guides", "ok" if good else "bad", value, "untouched: at most 1 %", remedy))
-    status = seen.status & _STATUS
+    status = seen.status & _STATUS_FAULTS
     if status:
         names = ", ".join(bit.name or str(bit.value) for bit in Status if bit & status)
         found.append(
@@ -148,10 +232,10 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
 
 def _noise(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     name = sensor.name
-    noise = {channel: seen.noise(channel) for channel in CHANNELS}
+    noise = {channel: seen.noise(channel) for channel in _CHANNELS}
     still = [channel for channel in ("radial_current", "angular_current", "touch_supply") if noise[channel] == 0.0]
     scale = sensor.electronics.full_count / 4095.0
-    loud = [channel for channel, value in noise.items() if value > _NOISY * scale]
+    loud = [channel for channel, value in noise.items() if value > _MAX_NOISE * scale]
     value = ", ".join(f"{channel} {value:.1f}" for channel, value in noise.items())
     verdict: Verdict = "bad" if still else "warning" if loud else "ok"
     remedy = ""
@@ -187,9 +271,9 @@ def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     ):
         measured = seen.mean(f"{phase}_current") * ampere
         ratio = measured / design
-        verdict: Verdict = "ok" if 1.0 / _NEAR <= ratio <= _NEAR else "warning"
+        verdict: Verdict = "ok" if 1.0 / _NEAR_FACTOR <= ratio <= _NEAR_FACTOR else "warning"
         remedy = ""
-        if ratio < 1.0 / _FAR or ratio > _FAR:
+        if ratio < 1.0 / _FAR_FACTOR or ratio > _FAR_FACTOR:
             verdict = "bad"
         if ratio < 0.02:
             remedy = f"no current: the wires of {wires} are open, or on the electrodes of both sheets"
@@ -197,6 +281,6 @@ def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
             lead = sum(parts.lead_ohms[number] for number in leads)
             own = (parts.supply_volts / measured - lead) * sheet / ohms
             remedy = f"if nothing is broken your layer has {own:.0f} ohm per square: write {key} = {own:.0f}"
-        value, rule = f"{1e3 * measured:.3f} mA", f"the design's {1e3 * design:.3f} mA, within {_NEAR:g} times"
+        value, rule = f"{1e3 * measured:.3f} mA", f"the design's {1e3 * design:.3f} mA, within {_NEAR_FACTOR:g} times"
         found.append(Finding(f"{sensor.name}, {phase} current", verdict, value, rule, remedy))
     return found

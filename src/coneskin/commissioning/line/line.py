@@ -17,7 +17,7 @@ from coneskin.skin.sources.source import Source
 __all__ = ["Line", "find_line"]
 
 _MAX_SIZE = 1 << 28  # bytes of a file of bytes
-_PIECE = 4096  # bytes of a file that are taken at once
+_PIECE_SIZE = 4096  # bytes of a file that are taken at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +60,8 @@ class Line:
             data = read_file(self.path, _MAX_SIZE)
         except OSError as error:
             raise SkinConnectionError(f"{self.path}: cannot be read ({error.strerror or error})") from error
-        for at in range(0, len(data), _PIECE):
-            yield 0.0, data[at : at + _PIECE]
+        for at in range(0, len(data), _PIECE_SIZE):
+            yield 0.0, data[at : at + _PIECE_SIZE]
 
 
 def find_line(target: str, baud: int) -> Line:

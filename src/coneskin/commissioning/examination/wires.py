@@ -18,23 +18,33 @@ from dataclasses import replace
 from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
 
+from coneskin.core.finding import Finding
 from coneskin.skin.virtual.circuit import LayerContact, Matrix, measure
 from coneskin.skin.virtual.ladder import RIGHT_WIRES, ResistorLadder, reorder, wire_order
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["ORDERS", "WIRINGS", "TouchReadings", "WireVerdict", "Wiring", "identify", "touch_places"]
+__all__ = [
+    "WIRINGS",
+    "TouchReadings",
+    "WirePatch",
+    "Wiring",
+    "examine_wires",
+    "identify",
+    "touch_places",
+    "touch_words",
+]
 
 #: electrodes on the terminals A, B, C, D, as in "BACD"; the right order first
-ORDERS = tuple("".join(order) for order in permutations(RIGHT_WIRES))
-_INDICES = {wires: wire_order(wires) for wires in ORDERS}
-_REFINED = 6  # wirings whose place is looked for as well
-_EDGE, _MIDDLE = 0.15, 0.5  # parts of slant and wrap at which the touches are asked for
-_ASIDE = 0.1  # part of slant and wrap by which a person may be off
-_SIEMENS = tuple(10.0 ** (-4.5 + 0.5 * k) for k in range(7))  # conductances that a touch may have, 0.03 to 32 mS
+_ORDERS = tuple("".join(order) for order in permutations(RIGHT_WIRES))
+_ORDER_INDICES = {wires: wire_order(wires) for wires in _ORDERS}
+_REFINED_WIRINGS = 6  # wirings whose place is looked for as well
+_EDGE_PART, _MIDDLE_PART = 0.15, 0.5  # parts of slant and wrap at which the touches are asked for
+_PLACE_ERROR = 0.1  # part of slant and wrap by which a person may be off
+_TOUCH_SIEMENS = tuple(10.0 ** (-4.5 + 0.5 * k) for k in range(7))  # conductances that a touch may have, 0.03 to 32 mS
 _VOLTS_ERROR, _CURRENT_ERROR = 0.03, 0.05  # parts of the supply, and of the larger drive current, of the model
-_CLEAR, _LEAST = 2.0, 0.25  # by which factor the second best must be worse, and how bad it must be
+_CLEAR_FACTOR, _CLEAR_MISFIT = 2.0, 0.25  # by which factor the second best must be worse, and how bad it must be
 
 
 class TouchReadings(NamedTuple):
@@ -58,7 +68,7 @@ class Wiring(NamedTuple):
     angular_turned: bool  #: the firmware drives the other one of C and D
 
 
-class WireVerdict(NamedTuple):
+class _WireVerdict(NamedTuple):
     """Answer, and how sure it is."""
 
     wiring: Wiring | None  #: None where none explains what was read, or two do
@@ -68,22 +78,22 @@ class WireVerdict(NamedTuple):
 
 
 #: every hypothesis, the right one first
-WIRINGS = tuple(Wiring(wires, turned) for wires in ORDERS for turned in (False, True))
+WIRINGS = tuple(Wiring(wires, turned) for wires in _ORDERS for turned in (False, True))
 
 
 def touch_places(sensor: Sensor) -> dict[str, tuple[float, float]]:
     """Return the places near A, B, C and D: u [m] and phi [rad]."""
-    cone, far = sensor.frustum, 1.0 - _EDGE
-    middle_u, middle_phi = _MIDDLE * cone.slant, _MIDDLE * cone.wrap
+    cone, far = sensor.frustum, 1.0 - _EDGE_PART
+    middle_u, middle_phi = _MIDDLE_PART * cone.slant, _MIDDLE_PART * cone.wrap
     return {
         "A": (far * cone.slant, middle_phi),
-        "B": (_EDGE * cone.slant, middle_phi),
+        "B": (_EDGE_PART * cone.slant, middle_phi),
         "C": (middle_u, far * cone.wrap),
-        "D": (middle_u, _EDGE * cone.wrap),
+        "D": (middle_u, _EDGE_PART * cone.wrap),
     }
 
 
-def identify(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> WireVerdict:
+def identify(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> _WireVerdict:
     """Find the order of the wires.
 
     Args:
@@ -92,12 +102,12 @@ def identify(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> WireVerdic
     """
     touches = [_Touch(sensor, place, touched[name]) for name, place in touch_places(sensor).items()]
     rough = {wiring: sum(touch.rough(wiring) for touch in touches) for wiring in WIRINGS}
-    near = sorted(rough, key=rough.__getitem__)[:_REFINED]
+    near = sorted(rough, key=rough.__getitem__)[:_REFINED_WIRINGS]
     fine = {wiring: sum(touch.fine(wiring) for touch in touches) for wiring in near}
     ranked, scale = sorted(near, key=fine.__getitem__), len(TouchReadings._fields) * len(touches)
     best, second = (math.sqrt(fine[wiring] / scale) for wiring in ranked[:2])
-    clear = second > _CLEAR * best and second > _LEAST
-    return WireVerdict(ranked[0] if clear else None, (ranked[0], ranked[1]), best, second)
+    clear = second > _CLEAR_FACTOR * best and second > _CLEAR_MISFIT
+    return _WireVerdict(ranked[0] if clear else None, (ranked[0], ranked[1]), best, second)
 
 
 class _Touch:
@@ -112,21 +122,21 @@ class _Touch:
 
     def rough(self, wiring: Wiring) -> float:
         """Return the sum of squares at the best conductance."""
-        self._siemens[wiring] = min(_SIEMENS, key=lambda siemens: self._squares(wiring, 0.0, 0.0, siemens))
+        self._siemens[wiring] = min(_TOUCH_SIEMENS, key=lambda siemens: self._squares(wiring, 0.0, 0.0, siemens))
         return self._squares(wiring, 0.0, 0.0, self._siemens[wiring])
 
     def fine(self, wiring: Wiring) -> float:
         """Return the same at the best place as well, by a search along its axes; ``rough`` was called before."""
         at = (0.0, 0.0, self._siemens[wiring])
-        best, step = self._squares(wiring, *at), _ASIDE
-        while step > _ASIDE / 20.0:
+        best, step = self._squares(wiring, *at), _PLACE_ERROR
+        while step > _PLACE_ERROR / 20.0:
             along, around, siemens = at
             tries = [
                 *((along + step, around, siemens), (along - step, around, siemens)),
                 *((along, around + step, siemens), (along, around - step, siemens)),
                 *((along, around, siemens * (1.0 + 4.0 * step)), (along, around, siemens / (1.0 + 4.0 * step))),
             ]
-            inside = [one for one in tries if max(abs(one[0]), abs(one[1])) <= _ASIDE]
+            inside = [one for one in tries if max(abs(one[0]), abs(one[1])) <= _PLACE_ERROR]
             found = min((self._squares(wiring, *one), one) for one in inside)
             if found[0] < best:
                 best, at = found
@@ -136,7 +146,7 @@ class _Touch:
 
     def _squares(self, wiring: Wiring, along: float, around: float, siemens: float) -> float:
         sensor, parts = self._driven[wiring.angular_turned], self._sensor.electronics
-        sheets = reorder(self._admittance(along, around, siemens), _INDICES[wiring.wires])
+        sheets = reorder(self._admittance(along, around, siemens), _ORDER_INDICES[wiring.wires])
         at = measure(sensor, (sheets, sheets, sheets))
         current = max(sensor.radial_amperes, sensor.angular_amperes) / parts.current_full_scale
         total = 0.0
@@ -156,3 +166,75 @@ class _Touch:
             contact = LayerContact(u + along * cone.slant, phi + around * cone.wrap, siemens)
             self._sheets[key] = ResistorLadder().admittance(self._sensor, (contact,))
         return self._sheets[key]
+
+
+_RIGHT_ORDER = _ORDERS[0]
+_OTHER_ELECTRODE = {"A": "B", "B": "A", "C": "D", "D": "C"}
+_GOOD_MISFIT = 0.3  # misfit of what explains the touches
+_RADIAL_TURNED = "BACD"  # reads what the other radial_positive reads
+
+
+class WirePatch(NamedTuple):
+    """Keys with which a scene reads a sensor rightly whose wires are exchanged."""
+
+    sensor: str  #: its name
+    keys: dict[str, str]
+
+
+def touch_words(sensor: Sensor, electrode: str) -> str:
+    """Return the place near an electrode, for a person."""
+    u, phi = touch_places(sensor)[electrode]
+    where = {
+        "A": "end 2, half way between the straight edges",
+        "B": "end 1, half way between the straight edges",
+        "C": "the straight edge phi = wrap, half way between the ends",
+        "D": "the straight edge phi = 0, half way between the ends",
+    }[electrode]
+    return (
+        f"{sensor.name} near electrode {electrode}: {where} (u = {1e3 * u:.0f} mm, phi = {math.degrees(phi):.0f} deg)"
+    )
+
+
+def examine_wires(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> tuple[Finding, WirePatch | None]:
+    """Find exchanged wires.
+
+    Args:
+        sensor: as the scene describes it.
+        touched: readings of the touches near A, B, C and D.
+
+    Returns:
+        the finding, and what in the scene would mend it; None where nothing is wrong, or the wires must be moved.
+    """
+    item, rule = f"{sensor.name}, wires", "terminals A, B, C, D carry the electrodes A, B, C, D"
+    wiring, likely, misfit, second = identify(sensor, touched)
+    if wiring is None:
+        value = f"nothing explains the touches clearly (misfit {misfit:.2f}, the next best {second:.2f})"
+        if misfit < _GOOD_MISFIT:
+            value = f"terminals A, B, C, D have the electrodes {likely[0].wires} or {likely[1].wires}: both explain it"
+        remedy = "were the four places touched, firmly? Repeat it; then look for an open wire or a short"
+        return Finding(item, "bad", value, rule, remedy), None
+    wires, turned = wiring
+    if wires == _RIGHT_ORDER and not turned:
+        return Finding(item, "ok", "in order, and the polarity is right", rule), None
+    said = [f"terminal {terminal} has electrode {letter}" for terminal, letter in _moved(wires)]
+    keys = {}
+    if wires == _RADIAL_TURNED:
+        driven = _OTHER_ELECTRODE[sensor.polarity.radial]
+        said = [f"{said[0]}, {said[1]}, or the firmware drives {driven} in place of the other"]
+        keys["radial_positive"] = driven
+    if turned:
+        keys["angular_positive"] = _OTHER_ELECTRODE[sensor.polarity.angular]
+        said.append(
+            f"the firmware drives {keys['angular_positive']}, not {sensor.polarity.angular}, in the angular phase"
+        )
+    value, written = "; ".join(said), " and ".join(f'{key} = "{word}"' for key, word in keys.items())
+    if wires in (_RIGHT_ORDER, _RADIAL_TURNED):
+        remedy = f"write {written} for this sensor" + (", or exchange A and B" if wires != _RIGHT_ORDER else "")
+        return Finding(item, "bad", value, rule, remedy), WirePatch(sensor.name, keys)
+    remedy = "move the wire on terminal " + ", ".join(f"{terminal} to {letter}" for terminal, letter in _moved(wires))
+    return Finding(item, "bad", value, rule, remedy + (f"; then write {written}" if turned else "")), None
+
+
+def _moved(wires: str) -> list[tuple[str, str]]:
+    """Return each terminal that has another electrode than its own, with that electrode."""
+    return [(terminal, letter) for terminal, letter in zip(_RIGHT_ORDER, wires, strict=True) if letter != terminal]

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 from coneskin.commissioning.misreadings import Place, miss
 from coneskin.commissioning.touching import Doubt, Held, Mark, Notice, TouchJudge
 
-from .fit import agreeing
-from .refusals import LEAST_TOUCHES, KnownTouch
+from .fit import MIN_TOUCHES, KnownTouch, agreeing
 
 if TYPE_CHECKING:
     from coneskin.skin.detection.frame.reading import TouchReading
@@ -102,9 +101,9 @@ class TouchSequence(TouchJudge["TouchReading"]):
     def refuse(self) -> list[Notice]:
         """Leave out the mark, unless too few are left."""
         left = self._queue[1:]
-        if len({touch.mark for touch in self.current.touches} | {mark.place for mark in left}) < LEAST_TOUCHES:
+        if len({touch.mark for touch in self.current.touches} | {mark.place for mark in left}) < MIN_TOUCHES:
             name = self.current.sensor.name
-            self.incomplete = f"{name}: fewer than {LEAST_TOUCHES} marks are left, too few for a calibration"
+            self.incomplete = f"{name}: fewer than {MIN_TOUCHES} marks are left, too few for a calibration"
             return [Notice("failed", self.incomplete)]
         return self._next()
 
@@ -160,7 +159,7 @@ class TouchSequence(TouchJudge["TouchReading"]):
 
     def _find_wrong(self, item: SensorTouches) -> list[Mark]:
         touches = [item.touches[number] for number in item.valid]
-        if len(touches) < LEAST_TOUCHES:
+        if len(touches) < MIN_TOUCHES:
             return []
         wrong = {
             touch.mark

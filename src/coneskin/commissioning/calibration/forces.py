@@ -1,23 +1,86 @@
-"""Presses with known forces: the level of each is read once it rests. Pure."""
+"""Known forces: the presses that a person makes with them, and the table that is fitted to the levels. Pure.
+
+The level of each press is read once it rests. The error of the table is that at a place where nobody pressed.
+"""
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.commissioning.touching import Held, Mark, Notice, TouchJudge
-
-from .force_fit import KnownPress
+from coneskin.core.errors import SensorError, SkinError
+from coneskin.skin.calibration import ForceTable
 
 if TYPE_CHECKING:
     from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["ForceSequence", "SensorPresses"]
+__all__ = ["ForceSequence", "KnownPress", "SensorPresses", "fit_forces"]
 
-_GRAVITY = 9.80665  # m/s2
+_MIN_RISE = 2.0  # standard errors by which the next force must raise the level
+_MODEL_ERROR = 0.02  # of the force; no interpolation is better
+
+
+class KnownPress(NamedTuple):
+    """A press with a known force."""
+
+    force: float  #: [N]
+    place: int  #: number of the place
+    level: float  #: mean while it rested
+
+
+def fit_forces(presses: Sequence[KnownPress]) -> ForceTable:
+    """Return the table that presses make, with the error that they have at a place that had no part in it.
+
+    Args:
+        presses: with two forces or more, each at two places or more.
+
+    Raises:
+        SkinError: the level does not rise with the force; the message says from which on.
+    """
+    table = _table(presses)
+    forces = sorted({press.force for press in presses})
+    logs = {f: [_log(p.level) for p in presses if p.force == f] for f in forces}
+    spread = math.sqrt(statistics.fmean([statistics.pvariance(values) for values in logs.values()]))
+    for low, high in pairwise(forces):
+        rise = statistics.fmean(logs[high]) - statistics.fmean(logs[low])
+        if rise < _MIN_RISE * spread * math.sqrt(2.0 / len(logs[high])):
+            raise SkinError(
+                f"{high:g} N hardly give a higher level than {low:g} N, from place to place it differs more: "
+                f"leave out the forces from {high:g} N on"
+            )
+    missed = []
+    for place in sorted({press.place for press in presses}):
+        rest = _table([press for press in presses if press.place != place])
+        for press in presses:
+            if press.place == place:
+                level = min(max(press.level, rest.levels[0]), rest.levels[-1])
+                read = rest.force(level)
+                assert read is not None
+                missed.append(math.log(read[0] / press.force))
+    error = math.hypot(_MODEL_ERROR, math.sqrt(statistics.fmean([value * value for value in missed])))
+    return ForceTable(table.forces, table.levels, round(min(error, 0.99), 4))
+
+
+def _table(presses: Sequence[KnownPress]) -> ForceTable:
+    forces = sorted({press.force for press in presses})
+    strengths = [math.exp(statistics.fmean([_log(p.level) for p in presses if p.force == f])) for f in forces]
+    try:
+        return ForceTable(tuple(forces), tuple(round(s / (1.0 + s), 5) for s in strengths), 0.0)
+    except SensorError as exc:
+        raise SkinError(f"the level does not rise with the force: {exc}") from exc
+
+
+def _log(level: float) -> float:
+    return math.log(level / (1.0 - level))
+
+
+_STANDARD_GRAVITY = 9.80665  # m/s2
 _HOLD_TIME = 0.4  # s for which a level must rest
 _LEVEL_CHANGE = 0.004  # of the level; the change from the first half of them to the second, and its noise
 
@@ -69,7 +132,7 @@ class ForceSequence(TouchJudge["TouchReading"]):
         details = {"number": number, "of": self._total, "sensor": item.sensor.name, "force_n": force}
         text = (
             f"{number} of {self._total}: press {item.sensor.name} with {force:g} N (the weight of "
-            f"{1e3 * force / _GRAVITY:.0f} g), {self.mark.where}"
+            f"{1e3 * force / _STANDARD_GRAVITY:.0f} g), {self.mark.where}"
         )
         return Notice("press", text, details)
 

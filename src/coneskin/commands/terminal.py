@@ -1,21 +1,91 @@
-"""Person at the terminal who touches marks: what is shown meanwhile, and what is typed."""
+"""Terminal of a command: hints, typed lines, signals that end it, and a person who touches marks."""
 
 from __future__ import annotations
 
 import json
 import math
 import queue
+import signal
 import sys
+import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
 from typing import TYPE_CHECKING, Any
-
-from .typed_lines import typed_lines
 
 if TYPE_CHECKING:
     from coneskin.commissioning.touching import Notice
     from coneskin.skin.detection.frame.reading import TouchReading
 
-__all__ = ["LiveReading", "Person"]
+__all__ = ["LiveReading", "Person", "ending_signals", "print_hint", "typed_lines"]
+
+
+def print_hint(text: str) -> None:
+    """Print a line with a command, unless what is pasted would be another one.
+
+    Where the terminal's encoding lacks a letter of a file's name, the letter is written out as an escape; a control
+    character in a name is one, too. No shell reads either as the file, so the line is left out.
+
+    Args:
+        text: the line; its file names are quoted for a shell.
+    """
+    try:
+        text.encode(sys.stdout.encoding or "ascii")
+    except UnicodeEncodeError:
+        return
+    if text.isprintable():
+        print(text, flush=True)
+
+
+def typed_lines() -> queue.SimpleQueue[str]:
+    """Start to read the standard input; return the queue that each of its lines comes to."""
+    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+    def read() -> None:
+        for line in sys.stdin or ():
+            lines.put(line)
+
+    threading.Thread(target=read, name="coneskin terminal", daemon=True).start()
+    return lines
+
+
+_ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@contextmanager
+def ending_signals() -> Iterator[Callable[[], None]]:
+    """Let SIGINT and SIGTERM raise, so that every ``finally`` is run.
+
+    SIGINT raises KeyboardInterrupt, SIGTERM SystemExit with the exit code 143. Some libraries catch every exception
+    where they are imported or called back: the exception is raised again by what is yielded, and at the end.
+
+    Yields:
+        a function that raises if a signal has come, to be called between the steps of the command.
+    """
+    came: list[int] = []
+
+    def look() -> None:
+        if came:
+            raise KeyboardInterrupt if came[0] == signal.SIGINT else SystemExit(128 + came[0])
+
+    def take(number: int, _: FrameType | None) -> None:
+        came.append(number)
+        look()
+
+    if threading.current_thread() is not threading.main_thread():  # others cannot set handlers
+        yield look
+        return
+    before = [(number, signal.signal(number, take)) for number in _ENDING_SIGNALS]
+    try:
+        yield look
+    except Exception:
+        look()  # what a library made of the signal is not the reason
+        raise
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)
+
 
 _LIVE_PERIOD = 0.2  # s between two lines of what is read now
 

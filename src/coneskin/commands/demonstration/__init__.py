@@ -1,1 +1,0 @@
-"""Parts of ``coneskin demo``: its scene, and what it reports."""

@@ -1,1 +1,0 @@
-"""Terminal of a command: a person who answers, lines typed, signals that end it."""
