@@ -6,7 +6,7 @@ from functools import cache
 
 import pytest
 
-from coneskin.commissioning.examination.wires import ORDERS, WIRINGS, TouchReadings, Wiring, identify, touch_places
+from coneskin.commissioning.examination.wires import WIRINGS, TouchReadings, Wiring, identify, touch_places
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
@@ -19,6 +19,7 @@ SENSORS = [
     Sensor(Frustum(0.0376, 0.0372, 0.24)),
     Sensor(Frustum(0.05, 0.09, 0.1, math.radians(120.0))),
 ]
+ORDERS = tuple(dict.fromkeys(wiring.wires for wiring in WIRINGS))
 _ASIDE = {"A": (0.04, -0.05), "B": (-0.03, 0.06), "C": (0.05, 0.02), "D": (-0.06, -0.04)}  # parts a person is off
 
 
