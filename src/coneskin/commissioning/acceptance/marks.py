@@ -201,7 +201,7 @@ def _begins_at_end1(placed: SensorOnArm, q: Sequence[float]) -> bool:
 
 def _from_joint(placed: SensorOnArm, model: ArmModel, u: float) -> float:
     """Return the distance of a place from the axis of the joint at which a tube begins, along the link [m]."""
-    from coneskin.robot.arm.link_frames import dh_mesh
+    from coneskin.robot.arm.kinematics import dh_mesh
 
     mesh: Pose = dh_mesh(model, placed.link_name)
     return mesh.inverse().apply(placed.frustum.centre(u))[2]
