@@ -185,11 +185,10 @@ def proofs() -> dict[str, list[str]]:
 
 
 def proof_table() -> str:
-    """Return the table of the promises and the tests that show them."""
+    """Return the list of the promises, each with the tests that show it."""
     shown = proofs()
-    lines = ["| promise | shown by |", "|---|---|"]
-    lines += [f"| {number} | {'<br>'.join(f'`{test}`' for test in shown.get(number, []))} |" for number in promises()]
-    return "\n".join(lines) + "\n"
+    rows = [f"* {number} {' '.join(f'`{test}`' for test in shown.get(number, []))}" for number in promises()]
+    return "\n".join(rows) + "\n"
 
 
 #: page -> name of a generated part -> what makes it

@@ -24,6 +24,7 @@ def measured(simulated, *options, answer=""):
     )
 
 
+@pytest.mark.promise("P69")
 @pytest.mark.long
 def test_every_assumption_is_measured_and_a_slow_controller_is_found():
     with SimulatedController("UR5e", free_host(), start_delay=0.06) as simulated:

@@ -3,6 +3,8 @@
 import ast
 from pathlib import Path
 
+import pytest
+
 from .test_house import ROOT, sources
 
 _OPENS_A_PORT = {"listen", "create_server", "start_server", "start_unix_server", "bind"}
@@ -23,6 +25,7 @@ _NAMES = {"src/coneskin/session/guard_run.py": {"bind"}}  # a name on this compu
 _PAGES = {"src/coneskin/view/page_server.py": {"bind"}}  # viser listens: of a page to look at, or of the designer's
 
 
+@pytest.mark.promise("P65")
 def test_only_the_simulated_controller_and_the_pages_open_ports() -> None:
     found = {str(path.relative_to(ROOT)): opened for path in sources() if (opened := _calls(path))}
     assert found == {"robot/sim/server.py": {"bind", "listen"}, "robot/sim/process.py": {"bind"}, **_NAMES, **_PAGES}

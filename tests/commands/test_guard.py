@@ -231,6 +231,7 @@ def test_a_guard_that_is_gone_is_noticed_while_it_waits_for_a_reset(command):
     assert said.endswith("coneskin guard: the guard hangs\n")
 
 
+@pytest.mark.promise("P47")
 def test_beside_an_externally_controlled_arm_it_stays_until_the_guard_lives_again(command):
     """A program that ended with its guard would leave a moving arm unguarded."""
     checks = iter([HANGS, KeyboardInterrupt()])
@@ -258,6 +259,7 @@ def interrupts():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.promise("P47")
 @pytest.mark.usefixtures("interrupts")
 def test_a_job_is_done_although_a_person_interrupts_it_twice():
     done = []

@@ -67,6 +67,7 @@ def worst(sensor: Sensor, marks: list[Place], read: list[Place], along: np.ndarr
     return np.maximum.outer(off, np.abs(np.angle(turn)).max(axis=1) / allowed.phi)
 
 
+@pytest.mark.promise("P13")
 @pytest.mark.long
 @settings(max_examples=20, deadline=None)
 @given(sensors, st.floats(0.0, 15.0))

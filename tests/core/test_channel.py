@@ -126,6 +126,7 @@ def test_a_channel_of_a_number_beyond_1023_is_waited_for():
 # ---- a program that does not read, and goes on
 
 
+@pytest.mark.promise("P56")
 def test_no_event_is_lost_and_the_gap_is_told_once():
     sender, reader = ends()
     sender._limit, sender.overflow = 1 << 18, RecordingOverflowFilter()

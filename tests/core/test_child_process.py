@@ -48,6 +48,7 @@ def test_a_child_that_cannot_start_is_said(monkeypatch):
     assert sys.executable == "/nowhere/python"
 
 
+@pytest.mark.promise("P68")
 @pytest.mark.long
 def test_a_child_imports_nothing_from_the_current_folder(tmp_path, monkeypatch):
     for name in ("json", "serial", "socket"):
@@ -112,6 +113,7 @@ def ends_in_time(number):
         os.close(descriptor)
 
 
+@pytest.mark.promise("P49")
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="only Linux has descriptors of processes")
 @pytest.mark.parametrize("said", [b"hold", b"start"])
 def test_a_child_notices_the_end_of_its_parent_though_a_fork_below_python_has_copies(said, tmp_path):

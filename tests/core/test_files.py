@@ -91,6 +91,7 @@ def test_sizes_for_people() -> None:
     assert [format_size(n) for n in (999, 1000, 1_500_000, 10**10)] == ["999 bytes", "1 kB", "1.5 MB", "10 GB"]
 
 
+@pytest.mark.promise("P66")
 def test_every_door_refuses_it(wrong: tuple[Path, str], tmp_path: Path) -> None:
     """A scene, a sensor file, a recording, a mesh and a URDF."""
     path, words = wrong

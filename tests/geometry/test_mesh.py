@@ -321,6 +321,7 @@ def test_an_xml_text_that_defines_entities_is_refused(tmp_path: Path, encoding: 
             load_mesh(tmp_path / name) if name.endswith("dae") else urdf_links(tmp_path / name)
 
 
+@pytest.mark.promise("P66")
 def test_no_file_that_a_mesh_names_is_opened(tmp_path: Path) -> None:
     """An OBJ may name a file of materials, and that one pictures: a pipe there would never be ready."""
     path = write_obj(tmp_path / "tube.obj", TUBE)

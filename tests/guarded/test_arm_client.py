@@ -116,6 +116,7 @@ def is_let_go(session):
     return names[-1] == "touch_ended"
 
 
+@pytest.mark.promise("P05")
 def test_a_touch_in_the_middle_of_each_kind_of_motion_ends_in_a_measured_standstill(controller, session):
     for name, motion in MOTIONS.items():
         before = controller.state()["q"]
@@ -172,6 +173,7 @@ STREAMS = {
 }
 
 
+@pytest.mark.promise("P51")
 def test_a_program_that_falls_silent_does_not_move_its_arm_on(controller, session):
     began = len(session.events)
     for name, command in STREAMS.items():
@@ -184,6 +186,7 @@ def test_a_program_that_falls_silent_does_not_move_its_arm_on(controller, sessio
     assert sum("no new speed or servo command" in what for what in said) == len(STREAMS)
 
 
+@pytest.mark.promise("P06")
 def test_a_touch_while_a_path_is_taken_stops_it_as_soon_as_it_moves(controller, session):
     before = controller.state()["q"]
     thread, raised = drive(MOTIONS["joint path"], session.arm)

@@ -87,6 +87,7 @@ def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tm
     assert replay(run).same
 
 
+@pytest.mark.promise("P42")
 def test_the_guard_killed_the_driver_stops_the_arm(controller, tmp_path):
     path = tmp_path / "run.rec"
     with guard(scene_for(controller), recording=path) as session:
@@ -98,6 +99,7 @@ def test_the_guard_killed_the_driver_stops_the_arm(controller, tmp_path):
     assert replay(read_run(path)).agrees  # up to the last that it sent
 
 
+@pytest.mark.promise("P39")
 @pytest.mark.long
 def test_the_driver_killed_the_guard_stops_the_arm(controller):
     with guard(scene_for(controller)) as session:
@@ -110,6 +112,7 @@ def test_the_driver_killed_the_guard_stops_the_arm(controller):
         assert "the driver process has ended" in latched.details["why"]
 
 
+@pytest.mark.promise("P39")
 @pytest.mark.long
 def test_the_driver_frozen_another_way_stops_the_arm(controller):
     with guard(scene_for(controller)) as session:
@@ -123,6 +126,7 @@ def test_the_driver_frozen_another_way_stops_the_arm(controller):
         kill(session, "driver", signal.SIGKILL)
 
 
+@pytest.mark.promise("P44")
 @pytest.mark.long
 def test_guard_and_driver_dead_the_controller_stops_itself(controller):
     """Nobody is left to send a stop: the watchdog that the driver has set ends the program."""
@@ -136,6 +140,7 @@ def test_guard_and_driver_dead_the_controller_stops_itself(controller):
         assert isinstance(raised[0], RobotRefused | RobotConnectionError)
 
 
+@pytest.mark.promise("P08")
 @pytest.mark.long
 def test_the_skin_unplugged_stops_the_arm(controller):
     with guard(scene_for(controller)) as session:
@@ -170,6 +175,7 @@ def test_a_controller_that_stays_frozen_is_told_as_an_arm_that_nobody_saw_stand(
         assert_stopped_on_the_way(controller)
 
 
+@pytest.mark.promise("P49")
 @pytest.mark.long
 def test_the_program_killed_the_arm_stops(controller, tmp_path):
     """Program and supervisor in one process, killed with SIGKILL: guard and driver see their channels end."""
@@ -188,6 +194,7 @@ def test_the_program_killed_the_arm_stops(controller, tmp_path):
     assert_stopped_on_the_way(controller)
 
 
+@pytest.mark.promise("P17")
 @pytest.mark.long
 def test_a_protective_stop_is_never_unlocked(controller):
     with guard(scene_for(controller)) as session:

@@ -16,6 +16,7 @@ def controller():
         yield simulated
 
 
+@pytest.mark.promise("P12")
 @pytest.mark.long
 @pytest.mark.parametrize("known", [False, True], ids=["without a record", "commissioned"])
 def test_only_a_commissioned_arm_may_move_away(controller, known, tmp_path):

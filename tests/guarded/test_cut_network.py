@@ -30,6 +30,7 @@ def controller():
         yield simulated
 
 
+@pytest.mark.promise("P54")
 @pytest.mark.long
 def test_a_program_with_the_lines_ends_when_the_network_is_cut(controller):
     with guard(scene_for(controller, REQUIRED, "external")) as session:
@@ -75,6 +76,7 @@ def test_a_motion_that_ur_rtde_sends_with_the_lines_ends_when_the_network_is_cut
             user.kill()
 
 
+@pytest.mark.promise("P54")
 @pytest.mark.long
 def test_a_program_without_the_lines_is_stopped_where_they_are_required(controller):
     with guard(scene_for(controller, REQUIRED, "external")) as session:
@@ -92,6 +94,7 @@ def test_beside_a_program_without_the_lines_the_guard_does_not_become_active(con
         guard(scene_for(controller, REQUIRED, "external"), start_timeout=8.0).__enter__()
 
 
+@pytest.mark.promise("P54")
 @pytest.mark.long
 def test_without_the_lines_it_is_said_where_they_are_not_required(controller):
     with guard(scene_for(controller, PATIENT, "external")) as session:

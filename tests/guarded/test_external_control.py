@@ -130,6 +130,7 @@ def run(controller):
         program.end()
 
 
+@pytest.mark.promise("P25")
 @pytest.mark.parametrize(
     "name",
     [
@@ -180,6 +181,7 @@ def test_it_gives_way_to_a_push(controller, run):
         assert session.wait_for(("latched",), 5.0) is not None
 
 
+@pytest.mark.promise("P43")
 @pytest.mark.long
 @pytest.mark.parametrize("gone", [("guard",), ("guard", "watchdog")])
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
@@ -224,6 +226,7 @@ def test_a_program_that_moves_a_latched_arm_is_stopped_again(controller, run):
         until(lambda: fast(controller))
 
 
+@pytest.mark.promise("P42")
 @pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_without_its_guard_the_watchdog_stops_the_arm(controller, run, number):
@@ -240,6 +243,7 @@ def test_without_its_guard_the_watchdog_stops_the_arm(controller, run, number):
         assert not any(controller.state()["qd"])
 
 
+@pytest.mark.promise("P45")
 @pytest.mark.parametrize("number", sweep([signal.SIGKILL, signal.SIGSTOP]))
 def test_without_both_the_guarding_program_stops_the_arm(controller, run, number):
     with guard(external(controller)) as session:
@@ -265,6 +269,7 @@ def test_without_its_watchdog_the_guard_stops_the_arm_and_does_not_arm_again(con
             session.reset()
 
 
+@pytest.mark.promise("P24")
 @pytest.mark.long
 @pytest.mark.parametrize(("fault", "left"), [("close scripts", "command"), ("close dashboard", "program")])
 def test_a_way_to_stop_that_is_gone_stops_the_arm_by_another(controller, run, fault, left):
@@ -279,6 +284,7 @@ def test_a_way_to_stop_that_is_gone_stops_the_arm_by_another(controller, run, fa
             session.reset()
 
 
+@pytest.mark.promise("P24")
 @pytest.mark.long
 def test_with_all_connections_gone_at_once_the_watchdog_opens_new_ones(controller, run):
     with guard(external(controller, {"[arm]": "[arm]\nslider_stop = false"})) as session:

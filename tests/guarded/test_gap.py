@@ -25,6 +25,7 @@ def with_a_gap(whole, cut, since, until):
         recorder.write(*blocks)
 
 
+@pytest.mark.promise("P56")
 @pytest.mark.parametrize("since", [1000.3, 1000.7])  # before and within the touch at 0.6 s
 def test_it_is_compared_up_to_the_gap_and_says_where_that_is(tmp_path, capsys, since):
     happened = record(tmp_path / "whole.rec")

@@ -85,6 +85,7 @@ def test_comply_gives_way_and_latches_when_the_push_ends(controller):
 # ---- a latched arm stays where it is
 
 
+@pytest.mark.promise("P19")
 @pytest.mark.long
 @pytest.mark.parametrize("revive", [True, False])
 def test_the_arm_never_starts_by_itself_when_the_control_program_starts_again(controller, revive):
@@ -125,6 +126,7 @@ def test_after_a_stop_by_another_way_a_person_lets_it_move_again(controller):
 # ---- processes
 
 
+@pytest.mark.promise("P53")
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["guard", "driver"])
 def test_sigterm_stops_the_arm(controller, name):
@@ -136,6 +138,7 @@ def test_sigterm_stops_the_arm(controller, name):
         assert_stopped_on_the_way(controller)
 
 
+@pytest.mark.promise("P42")
 def test_a_guard_that_hangs_is_missed_by_the_driver(controller):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
@@ -147,6 +150,7 @@ def test_a_guard_that_hangs_is_missed_by_the_driver(controller):
         assert session.wait_for(("latched",), 10.0) is not None
 
 
+@pytest.mark.promise("P59")
 @pytest.mark.long
 @pytest.mark.parametrize("control", ["internal", "external"])
 def test_after_a_suspension_of_all_processes_the_arm_is_stopped_at_once_and_latched(controller, tmp_path, control):
@@ -182,6 +186,7 @@ def test_after_a_suspension_of_all_processes_the_arm_is_stopped_at_once_and_latc
             program.kill()
 
 
+@pytest.mark.promise("P60")
 @pytest.mark.long
 @pytest.mark.parametrize("first", ["internal", "external"])
 def test_a_second_session_on_one_arm_is_refused_and_the_first_goes_on(controller, first):
@@ -210,6 +215,7 @@ def test_a_driver_that_hangs_does_not_let_the_guard_arm(controller, monkeypatch)
         guard(scene_for(controller), start_timeout=3.0).__enter__()
 
 
+@pytest.mark.promise("P61")
 @pytest.mark.long
 def test_a_controller_that_dies_while_the_guard_arms_is_a_refusal(controller):
     scene = scene_for(controller, {"[monitoring]": "[monitoring]\nsettle_ms = 1500"})
@@ -229,6 +235,7 @@ def test_a_controller_that_dies_while_the_guard_arms_is_a_refusal(controller):
 # ---- connections
 
 
+@pytest.mark.promise("P18")
 @pytest.mark.long
 def test_rtde_closed_while_the_dashboard_is_up(controller):
     """ur_rtde then uploads its program again and again, with the old command in the register, until it crashes."""
@@ -246,6 +253,7 @@ def test_rtde_closed_while_the_dashboard_is_up(controller):
             session.reset()
 
 
+@pytest.mark.promise("P24")
 @pytest.mark.long
 @pytest.mark.parametrize("fault", ["close dashboard", "close scripts"])
 def test_a_way_to_stop_that_is_gone_stops_the_arm(controller, fault):
@@ -261,6 +269,7 @@ def test_a_way_to_stop_that_is_gone_stops_the_arm(controller, fault):
 # ---- the recording
 
 
+@pytest.mark.promise("P55")
 @pytest.mark.long
 def test_a_full_disk_ends_the_recording_and_nothing_else(controller, tmp_path):
     """The system refuses to make the file longer, as a full disk would."""

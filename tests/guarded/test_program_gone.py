@@ -85,6 +85,7 @@ def lives(number):
         return False
 
 
+@pytest.mark.promise("P49")
 @pytest.mark.parametrize("fork", [FORK, FORK_BELOW_PYTHON])
 def test_a_program_that_has_forked_and_is_killed_stops_its_arm(controller, tmp_path, fork):
     """A worker of multiprocessing lives on with copies of all that was open; below Python nothing closes them."""
@@ -96,6 +97,7 @@ def test_a_program_that_has_forked_and_is_killed_stops_its_arm(controller, tmp_p
         until(lambda: not any(map(lives, program.children)), 10.0)
 
 
+@pytest.mark.promise("P50")
 @pytest.mark.parametrize("control", ["internal", "external"])
 def test_a_program_that_is_frozen_stops_its_arm_and_hears_why(controller, tmp_path, control):
     changes = PATIENT if control == "external" else None
@@ -111,6 +113,7 @@ def test_a_program_that_is_frozen_stops_its_arm_and_hears_why(controller, tmp_pa
         assert "the program that guards: no heartbeat for 500 ms" in program.process.stdout.readline()
 
 
+@pytest.mark.promise("P51")
 def test_a_program_whose_main_thread_hangs_moves_its_arm_no_longer_than_it_said(controller):
     with guard(scene_for(controller)) as session:
         begun = controller.state()["q"][0]
@@ -124,6 +127,7 @@ def test_a_program_whose_main_thread_hangs_moves_its_arm_no_longer_than_it_said(
         until(lambda: controller.state()["qd"][0] < -0.2)
 
 
+@pytest.mark.promise("P41")
 def test_a_frozen_driver_is_not_armed_and_does_not_do_later_what_was_asked(controller):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
@@ -169,6 +173,7 @@ def test_a_frozen_driver_that_nobody_needs_now_is_a_fault(controller):
         kill(session, "driver", signal.SIGCONT)
 
 
+@pytest.mark.promise("P40")
 def test_a_frozen_watchdog_is_a_fault_and_the_arm_is_not_armed_without_it(controller):
     with guard(scene_for(controller, PATIENT, "external")) as session:
         send(controller.host, 30002, RAW)
@@ -182,6 +187,7 @@ def test_a_frozen_watchdog_is_a_fault_and_the_arm_is_not_armed_without_it(contro
         kill(session, "watchdog", signal.SIGCONT)
 
 
+@pytest.mark.promise("P49")
 def test_no_process_outlives_a_killed_program_whose_controller_cannot_be_reached(controller, tmp_path):
     """``ur_rtde`` would wait for the answer to its stop: for a minute, or for five."""
     with Program(tmp_path, scene_text(controller.host), MOVE) as program:
@@ -193,6 +199,7 @@ def test_no_process_outlives_a_killed_program_whose_controller_cannot_be_reached
     controller.wait_for_standstill()  # the controller's own watchdog
 
 
+@pytest.mark.promise("P62")
 def test_lines_typed_before_a_collision_reset_nothing(controller, tmp_path):
     """Each would have let the arm go on one millisecond after a collision."""
     touches = "".join(
@@ -237,6 +244,7 @@ def test_a_program_with_more_than_1024_descriptors_guards_as_well(controller, tm
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
+@pytest.mark.promise("P52")
 def test_a_blocking_on_event_delays_neither_the_fallback_stop_nor_the_recording(controller, tmp_path):
     free = threading.Event()
     seen = []

@@ -19,6 +19,7 @@ from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E
 SLOWLY = {"distance_mm = 30": "distance_mm = 90\nspeed_mm_s = 40"}
 
 
+@pytest.mark.promise("P32")
 @pytest.mark.long
 def test_a_force_beside_the_skin_ends_the_retreat(tmp_path):
     path = tmp_path / "run.rec"

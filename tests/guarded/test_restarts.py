@@ -82,6 +82,7 @@ def assert_the_program_hears_that_it_stands(session):
         session.check()
 
 
+@pytest.mark.promise("P26")
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("code", "wait"),
@@ -98,6 +99,7 @@ def test_a_program_that_starts_again_at_once_is_stopped_for_good(controller, run
         assert_it_stays(controller)
 
 
+@pytest.mark.promise("P21")
 @pytest.mark.long
 @pytest.mark.parametrize("code", [pytest.param(LOOP, id="loop", marks=WHEEL), pytest.param(RESEND, id="resend")])
 def test_with_only_the_data_connection_left_the_slider_stops_it(controller, run, code):

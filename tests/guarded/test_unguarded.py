@@ -53,6 +53,7 @@ def reset(session):
     return True
 
 
+@pytest.mark.promise("P46")
 @pytest.mark.long
 @pytest.mark.parametrize("gone", [("guard",), ("watchdog", "guard")])
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
@@ -77,6 +78,7 @@ def test_a_program_that_starts_again_without_a_guard_is_stopped_again(controller
             kill(session, name, signal.SIGCONT)
 
 
+@pytest.mark.promise("P46")
 @pytest.mark.long
 def test_a_guard_that_has_hung_guards_again_and_is_missed_again(controller):
     with guard(external(controller)) as session:
@@ -155,6 +157,7 @@ class Ports:
             sock.close()
 
 
+@pytest.mark.promise("P45")
 @pytest.mark.parametrize("numbers", [(30003, 29999), (30003, 29999, 30004), (30003,), (29999,)])
 def test_a_stop_goes_out_by_whatever_port_opens(numbers):
     host = free_host()

@@ -59,6 +59,7 @@ def test_without_a_record_it_says_what_to_do(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.promise("P12")
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -104,6 +105,7 @@ def test_what_the_places_do_not_depend_on_keeps_it_valid(old: str, new: str, tmp
     assert known(scene_in(tmp_path, text)).valid
 
 
+@pytest.mark.promise("P58")
 def test_it_ages_where_the_scene_says_so(tmp_path: Path) -> None:
     scene = scene_in(tmp_path, SERIAL_RETREAT + "[commissioning]\nmax_age_days = 30\n")
     write_passed_record(scene)
@@ -174,6 +176,7 @@ def test_a_scene_that_only_stops_is_not_looked_at(tmp_path: Path) -> None:
     assert with_commissioning(alone, 0.0) is alone
 
 
+@pytest.mark.promise("P12")
 def test_the_check_lists_it(tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
     said = summarize(with_commissioning(scene, 0.0))["commissioning"]
@@ -186,6 +189,7 @@ RULE = '[[reaction.rule]]\nlevel_above = 0.2\nkind = "comply"\nfallback = "path"
 STOP_WITH_RULE = VIRTUAL_RETREAT.replace('kind = "retreat"', 'kind = "stop"') + RULE
 
 
+@pytest.mark.promise("P12")
 @pytest.mark.parametrize("text", [VIRTUAL_RETREAT, STOP_WITH_RULE], ids=["retreat", "a rule that complies"])
 def test_without_a_record_the_arm_only_stops_and_says_so(text: str, tmp_path: Path) -> None:
     scene = scene_in(tmp_path, text)

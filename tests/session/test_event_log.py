@@ -208,6 +208,7 @@ def test_every_event_comes_in_order_and_the_rest_at_the_end():
     delivery.close()
 
 
+@pytest.mark.promise("P52")
 def test_a_function_that_blocks_delays_nobody_and_is_told_what_it_has_missed(caplog):
     free, took, seen = threading.Event(), threading.Event(), []
 

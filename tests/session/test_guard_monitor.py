@@ -93,6 +93,7 @@ def fallback_stops(log, count):
     return stops
 
 
+@pytest.mark.promise("P42")
 def test_each_time_that_a_guard_hangs_it_is_missed_anew(channel, monkeypatch):
     monkeypatch.setattr("coneskin.session.guard_monitor._SESSION_HEARTBEAT_TIMEOUT", 0.01)
     ours, theirs = channel

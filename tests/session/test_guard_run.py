@@ -10,6 +10,7 @@ from coneskin.session.guard_run import ArmLock
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names of sockets that need no file")
 
 
+@pytest.mark.promise("P60")
 def test_a_second_guard_of_one_arm_is_refused_and_two_names_are_one_arm():
     now = [0.0]
 

@@ -70,6 +70,7 @@ def test_a_right_skin_passes() -> None:
     assert all(result.passed and result.distance_mm == 0.0 for result in item.results)
 
 
+@pytest.mark.promise("P13")
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda item: item.cause[:40])
 def test_each_wrong_wiring_fails_with_its_cause(wrong) -> None:
     sensor = scene().sensors[0].sensor

@@ -109,6 +109,7 @@ def towards_base(q):
     return ContactOnLink(4, (0.0, 0.0, 0.0), pose.inverse().rotate((x / size, y / size, 0.0)))
 
 
+@pytest.mark.promise("P35")
 def test_a_retreat_that_would_fold_the_arm_into_itself_ends_before():
     q, reaction = FOLDED, Reaction(kind="retreat", distance=0.5, time_budget=20.0)
     for space in (None, SPACE):

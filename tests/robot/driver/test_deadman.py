@@ -51,6 +51,7 @@ def test_it_beats_while_the_process_gets_on_and_no_longer(deadman, ends, now):
     assert ends[1].receive() == []
 
 
+@pytest.mark.promise("P49")
 @pytest.mark.parametrize("side", [1, 3])
 def test_when_a_channel_has_ended_the_process_does_within_its_last_while(deadman, ends, now, ended, side):
     ends[side].send(b"not read yet")
@@ -73,6 +74,7 @@ def test_a_process_that_is_about_to_end_does(deadman, now, ended):
     assert ended
 
 
+@pytest.mark.promise("P49")
 @pytest.mark.long
 @pytest.mark.parametrize("keeps_lock", [True, False])
 def test_a_process_that_a_library_has_frozen_ends_all_the_same(keeps_lock):

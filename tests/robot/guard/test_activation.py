@@ -9,6 +9,7 @@ from coneskin.robot.reaction.types import Reaction
 from tests.support.guard_rig import GuardRig, touch
 
 
+@pytest.mark.promise("P61")
 def test_nothing_moves_before_everything_is_sound():
     rig = GuardRig(touch(0.0, 0.3), speed=1.0)  # touched from the start
     rig.run(0.29)
@@ -20,6 +21,7 @@ def test_nothing_moves_before_everything_is_sound():
     assert [type(o) for o in rig.outputs if not isinstance(o, GuardEvent)] == [Release]
 
 
+@pytest.mark.promise("P61")
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
@@ -71,6 +73,7 @@ def test_a_reset_again_and_again_arms_no_later():
     assert rig.core.phase is Phase.ACTIVE
 
 
+@pytest.mark.promise("P63")
 def test_a_touch_while_a_reset_settles_refuses_it():
     rig = reset(touch(1.52, 1.8)).run(2.0)
     assert rig.core.phase is Phase.LATCHED
@@ -89,6 +92,7 @@ def test_a_fault_while_a_reset_settles_refuses_it_for_good():
     assert rig.core.phase is Phase.LATCHED  # sound again, but nobody has reset it since
 
 
+@pytest.mark.promise("P63")
 def test_an_arm_that_moves_while_a_reset_settles_is_stopped():
     rig = reset()
     rig.run(0.02)

@@ -58,6 +58,7 @@ def test_a_latched_arm_that_a_program_moves_is_stopped_again(external):
     assert max(map(abs, rig.arm.qd)) < 0.01
 
 
+@pytest.mark.promise("P22")
 def test_an_externally_controlled_arm_is_latched_at_the_end_of_a_watch():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), external=True, speed=1.0).run(1.2)
     standing = rig.event("standstill").time
@@ -84,6 +85,7 @@ def test_a_program_that_starts_during_the_watch_and_does_not_move_yet_lengthens_
     assert rig.core.phase is Phase.LATCHED
 
 
+@pytest.mark.promise("P27")
 def test_programs_that_start_again_and_again_without_a_motion_end_in_a_protective_stop():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), external=True, speed=1.0).run(0.8)
     for _ in range(3):
@@ -123,6 +125,7 @@ def test_while_it_is_touched_the_first_program_that_starts_again_gets_a_protecti
     assert rig.core.phase is Phase.LATCHED  # the controller shows it
 
 
+@pytest.mark.promise("P27")
 def test_a_protective_stop_that_never_shows_is_said():
     obeys = frozenset(StopPath) - {StopPath.PROTECTIVE}
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), external=True, speed=1.0, obeys=obeys).run(0.8)
@@ -133,6 +136,7 @@ def test_a_protective_stop_that_never_shows_is_said():
     assert "does not show the protective stop" in rig.event("latched").details["why"]
 
 
+@pytest.mark.promise("P29")
 def test_a_slider_at_0_is_put_back_by_a_reset_and_by_nothing_else():
     obeys = frozenset({StopPath.SLIDER})
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), external=True, speed=1.0, obeys=obeys)
@@ -152,6 +156,7 @@ def test_a_slider_at_0_is_put_back_by_a_reset_and_by_nothing_else():
     assert [output for output in rig.outputs if isinstance(output, SetSpeedSlider)] == [SetSpeedSlider(0.6)]
 
 
+@pytest.mark.promise("P26")
 @pytest.mark.parametrize("anew", [False, True])
 def test_a_touched_arm_that_creeps_is_stopped_after_two_millimetres_however_often_the_program_starts(anew):
     rig = GuardRig(touch(0.5), reaction=Reaction(kind="stop"), external=True).run(1.5)
@@ -167,6 +172,7 @@ def test_a_touched_arm_that_creeps_is_stopped_after_two_millimetres_however_ofte
     assert abs(rig.arm.q[0] - at) < 0.004  # it was 0.06 rad, and without end where it starts anew
 
 
+@pytest.mark.promise("P28")
 def test_a_person_may_jog_a_latched_arm():
     rig = GuardRig(touch(0.5), reaction=Reaction(kind="stop"), external=True).run(1.5)
     rig.arm.runtime_state = 1
@@ -187,6 +193,7 @@ def late_burst(rig, seconds):
     return skin, states
 
 
+@pytest.mark.promise("P23")
 def test_states_that_waited_are_no_reason_for_another_way():
     """A touch is read after 40 ms without the processor; 20 states from before the stop are read after it."""
     rig = GuardRig(touch(0.5, 0.7), speed=1.0).run(0.49)

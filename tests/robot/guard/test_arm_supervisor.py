@@ -53,6 +53,7 @@ def test_a_controller_that_repeats_itself_is_silent():
     assert StopPath.PROTECTIVE in rig.arm.commands
 
 
+@pytest.mark.promise("P58")
 def test_the_wall_clock_is_no_part_of_it(monkeypatch):
     """Nothing in the guard asks for the time of day: a clock that jumps by a year changes nothing."""
     import time

@@ -26,6 +26,7 @@ def stopping_time(rig, since):
 # ---- silence
 
 
+@pytest.mark.promise("P50")
 @BOTH
 def test_a_program_that_is_frozen_stops_its_arm_within_200_ms(external):
     rig = GuardRig(speed=1.0, external=external).run(0.5)
@@ -44,6 +45,7 @@ def test_a_program_that_is_frozen_stops_its_arm_within_200_ms(external):
     assert rig.core.phase is Phase.ACTIVE
 
 
+@pytest.mark.promise("P40")
 @BOTH
 def test_a_frozen_process_is_a_fault_although_nobody_needs_it_and_another_path_stops_the_arm(external):
     rig = GuardRig(speed=1.0, external=external, obeys=frozenset({StopPath.PROGRAM})).run(0.5)
@@ -72,6 +74,7 @@ def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
     assert monitor.silent(1.66) == {}
 
 
+@pytest.mark.promise("P48")
 def test_a_guard_that_is_held_up_again_and_again_notices_silence():
     """Held up for 30 ms after each 3 ms it took 1.3 s, and a frozen program's arm moved on by 64 deg."""
     monitor = HeartbeatMonitor({"it": 0.15})
@@ -97,6 +100,7 @@ def test_what_has_never_been_heard_is_a_blocker():
 # ---- releases
 
 
+@pytest.mark.promise("P64")
 @BOTH
 def test_it_is_active_only_after_the_acknowledgement(external):
     rig = GuardRig(external=external)
@@ -132,6 +136,7 @@ def test_a_release_that_nobody_acknowledges_is_taken_back_and_its_late_answer_co
     assert rig.names.count("activated") == 1
 
 
+@pytest.mark.promise("P40")
 def test_a_reset_while_the_driver_hangs_is_refused_with_its_name():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
     rig.companions.process_is_mute = True
@@ -145,6 +150,7 @@ def test_a_reset_while_the_driver_hangs_is_refused_with_its_name():
 # ---- resets
 
 
+@pytest.mark.promise("P62")
 def test_a_reset_of_another_stop_than_the_newest_forgives_nothing():
     rig = GuardRig(touch(0.5, 0.7), touch(2.5, 2.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
     rig.reset()
@@ -196,6 +202,7 @@ def names_the_right_one(seed):
     return right and abs(contact.details["u"] - places[1]["u"]) < 0.01
 
 
+@pytest.mark.promise("P04")
 @pytest.mark.parametrize("seeds", sweep([range(8), range(8, 70)]))
 def test_the_touch_that_stopped_is_named_in_each_of_70_runs(seeds):
     assert all(map(names_the_right_one, seeds))
@@ -208,6 +215,7 @@ def report(rig, kind):
     rig.feed(BlockKind.DRIVER, StatusReport(kind).encode())
 
 
+@pytest.mark.promise("P20")
 def test_the_driver_s_program_may_end_where_that_was_announced_and_for_no_longer_than_5_s():
     rig = GuardRig(speed=0.0).run(0.5)
     report(rig, "restarts")
@@ -250,6 +258,7 @@ def test_a_restart_that_was_refused_leaves_the_next_one_its_time():
     assert rig.core.phase is Phase.LATCHED
 
 
+@pytest.mark.promise("P20")
 def test_the_driver_s_program_that_ends_unannounced_is_a_fault():
     rig = GuardRig(speed=0.0).run(0.5)
     report(rig, "restarts")

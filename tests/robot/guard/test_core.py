@@ -21,6 +21,7 @@ from tests.support.guard_rig import GuardRig, make_core, touch
 from tests.support.sweep import sweep
 
 
+@pytest.mark.promise("P01")
 def test_a_touch_stops_the_arm_in_the_same_frame_and_it_retreats_along_the_normal():
     wide = Reaction(kind="retreat", arm_distance=0.5)
     rig = GuardRig(touch(0.5, 0.9), reaction=wide, speed=1.0).run(0.45)
@@ -53,6 +54,7 @@ def test_reaction_stop_does_not_move_the_arm_back():
     assert not any(isinstance(output, SetJointVelocity) for output in rig.outputs)
 
 
+@pytest.mark.promise("P08")
 @pytest.mark.parametrize(
     ("faults", "words"),
     [
@@ -75,6 +77,7 @@ def test_every_fault_of_the_skin_stops_and_latches(faults, words):
     assert not any(isinstance(output, SetJointVelocity) for output in rig.outputs)  # a fault is no reason to move
 
 
+@pytest.mark.promise("P14")
 def test_a_silent_controller_is_a_fault_and_every_way_is_tried():
     rig = GuardRig(speed=1.0).run(0.5)
     rig.mute_arm = True
@@ -88,6 +91,7 @@ def test_a_silent_controller_is_a_fault_and_every_way_is_tried():
     assert "has sent no state for 50 ms" in rig.event("stopping").details["why"]
 
 
+@pytest.mark.promise("P21")
 @pytest.mark.parametrize("works", [StopPath.PROGRAM, StopPath.COMMAND, StopPath.PROTECTIVE])
 def test_a_stop_that_does_not_show_is_followed_by_the_next_way(works):
     rig = GuardRig(touch(0.5), obeys=frozenset([works]), speed=0.0)
@@ -102,6 +106,7 @@ def test_a_stop_that_does_not_show_is_followed_by_the_next_way(works):
     assert not any(isinstance(output, SetJointVelocity) for output in rig.outputs)
 
 
+@pytest.mark.promise("P21")
 def test_an_arm_that_nothing_stops_is_never_called_standing():
     rig = GuardRig(touch(0.5), obeys=frozenset(), speed=0.0)
     rig.run(0.3)
@@ -123,6 +128,7 @@ def test_a_dead_driver_is_not_waited_for():
     assert rig.arm.commands[-1] is StopPath.PROGRAM
 
 
+@pytest.mark.promise("P17")
 @pytest.mark.parametrize("loss", [{"safety_bits": 0b100}, {"robot_mode": 5}])
 def test_nothing_moves_away_once_the_controller_has_stopped_the_arm(loss):
     """Its own stop is seen in the very state in which the arm stands, or while the arm already moves away."""
@@ -159,6 +165,7 @@ def test_a_stop_names_its_touch_and_has_a_number():
     assert [details["number"] for details in contacts] == [1, 2]
 
 
+@pytest.mark.promise("P17")
 def test_a_protective_stop_of_the_controller_latches():
     rig = GuardRig(speed=1.0).run(0.5)
     rig.arm.safety_bits = 0b100
@@ -180,6 +187,7 @@ def test_a_fault_during_the_retreat_ends_it():
     assert "retreated" not in rig.names
 
 
+@pytest.mark.promise("P36")
 def test_clamped_from_two_sides_it_only_stops():
     opposite = touch(0.51, sensor="two", phi=1.57 + math.pi)
     rig = GuardRig(touch(0.5), opposite, sensors=2, speed=1.0).run(1.5)
@@ -188,6 +196,7 @@ def test_clamped_from_two_sides_it_only_stops():
     assert "touches on opposite sides" in rig.event("latched").details["why"]
 
 
+@pytest.mark.promise("P14")
 def test_a_latched_arm_that_nobody_sees_is_stopped_until_it_is_seen_to_stand():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
     rig.mute_arm = True
@@ -233,6 +242,7 @@ def test_a_guard_that_was_suspended_stops_the_arm_and_latches_though_every_clock
     assert "did nothing for a while" in rig.event("latched").details["why"]
 
 
+@pytest.mark.promise("P14")
 def test_a_state_that_is_no_number_is_no_standstill():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0, obeys=frozenset()).run(0.502)
     rig.arm.qd[1] = math.nan
@@ -252,6 +262,7 @@ def test_a_controller_whose_time_is_no_number_is_silent():
     assert StopPath.PROTECTIVE in rig.arm.commands
 
 
+@pytest.mark.promise("P16")
 def test_an_arm_without_power_is_a_fault():
     rig = GuardRig(speed=1.0).run(0.5)
     rig.arm.robot_mode = 3
@@ -259,6 +270,7 @@ def test_an_arm_without_power_is_a_fault():
     assert "not powered" in rig.event("stopping").details["why"]
 
 
+@pytest.mark.promise("P39")
 def test_an_error_of_the_driver_stops():
     rig = GuardRig(speed=1.0).run(0.5)
     rig.feed(BlockKind.DRIVER, StatusReport("error", "moveJ was refused").encode())

@@ -3,6 +3,7 @@
 import math
 import struct
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,6 +14,7 @@ from coneskin.robot.reaction.types import Reaction
 from tests.support.guard_rig import GuardRig, touch
 
 
+@pytest.mark.promise("P57")
 @given(st.lists(st.tuples(st.floats(0.0, 30.0), st.sampled_from("ab")), max_size=60))
 def test_every_event_is_put_out_or_counted(gaps):
     folding, out, now = EventFolding(), [], 0.0
@@ -26,6 +28,7 @@ def test_every_event_is_put_out_or_counted(gaps):
         assert sum(e.details.get("count", 1) for e in out if e.details["what"] == about) == came
 
 
+@pytest.mark.promise("P57")
 def test_a_loose_plug_of_a_night_is_a_hundred_lines():
     folding, out = EventFolding(), []
     for n in range(14 * 3600):  # an hour

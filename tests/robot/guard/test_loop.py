@@ -70,6 +70,7 @@ def test_a_program_that_has_gone_does_not_stop_the_clock(ends):
     loop._close()
 
 
+@pytest.mark.promise("P59")
 @pytest.mark.parametrize("asleep", [False, True])
 def test_a_guard_that_was_suspended_says_so_to_its_core_before_anything_else(ends, asleep):
     """While a computer sleeps, its monotonic clock may stand still, and with it every silence that is measured."""

@@ -60,6 +60,7 @@ def test_a_retreat_from_one_hand_is_made():
     assert event(rig, "retreated").details["complete"] is True
 
 
+@pytest.mark.promise("P31")
 @pytest.mark.long  # three collisions and their bare stops take a second or two
 @pytest.mark.parametrize("answer", ["stop", "back", "comply"])
 @pytest.mark.parametrize("distance", [0.06, 0.3])
@@ -80,6 +81,7 @@ class LaggingRig(CollisionRig):
         super()._step()
 
 
+@pytest.mark.promise("P31")
 @pytest.mark.parametrize("kind", ["retreat", "comply"])
 def test_what_is_seen_too_late_ends_a_motion_away_whatever_the_scene_permits(kind):
     """Up to 9.8 mm farther into a second hand before, where frames came up to 0.25 s late."""
@@ -93,6 +95,7 @@ def test_what_is_seen_too_late_ends_a_motion_away_whatever_the_scene_permits(kin
     assert excess(rig, *bodies) < 0.005
 
 
+@pytest.mark.promise("P31")
 @pytest.mark.parametrize("force", [5.0, 20.0, 100.0])
 def test_a_press_that_grows_ends_the_retreat(force):
     press = replace(HAND, push=2.0, grow_to=force, grow_time=0.3, push_speed=0.4, hardest=200.0)

@@ -40,6 +40,7 @@ def refusals(rig: GuardRig) -> list[str]:
     return [reason for event in rig.events if event.name == "refused" for reason in event.details["reasons"]]
 
 
+@pytest.mark.promise("P09")
 def test_the_same_device_is_guarded_again_after_a_reset_and_not_before():
     rig = unplugged()
     rig.replug(a_skin())
@@ -64,6 +65,7 @@ def test_a_reset_at_once_is_refused_until_the_sensor_is_ready_anew():
     assert rig.core.phase is Phase.LATCHED
 
 
+@pytest.mark.promise("P09")
 @pytest.mark.parametrize(("device", "sensor"), [(7, 0), pytest.param(0, 3, marks=pytest.mark.long)])
 def test_another_device_is_refused_by_name_until_the_right_one_is_there(device, sensor):
     rig = unplugged()
@@ -101,6 +103,7 @@ def test_a_port_that_is_open_and_silent_or_touched_does_not_count():
     assert rig.core.phase is Phase.LATCHED
 
 
+@pytest.mark.promise("P09")
 @pytest.mark.long
 def test_before_the_arm_is_latched_an_open_port_changes_nothing():
     rig = GuardRig(speed=1.0, reaction=Reaction()).run(0.5)
@@ -227,6 +230,7 @@ def test_a_loop_that_ends_stops_the_attempts(session):
     assert attempts[0].stopped
 
 
+@pytest.mark.promise("P09")
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
 def test_a_real_port_that_comes_back_is_read_again(session, tmp_path: Path):
     from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal

@@ -20,6 +20,7 @@ SLOW = Reaction("slow", time_budget=5.0)
 FOREARM = ContactOnLink(3, (0.2, 0.0, 0.05), (0.0, 0.0, 1.0), 0.8, True, 0.1, 1)
 
 
+@pytest.mark.promise("P07")
 @pytest.mark.parametrize("heeds", [True, False])
 def test_an_arm_that_moves_into_the_touch_is_stopped_as_by_a_stop(heeds):
     """587 mm before, where the slider was not heeded and the joints were slower than 0.25 rad/s."""
@@ -38,6 +39,7 @@ def test_what_moves_into_the_touch_slowly_may_do_so_by_a_little():
     assert stop.time > slow.time + 0.02
 
 
+@pytest.mark.promise("P07")
 def test_a_slow_arm_that_something_holds_is_stopped():
     """A wall that stops the surface lets the setpoints go on: 540 N more than by a stop (bench `collision`, 514)."""
     rig = GuardRig(touch(0.5, 5.0, phi=(PHI + math.pi) % (2.0 * math.pi)), reaction=SLOW, speed=0.3).run(0.7)
@@ -58,6 +60,7 @@ def test_an_arm_that_recedes_from_the_touch_goes_on():
     assert "resumed" in rig.names
 
 
+@pytest.mark.promise("P03")
 def test_level_rules_see_a_press_that_grows_slowly():
     """Events come in steps of a tenth of the level: from 2 N, 0.81, to 200 N, 0.91, there is none."""
     firm = Rule(Reaction("stop"), level_above=0.82)

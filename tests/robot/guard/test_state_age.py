@@ -80,6 +80,7 @@ def setpoints(rig):
     return sum(isinstance(output, SetJointVelocity) for output in rig.outputs)
 
 
+@pytest.mark.promise("P15")
 def test_states_that_come_later_and_later_are_a_fault_and_the_arm_stands():
     rig = QueuedRig(speed=0.3).run(0.5).fill(0.08).run(1.0)
     (stop,) = [event for event in rig.events if event.name == "stopping"]  # once, though they stay late
@@ -103,6 +104,7 @@ def test_a_lag_within_what_a_silence_may_last_is_no_fault():
     assert rig.run(1.5).core.phase is Phase.LATCHED
 
 
+@pytest.mark.promise("P15")
 def test_no_arm_moves_away_by_states_that_are_late():
     rig = QueuedRig(touch(1.2, 1.5), reaction=RETREAT, speed=0.3, limits=PATIENT).run(0.5).fill(0.1).run(2.0)
     assert rig.core.phase is Phase.LATCHED
@@ -110,6 +112,7 @@ def test_no_arm_moves_away_by_states_that_are_late():
     assert setpoints(rig) == 0
 
 
+@pytest.mark.promise("P15")
 def test_a_motion_away_ends_where_states_become_late():
     rig = QueuedRig(touch(0.5, 0.8), reaction=RETREAT, speed=0.3, limits=PATIENT).run(0.5)
     while "retreating" not in rig.names:

@@ -97,6 +97,7 @@ speeds = st.tuples(*[st.floats(-0.8, 0.8)] * 3, *[st.just(0.0)] * 3)
 normals = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.3)
 
 
+@pytest.mark.promise("P36")
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 @given(speeds, st.lists(st.tuples(st.sampled_from((2, 3)), normals), min_size=2, max_size=2))
 def test_the_way_out_of_a_clamp_leads_into_no_touch(qd, touches):

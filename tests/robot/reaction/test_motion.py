@@ -122,6 +122,7 @@ def test_no_push_no_motion_and_the_end_of_the_push_is_the_end():
     assert over.reason == "the touch is over"
 
 
+@pytest.mark.promise("P31")
 def test_a_push_whose_place_is_not_known_holds_the_arm():
     start = begin_admittance(ARM, ArmState(0.0, Q), Reaction(kind="comply"))
     lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
@@ -131,6 +132,7 @@ def test_a_push_whose_place_is_not_known_holds_the_arm():
     assert after.plan is None
 
 
+@pytest.mark.promise("P38")
 def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_where_a_push_ends():
     """In a grip, giving way to one hand met the other, and braked into that with 4 rad/s2."""
     reaction = Reaction(kind="comply", acceleration=4.0, deceleration=12.0)
@@ -219,6 +221,7 @@ def test_a_joint_at_its_limit_ends_the_way_back():
 # ---- the table
 
 
+@pytest.mark.promise("P35")
 @pytest.mark.long
 @given(bent, normals, st.floats(-0.5, 0.8))
 @settings(max_examples=20)

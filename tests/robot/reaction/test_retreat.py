@@ -48,6 +48,7 @@ def states(draw: st.DrawFn) -> tuple[ArmModel, Joints, Joints, list[ContactOnLin
     return arm, six(angles), six(speeds), contacts, reaction
 
 
+@pytest.mark.promise("P33")
 @settings(max_examples=100)
 @given(states(), st.floats(0.0, 1.9))
 def test_a_step_keeps_all_limits_and_never_moves_towards_an_obstacle(
@@ -195,6 +196,7 @@ def test_with_the_joint_that_it_needs_at_its_limit_it_stands() -> None:
     assert "at its limit" in plan.reason
 
 
+@pytest.mark.promise("P33")
 def test_a_retreat_into_a_joint_limit_stays_within_it() -> None:
     """Runs that begin close before a limit, in whichever direction they go."""
     source = random.Random(6)

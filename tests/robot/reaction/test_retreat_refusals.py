@@ -85,6 +85,7 @@ def test_touches_on_two_links_are_both_left() -> None:
         assert normal @ rows @ np.array(step.qd) < -0.005
 
 
+@pytest.mark.promise("P02")
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -110,6 +111,7 @@ def test_an_arm_that_reports_nonsense_is_not_moved(bad: float) -> None:
     assert isinstance(planned(UR10E, (bad, *Q[1:]), [FOREARM]), Done)
 
 
+@pytest.mark.promise("P33")
 def test_the_time_ends_it() -> None:
     plan = planned(UR10E, Q, [FOREARM], Reaction(kind="retreat", time_budget=1.0))
     assert isinstance(plan, RetreatPlan)

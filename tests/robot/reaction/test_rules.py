@@ -53,6 +53,7 @@ def test_of_several_touches_the_hardest_counts(listed, default, touched, speed):
     assert {one.kind for one in each} <= every.kinds | {default.kind}
 
 
+@pytest.mark.promise("P03")
 @given(st.lists(rules, max_size=6), reactions, touches, touches, speeds)
 def test_another_touch_never_makes_it_gentler(listed, default, some, more, speed):
     every = RuleSet(default, tuple(listed))

@@ -58,6 +58,7 @@ def retreat(model: ArmModel, q: Joints, contact: ContactOnLink, reaction: Reacti
     return way, speed, plan.reason
 
 
+@pytest.mark.promise("P34")
 @pytest.mark.parametrize("name", ["UR3e", "UR5e", "UR10e", "UR30"])
 def test_no_point_of_the_arm_goes_farther_or_faster_than_allowed(name: str) -> None:
     model, draw = arm_model(name), random.Random(name)

@@ -147,6 +147,7 @@ def test_a_program_is_stopped_again_and_a_person_is_left_alone(world):
     assert world.speed == 0.5
 
 
+@pytest.mark.promise("P46")
 def test_without_states_stops_are_repeated_and_with_them_it_sees_again(world):
     world.obeys = (StopPath.PROGRAM,)
     hold = StandstillHold(stopper(world), MonitoringLimits().standstill, world.clock)

@@ -81,6 +81,7 @@ def stubborn(seconds=2.0, restart=0.0, paths=ALL, obeys=frozenset(StopPath)):
     return stop, named, None
 
 
+@pytest.mark.promise("P27")
 def test_a_program_that_starts_again_and_again_ends_in_a_protective_stop():
     _, named, ended = stubborn()
     assert named[-1][1] is StopPath.PROTECTIVE
@@ -128,6 +129,7 @@ def test_a_way_that_is_lost_in_a_later_round_is_not_waited_for():
     assert stop.next_paths(now) == [StopPath.SLIDER]
 
 
+@pytest.mark.promise("P21")
 def test_a_stop_is_tried_again_and_again_while_the_arm_moves():
     stop = monitor(paths=EXTERNAL_PATHS)
     named = []
@@ -148,6 +150,7 @@ def test_without_any_measurement_every_way_is_tried():
     assert stop.standing_at is None
 
 
+@pytest.mark.promise("P22")
 def test_a_passing_zero_is_no_standstill():
     stop = monitor()
     for k in range(50):

@@ -134,6 +134,7 @@ def test_a_silent_guard_counts_as_dead(driver, now):
     assert answers(program)[0]["stopped"] is True  # alive again is not enough: the guard has to clear it
 
 
+@pytest.mark.promise("P43")
 def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(driver, now):
     served, made, guard, _ = driver
     for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0)):

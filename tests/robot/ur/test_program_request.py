@@ -69,6 +69,7 @@ def test_a_request_from_later_holds_no_longer_than_one_from_now(driver, now, sen
     assert "speedStop" in stops(made._program.control)
 
 
+@pytest.mark.promise("P41")
 def test_a_request_that_has_waited_for_long_is_void_and_says_its_number(driver, now):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
@@ -83,6 +84,7 @@ def test_a_request_that_has_waited_for_long_is_void_and_says_its_number(driver, 
     assert stops(made._program.control) == ["stopJ"]
 
 
+@pytest.mark.promise("P51")
 @pytest.mark.parametrize(
     ("request_", "start", "stop"),
     [

@@ -65,6 +65,7 @@ def test_speeds_of_another_movement_move_nothing(bench, left):
     assert bench.controller.runtime.name == "STOPPED"
 
 
+@pytest.mark.promise("P43")
 def test_silence_ends_it_by_the_watchdog(bench):
     bench.write(JointVelocitySetpoint(3, QD, 2.0))
     bench.send(program_text(SetpointProgram(3, 10.0, 4.0)))

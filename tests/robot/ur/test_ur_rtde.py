@@ -9,6 +9,7 @@ from coneskin.robot.ur.ur_rtde import Mode, rtde_errors
 from .fake_wheel import arm, stops
 
 
+@pytest.mark.promise("P21")
 @pytest.mark.parametrize(
     ("start", "stop"),
     [

@@ -74,6 +74,7 @@ def _replay_mutated(bases: list[list[Block]], path: Path, seed: int) -> None:
     assert not said.getvalue() or said.getvalue().startswith("coneskin replay: ")
 
 
+@pytest.mark.promise("P66")
 def test_nothing_that_a_header_names_is_opened(tmp_path: Path) -> None:
     record(tmp_path / "run.rec", SKIN_ONLY)
     (tmp_path / "canary.toml").write_text("radius1_mm = 54\nradius2_mm = 54\nheight_mm = 434\n")
@@ -112,6 +113,7 @@ def test_a_recording_carries_the_mesh_that_it_was_made_with(tmp_path: Path) -> N
         place_on_arm(recorded, {})
 
 
+@pytest.mark.promise("P67")
 @pytest.mark.skipif(os.name != "posix", reason="permissions of files are POSIX's")
 def test_a_recording_is_for_its_owner_alone(tmp_path: Path) -> None:
     record(tmp_path / "run.rec", SKIN_ONLY)

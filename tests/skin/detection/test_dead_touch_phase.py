@@ -75,6 +75,7 @@ def test_a_dead_touch_phase_hides_no_touch(name, stuck):
     assert missed(Sensor(SENSORS[name]), stuck, 60, random.Random(1)) == []
 
 
+@pytest.mark.promise("P10")
 @pytest.mark.long
 @pytest.mark.parametrize("name", SENSORS)
 def test_a_dead_touch_phase_hides_no_touch_anywhere(name):

@@ -36,6 +36,7 @@ ONE_FAULT = {
 }
 
 
+@pytest.mark.promise("P08")
 @pytest.mark.parametrize("name", ONE_FAULT)
 def test_every_fault_of_the_twin_is_noticed_and_never_looks_untouched(name):
     faults, expected = ONE_FAULT[name]

@@ -188,6 +188,7 @@ def test_what_is_broken_is_named_touched_or_not(wiring, polarity):
     assert found.name in names
 
 
+@pytest.mark.promise("P10")
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("rail", ["ground", "supply", "rail"])
 @pytest.mark.parametrize("electrode", "ABCD")

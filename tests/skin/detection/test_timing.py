@@ -92,6 +92,7 @@ def first_fault(
     return None
 
 
+@pytest.mark.promise("P11")
 @pytest.mark.parametrize("ratio", [1e-4, -1e-4, 0.0])
 def test_a_lag_that_creeps_becomes_late(ratio):
     found = first_fault(ratio, 0.9e-3, 120.0)
@@ -102,6 +103,7 @@ def test_a_lag_that_creeps_becomes_late(ratio):
     assert found[0] * 0.9e-3 < 0.067  # so late is a touch at most
 
 
+@pytest.mark.promise("P11")
 @pytest.mark.long
 @pytest.mark.parametrize("ratio", [1e-4, -1e-4])
 def test_crystals_are_neither_late_nor_fast_in_ten_hours(ratio):

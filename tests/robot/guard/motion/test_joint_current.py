@@ -61,6 +61,7 @@ def resisted(how, joint=1, current=3.0):
     return rig.run(1.0), math.dist(place, rig.point())
 
 
+@pytest.mark.promise("P32")
 @pytest.mark.parametrize("how", ["stop", "back", "comply"])
 def test_a_retreat_that_a_force_resists_beside_the_skin_ends_at_once(how):
     rig, way = resisted(how)

@@ -19,6 +19,7 @@ def progress(before, after, normal):
     return sum((b - a) * -n for a, b, n in zip(before, after, normal, strict=True))
 
 
+@pytest.mark.promise("P01")
 @pytest.mark.parametrize("external", [False, True])
 def test_it_gives_way_while_it_is_pushed_and_stops_with_the_push(external):
     rig = GuardRig(touch(0.5, 1.0), reaction=comply(), speed=1.0, external=external).run(0.7)
@@ -62,6 +63,7 @@ def test_a_slow_arm_waits_at_standstill_for_the_place_of_the_touch():
     assert rig.event("retreated").details["progress"] > 0.01
 
 
+@pytest.mark.promise("P02")
 def test_it_waits_for_no_longer_where_the_place_stays_uncertain():
     both = (touch(0.5, phi=0.5), touch(0.5, phi=5.5))
     rig = GuardRig(*both, reaction=Reaction(kind="retreat"), speed=0.05, bits=12).run(1.5)
@@ -71,6 +73,7 @@ def test_it_waits_for_no_longer_where_the_place_stays_uncertain():
     assert not any(isinstance(command, SetJointVelocity) for command in rig.arm.commands)
 
 
+@pytest.mark.promise("P02")
 def test_an_arm_that_moves_while_it_waits_is_stopped():
     both = (touch(0.5, phi=0.5), touch(0.5, phi=5.5))
     rig = GuardRig(*both, reaction=Reaction(kind="retreat"), speed=0.05, bits=12).run(0.55)
@@ -116,6 +119,7 @@ def test_a_program_that_does_not_start_is_not_waited_for():
     assert rig.event("retreated").details["complete"] is False
 
 
+@pytest.mark.promise("P30")
 @pytest.mark.parametrize("external", [False, True])
 def test_an_arm_that_something_else_moves_is_not_left_to_it(external):
     """A person starts a program while the arm moves away: it replaces ours."""
@@ -172,6 +176,7 @@ def clamped(**settings):
     return GuardRig(touch(0.5), opposite, sensors=2, speed=1.0, **settings)
 
 
+@pytest.mark.promise("P37")
 def test_back_along_the_path_only_where_the_scene_asks_and_nothing_is_pressed():
     assert "retreating" not in clamped().run(1.5).names
     pressed = clamped(reaction=Reaction(kind="retreat", fallback="path")).run(1.5)  # one of the two is in the way
@@ -198,6 +203,7 @@ def test_back_along_the_path_where_the_place_is_not_known():
     assert was[0] + 0.05 + 0.012 - back.arm.q[0] == pytest.approx(0.079 / reach(MODEL)[0], abs=0.01)
 
 
+@pytest.mark.promise("P37")
 def test_an_arm_that_stood_does_not_go_back():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="retreat", fallback="path"), table=TablePlane(2.0)).run(1.5)
     assert "the arm stood when it was touched" in rig.event("latched").details["why"]

@@ -20,6 +20,7 @@ from tests.support.sweep import sweep
 from ..reactions import SLOW
 
 
+@pytest.mark.promise("P01")
 def test_slow_while_it_is_touched_then_as_before():
     rig = GuardRig(touch(0.5, 0.8), reaction=SLOW, speed=1.0).run(0.45)
     assert rig.arm.qd[0] == pytest.approx(1.0)
@@ -44,6 +45,7 @@ def test_a_slider_that_was_low_already_is_not_raised():
     assert [command.fraction for command in rig.arm.commands if isinstance(command, SetSpeedSlider)] == [0.15, 0.15]
 
 
+@pytest.mark.promise("P07")
 def test_an_arm_that_does_not_become_slower_is_stopped():
     rig = GuardRig(touch(0.5, 0.9), reaction=SLOW, speed=1.0)
     rig.arm.heeds = False
@@ -55,6 +57,7 @@ def test_an_arm_that_does_not_become_slower_is_stopped():
     assert rig.arm.commands[-1] == SetSpeedSlider(1.0)  # where it was before
 
 
+@pytest.mark.promise("P07")
 def test_a_touch_that_lasts_too_long_stops():
     rig = GuardRig(touch(0.5), reaction=SLOW, speed=1.0).run(2.0)
     assert rig.core.phase is Phase.LATCHED

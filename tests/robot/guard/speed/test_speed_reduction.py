@@ -38,6 +38,7 @@ def test_trouble_where_it_becomes_faster_again():
     assert one.trouble(10.5, 0.2) == "the arm did not become slower"
 
 
+@pytest.mark.promise("P07")
 def test_trouble_where_somebody_raises_the_slider_while_it_is_touched():
     one = slowing(speed=0.2)
     one.touched(10.0, True)

@@ -140,6 +140,7 @@ def test_a_certain_place_stays_certain_while_nothing_changes():
         assert all(valid[valid.index(True) :])
 
 
+@pytest.mark.promise("P02")
 @pytest.mark.parametrize("kind", ["over the seam", "grip", "clamp", "fingers"])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_certain_place_is_never_far_from_a_contact(shape, kind):
