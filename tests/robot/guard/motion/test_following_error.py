@@ -1,5 +1,7 @@
 """The monitor of a motion of ours: what ends it at once, what after a while, and what it lets pass."""
 
+import pytest
+
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.motion.reaction_motion import FollowingErrorMonitor
 from coneskin.robot.reaction.types import JointVelocity
@@ -17,11 +19,13 @@ def commanded(speed=0.2, acceleration=4.0):
     return monitor
 
 
+@pytest.mark.promise("P30")
 def test_five_millimetres_towards_the_touch_end_it_at_once():
     assert not commanded().exceeded(moving(0.002, 0.2), -0.0049)
     assert commanded().exceeded(moving(0.002, 0.2), -0.0051)
 
 
+@pytest.mark.promise("P30")
 def test_a_faster_motion_than_any_command_ends_it_after_five_samples():
     monitor = commanded()
     found = [monitor.exceeded(moving(0.002 * k, 0.31), 0.0) for k in range(1, 7)]
