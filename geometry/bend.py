@@ -27,9 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Bend", "BentStrip", "RulingFrame", "bends_between", "check_bends", "frames_along"]
 
-_TURN = 2.0 * math.pi
-_SLACK = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
-_NARROWEST = 1e-9  # rad; what is left of a bend that is cut is at least so wide
+_WRAP_ROUNDING = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
+_MIN_BEND_WIDTH = 1e-9  # rad; what is left of a bend that is cut is at least so wide
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +53,10 @@ def check_bends(bends: Sequence[Bend], wrap: float) -> None:
     for bend in bends:
         if not (math.isfinite(bend.width) and bend.width > 0.0 and math.isfinite(bend.turn)):
             raise GeometryError(f"a bend needs a width above 0 rad and a finite turn, got {bend}")
-        if abs(bend.turn) > _TURN:
+        if abs(bend.turn) > math.tau:
             raise GeometryError(f"a bend turns by a full turn (2 pi rad) at most, got {bend.turn!r} rad")
     width = math.fsum(bend.width for bend in bends)
-    if abs(width - wrap) > _SLACK:
+    if abs(width - wrap) > _WRAP_ROUNDING:
         raise GeometryError(
             f"the widths of the bends must add up to the wrap of {math.degrees(wrap):.6g} deg, they are "
             f"{math.degrees(width):.6g} deg"
@@ -77,18 +76,18 @@ def bends_between(bends: Sequence[Bend], phi1: float, phi2: float, around: bool 
     wrap = math.fsum(bend.width for bend in bends)
     beyond = phi2 - wrap
     if around:
-        bends = tuple(bends) * max(1, math.ceil(phi2 / wrap - _NARROWEST))
-    elif beyond > _NARROWEST:
+        bends = tuple(bends) * max(1, math.ceil(phi2 / wrap - _MIN_BEND_WIDTH))
+    elif beyond > _MIN_BEND_WIDTH:
         bends = (*bends, Bend(beyond, bends[-1].turn * beyond / bends[-1].width))
     for bend in bends:
         low, high = max(begin, phi1), min(begin + bend.width, phi2)
-        if high - low > _NARROWEST:
+        if high - low > _MIN_BEND_WIDTH:
             parts.append(Bend(high - low, bend.turn * (high - low) / bend.width))
         begin += bend.width
     return tuple(parts)
 
 
-_STRAIGHT = 1e-9  # rad; a strip that turns by less has its nearest foot by the formula of a plane
+_STRAIGHT_TURN = 1e-9  # rad; a strip that turns by less has its nearest foot by the formula of a plane
 
 
 class RulingFrame(NamedTuple):
@@ -151,10 +150,10 @@ class BentStrip:
         # the foot is where the arc's tangent is square to the way to the point: tan(angle) = omega qT / (1 - qV)
         rest = 1.0 + k * qn + g * qu
         omega = math.hypot(g, k)
-        if omega * self.arc > _STRAIGHT:
+        if omega * self.arc > _STRAIGHT_TURN:
             angle = np.arctan2(omega * qt, rest)
             middle = 0.5 * omega * self.arc
-            along = (angle - _TURN * np.round((angle - middle) / _TURN)) / omega
+            along = (angle - math.tau * np.round((angle - middle) / math.tau)) / omega
         else:
             along = qt / np.where(np.abs(rest) > 1e-12, rest, 1e-12)
         along = np.clip(along, low, high)

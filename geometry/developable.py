@@ -32,9 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Developable"]
 
-_TURN = 2.0 * math.pi
 _AT_EDGE = 1e-9  # rad; a foot so close to an edge may lie beyond it
-_OPEN = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer
+_MAX_OPENING = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +101,7 @@ class Developable:
     @property
     def closed(self) -> bool:
         """True where phi goes all around, so that phi and phi + 2 pi are one ruling."""
-        return self.frustum.wrap == _TURN
+        return self.frustum.wrap == math.tau
 
     @property
     def closing_gap(self) -> tuple[float, float]:
@@ -125,8 +124,8 @@ class Developable:
         if not self.closed:
             return
         gap, angle = self.closing_gap
-        around = _TURN * self.frustum.radius1
-        if gap > _OPEN * around or angle > _TURN * _OPEN or not 0.0 < self.turn < 1.5 * _TURN:
+        around = math.tau * self.frustum.radius1
+        if gap > _MAX_OPENING * around or angle > math.tau * _MAX_OPENING or not 0.0 < self.turn < 1.5 * math.tau:
             raise GeometryError(
                 f"the bends of a full wrap must close: they turn by {math.degrees(self.turn):.6g} deg in all (360 deg "
                 f"around a tube, above 0 outwards), and leave {1e3 * gap:.3g} mm and {math.degrees(angle):.3g} deg open"
@@ -145,7 +144,7 @@ class Developable:
     def _ruling(self, phi: float) -> RulingFrame:
         """Return the ruling at an azimuth [rad]; beyond the edges the outer strips continue."""
         if self.closed:
-            phi %= _TURN
+            phi %= math.tau
         number = max(0, bisect.bisect_right(self._starts, phi) - 1)
         strip, bend = self._strips[number], self.bends[number]
         return self._frame(number, (phi - self._starts[number]) * strip.arc / bend.width)
@@ -184,7 +183,7 @@ class Developable:
 
         phi = np.asarray(phi, float)
         if self.closed:
-            phi = phi % _TURN
+            phi = phi % math.tau
         number = np.clip(np.searchsorted(self._starts, phi, side="right") - 1, 0, None)
         share = np.array([strip.arc / bend.width for strip, bend in zip(self._strips, self.bends, strict=True)])
         at, way, normal = frames_along(self._strips, number, (phi - np.array(self._starts)[number]) * share[number])
@@ -238,7 +237,7 @@ class Developable:
     def azimuth_above(self, height: float, phi: float) -> float:
         """Return the azimuth [rad] on the parallel side at a height [m] of the ruling that has the azimuth phi here."""
         middle = self._middle
-        turns, left = divmod(phi, _TURN) if self.closed else (0.0, phi)
+        turns, left = divmod(phi, math.tau) if self.closed else (0.0, phi)
         arc = 0.0
         for number, bend in enumerate(self.bends):
             width = left if number == len(self.bends) - 1 else min(left, bend.width)
@@ -246,7 +245,7 @@ class Developable:
             left -= width
             if left <= 0.0:
                 break
-        return turns * _TURN + arc / (middle + height * self.growth)
+        return turns * math.tau + arc / (middle + height * self.growth)
 
     def mismatch(self, height: float) -> float:
         """Return how far the parallel side at a height [m] is from being a sector, in arc at end 1 or 2 [m]."""
@@ -267,8 +266,8 @@ class Developable:
         """
         if not self.closed:
             raise GeometryError("only a full wrap can be turned: a partial one has edges where it ends")
-        turn %= _TURN
-        bends = bends_between(self.bends, turn, turn + _TURN, around=True)
+        turn %= math.tau
+        bends = bends_between(self.bends, turn, turn + math.tau, around=True)
         return Developable(self.frustum, bends, self.lift), self._frame_at(0.0, turn)
 
     def _frame_at(self, u: float, phi: float) -> Pose:

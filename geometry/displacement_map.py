@@ -27,8 +27,7 @@ __all__ = ["DisplacementMap", "heights_by_ray", "measure_displacement"]
 
 Floats = NDArray[np.float64]
 
-TURN = 2.0 * math.pi
-_CHUNK = 16384  # points computed at a time, so that the intermediate arrays stay in the cache
+_CHUNK_POINTS = 16384  # points computed at a time, so that the intermediate arrays stay in the cache
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +54,7 @@ class DisplacementMap:
         heights = frozen(self.heights, (None, None), "heights")
         if min(heights.shape) < 2:
             raise GeometryError(f"heights must have at least 2 rows and 2 columns, got {heights.shape}")
-        if self.placed.frustum.wrap == TURN and not np.array_equal(heights[:, 0], heights[:, -1]):
+        if self.placed.frustum.wrap == math.tau and not np.array_equal(heights[:, 0], heights[:, -1]):
             raise GeometryError("heights of a full wrap must end with the column they begin with")
         object.__setattr__(self, "heights", heights)
         compiled = _compiled if type(self.placed) is PlacedFrustum else _bent
@@ -77,8 +76,8 @@ class DisplacementMap:
         f = self.placed.frustum
         rows, columns = self.heights.shape
         u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
-        if f.wrap == TURN:
-            phi = phi - TURN * np.floor(phi / TURN)
+        if f.wrap == math.tau:
+            phi = phi - math.tau * np.floor(phi / math.tau)
         x = np.clip(u * ((rows - 1) / f.slant), 0.0, rows - 1)
         y = np.clip(phi * ((columns - 1) / f.wrap), 0.0, columns - 1)
         i = np.minimum(x.astype(np.int32), rows - 2)
@@ -105,8 +104,8 @@ class DisplacementMap:
         sa, ca = f.sin_half_angle, f.cos_half_angle
         turn, shift = np.array(pose.rotation).T, np.array(pose.translation)
         result = np.empty((len(us), 3))
-        for start in range(0, len(us), _CHUNK):
-            part = slice(start, start + _CHUNK)
+        for start in range(0, len(us), _CHUNK_POINTS):
+            part = slice(start, start + _CHUNK_POINTS)
             u_part, phi_part = us[part], phis[part]
             height = self.height(u_part, phi_part)
             rho = f.radius1 + u_part * sa + height * ca
@@ -120,7 +119,7 @@ def _heights(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[flo
     f = placed.frustum
     last_row, last_column = len(heights) - 2, len(heights[0]) - 2
     per_u, per_phi = (last_row + 1) / f.slant, (last_column + 1) / f.wrap
-    full = f.wrap == TURN
+    full = f.wrap == math.tau
 
     def height(u: float, phi: float) -> float:
         y = phi * per_phi
@@ -201,7 +200,7 @@ def measure_displacement(
     if not limit > 0.0:
         raise GeometryError(f"limit must be above 0 m, got {limit!r}")
     f = placed.frustum
-    full = f.wrap == TURN
+    full = f.wrap == math.tau
     u = np.linspace(0.0, f.slant, along + 1)
     phi = np.linspace(0.0, f.wrap, around + 1)[: around if full else around + 1]
     # A mesh may end at the rim itself, so the rays of the nodes there start slightly inside.

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Frustum"]
 
-_TURN = 2.0 * math.pi
-
 
 @dataclass(frozen=True, slots=True)
 class Frustum:
@@ -43,7 +41,7 @@ class Frustum:
     radius1: float
     radius2: float
     height: float
-    wrap: float = _TURN
+    wrap: float = math.tau
 
     def __post_init__(self) -> None:
         for name in ("radius1", "radius2", "height"):
@@ -51,7 +49,7 @@ class Frustum:
             if not (math.isfinite(value) and value >= 0.0):
                 raise GeometryError(f"{name} must be finite and not negative, got {value!r} m")
             object.__setattr__(self, name, float(value))
-        if not 0.0 < self.wrap <= _TURN:
+        if not 0.0 < self.wrap <= math.tau:
             raise GeometryError(f"wrap must be above 0 and at most a full turn (2 pi rad), got {self.wrap!r} rad")
         object.__setattr__(self, "wrap", float(self.wrap))
         if self.radius1 == self.radius2 == 0.0:
@@ -172,7 +170,7 @@ class Frustum:
     @staticmethod
     def _branch(angle: float, span: float) -> float:
         """Return the angle [rad], moved by whole turns, that lies within half a turn of span / 2."""
-        return angle - _TURN * round((angle - 0.5 * span) / _TURN)
+        return angle - math.tau * round((angle - 0.5 * span) / math.tau)
 
     def points(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
         """Return the points of the side for arrays u [m] and phi [rad] that broadcast: shape (..., 3) [m]."""

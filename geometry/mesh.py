@@ -55,7 +55,7 @@ TO_Z_UP = {
     "Z_UP": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
 }
 
-_DEEPEST = 3  # elements within each other down to the unit: COLLADA, asset, unit
+_MAX_UNIT_DEPTH = 3  # elements within each other down to the unit: COLLADA, asset, unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ def read_collada_asset(path: Path, data: bytes) -> ColladaAsset:
                 continue
             # a tool's own unit may stand in an extra inside, and parts of the document have assets of their own
             inside = (
-                within[1:] if len(within) <= _DEEPEST else []
+                within[1:] if len(within) <= _MAX_UNIT_DEPTH else []
             )  # a deep document would be copied at each of its ends
             within.pop()
             if inside == ["asset", "unit"]:

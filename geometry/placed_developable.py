@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PlacedDevelopable"]
 
-_NORMALS = 360  # by which the middle of a section is found
+_NORMAL_COUNT = 360  # by which the middle of a section is found
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ class PlacedDevelopable(PlacedFrustum):
         """
         import numpy as np
 
-        phi = (np.arange(_NORMALS) + 0.5) * self.frustum.wrap / _NORMALS
+        phi = (np.arange(_NORMAL_COUNT) + 0.5) * self.frustum.wrap / _NORMAL_COUNT
         base, way, normal = self._side.rulings(phi)
         along = way.sum(axis=0) / np.linalg.norm(way.sum(axis=0))
         level = normal - np.outer(normal @ along, along)

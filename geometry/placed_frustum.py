@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PlacedFrustum", "double_cone"]
 
-_STRAIGHT = 1e-6  # m
+_STRAIGHT_DISTANCE = 1e-6  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class PlacedFrustum:
     @property
     def is_straight(self) -> bool:
         """True where the radii differ by less than a micrometre: no mesh and no cutter knows it from a cylinder."""
-        return abs(self.frustum.radius2 - self.frustum.radius1) < _STRAIGHT
+        return abs(self.frustum.radius2 - self.frustum.radius1) < _STRAIGHT_DISTANCE
 
     @property
     def kind(self) -> str:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .mesh import Mesh
 
-__all__ = ["GridRayCaster", "RayCaster"]
+__all__ = ["RayCaster"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -17,7 +17,7 @@ class RayCaster:
     """A caster of rays at one mesh.
 
     Embree (the package embreex) is used where it is installed. It works in float32, so it only finds the face and the
-    depth is taken from the plane of that face. Without it ``GridRayCaster`` finds the face, 10 to 50 times slower.
+    depth is taken from the plane of that face. Without it ``_GridRayCaster`` finds the face, 10 to 50 times slower.
 
     Attributes:
         engine: "embree" or "grid".
@@ -26,7 +26,7 @@ class RayCaster:
     def __init__(self, mesh: Mesh, engine: str | None = None) -> None:
         found = mesh.embree_intersector() if engine in (None, "embree") else None
         self.engine = "embree" if found else "grid"
-        self._first_faces = found or GridRayCaster(mesh).first_faces
+        self._first_faces = found or _GridRayCaster(mesh).first_faces
         normals = mesh.normals_and_areas()[0]
         # a coordinate at a time: numpy is slow with arrays of three columns
         self._normals = tuple(np.ascontiguousarray(column) for column in normals.T)
@@ -55,7 +55,7 @@ class RayCaster:
         return distance, face
 
 
-class GridRayCaster:
+class _GridRayCaster:
     """A caster of rays through a grid of cells; each ray tests the faces of the cells that it passes."""
 
     def __init__(self, mesh: Mesh, cells: int = 48) -> None:

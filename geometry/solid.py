@@ -60,7 +60,7 @@ def without_undercut(radius: Floats, phi: Floats) -> Floats:
 
 Indices = NDArray[np.int64]
 
-_WELD = 1e-7  # m; corners nearer to each other are one
+_WELD_DISTANCE = 1e-7  # m; corners nearer to each other are one
 _STL_FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -121,7 +121,7 @@ def shell_surface(inner: ArrayLike, outer: ArrayLike) -> ClosedSurface:
         low_out, high_out = loop[2 * rows - 1 - steps], loop[2 * rows - 2 - steps]
         faces += [np.stack([low, high, high_out], -1)[:, ::order], np.stack([low, high_out, low_out], -1)[:, ::order]]
     corners = loops.reshape(-1, 3)
-    _, first, inverse = np.unique(np.round(corners / _WELD), axis=0, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(np.round(corners / _WELD_DISTANCE), axis=0, return_index=True, return_inverse=True)
     joined = inverse.reshape(-1)[np.concatenate([face.reshape(-1, 3) for face in faces])]
     a, b, c = joined.T
     joined = joined[(a != b) & (b != c) & (c != a)]
@@ -146,7 +146,7 @@ def to_stl(surface: ClosedSurface, title: str = "") -> bytes:
     return header + len(table).to_bytes(4, "little") + table.tobytes()
 
 
-_MM = 1e3
+_MM_PER_M = 1e3
 
 
 class WrappedLayer(NamedTuple):
@@ -203,7 +203,7 @@ def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
     for layer in layers:
         polygon = BRepBuilderAPI_MakePolygon()
         for radius, z in _section(layer.inner, layer.thickness):
-            polygon.Add(gp_Pnt(_MM * radius, 0.0, _MM * z))
+            polygon.Add(gp_Pnt(_MM_PER_M * radius, 0.0, _MM_PER_M * z))
         polygon.Close()
         axis = gp_Ax1(gp_Pnt(0.0, 0.0, 0.0), gp_Dir(0.0, 0.0, 1.0))
         face = BRepBuilderAPI_MakeFace(polygon.Wire()).Face()
@@ -212,7 +212,7 @@ def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
             raise GeometryError(f"{layer.name}: the CAD kernel makes no solid of it")
         move = gp_Trsf()
         rows = zip(layer.pose.rotation, layer.pose.translation, strict=True)
-        move.SetValues(*(value for row, shift in rows for value in (*row, _MM * shift)))
+        move.SetValues(*(value for row, shift in rows for value in (*row, _MM_PER_M * shift)))
         label = shapes.AddShape(turned.Shape().Moved(TopLoc_Location(move)), False)
         TDataStd_Name.Set_s(label, TCollection_ExtendedString(layer.name))
     writer = STEPCAFControl_Writer()

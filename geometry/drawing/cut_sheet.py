@@ -36,13 +36,12 @@ __all__ = [
     "Stroke",
     "StrokeKind",
     "cut_sheets",
-    "layout_above",
     "make_test_piece",
     "nest_sheets",
 ]
 
 
-def layout_above(layout: SheetLayout, place: PlacedFrustum, height: float) -> SheetLayout:
+def _layout_above(layout: SheetLayout, place: PlacedFrustum, height: float) -> SheetLayout:
     """Return a layout for a layer at a height [m] above the link, so that its features lie on the same normals.
 
     The layers of a cone grow evenly and share their azimuths. Around a link of another section a layer grows at the
@@ -223,7 +222,7 @@ def cut_sheets(
     def sheet(number: int, name: str, index: int, face: SheetFace, foil: bool = False) -> CutSheet:
         face = face if face_up == "work" else face_up
         surface = snap_to_cylinder(stack.surface(place, index), snap)
-        layout = layout_above(flat, place, stack.offset(index))
+        layout = _layout_above(flat, place, stack.offset(index))
         layer = stack.layers[index]
         text = (plain, f"{number} {name.upper()}", f"{face.upper()} FACE UP")
         material = "aluminium foil" if foil else f"{layer.material} {layer.thickness * 1e3:.2f} mm"
@@ -310,17 +309,17 @@ def _finish(part: CutPart, kerf: float, mirror: bool) -> CutPart:
 
 TEST_SQUARE = 40e-3  #: side of the square [m], drawn without a kerf
 TEST_HOLE = 20e-3  #: side of its hole [m]
-_TICK = 2e-3  # m; from the border to the marked square
-_LETTERS = 3e-3  # m
+_TICK_LENGTH = 2e-3  # m; from the border to the marked square
+_LETTER_HEIGHT = 3e-3  # m
 
 
 def make_test_piece(material: str) -> CutSheet:
     """Draw the test piece of a material; its lines have no kerf, so that the kerf can be measured on it."""
     half, inner = 0.5 * TEST_SQUARE, 0.5 * TEST_HOLE
-    strokes = (_square("score", half - _TICK), _square("hole", inner), _square("cut", half))
+    strokes = (_square("score", half - _TICK_LENGTH), _square("hole", inner), _square("cut", half))
     side, hole = f"{TEST_SQUARE * 1e3:g} mm", f"hole {TEST_HOLE * 1e3:g} mm"
-    middle = 0.5 * (half - _TICK + inner)
-    labels = (PartLabel(f"TEST {side}", 0.0, middle, _LETTERS), PartLabel(hole, 0.0, -middle, _LETTERS))
+    middle = 0.5 * (half - _TICK_LENGTH + inner)
+    labels = (PartLabel(f"TEST {side}", 0.0, middle, _LETTER_HEIGHT), PartLabel(hole, 0.0, -middle, _LETTER_HEIGHT))
     flat = Frustum(half, half, TEST_SQUARE)
     return CutSheet(0, "test piece", material, "outside", flat, (CutPart("test piece", strokes, labels),))
 

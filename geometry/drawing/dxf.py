@@ -16,7 +16,7 @@ __all__ = ["ArcStyle", "to_dxf"]
 
 ArcStyle = Literal["bulge", "arc-line", "flattened"]
 #: AutoCAD colour numbers nearest to LINE_COLOURS; text is dark grey, because 7 is white on some screens
-_ACI = {"cut": 1, "hole": 6, "score": 5, "fold": 3, "label": 250}
+_COLOR_INDEX = {"cut": 1, "hole": 6, "score": 5, "fold": 3, "label": 250}
 
 
 def to_dxf(sheets: Sequence[CutSheet], arcs: ArcStyle = "bulge", tolerance: float = 1e-5) -> str:
@@ -52,7 +52,7 @@ def to_dxf(sheets: Sequence[CutSheet], arcs: ArcStyle = "bulge", tolerance: floa
     def layer(sheet: CutSheet, kind: str) -> dict[str, str]:
         name = f"{sheet.slug}_{kind.upper()}"
         if name not in document.layers:
-            document.layers.add(name, color=_ACI[kind])
+            document.layers.add(name, color=_COLOR_INDEX[kind])
         return {"layer": name}
 
     for sheet in sheets:

@@ -37,9 +37,9 @@ __all__ = [
 ]
 
 #: side of the wires -> the electrode beside it, the one opposite to it, and the two that run towards it
-_ELECTRODES = {"end1": "BADC", "end2": "ABDC", "edge0": "DCBA", "edge1": "CDBA"}
-_LEAST = 1e-4  # m; no cutter makes a narrower strip or gap
-_LEAST_ACTIVE = 1e-3  # m; less between the electrodes is no sensor
+_SIDE_ELECTRODES = {"end1": "BADC", "end2": "ABDC", "edge0": "DCBA", "edge1": "CDBA"}
+_MIN_CUT_WIDTH = 1e-4  # m; no cutter makes a narrower strip or gap
+_MIN_ACTIVE_LENGTH = 1e-3  # m; less between the electrodes is no sensor
 _MIN_WEB = 1e-3  # m; least width of material around a hole
 
 
@@ -73,8 +73,8 @@ class ElectrodePlan:
     def __post_init__(self) -> None:
         for name in ("electrode", "setback", "lead", "clearance", "margin", "tab", "hole"):
             value, may_be_none = getattr(self, name), name in ("margin", "tab", "hole")
-            if not (_LEAST <= value < math.inf or (may_be_none and value == 0.0)):
-                rule = f"{'0 or ' if may_be_none else ''}finite and at least {_LEAST * 1e3:g} mm"
+            if not (_MIN_CUT_WIDTH <= value < math.inf or (may_be_none and value == 0.0)):
+                rule = f"{'0 or ' if may_be_none else ''}finite and at least {_MIN_CUT_WIDTH * 1e3:g} mm"
                 raise GeometryError(f"{name} must be {rule}, got {value * 1e3:.4g} mm")
         if self.wires not in get_args(SheetSide):
             raise GeometryError(f"wires must leave at one of {', '.join(get_args(SheetSide))}, got {self.wires!r}")
@@ -96,14 +96,14 @@ class ElectrodePlan:
     @property
     def led_across(self) -> str:
         """The electrode on the far side, whose lead crosses the sheet to the wires, where its own layer is cut away."""
-        return _ELECTRODES[self.wires][1]
+        return _SIDE_ELECTRODES[self.wires][1]
 
     @property
     def least_arc(self) -> float:
         """Length around the narrow end of a sheet below which electrodes, lead and tabs may find no room [m]."""
         back = max(self.margin, self.setback + self.lead + self.clearance) + self.lead + self.clearance
         tabs = back + 2.0 * self.clearance + self.lead if self.tab else back
-        return max(self.margin + self.electrode + _LEAST_ACTIVE, tabs) + self.margin + self.electrode
+        return max(self.margin + self.electrode + _MIN_ACTIVE_LENGTH, tabs) + self.margin + self.electrode
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,9 +243,9 @@ def lay_out_sheet(sheet: Frustum, plan: ElectrodePlan | None = None) -> SheetLay
         rim=shape((0.0, 0.0), (0.0, q_all), (p_all, q_all), (p_all, 0.0)),
         upper=across if at_end else along,
         lower=along if at_end else across,
-        foils=dict(sorted(zip(_ELECTRODES[plan.wires], (near_foil, far_foil, low_foil, high_foil), strict=True))),
+        foils=dict(sorted(zip(_SIDE_ELECTRODES[plan.wires], (near_foil, far_foil, low_foil, high_foil), strict=True))),
         marks={"upper" if at_end else "lower": across_marks, "lower" if at_end else "upper": along_marks},
-        folds={name: fold(q) for name, q in zip(_ELECTRODES[plan.wires], tab_q, strict=True)} if plan.tab else {},
+        folds={name: fold(q) for name, q in zip(_SIDE_ELECTRODES[plan.wires], tab_q, strict=True)} if plan.tab else {},
         holes=tuple((at.u, at.phi) for at in holes if isinstance(at, ShapeCorner)) if plan.hole else (),
     )
 
@@ -272,7 +272,7 @@ def edge_room(sheet: Frustum) -> float:
 
 def _check_room(plan: ElectrodePlan, where: str, active: float, whole: float, unit: float) -> None:
     """Refuse a sheet that would have no active area left in one direction."""
-    if active > _LEAST_ACTIVE * unit:
+    if active > _MIN_ACTIVE_LENGTH * unit:
         return
     raise GeometryError(
         f"the sheet measures {whole / unit * 1e3:.4g} mm {where}; margins of {plan.margin * 1e3:.4g} mm and electrodes "

@@ -19,9 +19,9 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 __all__ = ["PAPER_STACK", "AssemblyMode", "LayerStack", "SheetLayer", "parallel_frustum", "snap_to_cylinder"]
 
 AssemblyMode = Literal["loose", "pairs", "bonded"]
-_THICKEST = 0.02  # m; of a layer: what is thicker is no sheet that can be wrapped
+_MAX_LAYER_THICKNESS = 0.02  # m; of a layer: what is thicker is no sheet that can be wrapped
 #: number of the body to which each layer belongs when the sheet is wrapped; a body has one neutral surface
-_BODIES = {"loose": "01234", "pairs": "00122", "bonded": "00000"}
+_BODY_NUMBERS = {"loose": "01234", "pairs": "00122", "bonded": "00000"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +46,9 @@ class SheetLayer:
     stiffness: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.thickness <= _THICKEST:
+        if not 0.0 < self.thickness <= _MAX_LAYER_THICKNESS:
             raise GeometryError(
-                f"thickness of {self.name} must be above 0 and at most {_THICKEST * 1e3:g} mm, got "
+                f"thickness of {self.name} must be above 0 and at most {_MAX_LAYER_THICKNESS * 1e3:g} mm, got "
                 f"{self.thickness * 1e3:.4g} mm"
             )
         if not self.material.isprintable():
@@ -97,7 +97,7 @@ class LayerStack:
         It is the neutral surface of the body of the layer: sum E t y / sum E t over the layers that are glued together,
         where y is the height of the neutral surface of each layer alone.
         """
-        bodies = _BODIES[self.assembly]
+        bodies = _BODY_NUMBERS[self.assembly]
         body = [i for i in range(5) if bodies[i] == bodies[index]]
         weights = [self.layers[i].stiffness * self.layers[i].thickness for i in body]
         heights = [self.face_offset(i) + self.layers[i].neutral_factor * self.layers[i].thickness for i in body]

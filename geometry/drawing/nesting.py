@@ -16,9 +16,9 @@ from .cut_sheet import CutPart, CutSheet, Stroke
 
 __all__ = ["MaterialBed", "nest_on_beds"]
 
-_GRID = 1e-3  # m; boxes are packed in whole millimetres
-_SHORTEST = 0.05  # m; side of a bed
-_LONGEST = 10.0  # m; side of a bed
+_GRID_STEP = 1e-3  # m; boxes are packed in whole millimetres
+_MIN_BED_SIDE = 0.05  # m; side of a bed
+_MAX_BED_SIDE = 10.0  # m; side of a bed
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +85,12 @@ def nest_on_beds(
         import rpack
     except ImportError as exc:
         raise MissingExtra("rectangle-packer", "nesting parts on a bed", "design") from exc
-    if not (_SHORTEST <= width <= _LONGEST and _SHORTEST <= depth <= _LONGEST and 0.0 <= gap <= 0.1):
+    if not (_MIN_BED_SIDE <= width <= _MAX_BED_SIDE and _MIN_BED_SIDE <= depth <= _MAX_BED_SIDE and 0.0 <= gap <= 0.1):
         raise GeometryError(
-            f"a bed is from {_SHORTEST * 1e3:g} to {_LONGEST * 1e3:g} mm wide and deep, with gaps from 0 to 100 mm, "
-            f"got {width * 1e3:.4g} x {depth * 1e3:.4g} mm with {gap * 1e3:.4g} mm"
+            f"a bed is from {_MIN_BED_SIDE * 1e3:g} to {_MAX_BED_SIDE * 1e3:g} mm wide and deep, with gaps from 0 to "
+            f"100 mm, got {width * 1e3:.4g} x {depth * 1e3:.4g} mm with {gap * 1e3:.4g} mm"
         )
-    room = math.floor((width - gap) / _GRID + 1e-6), math.floor((depth - gap) / _GRID + 1e-6)
+    room = math.floor((width - gap) / _GRID_STEP + 1e-6), math.floor((depth - gap) / _GRID_STEP + 1e-6)
 
     def packed(sizes: list[tuple[int, int]]) -> list[tuple[int, int]] | None:
         if any(w > room[0] or d > room[1] for w, d in sizes):
@@ -116,7 +116,7 @@ def nest_on_beds(
                     on_bed.append(way)
                     break
             else:
-                w, d = (size * _GRID * 1e3 for size in piece.size)
+                w, d = (size * _GRID_STEP * 1e3 for size in piece.size)
                 larger.append(
                     f"{piece.sheet.slug}, {piece.part.name}: {w:.0f} x {d:.0f} mm does not fit on a bed of "
                     f"{width * 1e3:g} x {depth * 1e3:g} mm: name a larger one, or cut it from its own file"
@@ -126,11 +126,11 @@ def nest_on_beds(
             assert places is not None
             merged: dict[str, CutSheet] = {}
             for piece, (x, y) in zip(on_bed, places, strict=True):
-                moved = replace(piece.sheet, parts=(piece.part,)).moved(x * _GRID + gap, y * _GRID + gap)
+                moved = replace(piece.sheet, parts=(piece.part,)).moved(x * _GRID_STEP + gap, y * _GRID_STEP + gap)
                 known = merged.get(moved.slug)
                 merged[moved.slug] = moved if known is None else replace(known, parts=known.parts + moved.parts)
-            right = max(x + piece.size[0] for piece, (x, _) in zip(on_bed, places, strict=True)) * _GRID + gap
-            top = max(y + piece.size[1] for piece, (_, y) in zip(on_bed, places, strict=True)) * _GRID + gap
+            right = max(x + piece.size[0] for piece, (x, _) in zip(on_bed, places, strict=True)) * _GRID_STEP + gap
+            top = max(y + piece.size[1] for piece, (_, y) in zip(on_bed, places, strict=True)) * _GRID_STEP + gap
             beds.append(MaterialBed(material, number, tuple(merged.values()), width, depth, (right, top)))
     return tuple(beds), tuple(larger)
 
@@ -157,7 +157,9 @@ def _piece(sheet: CutSheet, part: CutPart, gap: float) -> _Piece:
     """Return a part with its box at (0, 0); the size of the box includes the gap on its right and above it."""
     x0, y0, x1, y1 = replace(sheet, parts=(part,)).bounds
     (moved,) = replace(sheet, parts=(part,)).moved(-x0, -y0).parts
-    return _Piece(sheet, moved, (math.ceil((x1 - x0 + gap) / _GRID - 1e-6), math.ceil((y1 - y0 + gap) / _GRID - 1e-6)))
+    return _Piece(
+        sheet, moved, (math.ceil((x1 - x0 + gap) / _GRID_STEP - 1e-6), math.ceil((y1 - y0 + gap) / _GRID_STEP - 1e-6))
+    )
 
 
 def _rotated(part: CutPart, angle: float) -> CutPart:

@@ -12,18 +12,18 @@ from coneskin.geometry.frustum import Frustum
 from .electrode_layout import SheetLayout, SurfaceRectangle
 from .surface_shape import ShapeCorner, drawing_point
 
-__all__ = ["CAP_HEIGHT", "PartLabel", "ascii_text", "part_labels", "strip_label", "text_width"]
+__all__ = ["CAP_HEIGHT", "PartLabel", "ascii_text", "part_labels", "strip_label"]
 
 #: height of a capital letter of Helvetica [em]
 CAP_HEIGHT = 0.718
 #: widths of Helvetica from space to tilde [em / 1000] (Adobe core 14 metrics)
-_WIDTHS = (
+_LETTER_WIDTHS = (
     "278 278 355 556 556 889 667 191 333 333 389 584 278 333 278 278 556 556 556 556 556 556 556 556 556 556 278 278 "
     "584 584 584 556 1015 667 667 722 722 667 611 778 722 278 500 667 556 833 722 778 667 778 722 667 611 722 667 944 "
     "667 667 611 278 278 278 469 556 333 556 556 500 556 556 278 556 556 222 222 500 222 833 556 556 556 556 333 500 "
     "278 556 500 722 500 500 500 334 260 334 584"
 )
-_EM_WIDTHS = tuple(int(width) / 1000.0 for width in _WIDTHS.split())
+_EM_WIDTHS = tuple(int(width) / 1000.0 for width in _LETTER_WIDTHS.split())
 _MAX_HEIGHT = 5e-3  # m, of capitals
 _MIN_HEIGHT = 1.2e-3  # m, of capitals; smaller text cannot be read
 _LINE_PITCH = 1.7  # from one line to the next, in heights of capitals
@@ -50,7 +50,7 @@ class PartLabel:
     @property
     def width(self) -> float:
         """Length of the line in Helvetica [m]."""
-        return text_width(self.text, self.height)
+        return _text_width(self.text, self.height)
 
     def mirrored(self) -> PartLabel:
         """Return the label at its place on the mirrored part, itself not mirrored."""
@@ -71,7 +71,7 @@ def ascii_text(text: str) -> str:
     return "".join(letter if " " <= letter <= "~" else "?" for letter in letters)
 
 
-def text_width(text: str, height: float) -> float:
+def _text_width(text: str, height: float) -> float:
     """Return the length of a line of ASCII text in Helvetica, in the unit of the height of its capitals."""
     return sum(_EM_WIDTHS[ord(letter) - 32] for letter in text) * height / CAP_HEIGHT
 

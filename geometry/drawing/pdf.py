@@ -21,16 +21,16 @@ from .cut_sheet import LINE_COLOURS, CutSheet
 from .outline import Outline
 from .part_labels import CAP_HEIGHT, PartLabel
 
-__all__ = ["PageSize", "PageTiling", "PdfWriter", "pdf_number", "tile_pages", "to_pdf"]
+__all__ = ["PageSize", "to_pdf"]
 
 
-def pdf_number(value: float) -> str:
+def _pdf_number(value: float) -> str:
     """Return a number to five decimals without an exponent, which PDF does not allow."""
     text = f"{value:.5f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 
-class PdfWriter:
+class _PdfWriter:
     """Collection of the objects of a file, written at the end (PDF 1.5, ISO 32000-1 section 7.5)."""
 
     def __init__(self) -> None:
@@ -69,14 +69,14 @@ class PdfWriter:
         return bytes(data + f"startxref\n{table}\n%%EOF\n".encode())
 
 
-_SIDE = 14.0  # mm; left and right margin of a page, for crop marks
-_TOP = 14.0  # mm; top margin of a page, for crop marks
-_BOTTOM = 24.0  # mm; bottom margin of a page, for crop marks and the scale bar
+_SIDE_MARGIN = 14.0  # mm; left and right margin of a page, for crop marks
+_TOP_MARGIN = 14.0  # mm; top margin of a page, for crop marks
+_BOTTOM_MARGIN = 24.0  # mm; bottom margin of a page, for crop marks and the scale bar
 _SAMPLE_STEP = 0.5e-3  # m; distance of points along strokes by which used pages are found
 
 
 @dataclass(frozen=True, slots=True)
-class PageTiling:
+class _PageTiling:
     """Pages of a drawing, each with a window on it; all lengths in mm.
 
     Attributes:
@@ -98,15 +98,15 @@ class PageTiling:
     @property
     def corner(self) -> tuple[float, float]:
         """Lower left corner of the window on its page."""
-        return _SIDE, _BOTTOM
+        return _SIDE_MARGIN, _BOTTOM_MARGIN
 
     @property
     def window(self) -> tuple[float, float]:
         """Width and height of a window."""
-        return self.width - 2.0 * _SIDE, self.height - _TOP - _BOTTOM
+        return self.width - 2.0 * _SIDE_MARGIN, self.height - _TOP_MARGIN - _BOTTOM_MARGIN
 
 
-def tile_pages(sheets: Sequence[CutSheet], width: float, height: float) -> PageTiling:
+def _tile_pages(sheets: Sequence[CutSheet], width: float, height: float) -> _PageTiling:
     """Spread sheets over pages of a size [mm], in portrait or landscape, whichever needs fewer pages."""
     boxes = [sheet.bounds for sheet in sheets]
     extent = (
@@ -124,9 +124,9 @@ def tile_pages(sheets: Sequence[CutSheet], width: float, height: float) -> PageT
 
 def _spread(
     points: NDArray[np.float64], extent: tuple[float, float, float, float], width: float, height: float
-) -> PageTiling:
+) -> _PageTiling:
     x0, y0, x1, y1 = extent
-    window_x, window_y = width - 2.0 * _SIDE, height - _TOP - _BOTTOM
+    window_x, window_y = width - 2.0 * _SIDE_MARGIN, height - _TOP_MARGIN - _BOTTOM_MARGIN
     columns, rows = max(1, math.ceil((x1 - x0) / window_x)), max(1, math.ceil((y1 - y0) / window_y))
     left = 0.5 * (x0 + x1 - columns * window_x)
     bottom = 0.5 * (y0 + y1 - rows * window_y)
@@ -134,14 +134,14 @@ def _spread(
     column, row = np.minimum(places.astype(int), (columns - 1, rows - 1)).T
     seen = {divmod(int(cell), rows) for cell in np.unique(column * rows + row)}
     cells = tuple(sorted(seen, key=lambda cell: (-cell[1], cell[0])))
-    return PageTiling(width, height, (columns, rows), (left, bottom), extent, cells)
+    return _PageTiling(width, height, (columns, rows), (left, bottom), extent, cells)
 
 
 PageSize = Literal["A4", "A3", "Letter"]
 _PAGE_SIZES = {"A4": (210.0, 297.0), "A3": (297.0, 420.0), "Letter": (215.9, 279.4)}  # mm, ISO 216 and ANSI Y14.1
 _MAX_CUBIC_SWEEP = math.radians(15.0)  # rad; a cubic over it deviates from the arc by 6e-9 of the radius
 _POINTS_PER_MM = 72.0 / 25.4
-_BLEED = 4.0  # mm; width printed beyond a window
+_BLEED_WIDTH = 4.0  # mm; width printed beyond a window
 
 
 def to_pdf(sheets: Sequence[CutSheet], page: PageSize = "A4", title: str = "coneskin") -> bytes:
@@ -160,20 +160,20 @@ def to_pdf(sheets: Sequence[CutSheet], page: PageSize = "A4", title: str = "cone
     """
     if page not in get_args(PageSize):
         raise GeometryError(f"page must be one of {', '.join(get_args(PageSize))}, got {page!r}")
-    tiling = tile_pages(sheets, *_PAGE_SIZES[page])
-    pdf = PdfWriter()
+    tiling = _tile_pages(sheets, *_PAGE_SIZES[page])
+    pdf = _PdfWriter()
     font = pdf.add("<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>")
     layers = [pdf.add(f"<< /Type /OCG /Name ({sheet.slug}) >>") for sheet in sheets]
     names = " ".join(f"/L{i} {layer} 0 R" for i, layer in enumerate(layers))
     resources = f"/Font << /F {font} 0 R >> /Properties << {names} >>"
     x0, y0, x1, y1 = tiling.extent
-    box = " ".join(pdf_number(value) for value in (x0 - 1, y0 - 1, x1 + 1, y1 + 1))
+    box = " ".join(_pdf_number(value) for value in (x0 - 1, y0 - 1, x1 + 1, y1 + 1))
     drawing = pdf.add_stream(
         "\n".join(_drawing(sheets)),
         f"/Type /XObject /Subtype /Form /BBox [{box}] /Resources << {resources} >>",
     )
     shared = f"<< {resources} /XObject << /D {drawing} 0 R >> >>"
-    box = f"[0 0 {pdf_number(tiling.width * _POINTS_PER_MM)} {pdf_number(tiling.height * _POINTS_PER_MM)}]"
+    box = f"[0 0 {_pdf_number(tiling.width * _POINTS_PER_MM)} {_pdf_number(tiling.height * _POINTS_PER_MM)}]"
     contents = [_map_page(tiling, sheets, f"{title} - {page}"), *_tiles(tiling, title)]
     for content in contents:
         stream = pdf.add_stream("\n".join([f"{_POINTS_PER_MM:.9f} 0 0 {_POINTS_PER_MM:.9f} 0 0 cm", *content]))
@@ -203,7 +203,7 @@ def _drawing(sheets: Sequence[CutSheet]) -> Iterator[str]:
 
 def _path(outline: Outline) -> Iterator[str]:
     def at(x: float, y: float) -> str:
-        return f"{pdf_number(x * 1e3)} {pdf_number(y * 1e3)}"
+        return f"{_pdf_number(x * 1e3)} {_pdf_number(y * 1e3)}"
 
     x0, y0, _ = outline.vertices[0]
     yield f"{at(x0, y0)} m"
@@ -230,16 +230,16 @@ def _label(label: PartLabel) -> str:
 
 def _text(text: str, x: float, y: float, height: float, c: float = 1.0, s: float = 0.0) -> str:
     escaped = text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
-    turn = " ".join(pdf_number(value) for value in (c, s, -s, c, x, y))
-    return f"BT /F {pdf_number(height / CAP_HEIGHT)} Tf {turn} Tm ({escaped}) Tj ET"
+    turn = " ".join(_pdf_number(value) for value in (c, s, -s, c, x, y))
+    return f"BT /F {_pdf_number(height / CAP_HEIGHT)} Tf {turn} Tm ({escaped}) Tj ET"
 
 
 def _rgb(colour: tuple[int, int, int], operator: str) -> str:
-    return " ".join(pdf_number(value / 255.0) for value in colour) + f" {operator}"
+    return " ".join(_pdf_number(value / 255.0) for value in colour) + f" {operator}"
 
 
 def _line(x0: float, y0: float, x1: float, y1: float) -> str:
-    return f"{pdf_number(x0)} {pdf_number(y0)} m {pdf_number(x1)} {pdf_number(y1)} l S"
+    return f"{_pdf_number(x0)} {_pdf_number(y0)} m {_pdf_number(x1)} {_pdf_number(y1)} l S"
 
 
 def _scale_bar(x: float, y: float) -> Iterator[str]:
@@ -251,7 +251,7 @@ def _scale_bar(x: float, y: float) -> Iterator[str]:
     yield _text("100 mm - measure before cutting", x + 104.0, y, 2.2)
 
 
-def _tiles(tiling: PageTiling, title: str) -> Iterator[list[str]]:
+def _tiles(tiling: _PageTiling, title: str) -> Iterator[list[str]]:
     width, height = tiling.window
     count = len(tiling.cells)
     for page, (column, row) in enumerate(tiling.cells, start=1):
@@ -259,10 +259,10 @@ def _tiles(tiling: PageTiling, title: str) -> Iterator[list[str]]:
         x, y = tiling.origin[0] + column * width, tiling.origin[1] + row * height
         content = [
             "q",
-            f"{pdf_number(left - _BLEED)} {pdf_number(bottom - _BLEED)} {pdf_number(width + 2 * _BLEED)} ",
+            f"{_pdf_number(left - _BLEED_WIDTH)} {_pdf_number(bottom - _BLEED_WIDTH)} {_pdf_number(width + 2 * _BLEED_WIDTH)} ",
         ]
-        content[-1] += f"{pdf_number(height + 2 * _BLEED)} re W n"
-        content += [f"1 0 0 1 {pdf_number(left - x)} {pdf_number(bottom - y)} cm /D Do", "Q"]
+        content[-1] += f"{_pdf_number(height + 2 * _BLEED_WIDTH)} re W n"
+        content += [f"1 0 0 1 {_pdf_number(left - x)} {_pdf_number(bottom - y)} cm /D Do", "Q"]
         content += _crop_marks(left, bottom, width, height)
         for dx, dy, mid_x, mid_y in (
             (-1, 0, left, bottom + 0.5 * height),
@@ -304,14 +304,14 @@ def _registration(x: float, y: float) -> Iterator[str]:
     yield _line(x - 3.0, y, x + 3.0, y)
     yield _line(x, y - 3.0, x, y + 3.0)
     a, b = [(2.0, 0.0), (0.0, 2.0), (-2.0, 0.0), (0.0, -2.0)], [(0.0, k), (-k, 0.0), (0.0, -k), (k, 0.0)]
-    words = [f"{pdf_number(x + 2.0)} {pdf_number(y)} m"]
+    words = [f"{_pdf_number(x + 2.0)} {_pdf_number(y)} m"]
     for (px, py), (tx, ty), (qx, qy), (sx, sy) in zip(a, b, a[1:] + a[:1], b[1:] + b[:1], strict=True):
         points = (x + px + tx, y + py + ty, x + qx - sx, y + qy - sy, x + qx, y + qy)
-        words.append(" ".join(pdf_number(value) for value in points) + " c")
+        words.append(" ".join(_pdf_number(value) for value in points) + " c")
     yield " ".join(words) + " s"
 
 
-def _map_page(tiling: PageTiling, sheets: Sequence[CutSheet], title: str) -> list[str]:
+def _map_page(tiling: _PageTiling, sheets: Sequence[CutSheet], title: str) -> list[str]:
     """Return the overview page: a map of the pages, the materials, and how to print."""
     left, bottom = tiling.corner
     width, height = tiling.window
@@ -333,16 +333,14 @@ def _map_page(tiling: PageTiling, sheets: Sequence[CutSheet], title: str) -> lis
     shift_x, shift_y = x - scale * tiling.origin[0], y - scale * tiling.origin[1]
     content += [
         "q",
-        f"{scale:.6f} 0 0 {scale:.6f} {pdf_number(shift_x)} {pdf_number(shift_y)} cm",
+        f"{scale:.6f} 0 0 {scale:.6f} {_pdf_number(shift_x)} {_pdf_number(shift_y)} cm",
         "/D Do",
         "Q",
         "0.5 0.5 0.5 RG 0.2 w",
     ]
     for page, (column, row) in enumerate(tiling.cells, start=1):
         cell_x, cell_y = x + scale * column * width, y + scale * row * height
-        content.append(
-            f"{pdf_number(cell_x)} {pdf_number(cell_y)} {pdf_number(scale * width)} {pdf_number(scale * height)} re S"
-        )
+        content.append(" ".join(map(_pdf_number, (cell_x, cell_y, scale * width, scale * height))) + " re S")
         content.append("0.5 0.5 0.5 rg")
         content.append(_text(str(page), cell_x + 1.5, cell_y + 1.5, min(5.0, 0.2 * scale * height)))
     content += _scale_bar(left, 8.0)

@@ -18,20 +18,11 @@ from coneskin.geometry.frustum import Frustum
 
 from .outline import FlatPoint, Outline, PathSegment, circle_outline
 
-__all__ = [
-    "ShapeCorner",
-    "ShapeElement",
-    "ShapeTab",
-    "SheetSide",
-    "SurfaceShape",
-    "draw_hole",
-    "draw_shape",
-    "drawing_point",
-]
+__all__ = ["ShapeCorner", "ShapeTab", "SheetSide", "SurfaceShape", "draw_hole", "draw_shape", "drawing_point"]
 
 SheetSide = Literal["end1", "end2", "edge0", "edge1"]
 _MIN_CHORD = 1e-9  # m; vertices closer than this are merged
-_ROUNDING = 1e-12  # m or rad; smaller differences of coordinates are rounding errors
+_ROUNDING_ERROR = 1e-12  # m or rad; smaller differences of coordinates are rounding errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +52,8 @@ class ShapeTab:
     side: SheetSide
 
 
-ShapeElement = ShapeCorner | ShapeTab
-SurfaceShape = tuple[ShapeElement, ...]
+_ShapeElement = ShapeCorner | ShapeTab
+SurfaceShape = tuple[_ShapeElement, ...]
 
 
 def drawing_point(frustum: Frustum, u: float, phi: float) -> FlatPoint:
@@ -117,9 +108,9 @@ def _edge(frustum: Frustum, a: ShapeCorner, b: ShapeCorner) -> list[PathSegment]
     start, end = drawing_point(frustum, a.u, a.phi), drawing_point(frustum, b.u, b.phi)
     if a == b or start == end:
         return []
-    if abs(a.phi - b.phi) < _ROUNDING:
+    if abs(a.phi - b.phi) < _ROUNDING_ERROR:
         return [PathSegment(start, end)]
-    if abs(a.u - b.u) > _ROUNDING:
+    if abs(a.u - b.u) > _ROUNDING_ERROR:
         raise GeometryError(f"neighbours of a shape must share u or phi, got {a} and {b}")
     if frustum.radius_at(a.u) <= 0.0:
         raise GeometryError("a shape cannot reach beyond the apex of its cone")

@@ -16,11 +16,14 @@ from .surface_shape import ShapeCorner, SurfaceShape, drawing_point
 
 __all__ = ["CoverMarks", "TouchMark", "mark_parts", "marks_on_link", "touch_marks"]
 
-_FIRST, _LAST = 0.1, 0.9  # of the slant and of the wrap; beyond, a touch is cut off by the rim
-_PRINTED = 3  # marks along and around
-_READ, _COVER = 3, 4  # layers: the upper conductive one, on which touches are located, and the one that is drawn on
-_ARM = 2e-3  # m; half of a line of the cross
-_NUMBER = 2e-3  # m; height of a mark's number
+_FIRST_SHARE, _LAST_SHARE = 0.1, 0.9  # of the slant and of the wrap; beyond, a touch is cut off by the rim
+_MARKS_PER_SIDE = 3  # marks along and around
+_READ_LAYER, _COVER_LAYER = (
+    3,
+    4,
+)  # layers: the upper conductive one, on which touches are located, and the one that is drawn on
+_ARM_LENGTH = 2e-3  # m; half of a line of the cross
+_NUMBER_HEIGHT = 2e-3  # m; height of a mark's number
 
 
 class TouchMark(NamedTuple):
@@ -37,7 +40,7 @@ def mark_parts(side: int) -> Iterator[tuple[float, float]]:
     Args:
         side: marks along, and around.
     """
-    parts = [_FIRST + (_LAST - _FIRST) * k / (side - 1) for k in range(side)]
+    parts = [_FIRST_SHARE + (_LAST_SHARE - _FIRST_SHARE) * k / (side - 1) for k in range(side)]
     for row, along in enumerate(parts):
         for around in parts if row % 2 == 0 else reversed(parts):
             yield along, around
@@ -51,7 +54,7 @@ def touch_marks(active: Frustum) -> tuple[TouchMark, ...]:
     """
     return tuple(
         TouchMark(number, along * active.slant, around * active.wrap)
-        for number, (along, around) in enumerate(mark_parts(_PRINTED), 1)
+        for number, (along, around) in enumerate(mark_parts(_MARKS_PER_SIDE), 1)
     )
 
 
@@ -63,7 +66,7 @@ def marks_on_link(layout: SheetLayout, stack: LayerStack, place: PlacedFrustum) 
         stack: the layers.
         place: side of the link under the sheet.
     """
-    height, field = stack.middle(_READ), layout.field
+    height, field = stack.middle(_READ_LAYER), layout.field
     read = place.parallel(height)
     first, last = (place.azimuth_above(height, phi) for phi in (field.phi1, field.phi2))
     return tuple(
@@ -71,7 +74,7 @@ def marks_on_link(layout: SheetLayout, stack: LayerStack, place: PlacedFrustum) 
             field.u1 + along * (field.u2 - field.u1),
             read.azimuth_above(-height, first + around * (last - first)),
         )
-        for along, around in mark_parts(_PRINTED)
+        for along, around in mark_parts(_MARKS_PER_SIDE)
     )
 
 
@@ -105,27 +108,27 @@ class CoverMarks:
             stack: the layers.
             place: side of the link under the sheet.
         """
-        top = stack.offset(_COVER)
+        top = stack.offset(_COVER_LAYER)
         places = ((u, place.azimuth_above(top, phi)) for u, phi in marks_on_link(flat, stack, place))
         return cls(cover, surface, tuple(places))
 
     @property
     def clear(self) -> SurfaceRectangle:
         """Part of the cover between the first two rows of marks, free for text."""
-        low, high = self.places[0][0] + 2.0 * _ARM, self.places[_PRINTED][0] - 2.0 * _ARM
+        low, high = self.places[0][0] + 2.0 * _ARM_LENGTH, self.places[_MARKS_PER_SIDE][0] - 2.0 * _ARM_LENGTH
         return SurfaceRectangle(low, high, self.layout.active.phi1, self.layout.active.phi2)
 
     def lines(self) -> Iterator[SurfaceShape]:
         """Yield the two lines of each mark's cross."""
         for u, phi in self.places:
-            turn = _ARM / self.surface.radius_at(u)
-            yield ShapeCorner(u - _ARM, phi), ShapeCorner(u + _ARM, phi)
+            turn = _ARM_LENGTH / self.surface.radius_at(u)
+            yield ShapeCorner(u - _ARM_LENGTH, phi), ShapeCorner(u + _ARM_LENGTH, phi)
             yield ShapeCorner(u, phi - turn), ShapeCorner(u, phi + turn)
 
     def labels(self) -> Iterator[PartLabel]:
         """Yield the number of each mark, beside its cross."""
         surface = self.surface
         for number, (u, phi) in enumerate(self.places, 1):
-            turn = 1.5 * (_ARM + _NUMBER) / surface.radius_at(u)
-            x, y = drawing_point(surface, u + 0.5 * _NUMBER, phi + turn)
-            yield PartLabel(str(number), x, y, _NUMBER, -(phi - 0.5 * surface.wrap) * surface.sin_half_angle)
+            turn = 1.5 * (_ARM_LENGTH + _NUMBER_HEIGHT) / surface.radius_at(u)
+            x, y = drawing_point(surface, u + 0.5 * _NUMBER_HEIGHT, phi + turn)
+            yield PartLabel(str(number), x, y, _NUMBER_HEIGHT, -(phi - 0.5 * surface.wrap) * surface.sin_half_angle)

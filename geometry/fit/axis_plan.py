@@ -23,7 +23,6 @@ __all__ = [
     "AxisPlan",
     "SheetRequirements",
     "SideLine",
-    "clashing_cells",
     "kept_clear",
     "largest_partial_wrap",
     "largest_region",
@@ -137,11 +136,10 @@ def _worthiest(
 Floats = NDArray[np.float64]
 SideLine = tuple[float, float]  #: radius at z = 0 of the profile's frame [m], and dr/dz
 
-TURN = 2.0 * math.pi
-_BIN = 0.0005  # m; of the histogram of radii
+_RADIUS_BIN = 0.0005  # m; of the histogram of radii
 _MAX_PEAKS = 3  # radii tried for each slope
-_HARDLY = 0.97  # of the largest side so far: fewer cells near a line hold no larger one
-_APART = 0.002  # m; least distance between two of them
+_MIN_CELL_SHARE = 0.97  # of the largest side so far: fewer cells near a line hold no larger one
+_MIN_LINE_DISTANCE = 0.002  # m; least distance between two of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,17 +206,21 @@ def side_lines(profile: RadialProfile, cones: tuple[InfiniteCone, ...]) -> list[
         if len(radii) == 0:
             continue
         low = float(radii.min())
-        places = ((radii - low) / _BIN).astype(np.int64)
+        places = ((radii - low) / _RADIUS_BIN).astype(np.int64)
         counts = np.convolve(np.bincount(places, weights=np.abs(radii)), np.ones(3), "same")
         for _ in range(_MAX_PEAKS):
             top = int(counts.argmax())
-            near = radii[np.abs(radii - low - (top + 0.5) * _BIN) <= 1.5 * _BIN]
+            near = radii[np.abs(radii - low - (top + 0.5) * _RADIUS_BIN) <= 1.5 * _RADIUS_BIN]
             if len(near) == 0 or len(near) < 0.01 * profile.radius.size:
                 break
             line = (float(np.median(near)), slope)
-            if all(abs(line[0] - r) > 0.5 * _BIN or s != slope for r, s in lines):
+            if all(abs(line[0] - r) > 0.5 * _RADIUS_BIN or s != slope for r, s in lines):
                 lines.append(line)
-            counts[max(0, top - round(_APART / _BIN)) : top + round(_APART / _BIN) + 1] = 0.0
+            counts[
+                max(0, top - round(_MIN_LINE_DISTANCE / _RADIUS_BIN)) : top
+                + round(_MIN_LINE_DISTANCE / _RADIUS_BIN)
+                + 1
+            ] = 0.0
     return lines
 
 
@@ -252,7 +254,7 @@ def plan_sheets(
             if sides and (known is None or plan.area > known.area):
                 best[len(sides)] = plan
             wanted = count if exactly is None else sum(exactly)
-            if len(sides) == wanted or requirements.wrap == TURN:
+            if len(sides) == wanted or requirements.wrap == math.tau:
                 break
             held = profile
             for side in sides:
@@ -273,10 +275,10 @@ def _full_wraps(
 ) -> list[list[StraightSide]]:
     """Return the sides of none, one, two ... full wraps that cover most, each list longer than the one before."""
     found: list[list[StraightSide]] = [[]]
-    if requirements.wrap is not None and requirements.wrap != TURN:
+    if requirements.wrap is not None and requirements.wrap != math.tau:
         return found
     high, low = profile.bounds(requirements.tolerance)
-    low = np.where(low >= requirements.least_radius(TURN), low, 0.0)
+    low = np.where(low >= requirements.least_radius(math.tau), low, 0.0)
     ends = longest_intervals(profile.z, high, low, requirements.tolerance, rows)
     worth = profile.radius.mean(axis=1) if profile.weight is None else (profile.radius * profile.weight).mean(axis=1)
     for number in range(1, count + 1):
@@ -298,9 +300,9 @@ def largest_partial_wrap(
     """Return the largest side near one of the lines; None where none is large enough."""
     around = len(profile.phi)
     exact = requirements.wrap is not None
-    columns = min(math.ceil((requirements.wrap or requirements.min_wrap) / TURN * around), around)
+    columns = min(math.ceil((requirements.wrap or requirements.min_wrap) / math.tau * around), around)
     free, floor = profile.free(), profile.floor(requirements.tolerance)
-    least = requirements.least_radius(columns * TURN / around)
+    least = requirements.least_radius(columns * math.tau / around)
     best: StraightSide | None = None
     area = 0.0
     for radius, slope in lines:
@@ -311,8 +313,8 @@ def largest_partial_wrap(
         filled = good.sum(axis=1)
         if int(filled.sum()) < rows * columns:
             continue
-        most = float(filled @ line) * profile.step * TURN / around * math.hypot(1.0, slope)
-        if requirements.weights is None and most < _HARDLY * area:
+        most = float(filled @ line) * profile.step * math.tau / around * math.hypot(1.0, slope)
+        if requirements.weights is None and most < _MIN_CELL_SHARE * area:
             continue
         worth = None if requirements.weights is None else profile.weight
         region = largest_region(good, rows, columns, exact, worth)
@@ -330,16 +332,16 @@ def _neighbourhood(profile: RadialProfile, side: StraightSide, gap: float) -> ND
     rows = math.ceil(gap / profile.step)
     around = len(profile.phi)
     least = float(side.radii(profile.z[side.first : side.end]).min())
-    wide = min(math.ceil(gap / (TURN / around * max(least, 1e-3))), around)
+    wide = min(math.ceil(gap / (math.tau / around * max(least, 1e-3))), around)
     columns = azimuth_columns(profile, side.column - wide, min(side.columns + 2 * wide, around))
     cells[np.ix_(np.arange(max(0, side.first - rows), min(len(profile.z), side.end + rows)), columns)] = True
     return cells
 
 
-_LAYERS = 4  # heights at which the space above a cell is tested
+_TESTED_HEIGHTS = 4  # heights at which the space above a cell is tested
 
 
-def clashing_cells(
+def _clashing_cells(
     profile: RadialProfile, other: RadialProfile, side: StraightSide, thickness: float, gap: float
 ) -> NDArray[np.bool_]:
     """Return the cells above which the space of a sheet meets that of another sheet, shape (k, p).
@@ -370,7 +372,7 @@ def clashing_cells(
     base = np.stack([x.flat[near], y.flat[near], z.flat[near]], axis=1)
     way = out[near % len(profile.phi)]
     met = np.zeros(len(near), bool)
-    for layer in np.linspace(0.0, thickness, _LAYERS):
+    for layer in np.linspace(0.0, thickness, _TESTED_HEIGHTS):
         x, y, z = (base + layer * way).T
         rho = np.sqrt(x * x + y * y)
         height = (rho - side.radius - side.slope * z) * ca
@@ -396,7 +398,7 @@ def kept_clear(profile: RadialProfile, plans: list[AxisPlan], requirements: Shee
     """
     for plan in plans:
         for side in plan.sides:
-            cells = clashing_cells(profile, plan.profile, side, requirements.thickness, requirements.gap)
+            cells = _clashing_cells(profile, plan.profile, side, requirements.thickness, requirements.gap)
             if cells.any():
                 profile = profile.blocked(cells)
     return profile

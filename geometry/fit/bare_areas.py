@@ -143,7 +143,7 @@ def _straight_length(
     return max(end - start for start, end in enumerate(ends)) * profile.step
 
 
-_NEIGHBOURS = 8  # samples, half of which must face one way where the hull is flat: beside an edge no more do
+_NEIGHBOR_COUNT = 8  # samples, half of which must face one way where the hull is flat: beside an edge no more do
 _FLAT_COSINE = math.cos(math.radians(2.0))
 _ROUND_COSINE = 0.985
 _STRAIGHT_SINE = 0.06
@@ -284,7 +284,7 @@ def flat_samples(hull: SurfaceSamples) -> NDArray[np.bool_]:
     """Return whether the hull is flat about each sample, shape (n,)."""
     from scipy.spatial import cKDTree
 
-    near = cKDTree(hull.points).query(hull.points, min(_NEIGHBOURS, len(hull)))[1]
+    near = cKDTree(hull.points).query(hull.points, min(_NEIGHBOR_COUNT, len(hull)))[1]
     cosines = np.einsum("ijk,ik->ij", hull.normals[near], hull.normals)
     return np.asarray(np.quantile(cosines, 0.5, axis=1) >= _FLAT_COSINE)
 

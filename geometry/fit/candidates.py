@@ -24,7 +24,7 @@ __all__ = ["AxisCandidate", "cone_hypotheses", "find_axis_candidates", "find_rev
 
 Floats = NDArray[np.float64]
 
-_ROUNDS = 30  # reweighted solutions
+_FIT_ROUNDS = 30  # reweighted solutions
 
 
 def find_revolution_axis(
@@ -52,7 +52,7 @@ def find_revolution_axis(
         axis, moment = _smallest(rows, np.ones(len(rows)))
     else:
         axis, moment = start[1], np.cross((start[0] - middle) / size, start[1])
-    for turn in range(_ROUNDS):
+    for turn in range(_FIT_ROUNDS):
         lever = np.maximum(np.linalg.norm(np.cross(n, axis), axis=1), 0.05)
         miss = (rows @ np.concatenate([axis, moment])) / lever
         scale = max(spread, 100.0 * spread * 0.7**turn) / size
@@ -77,7 +77,7 @@ def _smallest(rows: Floats, weights: Floats) -> tuple[Floats, Floats]:
 
 _PAIR_COUNT = 2400  # pairs drawn, a cylinder from each
 _TRIPLE_COUNT = 1500  # triples drawn, a cone from each
-_POOLS = (12, 60, 1)  # points of which the nearest is the partner: near by, nearer by, anywhere
+_PARTNER_POOLS = (12, 60, 1)  # points of which the nearest is the partner: near by, nearer by, anywhere
 _LEAST_SHARE = 0.015  # of the hull that a hypothesis must explain: a sheet of 25 mm on a link of 300 mm has more
 _VOTER_COUNT = 1200  # points that vote
 _MIN_HALF_ANGLE = math.radians(8.0)  # rad; a slighter cone is found as a cylinder
@@ -128,8 +128,8 @@ def _partners(samples: SurfaceSamples, rng: np.random.Generator, count: int, oth
     chosen = [first]
     for _ in range(others):
         partner = np.empty(count, np.int64)
-        for kind, size in enumerate(_POOLS):
-            mine = np.arange(kind, count, len(_POOLS))
+        for kind, size in enumerate(_PARTNER_POOLS):
+            mine = np.arange(kind, count, len(_PARTNER_POOLS))
             pool = rng.integers(0, len(samples), (len(mine), size))
             gaps = np.linalg.norm(samples.points[pool] - samples.points[first[mine]][:, None], axis=2)
             partner[mine] = pool[np.arange(len(mine)), gaps.argmin(axis=1)]
@@ -200,7 +200,7 @@ def _explains(
 _MAX_DUPLICATE_TILT = 0.002  # rad; angle below which two axes are one
 _MAX_DUPLICATE_SHIFT = 0.0002  # m; distance in the middle of the link below which two axes are one
 _MAX_DUPLICATE_RADIUS = 0.001  # m; difference of radii below which two cones about one axis are one
-_GATES = ((0.002, 0.0005), (0.001,), (0.005,))  # m, one after another; from exact tubes to crowned ones
+_DISTANCE_GATES = ((0.002, 0.0005), (0.001,), (0.005,))  # m, one after another; from exact tubes to crowned ones
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -245,7 +245,7 @@ def find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
     for seed, distance in enumerate((max(0.0015, 0.004 * size), 0.001), 2):
         for start in cone_hypotheses(samples, distance, seed=seed):
             rough = fit_cone(thinned, start, (max(0.006, 0.06 * start.radius),), 0.4, 1e-2)
-            for gates in _GATES if rough is not None else ():
+            for gates in _DISTANCE_GATES if rough is not None else ():
                 cone = rough
                 for gate in gates:
                     cone = cone and fit_cone(samples, cone, (gate,), precision=1e-3)

@@ -21,17 +21,17 @@ from .cone_fit import InfiniteCone
 from .profile import AxisFrame, RadialProfile, measure_profile
 from .side import StraightSide
 
-__all__ = ["AxisSurvey", "Choice", "better_surveys", "grown", "packings", "profile_about", "search_axis", "survey_axes"]
+__all__ = ["AxisSurvey", "Choice", "better_surveys", "grown", "packings", "profile_about", "survey_axes"]
 
 Floats = NDArray[np.float64]
 
-_STEPS = (0.0006, 0.0003, 0.00015)  # m; of the surface, by a shift or by a tilt, one after another
+_AXIS_STEPS = (0.0006, 0.0003, 0.00015)  # m; of the surface, by a shift or by a tilt, one after another
 _MAX_ROUNDS = 4  # at one step
-_LOOSE = 1.6  # times the tolerance, where nothing fits within it
-_ENOUGH = 0.97  # of the sheet within the looser tolerance; more is hardly to be found
+_LOOSE_FACTOR = 1.6  # times the tolerance, where nothing fits within it
+_ENOUGH_SHARE = 0.97  # of the sheet within the looser tolerance; more is hardly to be found
 
 
-def search_axis(
+def _search_axis(
     profile: RadialProfile, side: StraightSide, lines: list[SideLine], requirements: SheetRequirements
 ) -> AxisFrame | None:
     """Return an axis about which a single sheet covers more; None where none is found.
@@ -59,7 +59,7 @@ def search_axis(
         return 0.0 if found is None else found.area(moved)
 
     tight = replace(requirements, wrap=2.0 * math.pi) if full else requirements
-    loose = replace(tight, tolerance=_LOOSE * tight.tolerance)
+    loose = replace(tight, tolerance=_LOOSE_FACTOR * tight.tolerance)
 
     def worth(move: Floats) -> tuple[float, float]:
         moved = _moved(profile, move[:2], move[2:] / reach, middle, side.slope)
@@ -68,9 +68,9 @@ def search_axis(
 
     here = np.zeros(4)
     start = best = worth(here)
-    if start[0] >= _ENOUGH * side.area(profile):
+    if start[0] >= _ENOUGH_SHARE * side.area(profile):
         return None
-    for step in _STEPS:
+    for step in _AXIS_STEPS:
         for _ in range(_MAX_ROUNDS):
             before = best
             for way in step * np.eye(4):
@@ -104,10 +104,10 @@ def _moved(profile: RadialProfile, shift: Floats, tilt: Floats, middle: float, s
 
 
 _COARSE_GRID = (120, 53)  # slices, and rays in each; odd, so that the rays do not hit facets in step
-_STARTS = 3  # plans of each number of sheets about one axis, none beside another, from which packings are grown
-_SEARCHED = 5  # axes, no two beside each other, from which a better one is looked for
-_BESIDE = (0.005, 0.0005)  # rad, m
-_NEAR = 1.6  # times the tolerance within which an axis is promising
+_STARTING_PLANS = 3  # plans of each number of sheets about one axis, none beside another, from which packings are grown
+_SEARCHED_AXES = 5  # axes, no two beside each other, from which a better one is looked for
+_SAME_AXIS = (0.005, 0.0005)  # rad, m
+_PROMISING_FACTOR = 1.6  # times the tolerance within which an axis is promising
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,17 +155,17 @@ def better_surveys(
         surveys: of the axes, as ``survey_axes`` returns them.
         requirements: on the sheets.
     """
-    near = replace(requirements, tolerance=_NEAR * requirements.tolerance)
+    near = replace(requirements, tolerance=_PROMISING_FACTOR * requirements.tolerance)
     alone = [(plan, one) for one in surveys for plan in plan_sheets(one.profile, one.lines, near, 1)]
     found: list[AxisSurvey] = []
     kept: list[AxisFrame] = []
     for plan, one in sorted(alone, key=lambda pair: -pair[0].area):
         frame = one.profile.frame
-        if len(kept) == _SEARCHED or any(_beside(frame, other) for other in kept):
+        if len(kept) == _SEARCHED_AXES or any(_beside(frame, other) for other in kept):
             continue
         kept.append(frame)
         (side,) = plan.sides
-        better = search_axis(one.profile, side, one.lines, requirements)
+        better = _search_axis(one.profile, side, one.lines, requirements)
         if better is not None:
             profile = profile_about(mesh, rays, better, _COARSE_GRID, requirements)
             moved = float((better.origin - frame.origin) @ frame.axis)
@@ -178,7 +178,7 @@ def _beside(frame: AxisFrame, other: AxisFrame) -> bool:
     """Tell whether two axes are so near each other that a search from one finds what it finds from the other."""
     gap = frame.origin - other.origin
     tilt = float(np.linalg.norm(np.cross(frame.axis, other.axis)))
-    return tilt < _BESIDE[0] and float(np.linalg.norm(gap - (gap @ other.axis) * other.axis)) < _BESIDE[1]
+    return tilt < _SAME_AXIS[0] and float(np.linalg.norm(gap - (gap @ other.axis) * other.axis)) < _SAME_AXIS[1]
 
 
 def packings(
@@ -198,7 +198,7 @@ def packings(
     for start in singles:
         frame = start.plan.profile.frame
         alike = [other for other in seen if len(other.plan.sides) == len(start.plan.sides)]
-        if len(alike) == _STARTS or any(_beside(frame, other.plan.profile.frame) for other in alike):
+        if len(alike) == _STARTING_PLANS or any(_beside(frame, other.plan.profile.frame) for other in alike):
             continue
         seen.append(start)
         packing = grown([start], surveys, alone, requirements)

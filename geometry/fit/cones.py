@@ -27,18 +27,9 @@ from .plan import FineStage, SheetPlan, best_plan
 from .surface_samples import SurfaceSamples, sample_surface
 from .touch_weights import TouchWeights, exposure_weights
 
-__all__ = [
-    "LEAST_GAIN",
-    "SEARCH_SAMPLES",
-    "BareLength",
-    "LinkFit",
-    "SampledLink",
-    "find_cones",
-    "fit_cones",
-    "sample_link",
-]
+__all__ = ["LEAST_GAIN", "BareLength", "LinkFit", "SampledLink", "find_cones", "fit_cones", "sample_link"]
 
-SEARCH_SAMPLES = 6000  #: points on the mesh from which the axes are found, whatever is asked
+_SEARCH_SAMPLES = 6000  #: points on the mesh from which the axes are found, whatever is asked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,8 +84,8 @@ def sample_link(mesh: Mesh, options: FitOptions, progress: Callable[[str], None]
     """
     progress("sampling the hull")
     rays = RayCaster(mesh)
-    hull = sample_surface(mesh, rays, SEARCH_SAMPLES)
-    counted = hull if options.samples == SEARCH_SAMPLES else sample_surface(mesh, rays, options.samples)
+    hull = sample_surface(mesh, rays, _SEARCH_SAMPLES)
+    counted = hull if options.samples == _SEARCH_SAMPLES else sample_surface(mesh, rays, options.samples)
     weights = options.weights
     if options.exposure:
         progress("casting rays to the outside")

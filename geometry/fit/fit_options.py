@@ -14,13 +14,12 @@ from .touch_weights import TouchWeights
 
 __all__ = ["MOST_TOLERANCE", "FitOptions"]
 
-TURN = 2.0 * math.pi
 MOST_TOLERANCE = 0.020  #: m; a sheet that stands off further does not follow the link
 _MOST_BRIDGE = 0.100  # m; over a wider hole a sheet sags
-_WIRES = 4  # of a sheet
+_SHEET_WIRES = 4  # of a sheet
 _MOST_SHEETS = 100
 _LEAST_SAMPLES, _MOST_SAMPLES = 100, 10_000_000
-_SHORTEST = 1e-100  # of a direction, so that its square is neither 0 nor infinite
+_MIN_DIRECTION_LENGTH = 1e-100  # of a direction, so that its square is neither 0 nor infinite
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +77,14 @@ class FitOptions:
         _check_count("max_sheets", self.max_sheets, 1, _MOST_SHEETS)
         _check_count("samples", self.samples, _LEAST_SAMPLES, _MOST_SAMPLES)
         if self.max_wires is not None:  # four for one sheet
-            _check_count("max_wires", self.max_wires, _WIRES, _WIRES * _MOST_SHEETS)
-        for name, angle in (("wrap", TURN if self.wrap is None else self.wrap), ("min_wrap", self.min_wrap)):
-            if not 0.0 < angle <= TURN:
+            _check_count("max_wires", self.max_wires, _SHEET_WIRES, _SHEET_WIRES * _MOST_SHEETS)
+        for name, angle in (("wrap", math.tau if self.wrap is None else self.wrap), ("min_wrap", self.min_wrap)):
+            if not 0.0 < angle <= math.tau:
                 raise GeometryError(
                     f"{name} must be above 0 and at most a full turn of 360 deg, got {math.degrees(angle):g} deg"
                 )
         facing = tuple(self.seam_direction)
-        if len(facing) != 3 or not _SHORTEST < math.hypot(*facing) < 1.0 / _SHORTEST:
+        if len(facing) != 3 or not _MIN_DIRECTION_LENGTH < math.hypot(*facing) < 1.0 / _MIN_DIRECTION_LENGTH:
             raise GeometryError(f"the direction of the seam must be three numbers, finite and not zero, got {facing}")
         if self.weights is not None and self.exposure:
             raise GeometryError("weights of touches come from a map or from the exposure, not from both")
@@ -93,7 +92,7 @@ class FitOptions:
     @property
     def most_sheets(self) -> int:
         """Number of sheets that may be used, by their number and by their wires."""
-        return self.max_sheets if self.max_wires is None else min(self.max_sheets, self.max_wires // _WIRES)
+        return self.max_sheets if self.max_wires is None else min(self.max_sheets, self.max_wires // _SHEET_WIRES)
 
     @property
     def seam(self) -> NDArray[np.float64]:

@@ -20,8 +20,6 @@ from .surface_samples import SurfaceSamples
 
 __all__ = ["FittedSheet", "fitted_sheet"]
 
-TURN = 2.0 * math.pi
-
 
 @dataclass(frozen=True, slots=True)
 class FittedSheet:
@@ -99,9 +97,9 @@ def fitted_sheet(
     profile, frame = plan.profile, plan.profile.frame
     start, end = _ends(plan)[plan.sides.index(side)]
     radii = side.radius + side.slope * start, side.radius + side.slope * end
-    width = TURN / len(profile.phi)
+    width = math.tau / len(profile.phi)
     full = side.columns == len(profile.phi)
-    wrap = TURN if full else (side.columns - 1) * width
+    wrap = math.tau if full else (side.columns - 1) * width
     turn = 0.0 if full else side.column * width
     spin = np.array([[math.cos(turn), -math.sin(turn), 0.0], [math.sin(turn), math.cos(turn), 0.0], [0, 0, 1]])
     base = frame.origin + start * frame.axis

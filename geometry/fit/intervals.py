@@ -18,7 +18,7 @@ __all__ = ["balance_borders", "choose_intervals", "least_deviation", "longest_in
 Floats = NDArray[np.float64]
 Interval = tuple[int, int]  #: first slice and the one after the last
 
-_ROUNDING = 1e-9  # m; so that no interval is given up that is good by rounding
+_ROUNDING_ERROR = 1e-9  # m; so that no interval is given up that is good by rounding
 
 
 def least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float, float]:
@@ -143,7 +143,7 @@ def _hopeless(z: Floats, high: Floats, low: Floats, tolerance: float, count: int
     first, last = slice(None, len(z) - count + 1), slice(count - 1, None)
     climb = spread - np.minimum(high[first] - low[last], high[last] - low[first])
     steepest = climb / (z[last] - z[first])
-    hopeless: list[bool] = (0.5 * gaps.max(axis=1) > (tolerance + _ROUNDING) * np.hypot(1.0, steepest)).tolist()
+    hopeless: list[bool] = (0.5 * gaps.max(axis=1) > (tolerance + _ROUNDING_ERROR) * np.hypot(1.0, steepest)).tolist()
     return hopeless
 
 

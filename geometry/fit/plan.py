@@ -78,7 +78,7 @@ def refine_axis(profile: RadialProfile, sides: list[StraightSide], tolerance: fl
 _FINE_GRID = (512, 149)  # slices, and rays in each; odd for the same reason
 _FINE_PACKINGS = 6  # packings made anew on fine profiles
 _LAST_TRIES = 12  # sheets that are tried where no packing is within the tolerance on fine profiles
-_COMPLETIONS = 3  # further sheets that are tried on fine profiles, where a plan has fewer than it may have
+_MAX_COMPLETIONS = 3  # further sheets that are tried on fine profiles, where a plan has fewer than it may have
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,7 +177,7 @@ class FineStage:
         least = self.requirements.least_gain if axes else 0.0
         single = ((plans[0].area, n) for n, plans in enumerate(self.alone(surveys)) if plans)
         hopes = sorted((hope for hope in single if hope[0] > least), reverse=True)
-        tries = _COMPLETIONS if axes else _LAST_TRIES
+        tries = _MAX_COMPLETIONS if axes else _LAST_TRIES
         found: list[Choice] = []
         for hope, number in hopes:
             if len(found) >= tries and hope <= found[tries - 1].plan.area:  # what is there can only take from it

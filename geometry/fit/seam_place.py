@@ -26,12 +26,11 @@ __all__ = ["ChosenSeam", "place_seams"]
 
 Floats = NDArray[np.float64]
 
-TURN = 2.0 * math.pi
-_AZIMUTHS = 36
-_ROWS = 21  # along a sheet; most of what shields a tube stands beyond its ends
-_NEAR = 1  # azimuths on both sides that count too: a blind seam is 20 to 35 deg wide
-_SEAM = math.radians(15.0)  # rad on both sides of a seam that its electrodes take
-_SHIELDED = 0.005  # of the half-space; a smaller difference between the sides is the error of the rays
+_AZIMUTH_COUNT = 36
+_ROW_COUNT = 21  # along a sheet; most of what shields a tube stands beyond its ends
+_NEAR_AZIMUTHS = 1  # azimuths on both sides that count too: a blind seam is 20 to 35 deg wide
+_SEAM_MARGIN = math.radians(15.0)  # rad on both sides of a seam that its electrodes take
+_MIN_SHIELDED_SHARE = 0.005  # of the half-space; a smaller difference between the sides is the error of the rays
 
 
 class ChosenSeam(NamedTuple):
@@ -61,29 +60,29 @@ def place_seams(
     sheets = list(fit.sheets)
     places: list[ChosenSeam] = []
     for axis in dict.fromkeys(sheet.axis for sheet in sheets):
-        full = [i for i, sheet in enumerate(sheets) if sheet.axis == axis and sheet.frustum.wrap == TURN]
+        full = [i for i, sheet in enumerate(sheets) if sheet.axis == axis and sheet.frustum.wrap == math.tau]
         if not full:
             continue
         parts = [_touches_around(sheets[i].placed, rays, weights) for i in full]
         area = np.array([sheets[i].frustum.area for i in full])
         exposed = np.average(parts, axis=0, weights=area)
-        wide = np.mean([np.roll(exposed, k) for k in range(-_NEAR, _NEAR + 1)], axis=0)
+        wide = np.mean([np.roll(exposed, k) for k in range(-_NEAR_AZIMUTHS, _NEAR_AZIMUTHS + 1)], axis=0)
         best = int(wide.argmin())
         shielded, least = 1.0 - float(wide[best]), 1.0 - float(wide.max())
         flat = _bends_around([sheets[i].placed for i in full])
-        even = shielded - least < _SHIELDED
+        even = shielded - least < _MIN_SHIELDED_SHARE
         if even:
             best = 0 if flat is None else int(flat.argmin())
         elif flat is not None:  # among the places that are shielded as well, that with the least bend: it peels least
-            best = int(np.where(wide <= wide.min() + _SHIELDED, flat, np.inf).argmin())
+            best = int(np.where(wide <= wide.min() + _MIN_SHIELDED_SHARE, flat, np.inf).argmin())
             shielded = 1.0 - float(wide[best])
-        turn = best * TURN / _AZIMUTHS
+        turn = best * math.tau / _AZIMUTH_COUNT
         for i in full:
             placed = sheets[i].placed
             sheets[i] = replace(
                 sheets[i],
                 placed=placed.turned(turn),
-                start_azimuth=(sheets[i].start_azimuth + turn) % TURN,
+                start_azimuth=(sheets[i].start_azimuth + turn) % math.tau,
             )
         direction = sheets[full[0]].placed.link_frustum.rotate((1.0, 0.0, 0.0))
         numbers = [str(i + 1) for i in full]
@@ -103,23 +102,23 @@ def place_seams(
 def _touches_around(placed: PlacedFrustum, rays: RayCaster, weights: TouchWeights | None) -> Floats:
     """Return the share of the half-space that is free, weighted, at evenly spaced azimuths, shape (azimuths,)."""
     side = placed.frustum
-    u = (np.arange(_ROWS) + 0.5) * side.slant / _ROWS
-    phi = np.arange(_AZIMUTHS) * TURN / _AZIMUTHS
+    u = (np.arange(_ROW_COUNT) + 0.5) * side.slant / _ROW_COUNT
+    phi = np.arange(_AZIMUTH_COUNT) * math.tau / _AZIMUTH_COUNT
     points, normals = placed.place(u[:, None], phi[None, :])
-    count = _ROWS * _AZIMUTHS
+    count = _ROW_COUNT * _AZIMUTH_COUNT
     samples = SurfaceSamples(points.reshape(-1, 3), normals.reshape(-1, 3), np.full(count, -1), side.area / count)
     free = exposure_weights(samples, rays).weights * (1.0 if weights is None else weights.at(samples.points))
-    return np.asarray(free.reshape(_ROWS, _AZIMUTHS).mean(axis=0))
+    return np.asarray(free.reshape(_ROW_COUNT, _AZIMUTH_COUNT).mean(axis=0))
 
 
 def _bends_around(places: list[PlacedFrustum]) -> Floats | None:
     """Return how sharply the sheets are bent around evenly spaced azimuths [rad]; None of cones."""
     if not any(placed.bends for placed in places):
         return None
-    worst = np.zeros(_AZIMUTHS)
-    reach = np.linspace(-1.0, 1.0, 9) * _SEAM
+    worst = np.zeros(_AZIMUTH_COUNT)
+    reach = np.linspace(-1.0, 1.0, 9) * _SEAM_MARGIN
     for placed in places:
-        phi = np.arange(_AZIMUTHS)[:, None] * TURN / _AZIMUTHS + reach
+        phi = np.arange(_AZIMUTH_COUNT)[:, None] * math.tau / _AZIMUTH_COUNT + reach
         normals = placed.place(np.zeros(phi.shape), phi)[1]
         turns = np.linalg.norm(np.diff(normals, axis=1), axis=2).sum(axis=1)
         worst = np.maximum(worst, np.round(turns, 3))
@@ -141,7 +140,7 @@ def _reason(
     other = "--seam puts it elsewhere"
     if flattest:
         return f"{where}, where the link is flattest, because a seam over a sharp bend peels; {other}"
-    if shielded - least < _SHIELDED:
+    if shielded - least < _MIN_SHIELDED_SHARE:
         return f"{where}: the link shields no side more than another, so it is any side; {other}"
     if weights is not None:
         return f"{where}, where touches count least by {weights.name}; the cable leaves beside it; {other}"

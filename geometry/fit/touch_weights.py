@@ -24,11 +24,11 @@ __all__ = ["LEAST_WEIGHT", "TouchWeights", "exposure_weights", "read_touch_weigh
 Floats = NDArray[np.float64]
 
 LEAST_WEIGHT = 1e-3  #: of the largest; where nothing touches, a sheet may still lie, and it is worth nearly nothing
-_COLUMNS = ("x_mm", "y_mm", "z_mm", "weight")
+_MAP_COLUMNS = ("x_mm", "y_mm", "z_mm", "weight")
 _MAX_SIZE = 50_000_000  # bytes of a map; a million places
-_FARTHEST = 10_000.0  # mm of a coordinate, as in a scene
-_RAYS = 32  # from each sample of the hull
-_LIFT = 0.002  # m; a fingertip above the surface, not in its seams and grooves
+_MAX_COORDINATE = 10_000.0  # mm of a coordinate, as in a scene
+_RAY_COUNT = 32  # from each sample of the hull
+_FINGER_LIFT = 0.002  # m; a fingertip above the surface, not in its seams and grooves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,25 +101,25 @@ def read_touch_weights(path: str | Path) -> TouchWeights:
         raise GeometryError(f"{path}: a map of weights is a text file, and byte {exc.start} is not UTF-8") from exc
     rows = csv.DictReader(io.StringIO(text))
     head = [name.strip() for name in rows.fieldnames or ()]
-    missing = [name for name in _COLUMNS if name not in head]
+    missing = [name for name in _MAP_COLUMNS if name not in head]
     if missing:
         raise GeometryError(
-            f"{path}: a map of weights has the columns {', '.join(_COLUMNS)} in its first line; "
+            f"{path}: a map of weights has the columns {', '.join(_MAP_COLUMNS)} in its first line; "
             f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
         )
     rows.fieldnames = head
     values: list[list[float]] = []
     for row in rows:
         try:
-            values.append([float(row[name]) for name in _COLUMNS])
+            values.append([float(row[name]) for name in _MAP_COLUMNS])
         except (TypeError, ValueError) as exc:
             raise GeometryError(
-                f"{path}: line {rows.line_num} must have a number in each of {', '.join(_COLUMNS)}"
+                f"{path}: line {rows.line_num} must have a number in each of {', '.join(_MAP_COLUMNS)}"
             ) from exc
         *place, weight = values[-1]
-        if not (all(abs(x) <= _FARTHEST for x in place) and 0.0 <= weight < math.inf):
+        if not (all(abs(x) <= _MAX_COORDINATE for x in place) and 0.0 <= weight < math.inf):
             raise GeometryError(
-                f"{path}: line {rows.line_num}: places must be finite and within {_FARTHEST:g} mm, "
+                f"{path}: line {rows.line_num}: places must be finite and within {_MAX_COORDINATE:g} mm, "
                 f"and weights finite and not negative, got {values[-1]}"
             )
     table = np.array(values, float).reshape(-1, 4)
@@ -137,11 +137,11 @@ def exposure_weights(hull: SurfaceSamples, rays: RayCaster) -> TouchWeights:
         hull: samples of the link.
         rays: a ray caster of the same mesh.
     """
-    turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(_RAYS)  # the golden angle spreads them evenly
-    out = np.sqrt((np.arange(_RAYS) + 0.5) / _RAYS)  # evenly over the disc: by the cosine over the hemisphere
+    turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(_RAY_COUNT)  # the golden angle spreads them evenly
+    out = np.sqrt((np.arange(_RAY_COUNT) + 0.5) / _RAY_COUNT)  # evenly over the disc: by the cosine over the hemisphere
     spread = np.stack([out * np.cos(turn), out * np.sin(turn), np.sqrt(1.0 - out**2)], axis=1)
     frames = np.array([np.stack([*perpendicular_vectors(normal), normal], axis=1) for normal in hull.normals])
     ways = np.einsum("nij,rj->nri", frames, spread).reshape(-1, 3)
-    starts = np.repeat(hull.points + _LIFT * hull.normals, _RAYS, axis=0)
-    free = np.isinf(rays.cast(starts, ways)[0]).reshape(-1, _RAYS)
+    starts = np.repeat(hull.points + _FINGER_LIFT * hull.normals, _RAY_COUNT, axis=0)
+    free = np.isinf(rays.cast(starts, ways)[0]).reshape(-1, _RAY_COUNT)
     return TouchWeights(hull.points, free.mean(axis=1), "exposure")

@@ -142,11 +142,10 @@ def _longest_run(alive: NDArray[np.bool_]) -> tuple[int, int]:
     return int((gaps[longest] + 1) % len(alive)), int(lengths[longest])
 
 
-TURN = 2.0 * math.pi
 _FIT_ROWS = 12  # slices whose points are fitted
 _LEAST_POINTS = 100  # of a region, to fit a side to it
 _CHECK_ROWS = 60  # slices by which a fit is judged
-_ALIGNED = 0.9  # cosine between the normals of the hull and of a sheet on it
+_MIN_NORMAL_COSINE = 0.9  # cosine between the normals of the hull and of a sheet on it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,7 +177,7 @@ def _bridged_anew(profile: RadialProfile, apex: float | None, width: float) -> R
     section = np.where(present, np.nanmedian(np.where(present, shown, 1.0), axis=0), 0.0) * scale[:, None]
     lift = float(section.max())
     depth = np.where(profile.radius > 0.0, np.maximum(profile.radius - section + lift, 1e-6), 0.0)
-    arc = TURN / len(profile.phi) * float(np.median(section[:, present]))
+    arc = math.tau / len(profile.phi) * float(np.median(section[:, present]))
     filled = bridge_holes(depth, profile.step, arc, width) - lift + section
     return replace(profile, bridged=np.maximum(filled, profile.radius))
 
@@ -191,11 +190,11 @@ def _apex_height(profile: RadialProfile, candidate: RulingCandidate) -> float | 
 
 def widest_region(profile: RadialProfile, candidate: RulingCandidate, options: FitOptions) -> RuledRegion | None:
     """Return the region of a profile that one sheet can cover."""
-    columns = math.ceil(options.min_wrap / TURN * len(profile.phi))
+    columns = math.ceil(options.min_wrap / math.tau * len(profile.phi))
     rows = max(3, math.ceil(options.min_length / profile.step))
     least = np.full(len(profile.z), 0.25 * options.min_radius)
     apex = _apex_height(profile, candidate)
-    return ruled_region(profile, apex, options.tolerance, rows, least, columns, options.wrap == TURN)
+    return ruled_region(profile, apex, options.tolerance, rows, least, columns, options.wrap == math.tau)
 
 
 def hull_points(profile: RadialProfile, rows: slice = slice(None), columns: NDArray[np.int64] | None = None) -> Floats:
@@ -284,10 +283,10 @@ def _covered_samples(placed: PlacedFrustum, hull: SurfaceSamples, distance: floa
     side = placed.frustum
     u, phi, off = placed.locate_all(hull.points)
     inside = (np.abs(off) <= distance) & (u >= 0.0) & (u <= side.slant) & (phi >= 0.0) & (phi <= side.wrap)
-    if side.wrap >= TURN - 1e-9:
+    if side.wrap >= math.tau - 1e-9:
         inside = (np.abs(off) <= distance) & (u >= 0.0) & (u <= side.slant)
     normals = placed.place(np.zeros(len(phi)), phi)[1]
-    return np.asarray(inside & (np.einsum("ij,ij->i", normals, hull.normals) > _ALIGNED))
+    return np.asarray(inside & (np.einsum("ij,ij->i", normals, hull.normals) > _MIN_NORMAL_COSINE))
 
 
 def covered_by(sheets: Iterable[FittedSheet], hull: SurfaceSamples, distance: float) -> NDArray[np.bool_]:

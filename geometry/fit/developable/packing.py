@@ -32,10 +32,10 @@ from .found_sheet import (
 )
 from .ruling_candidates import RulingCandidate, find_ruling_candidates
 
-__all__ = ["bare_beside", "find_sheets", "with_developables"]
+__all__ = ["find_sheets", "with_developables"]
 
 
-def bare_beside(
+def _bare_beside(
     sheets: Sequence[FittedSheet],
     more: Sequence[FittedSheet],
     earlier: Sequence[BareArea],
@@ -71,12 +71,11 @@ def _among(hull: SurfaceSamples, area: BareArea) -> NDArray[np.bool_]:
 
 Floats = NDArray[np.float64]
 
-TURN = 2.0 * math.pi
-_COARSE = (100, 53)  # slices, and rays in each
-_FINE = (300, 149)
+_COARSE_GRID = (100, 53)  # slices, and rays in each
+_FINE_GRID = (300, 149)
 _CONVEX_SHARE = 0.5  # of the hull that the sheets on a convex mesh must cover
-_SAME = 0.9  # share of the points of a region on a known side: it is no other one
-_REFINED = 3  # regions of which the best is looked for on fine profiles
+_SAME_SHARE = 0.9  # share of the points of a region on a known side: it is no other one
+_REFINED_REGIONS = 3  # regions of which the best is looked for on fine profiles
 
 
 def with_developables(
@@ -93,7 +92,7 @@ def with_developables(
     Returns:
         ``cones`` where they cover as much, or all but ``LEAST_GAIN`` of the hull as much; else a fit with developables.
     """
-    if options.wrap is not None and options.wrap != TURN:
+    if options.wrap is not None and options.wrap != math.tau:
         return cones
     most, tolerance = options.most_sheets, options.tolerance
     say("looking for rulings")
@@ -104,7 +103,7 @@ def with_developables(
     if float(worth[~taken].sum()) < least * float(worth.sum()):
         return cones
     candidates = find_ruling_candidates(link.hull, link.axes)
-    coarse = [(one, ruled_profile(mesh, rays, one, _COARSE, options)) for one in candidates]
+    coarse = [(one, ruled_profile(mesh, rays, one, _COARSE_GRID, options)) for one in candidates]
     say("measuring rulings")
     # where the widest region is that of a cone which is there already, other sheets only go beside the cones
     regions = _regions(coarse, options, [])
@@ -128,7 +127,7 @@ def with_developables(
     kinds = " and ".join(sorted({f"a {sheet.placed.kind}" for sheet in best if sheet.placed.bends}))
     say("looking at what stays bare")
     more = _pack(mesh, rays, hull, worth, coarse, options, list(best), 1, least) if len(best) == most else []
-    bare = bare_beside(best, more, () if best is alone else cones.bare_areas, link.hull, options)
+    bare = _bare_beside(best, more, () if best is alone else cones.bare_areas, link.hull, options)
     note = f"the link is not round: cones cover {shares[0]} of its hull, with {kinds} it is {shares[1]}"
     return replace(
         cones,
@@ -163,13 +162,13 @@ def _pack(
         best: FoundSheet | None = None
         tried = 0
         for area, number, region in regions:
-            if tried == _REFINED or area < least * len(hull) * hull.area:
+            if tried == _REFINED_REGIONS or area < least * len(hull) * hull.area:
                 break
             if best is not None and _lies_on(best.placed, coarse[number][1], region, options.tolerance):
                 continue
             tried += 1
             candidate = coarse[number][0]
-            fine = _kept_clear(ruled_profile(mesh, rays, candidate, _FINE, options), there, options)
+            fine = _kept_clear(ruled_profile(mesh, rays, candidate, _FINE_GRID, options), there, options)
             found = fit_sheet(mesh, fine, hull, worth, candidate, options, len(there))
             if found is None or float(worth[found.covers & ~taken].sum()) < least * float(worth.sum()):
                 continue
@@ -197,7 +196,7 @@ def _regions(
 def _area(profile: RadialProfile, region: RuledRegion) -> float:
     """Return the area of a region [m2], but for the slope of its section."""
     cells = profile.radius[region.first : region.end][:, columns_of(region, len(profile.phi))]
-    return float(cells.sum()) * profile.step * TURN / len(profile.phi)
+    return float(cells.sum()) * profile.step * math.tau / len(profile.phi)
 
 
 def _lies_on(placed: PlacedFrustum, profile: RadialProfile, region: RuledRegion, tolerance: float) -> bool:
@@ -208,7 +207,7 @@ def _lies_on(placed: PlacedFrustum, profile: RadialProfile, region: RuledRegion,
     u, phi, off = placed.locate_all(points)
     slack = 2.0 * profile.step
     on = (np.abs(off) < 1.5 * tolerance) & (u > -slack) & (u < placed.frustum.slant + slack)
-    return float((on & (phi >= 0.0) & (phi <= placed.frustum.wrap)).mean()) > _SAME
+    return float((on & (phi >= 0.0) & (phi <= placed.frustum.wrap)).mean()) > _SAME_SHARE
 
 
 def _kept_clear(profile: RadialProfile, sheets: list[FittedSheet], options: FitOptions) -> RadialProfile:

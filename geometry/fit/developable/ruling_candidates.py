@@ -19,14 +19,14 @@ __all__ = ["RulingCandidate", "find_ruling_candidates"]
 
 Floats = NDArray[np.float64]
 
-_DRAWS = 1600  # pairs, and triples, of samples
-_VOTERS = 1200  # samples that vote
-_GATE = 0.035  # rad; angle between a ruling and the tangent plane up to which a sample counts
+_DRAW_COUNT = 1600  # pairs, and triples, of samples
+_VOTER_COUNT = 1200  # samples that vote
+_RULING_GATE = 0.035  # rad; angle between a ruling and the tangent plane up to which a sample counts
 _LEAST_SHARE = 0.08  # of the hull that must obey a candidate
-_DIRECTIONS = 4  # tried at most
-_APEXES = 2
-_FARTHEST = 30.0  # sizes of the link; rulings that meet further away are parallel
-_SAME = 0.02  # rad; directions closer than this are one
+_MAX_DIRECTIONS = 4  # tried at most
+_MAX_APEXES = 2
+_MAX_APEX_DISTANCE = 30.0  # sizes of the link; rulings that meet further away are parallel
+_SAME_DIRECTION = 0.02  # rad; directions closer than this are one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,16 +55,16 @@ def find_ruling_candidates(samples: SurfaceSamples, axes: list[AxisCandidate]) -
     if len(samples) < 24:
         return []
     size = float(np.ptp(samples.points, axis=0).max())
-    voters = rng.permutation(len(samples))[:_VOTERS]
+    voters = rng.permutation(len(samples))[:_VOTER_COUNT]
     found: list[RulingCandidate] = []
     for direction in _directions(samples, voters, rng, axes):
-        obeys = np.abs(samples.normals @ direction) < 2.0 * _GATE
+        obeys = np.abs(samples.normals @ direction) < 2.0 * _RULING_GATE
         middle = _middle(samples.points[obeys], direction)
         found.append(RulingCandidate(middle, direction))
         for axis in axes:  # a tube beside another one is not about the middle of both
             off = axis.origin - middle
             apart = float(np.linalg.norm(off - (off @ direction) * direction))
-            if abs(axis.axis @ direction) > 1.0 - _SAME**2 and apart > 0.03 * size and len(found) < 8:
+            if abs(axis.axis @ direction) > 1.0 - _SAME_DIRECTION**2 and apart > 0.03 * size and len(found) < 8:
                 found.append(RulingCandidate(axis.origin, direction))
         loose = np.abs(samples.normals @ direction) < 0.3
         apex = _common_point(samples.points[loose], samples.normals[loose], size, direction)
@@ -82,28 +82,28 @@ def _directions(
     samples: SurfaceSamples, voters: NDArray[np.int64], rng: np.random.Generator, axes: list[AxisCandidate]
 ) -> list[Floats]:
     """Return the directions to which most tangent planes are parallel, the best first, refined."""
-    i, j = rng.integers(0, len(samples), (2, _DRAWS))
+    i, j = rng.integers(0, len(samples), (2, _DRAW_COUNT))
     drawn = np.cross(samples.normals[i], samples.normals[j])
     length = np.linalg.norm(drawn, axis=1)
     drawn = drawn[length > 0.3] / length[length > 0.3, None]
     trials = np.concatenate([drawn, *(axis.axis[None] for axis in axes)])
-    votes = np.abs(samples.normals[voters] @ trials.T) < _GATE
+    votes = np.abs(samples.normals[voters] @ trials.T) < _RULING_GATE
     left = np.ones(len(voters))
     chosen: list[Floats] = []
-    while len(chosen) < _DIRECTIONS:
+    while len(chosen) < _MAX_DIRECTIONS:
         score = left @ votes
         best = int(score.argmax())
         if score[best] < _LEAST_SHARE * len(voters):
             break
         left[votes[:, best]] *= 0.3  # a flat of a box obeys several directions
         direction = trials[best]
-        for gate in (2.0 * _GATE, _GATE, 0.5 * _GATE):
+        for gate in (2.0 * _RULING_GATE, _RULING_GATE, 0.5 * _RULING_GATE):
             near = samples.normals[np.abs(samples.normals @ direction) < gate]
             if len(near) < 12:
                 break
             direction = np.linalg.eigh(near.T @ near)[1][:, 0]
         direction = direction * np.sign(direction[int(np.abs(direction).argmax())])
-        if all(abs(direction @ other) < math.cos(_SAME) for other in chosen):
+        if all(abs(direction @ other) < math.cos(_SAME_DIRECTION) for other in chosen):
             chosen.append(direction)
         votes[:, best] = False
         if not votes.any():
@@ -130,35 +130,35 @@ def _common_point(points: Floats, normals: Floats, size: float, direction: Float
             return None
         solution = np.linalg.eigh((rows * weights[:, None]).T @ rows)[1][:, 0]
         miss = np.abs(rows @ solution) / max(float(np.linalg.norm(solution[:3])), 1e-9)
-        scale = max(4.0 * float(np.median(miss[weights > 0.0])), 0.2 * _GATE)
+        scale = max(4.0 * float(np.median(miss[weights > 0.0])), 0.2 * _RULING_GATE)
         weights = np.where(miss < scale, (1.0 - (miss / scale) ** 2) ** 2, 0.0)
-    if abs(solution[3]) * _FARTHEST < np.linalg.norm(solution[:3]):
+    if abs(solution[3]) * _MAX_APEX_DISTANCE < np.linalg.norm(solution[:3]):
         return None
     return np.asarray(middle + size * solution[:3] / solution[3])
 
 
 def _apexes(samples: SurfaceSamples, voters: NDArray[np.int64], rng: np.random.Generator, size: float) -> list[Floats]:
     """Return the points in which most tangent planes meet, the best first, refined."""
-    index = rng.integers(0, len(samples), (_DRAWS, 3))
+    index = rng.integers(0, len(samples), (_DRAW_COUNT, 3))
     p, n = samples.points[index], samples.normals[index]
     sound = np.abs(np.linalg.det(n)) > 0.01
     p, n = p[sound], n[sound]
     trials = np.linalg.solve(n, np.einsum("hij,hij->hi", n, p)[..., None])[..., 0]
     middle = samples.points.mean(axis=0)
-    trials = trials[np.linalg.norm(trials - middle, axis=1) < _FARTHEST * size]
+    trials = trials[np.linalg.norm(trials - middle, axis=1) < _MAX_APEX_DISTANCE * size]
     if len(trials) == 0:
         return []
     chosen: list[Floats] = []
     left = np.ones(len(voters))
     votes = _votes(samples, voters, trials)
-    while len(chosen) < _APEXES:
+    while len(chosen) < _MAX_APEXES:
         score = left @ votes
         best = int(score.argmax())
         if score[best] < _LEAST_SHARE * len(voters):
             break
         left[votes[:, best]] = 0.0
         apex = trials[best]
-        for gate in (2.0 * _GATE, _GATE, 0.5 * _GATE):
+        for gate in (2.0 * _RULING_GATE, _RULING_GATE, 0.5 * _RULING_GATE):
             way = samples.points - apex
             near = np.abs(np.einsum("ij,ij->i", samples.normals, way)) < gate * np.linalg.norm(way, axis=1)
             if near.sum() < 12:
@@ -173,7 +173,7 @@ def _votes(samples: SurfaceSamples, voters: NDArray[np.int64], trials: Floats) -
     p, n = samples.points[voters], samples.normals[voters]
     off = np.einsum("ij,ij->i", n, p)[:, None] - n @ trials.T
     square = (p**2).sum(axis=1)[:, None] - 2.0 * p @ trials.T + (trials**2).sum(axis=1)
-    return np.asarray(np.abs(off) < _GATE * np.sqrt(np.maximum(square, 1e-12)))
+    return np.asarray(np.abs(off) < _RULING_GATE * np.sqrt(np.maximum(square, 1e-12)))
 
 
 def _about(samples: SurfaceSamples, apex: Floats) -> RulingCandidate:
@@ -181,7 +181,7 @@ def _about(samples: SurfaceSamples, apex: Floats) -> RulingCandidate:
     way = samples.points - apex
     length = np.linalg.norm(way, axis=1)
     ways = way / np.maximum(length, 1e-9)[:, None]
-    near = np.abs(np.einsum("ij,ij->i", samples.normals, ways)) < 2.0 * _GATE
+    near = np.abs(np.einsum("ij,ij->i", samples.normals, ways)) < 2.0 * _RULING_GATE
     if near.sum() < 12:
         near[:] = True
     mean = ways[near].mean(axis=0)

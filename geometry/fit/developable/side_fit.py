@@ -17,13 +17,12 @@ __all__ = ["fit_developable"]
 
 Floats = NDArray[np.float64]
 
-TURN = 2.0 * math.pi
-_STRIPS = 64  # around a full turn; the section of a stadium of 40 mm is then within 0.03 mm
-_ROUNDS = 8
-_SETTLED = 0.97  # of the error before: less is no progress
-_STIFF = 0.02  # weight of a change of curvature between strips, against the distances of the points
-_NODES = 4  # of a strip, at which its motions are summed
-_DAMPING = 1e-4  # of the steps that change nothing, such as a slide along the sheet
+_STRIPS_PER_TURN = 64  # around a full turn; the section of a stadium of 40 mm is then within 0.03 mm
+_FIT_ROUNDS = 8
+_SETTLED_SHARE = 0.97  # of the error before: less is no progress
+_STIFFNESS_WEIGHT = 0.02  # weight of a change of curvature between strips, against the distances of the points
+_STRIP_NODES = 4  # of a strip, at which its motions are summed
+_STEP_DAMPING = 1e-4  # of the steps that change nothing, such as a slide along the sheet
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,10 +93,10 @@ def fit_developable(
     u = side.locate_all(points)[0]
     trial = replace(trial, slant=max(float(u.max()), 1e-3))
     best, error = trial, math.inf
-    for _ in range(_ROUNDS):
+    for _ in range(_FIT_ROUNDS):
         off = trial.side().locate_all(points)[2]
         now = float(np.sqrt((np.minimum(np.abs(off), 2.0 * tolerance) ** 2).mean()))
-        better = now < _SETTLED * error
+        better = now < _SETTLED_SHARE * error
         if now < error:
             best, error = trial, now
         if not better:
@@ -117,10 +116,10 @@ def _start(section: Floats, rulings: Floats, full: bool, common_apex: bool, tole
         return None
     slack = len(points) * (0.15 * tolerance) ** 2
     spline, _ = splprep(points.T, s=slack, k=3, per=full)
-    fine = np.linspace(0.0, 1.0, 40 * _STRIPS + 1)
+    fine = np.linspace(0.0, 1.0, 40 * _STRIPS_PER_TURN + 1)
     curve = np.array(splev(fine, spline)).T
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-    count = _STRIPS if full else max(12, round(0.6 * _STRIPS))
+    count = _STRIPS_PER_TURN if full else max(12, round(0.6 * _STRIPS_PER_TURN))
     at = np.interp(np.linspace(0.0, arc[-1], count + 1), arc, fine)
     t = np.array(splev(at, spline, der=1)).T
     u = _ways(np.array(splev(at, spline)).T, section, rulings)
@@ -137,7 +136,7 @@ def _start(section: Floats, rulings: Floats, full: bool, common_apex: bool, tole
         sine_arc = float(np.linalg.norm(np.diff(u, axis=0), axis=1).sum())
         if float(np.einsum("ij,ij->i", np.diff(u, axis=0), middle).sum()) < 0.0:
             sine_arc = -sine_arc
-    wrap = TURN if full else min(math.hypot(sine_arc, float(turns.sum())), TURN - 1e-3)
+    wrap = math.tau if full else min(math.hypot(sine_arc, float(turns.sum())), math.tau - 1e-3)
     if wrap < 0.1 or abs(sine_arc) > 0.99 * wrap:
         return None
     start = np.array(splev(at[:1], spline)).T[0]
@@ -170,10 +169,10 @@ def _step(trial: _Trial, points: Floats, full: bool, common_apex: bool, toleranc
     ends, end = _ends(trial, side)
     ends[:, ~free] = 0.0
     width = trial.arc / len(trial.turns)
-    reach = max(trial.arc / TURN, 1e-3)
+    reach = max(trial.arc / math.tau, 1e-3)
     units = np.concatenate([np.full(3, reach), np.ones(3), [1.0, reach], np.full(count - 8, reach)])
-    stiff = _second_differences(len(trial.turns), full) * (_STIFF * width * math.sqrt(len(points)))
-    rows = [weights[:, None] * slopes, np.diag(units * _DAMPING * math.sqrt(len(points)))]
+    stiff = _second_differences(len(trial.turns), full) * (_STIFFNESS_WEIGHT * width * math.sqrt(len(points)))
+    rows = [weights[:, None] * slopes, np.diag(units * _STEP_DAMPING * math.sqrt(len(points)))]
     values = [weights * off, np.zeros(count)]
     rows.append(np.concatenate([np.zeros((len(stiff), 8)), stiff], axis=1))
     values.append(-stiff @ trial.turns)
@@ -205,7 +204,7 @@ def _motions(trial: _Trial, side: PlacedDevelopable, points: Floats, ways: Float
     flat sector one about the normals there, and more arc a shift along the tangents.
     """
     count = len(trial.turns)
-    nodes = trial.wrap * (np.arange(_NODES * count) + 0.5) / (_NODES * count)
+    nodes = trial.wrap * (np.arange(_STRIP_NODES * count) + 0.5) / (_STRIP_NODES * count)
     base, u, n = side.side.rulings(nodes)
     pose = side.link_frustum
     turn = np.array(pose.rotation).T
@@ -223,7 +222,7 @@ def _motions(trial: _Trial, side: PlacedDevelopable, points: Floats, ways: Float
 
     # g = sine * wrap / arc, and an arc of arc / nodes belongs to each node
     motions[:, 7] = -rotations(n).sum(axis=1) * (trial.wrap / len(nodes))
-    motions[:, 8:] = rotations(u).reshape(len(points), count, _NODES).sum(axis=2) / _NODES
+    motions[:, 8:] = rotations(u).reshape(len(points), count, _STRIP_NODES).sum(axis=2) / _STRIP_NODES
     return motions
 
 
@@ -232,7 +231,7 @@ def _ends(trial: _Trial, side: PlacedDevelopable) -> tuple[Floats, Floats]:
 
     The gap is a shift [m], and a turn as a shift at the mean radius.
     """
-    pose, radius = side.link_frustum, trial.arc / TURN
+    pose, radius = side.link_frustum, trial.arc / math.tau
     at, *rest = side.side.edge()
     end, (t, u, _) = np.array(pose.apply(at)), (np.array(pose.rotate(vector)) for vector in rest)
     first_u, first_n = trial.frame[1], trial.frame[2]

@@ -33,7 +33,7 @@ from .sheets.sheet_design import DesignOptions, JigPlan, JigSurface
 
 __all__ = ["DESIGN_TABLES", "DesignSettings", "read_settings", "settings_text"]
 
-_OPTIONS, _FILES, _LAYERS = DesignOptions(), FileOptions(), PAPER_STACK.layers
+_DEFAULT_OPTIONS, _DEFAULT_FILES, _PAPER_LAYERS = DesignOptions(), FileOptions(), PAPER_STACK.layers
 _GIVEN_ELECTRONICS = ("supply_v", "adc_v", "adc_bits", "pulldown_ohm", "current_full_scale_ma")
 _GIVEN_SHEETS = ("upper_sheet_ohm", "lower_sheet_ohm")  # they have a default in a scene, and none in a design
 
@@ -50,7 +50,7 @@ def _fields(text: str, owner: object, *keys: Key) -> tuple[Key, ...]:
 
 def _of_layers(key: Key) -> Key:
     """Return the key of a field of the five layers, with the values of the paper."""
-    return replace(key, default=tuple(getattr(layer, key.plain) for layer in _LAYERS), length=5)
+    return replace(key, default=tuple(getattr(layer, key.plain) for layer in _PAPER_LAYERS), length=5)
 
 
 #: table of design.toml -> what it is about, and its keys
@@ -118,7 +118,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
             tab_mm: length of the tabs beyond the rim, 0 for none
             hole_mm: diameter of the registration holes, 0 for none
             """,
-            _OPTIONS.plan,
+            _DEFAULT_OPTIONS.plan,
             *(Key(f"{name}_mm", low=0.0) for name in ("margin", "electrode", "setback", "lead", "clearance")),
             *(Key(f"{name}_mm", low=0.0) for name in ("tab", "hole")),
         ),
@@ -134,7 +134,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
             cover_seam: close the blind seam of each full wrap by a strip, a sensor on top
             sheet_gap_mm: smallest distance between neighboring sheets
             """,
-            _OPTIONS,
+            _DEFAULT_OPTIONS,
             Key("wires", str, choices=get_args(SheetSide), unset="end1, or end2 for the last of several on one axis"),
             Key("connector_mm", low=30.0, high=2000.0),
             Key("seam_gap_mm", low=0.0),
@@ -151,7 +151,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
                 kerf_mm: width of the cut
                 face_up: face that is up in the drawings. work is the one on which the next part is glued
                 """,
-                _OPTIONS,
+                _DEFAULT_OPTIONS,
                 Key("kerf_mm", low=0.0),
                 Key("face_up", choices=get_args(FaceUp)),
             ),
@@ -164,7 +164,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
                 bed_gap_mm: gap between nested parts
                 step: write the wrapped layers as a STEP file too (extra cad)
                 """,
-                _FILES,
+                _DEFAULT_FILES,
                 Key("tolerance_mm", low=1e-4, high=1.0),
                 Key("arcs", choices=get_args(ArcStyle)),
                 Key("page", choices=get_args(PageSize)),
@@ -186,7 +186,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
             grip_mm: length on the link
             parts: parts of a collar
             """,
-            _OPTIONS.jig,
+            _DEFAULT_OPTIONS.jig,
             Key("surface", choices=get_args(JigSurface)),
             Key("wall_mm", low=1.5, high=20.0),
             Key("clearance_mm", low=0.0, high=3.0),
@@ -298,7 +298,7 @@ def _settings(values: Mapping[str, Mapping[str, Any]]) -> DesignSettings:
         _layer(layer, {name: five[i] for name, five in layers.items()}) for i, layer in enumerate(PAPER_STACK.layers)
     )
     drawings = dict(values["drawings"])
-    tolerance = drawings.get("tolerance", _FILES.tolerance)
+    tolerance = drawings.get("tolerance", _DEFAULT_FILES.tolerance)
     of_options = {name: drawings.pop(name) for name in ("kerf", "face_up") if name in drawings}
     given = dict(values["electronics"])
     ohms = {f"{name}_ohms": given.pop(name) for name in ("upper_sheet", "lower_sheet") if name in given}

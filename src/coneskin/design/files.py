@@ -31,8 +31,8 @@ __all__ = ["DESIGN_FILE", "FileOptions", "check_target", "new_folder", "sheet_fo
 
 #: summary of a design; only a folder with this file may be replaced
 DESIGN_FILE = "design.json"
-_FINEST = 1e-7  # m; a flattened arc of 1 m then has 2000 lines
-_COARSEST = 1e-3  # m
+_MIN_TOLERANCE = 1e-7  # m; a flattened arc of 1 m then has 2000 lines
+_MAX_TOLERANCE = 1e-3  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +56,9 @@ class FileOptions:
     step: bool = False
 
     def __post_init__(self) -> None:
-        if not 0.999 * _FINEST <= self.tolerance <= 1.001 * _COARSEST:  # millimetres in SI are not exact
+        if not 0.999 * _MIN_TOLERANCE <= self.tolerance <= 1.001 * _MAX_TOLERANCE:  # millimetres in SI are not exact
             raise GeometryError(
-                f"the tolerance of the cut must be from {_FINEST * 1e3:g} to {_COARSEST * 1e3:g} mm, got "
+                f"the tolerance of the cut must be from {_MIN_TOLERANCE * 1e3:g} to {_MAX_TOLERANCE * 1e3:g} mm, got "
                 f"{self.tolerance * 1e3:.4g} mm"
             )
 

@@ -30,20 +30,20 @@ if TYPE_CHECKING:
 __all__ = ["ArmAddress", "DesignFolder", "arm_link", "first_scene", "read_design"]
 
 _MAX_BYTES = 4 << 20  # of design.json
-_TUBES = {"upper_arm": 1, "forearm": 2}  # link -> index of the DH length along which its mesh's z axis runs
-_HEAD = """\
+_TUBE_AXES = {"upper_arm": 1, "forearm": 2}  # link -> index of the DH length along which its mesh's z axis runs
+_FILE_HEAD = """\
 # Written by `coneskin init`; every key is described in docs/look-up/scene.md.
 """
-_MOTION = """\
+_MOTION_TEXT = """\
 # What a simulation needs from here on; take it out for real hardware.
 [motion]
 waypoints_deg = [[-40, -90, 90, -90, -90, 0], [60, -80, 80, -90, -90, 0]]
 speed_deg_s = 30
 acceleration_deg_s2 = 90
 """
-_MONITORING = """\
+_MONITORING_TEXT = """\
 [monitoring]                  # a pseudo-terminal on a busy computer can stall for longer than 50 ms"""
-_STALL = 250  # ms
+_STALL_MS = 250  # ms
 _TOUCH_START = 2.5  # s after the skin's start: the arm moves at full speed until about 3.4 s
 _TOUCH_END = 2.8  # s
 
@@ -158,7 +158,7 @@ def first_scene(
         )
     if arm is not None and name is not None:
         name = next(known for known, number in LINK_INDEX.items() if number == link_index(name))
-    lines = [_HEAD]
+    lines = [_FILE_HEAD]
     if arm is not None:
         lines.append(f'[arm]\nmodel = "{arm_model(arm.model).name}"\nhost = {json.dumps(arm.host)}\n')
     lines.append(f'[[link]]\nname = {json.dumps(name or "link")}\nframe = "{design.frame or "mesh"}"\n')
@@ -181,12 +181,12 @@ def first_scene(
     lines.append('[recording]\nfolder = "runs"\n')
     limits: dict[str, float] = dict(boards[0].monitoring) if boards else {}
     if not ports:
-        limits |= {key: max(limits.get(key, 0), _STALL) for key in ("skin_silence_ms", "skin_late_ms")}
+        limits |= {key: max(limits.get(key, 0), _STALL_MS) for key in ("skin_silence_ms", "skin_late_ms")}
         if arm is not None:
-            lines.append(_MOTION)
-            limits["arm_silence_ms"] = _STALL
+            lines.append(_MOTION_TEXT)
+            limits["arm_silence_ms"] = _STALL_MS
     if limits:
-        lines.append("[monitoring]" if ports else _MONITORING)
+        lines.append("[monitoring]" if ports else _MONITORING_TEXT)
         lines += [*(f"{key} = {value_text(value)}" for key, value in limits.items()), ""]
     return "\n".join(lines)
 
@@ -211,12 +211,12 @@ def _padding(thickness: float) -> str:
 
 def _middle_of_tube(cone: Frustum, link: str, model: str) -> str:
     """Return the pose of a sensor that was designed from dimensions: the middle of the tube, until it is measured."""
-    if link not in _TUBES:
+    if link not in _TUBE_AXES:
         raise GeometryError(
             f"the design was made from dimensions, so where it is on the {link} is not known; design it from the "
-            f"link's mesh, or choose --link {' or '.join(_TUBES)}"
+            f"link's mesh, or choose --link {' or '.join(_TUBE_AXES)}"
         )
-    start = 0.5e3 * (abs(arm_model(model).a[_TUBES[link]]) - cone.height)
+    start = 0.5e3 * (abs(arm_model(model).a[_TUBE_AXES[link]]) - cone.height)
     return f"xyz_mm = [0, 0, {start:.1f}]       # MEASURE: end 1 along the link from the joint; the design knew no link"
 
 

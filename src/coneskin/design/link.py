@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["LinkMesh", "find_link_sheets", "fit_link", "fit_mesh", "load_link", "with_seams"]
 
 #: words in the name of a file or folder
-_VISUAL, _SIMPLIFIED = {"visual", "visuals"}, {"collision", "collisions", "hull", "hulls", "convex"}
+_VISUAL_WORDS, _HULL_WORDS = {"visual", "visuals"}, {"collision", "collisions", "hull", "hulls", "convex"}
 _RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
 
 
@@ -170,9 +170,9 @@ def _called_visual(path: str) -> bool:
     """Tell whether a path calls its mesh the visual one, as ROS descriptions do; the nearest name counts."""
     for part in reversed(Path(path).parts):
         words = set(re.split("[^a-z]+", part.lower()))
-        if words & _SIMPLIFIED:
+        if words & _HULL_WORDS:
             return False
-        if words & _VISUAL:
+        if words & _VISUAL_WORDS:
             return True
     return False
 

@@ -28,7 +28,7 @@ __all__ = ["draw_jig", "draw_link", "draw_weights", "drawn_triangles"]
 
 _SHEET_COLOURS = ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
 _BARE_COLOURS = ("#c4c8ce", "#d8c9a3", "#b3c7b0", "#cdb4c9", "#a9b8c9", "#e0b9a8")
-_LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
+_LABEL_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
 _MAX_FACES = 12000  # faces; matplotlib draws them in about a second
 
 
@@ -151,7 +151,7 @@ def _draw_face(axes: Any, face: DatumFace, sight: _Sight) -> None:
         return
     outline = 1e3 * (face.outline + 5e-4 * np.array(face.normal))
     axes.plot(*np.concatenate([outline, outline[:1]]).T, "--", color=INK_COLOUR, lw=1.2)
-    axes.text(*outline.mean(axis=0), face.name, fontweight="bold", ha="center", va="center", bbox=_LABEL)
+    axes.text(*outline.mean(axis=0), face.name, fontweight="bold", ha="center", va="center", bbox=_LABEL_BOX)
 
 
 def _name_ends(axes: Any, design: SheetDesign, sight: _Sight, colour: str) -> None:
@@ -169,7 +169,7 @@ def _name_ends(axes: Any, design: SheetDesign, sight: _Sight, colour: str) -> No
         best = int(np.where(seen, normals @ sight.view, -1.0).argmax())
         aside = 40.0 * sight.size * (1.0 if end == 2 else -1.0) * axis
         name = f"{design.name}, end {end}"
-        axes.text(*(points[best] + aside), name, color=colour, fontsize=8, ha="center", va="center", bbox=_LABEL)
+        axes.text(*(points[best] + aside), name, color=colour, fontsize=8, ha="center", va="center", bbox=_LABEL_BOX)
 
 
 def _by_reason(triangles: Any, areas: Sequence[BareArea]) -> list[tuple[str, Any]]:
@@ -260,8 +260,8 @@ def _covered(design: SheetDesign, triangles: Any) -> Any:
     return covered.all(axis=1)
 
 
-_OUTLINE = "#d1495b"
-_LIFT = 1e-3  # m; by which outlines stand off the outer face, so that they are not hidden
+_OUTLINE_COLOR = "#d1495b"
+_OUTLINE_LIFT = 1e-3  # m; by which outlines stand off the outer face, so that they are not hidden
 
 
 def draw_weights(figure: Any, triangles: Any, designs: Sequence[SheetDesign], weights: TouchWeights) -> None:
@@ -295,7 +295,7 @@ def draw_weights(figure: Any, triangles: Any, designs: Sequence[SheetDesign], we
         for design in designs:
             for line, normals in _outlines(design):
                 line[normals @ view < 0.0] = np.nan
-                axes.plot(*line.T, color=_OUTLINE, lw=1.5)
+                axes.plot(*line.T, color=_OUTLINE_COLOR, lw=1.5)
         axes.set(
             xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x [mm]", ylabel="y [mm]"
         )
@@ -312,7 +312,7 @@ def _outlines(design: SheetDesign) -> list[tuple[Any, Any]]:
     """Return points [mm] and normals of the ends and edges of a sheet's outer face."""
     import numpy as np
 
-    side, height = design.place.frustum, design.options.stack.thickness + _LIFT
+    side, height = design.place.frustum, design.options.stack.thickness + _OUTLINE_LIFT
     along, around = np.linspace(0.0, side.slant, 40), np.linspace(0.0, side.wrap, 180)
     found = []
     for u, phi in ((0.0, around), (side.slant, around), (along, 0.0), (along, side.wrap)):
@@ -321,9 +321,9 @@ def _outlines(design: SheetDesign) -> list[tuple[Any, Any]]:
     return found
 
 
-_LIGHT = np.array([0.35, -0.55, 0.76])
-_APART = 0.25  # of the radius of a part: how far the parts are drawn from each other
-_COLOURS = ((0.42, 0.62, 0.78), (0.85, 0.62, 0.40), (0.55, 0.72, 0.50), (0.72, 0.58, 0.76))
+_LIGHT_DIRECTION = np.array([0.35, -0.55, 0.76])
+_PART_DISTANCE = 0.25  # of the radius of a part: how far the parts are drawn from each other
+_PART_COLORS = ((0.42, 0.62, 0.78), (0.85, 0.62, 0.40), (0.55, 0.72, 0.50), (0.72, 0.58, 0.76))
 
 
 def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
@@ -341,19 +341,19 @@ def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
         turned = -1.0 if collar.end == 1 else 1.0  # as it stands, end 1 is upside down
         for part in collar.parts:
             middle = 0.5 * (part.start + part.end)
-            aside = 0.5 * _APART * max(part.surface.size[:2])
+            aside = 0.5 * _PART_DISTANCE * max(part.surface.size[:2])
             off = np.array([aside * math.cos(middle), turned * aside * math.sin(middle), 0.0])
             triangles = 1e3 * (part.surface.vertices[part.surface.faces] + off)
             a, b, c = triangles.transpose(1, 0, 2)
             normal = np.cross(b - a, c - a)
             size = np.linalg.norm(normal, axis=1)
-            bright = 0.55 + 0.45 * (normal @ _LIGHT) / np.where(size > 0.0, size, 1.0)
+            bright = 0.55 + 0.45 * (normal @ _LIGHT_DIRECTION) / np.where(size > 0.0, size, 1.0)
             shown.append(triangles)
-            paint.append(np.clip(np.outer(bright, _COLOURS[(part.number - 1) % len(_COLOURS)]), 0.0, 1.0))
+            paint.append(np.clip(np.outer(bright, _PART_COLORS[(part.number - 1) % len(_PART_COLORS)]), 0.0, 1.0))
             at = 1e3 * (part.surface.vertices.mean(axis=0) + off)
             at[:2] += 0.35e3 * max(part.surface.size[:2]) * np.array([math.cos(middle), turned * math.sin(middle)])
             name = f"part {part.number}" + (", begins at edge 0" if part.number == 1 else "")
-            axes.text(at[0], at[1], -8.0, name, fontsize=9, ha="center", zorder=10, bbox=_LABEL)
+            axes.text(at[0], at[1], -8.0, name, fontsize=9, ha="center", zorder=10, bbox=_LABEL_BOX)
         triangles = np.concatenate(shown)
         drawn = Poly3DCollection(triangles, facecolors=np.concatenate(paint), edgecolors="none", clip_on=False)
         axes.add_collection3d(drawn)

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 __all__ = ["report_text"]
 
-_ASSEMBLY = {
+_ASSEMBLY_WORDS = {
     "loose": "Wrap the layers one after another; each is cut for its own radius.",
     "pairs": "Glue each conductive sheet to its substrate while both are flat, then wrap the pairs.",
     "bonded": "Glue all layers together while they are flat, then wrap the sheet; check the strains above.",
 }
-_TOOLS = (
+_TOOL_LIST = (
     "Tools: what cuts (a plotter with knives, or a scalpel and a cutting mat), caliper, steel rule, tape measure, try "
     "square, soft pencil, needle, hand roller of rubber, kitchen scales, multimeter, wire stripper, crimping tool for "
     "the contacts, flat pliers, side cutters, heat gun; a 3D printer where there is a jig."
@@ -75,7 +75,7 @@ def report_text(
     lines += _table(head, [[_text(row[key]) for key in keys] for row in material_rows(designs)])
     lines += ["", "### Everything to buy or to cut", ""]
     lines += _table(("item", "quantity", "for"), bill_of_materials(designs, figures, beds))
-    lines += ["", _TOOLS]
+    lines += ["", _TOOL_LIST]
     if len(designs) > 1:
         lines += ["", "Build all sheets flat in any order; put them on the link in the order of their numbers."]
     for index, (design, item) in enumerate(zip(designs, figures, strict=True)):
@@ -139,7 +139,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     yield ""
     yield "### Layers"
     yield ""
-    yield f"Assembly: {stack.assembly}. {_ASSEMBLY[stack.assembly]} The patterns differ in radius, but not in theta0."
+    yield f"Assembly: {stack.assembly}. {_ASSEMBLY_WORDS[stack.assembly]} The patterns differ in radius, but not in theta0."
     yield ""
     surfaces = {cut.name: cut.surface for cut in design.cuts}
     table = []

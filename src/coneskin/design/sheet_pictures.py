@@ -206,8 +206,8 @@ def draw_parts(figure: Any, design: SheetDesign) -> None:
     axes.text(0.0, 0.95, "\n".join(words), va="top", fontsize=8, transform=axes.transAxes)
 
 
-_ORDER = (1, 3, 2, 4, 6, 5, 7)  # numbers of the parts, from the link outwards
-_FACES = ("#e8d9c0", "#55585e", FOIL_COLOUR, "#cfe3f1", FOIL_COLOUR, "#55585e", "#e8d9c0")
+_PART_ORDER = (1, 3, 2, 4, 6, 5, 7)  # numbers of the parts, from the link outwards
+_FACE_COLORS = ("#e8d9c0", "#55585e", FOIL_COLOUR, "#cfe3f1", FOIL_COLOUR, "#55585e", "#e8d9c0")
 
 
 def draw_stack(figure: Any, design: SheetDesign) -> None:
@@ -223,7 +223,7 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
     squeeze, lean = 0.38, 0.30
     pitch = squeeze * depth * 0.62 + 0.05 * width
     right = 0.0
-    stacked = sorted(design.cuts, key=lambda cut: _ORDER.index(cut.number))
+    stacked = sorted(design.cuts, key=lambda cut: _PART_ORDER.index(cut.number))
     for level, cut in enumerate(stacked):
         lift = level * pitch
 
@@ -238,7 +238,7 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
                 if stroke.kind == "cut":
                     x, y = slanted(stroke.outline)
                     right = max(right, *x)
-                    axes.fill(x, y, facecolor=_FACES[level], edgecolor=INK_COLOUR, lw=0.7, alpha=0.92)
+                    axes.fill(x, y, facecolor=_FACE_COLORS[level], edgecolor=INK_COLOUR, lw=0.7, alpha=0.92)
             for stroke in part.strokes:
                 colour = {"hole": "#b3007a", "score": "#2040c0", "fold": "#0a7d24"}.get(stroke.kind)
                 if colour:

@@ -15,13 +15,12 @@ from .sheet_design import SheetDesign, design_sheets
 
 __all__ = ["blind_angle", "cover_seams"]
 
-_TURN = 2.0 * math.pi
-_FULL = 0.9  # of a turn; from there on a wrap has a seam rather than a side without a sheet
+_SEAM_TURN_SHARE = 0.9  # of a turn; from there on a wrap has a seam rather than a side without a sheet
 
 
 def blind_angle(design: SheetDesign) -> float:
     """Return the angle about the axis in which a sheet locates no touch: its seam, and what it does not wrap [rad]."""
-    return _TURN - (design.layout.active.phi2 - design.layout.active.phi1)
+    return math.tau - (design.layout.active.phi2 - design.layout.active.phi1)
 
 
 def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
@@ -42,7 +41,7 @@ def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
     """
     strips: list[SheetDesign] = []
     for design in designs:
-        if design.options.cover_seam and design.place.frustum.wrap > _FULL * _TURN:
+        if design.options.cover_seam and design.place.frustum.wrap > _SEAM_TURN_SHARE * math.tau:
             options = replace(
                 design.options, wires=design.layout.plan.wires, seam_gap=0.0, overlap=0.0, cover_seam=False
             )
@@ -54,7 +53,7 @@ def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
         widest = max(design.place.frustum.wrap for design in designs)
         raise GeometryError(
             f"no sheet has a seam to cover: the widest wraps {math.degrees(widest):.0f} deg, and a seam needs at least "
-            f"{math.degrees(_FULL * _TURN):.0f}; leave the covered seam out"
+            f"{math.degrees(_SEAM_TURN_SHARE * math.tau):.0f}; leave the covered seam out"
         )
     return (*designs, *strips)
 
@@ -69,14 +68,14 @@ def _strip_place(design: SheetDesign) -> tuple[PlacedFrustum, float]:
         )
     above = design.place.parallel(stack.thickness)
     outer = above.frustum
-    trial = Frustum(outer.radius1, outer.radius2, outer.height, 0.5 * _TURN)
+    trial = Frustum(outer.radius1, outer.radius2, outer.height, 0.5 * math.tau)
     inside = lay_out_sheet(trial, plan).active
     before, after = inside.phi1, trial.wrap - inside.phi2
     wrap = before + blind_angle(design) + after
-    if wrap > 0.5 * _TURN:
+    if wrap > 0.5 * math.tau:
         raise GeometryError(
             f"{design.name}: a strip over its seam would have to wrap {math.degrees(wrap):.0f} deg, at most 180: make "
             "electrodes and margins narrower"
         )
     start = design.layout.active.phi2 - before
-    return above.part(0.0, outer.slant, start, start + wrap), 0.5 * (side.wrap + _TURN) - start
+    return above.part(0.0, outer.slant, start, start + wrap), 0.5 * (side.wrap + math.tau) - start

@@ -31,19 +31,10 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.fit.fitted_sheet import FittedSheet
 
-__all__ = [
-    "DesignOptions",
-    "JigPlan",
-    "JigSurface",
-    "SheetDesign",
-    "SheetJoint",
-    "adjoin",
-    "design_sheets",
-    "find_joint",
-]
+__all__ = ["DesignOptions", "JigPlan", "JigSurface", "SheetDesign", "SheetJoint", "design_sheets"]
 
 JigSurface = Literal["link", "cone", "none"]
-_SHORTEST = 4e-3  # m
+_MIN_GRIP = 4e-3  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +63,7 @@ class JigPlan:
     grip: float = 15e-3
 
     def __post_init__(self) -> None:
-        limits = {"wall": (1.5e-3, 20e-3), "clearance": (0.0, 3e-3), "reach": (8e-3, 0.2), "grip": (_SHORTEST, 0.1)}
+        limits = {"wall": (1.5e-3, 20e-3), "clearance": (0.0, 3e-3), "reach": (8e-3, 0.2), "grip": (_MIN_GRIP, 0.1)}
         for name, (least, most) in limits.items():
             value = getattr(self, name)
             if not 0.999 * least <= value <= 1.001 * most:  # millimetres in SI are not exact
@@ -81,9 +72,6 @@ class JigPlan:
                 )
         if not 2 <= self.parts <= 8:
             raise GeometryError(f"a jig is split into 2 to 8 parts, got {self.parts}")
-
-
-_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,17 +89,17 @@ class SheetJoint:
     trimmed: float
 
 
-def adjoin(one: PlacedFrustum, two: PlacedFrustum) -> bool:
+def _adjoin(one: PlacedFrustum, two: PlacedFrustum) -> bool:
     """Tell whether two sheets follow each other along one axis, with the same wrap."""
     turn = one.link_frustum.inverse() @ two.link_frustum
     x, y, z = turn.translation
     tilt = math.hypot(turn.rotation[0][2], turn.rotation[1][2])
     same = abs(one.frustum.wrap - two.frustum.wrap) < 1e-6
-    same &= one.frustum.wrap > _TURN - 1e-6 or turn.rotation[0][0] > 1.0 - 1e-9
+    same &= one.frustum.wrap > math.tau - 1e-6 or turn.rotation[0][0] > 1.0 - 1e-9
     return same and tilt < 1e-6 and math.hypot(x, y) < 1e-6 and z > 0.5 * one.frustum.height
 
 
-def find_joint(one: PlacedFrustum, two: PlacedFrustum, stack: LayerStack, gap: float) -> SheetJoint:
+def _find_joint(one: PlacedFrustum, two: PlacedFrustum, stack: LayerStack, gap: float) -> SheetJoint:
     """Return the joint of two neighbours, trimmed so that no layer of one runs into the other.
 
     A face at the height t above the link is shifted along the axis by -t sin(half angle): at a belt the outer faces
@@ -126,7 +114,7 @@ def find_joint(one: PlacedFrustum, two: PlacedFrustum, stack: LayerStack, gap: f
 
 _LOWER_CONDUCTIVE, _UPPER_CONDUCTIVE = 1, 3  # indices of the layers in the stack
 _MOST_STRAIN = 0.4  # of a face of a wrapped layer; foam wrinkles or tears beyond
-_STRAIGHT = 0.02  # of the fit's tolerance; a taper below it is noise of the mesh, and the side a cylinder's
+_STRAIGHT_SHARE = 0.02  # of the fit's tolerance; a taper below it is noise of the mesh, and the side a cylinder's
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,11 +234,11 @@ def design_sheets(
         why = "no place was given" if isinstance(places, Sequence) else places.reason
         raise GeometryError(f"there is no sheet to design: {why}")
     if not isinstance(places, Sequence):
-        links = [_straightened(link, _STRAIGHT * places.tolerance) for link in links]
+        links = [_straightened(link, _STRAIGHT_SHARE * places.tolerance) for link in links]
     if not (math.isfinite(options.sheet_gap) and options.sheet_gap >= 0.0):
         raise GeometryError(f"sheet gap must be finite and not negative, got {options.sheet_gap * 1e3:.4g} mm")
     joints = [
-        find_joint(a, b, options.stack, options.sheet_gap) if adjoin(a, b) else None
+        _find_joint(a, b, options.stack, options.sheet_gap) if _adjoin(a, b) else None
         for a, b in itertools.pairwise(links)
     ]
     cuts = [0.0, *(0.5 * joint.trimmed if joint else 0.0 for joint in joints), 0.0]
@@ -319,7 +307,7 @@ def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
                     f"possible: make it thinner than {layer.thickness * 1e3:g} mm, or choose another "
                     "layers.assembly"
                 )
-    if options.overlap and link.frustum.wrap < _TURN - 1e-9:
+    if options.overlap and link.frustum.wrap < math.tau - 1e-9:
         wrap = math.degrees(link.frustum.wrap)
         raise GeometryError(f"an overlap closes the seam of a full wrap, this one is of {wrap:.4g} deg: leave it out")
 
@@ -357,10 +345,12 @@ def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
     narrow = min(side.radius1, side.radius2)
     if not (math.isfinite(gap) and gap >= 0.0):
         raise GeometryError(f"seam gap must be finite and not negative, got {gap * 1e3:.4g} mm; for a flap use overlap")
-    if gap == 0.0 or side.wrap < _TURN - 1e-9:
+    if gap == 0.0 or side.wrap < math.tau - 1e-9:
         return link
-    if gap >= _TURN * narrow:
-        raise GeometryError(f"seam gap of {gap * 1e3:.4g} mm takes the whole narrow end, {_TURN * narrow * 1e3:.4g} mm")
+    if gap >= math.tau * narrow:
+        raise GeometryError(
+            f"seam gap of {gap * 1e3:.4g} mm takes the whole narrow end, {math.tau * narrow * 1e3:.4g} mm"
+        )
     turn = gap / narrow
     return link.part(0.0, side.slant, 0.5 * turn, side.wrap - 0.5 * turn)
 

@@ -240,24 +240,24 @@ def _round(value: float, digits: int = 4) -> float:
     return round(value, digits) + 0.0
 
 
-_FLAT = 1e4  # m; an arc of such a radius is a straight line within a micrometre
-_FAR = 5.0  # m; no compass draws a larger radius: how far the arc rises says more
+_FLAT_RADIUS = 1e4  # m; an arc of such a radius is a straight line within a micrometre
+_MAX_COMPASS = 5.0  # m; no compass draws a larger radius: how far the arc rises says more
 
 
 def sector_text(cone: Frustum) -> str:
     """Return what a flat pattern is."""
     flat = unroll(cone)
-    if flat.r1 > _FLAT:
+    if flat.r1 > _FLAT_RADIUS:
         return f"rectangle {flat.arc1 * 1e3:.3f} x {flat.slant * 1e3:.3f} mm"
     return polar_text(flat)
 
 
 def polar_text(flat: Sector) -> str:
     """Return radii and angle of a sector; of a nearly straight one how far its arcs rise above their chords."""
-    if flat.r1 > _FLAT:
+    if flat.r1 > _FLAT_RADIUS:
         return "a rectangle"
     theta = f"theta0 {math.degrees(flat.theta0):.4f} deg"
-    if max(flat.r1, flat.r2) < _FAR:
+    if max(flat.r1, flat.r2) < _MAX_COMPASS:
         return f"r1 {flat.r1 * 1e3:.3f} mm, r2 {flat.r2 * 1e3:.3f} mm, {theta}"
     rises = [2.0 * radius * math.sin(0.25 * flat.theta0) ** 2 for radius in (flat.r1, flat.r2)]
     return (

@@ -24,11 +24,7 @@ if TYPE_CHECKING:
     from coneskin.geometry.ray_casting import RayCaster
 
 __all__ = [
-    "BAND_COLOURS",
     "ELECTRODE_COLOURS",
-    "HOLE_COLOUR",
-    "DeviationBand",
-    "ElectrodeMark",
     "design_facts",
     "deviation_bands",
     "electrode_marks",
@@ -38,7 +34,7 @@ __all__ = [
 ]
 
 #: of a deviation, from the mesh far below the side, over on it, to far above
-BAND_COLOURS = (
+_BAND_COLOURS = (
     (33, 102, 172),
     (103, 169, 207),
     (176, 214, 205),
@@ -47,12 +43,12 @@ BAND_COLOURS = (
     (239, 138, 98),
     (178, 24, 43),
 )
-HOLE_COLOUR = (90, 90, 90)  #: of what spans a hole
-_ROWS, _COLUMNS = 40, 96
-_ABOVE = 0.0004  # m; so that the mesh does not shine through
+_HOLE_COLOUR = (90, 90, 90)  #: of what spans a hole
+_GRID_ROWS, _GRID_COLUMNS = 40, 96
+_PATCH_LIFT = 0.0004  # m; so that the mesh does not shine through
 
 
-class DeviationBand(NamedTuple):
+class _DeviationBand(NamedTuple):
     """Patches of a side with about the same deviation.
 
     Attributes:
@@ -70,7 +66,7 @@ class DeviationBand(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def deviation_bands(rays: RayCaster, placed: PlacedFrustum, tolerance: float) -> list[DeviationBand]:
+def deviation_bands(rays: RayCaster, placed: PlacedFrustum, tolerance: float) -> list[_DeviationBand]:
     """Return the bands of a sheet; one without a patch is left out.
 
     Args:
@@ -81,39 +77,39 @@ def deviation_bands(rays: RayCaster, placed: PlacedFrustum, tolerance: float) ->
     import numpy as np
 
     side = placed.frustum
-    edges_u, edges_phi = np.linspace(0.0, side.slant, _ROWS + 1), np.linspace(0.0, side.wrap, _COLUMNS + 1)
+    edges_u, edges_phi = np.linspace(0.0, side.slant, _GRID_ROWS + 1), np.linspace(0.0, side.wrap, _GRID_COLUMNS + 1)
     u, phi = 0.5 * (edges_u[:-1] + edges_u[1:]), 0.5 * (edges_phi[:-1] + edges_phi[1:])
     heights = heights_by_ray(rays, placed, u, phi, tolerance)
     points, normals = placed.place(edges_u[:, None], edges_phi[None, :])
-    corners = (points + _ABOVE * normals).reshape(-1, 3)
-    index = np.arange(len(corners)).reshape(_ROWS + 1, _COLUMNS + 1)
+    corners = (points + _PATCH_LIFT * normals).reshape(-1, 3)
+    index = np.arange(len(corners)).reshape(_GRID_ROWS + 1, _GRID_COLUMNS + 1)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    limits = tolerance * np.linspace(-1.0, 1.0, len(BAND_COLOURS) + 1)
+    limits = tolerance * np.linspace(-1.0, 1.0, len(_BAND_COLOURS) + 1)
     hole = ~np.isfinite(heights) | (heights < -tolerance)
-    band = np.clip(np.searchsorted(limits, heights) - 1, 0, len(BAND_COLOURS) - 1)
-    band[hole] = len(BAND_COLOURS)
+    band = np.clip(np.searchsorted(limits, heights) - 1, 0, len(_BAND_COLOURS) - 1)
+    band[hole] = len(_BAND_COLOURS)
     found = []
-    for number, colour in enumerate((*BAND_COLOURS, HOLE_COLOUR)):
+    for number, colour in enumerate((*_BAND_COLOURS, _HOLE_COLOUR)):
         here = band == number
         if not here.any():
             continue
-        low, high = (np.nan, np.nan) if number == len(BAND_COLOURS) else (limits[number], limits[number + 1])
+        low, high = (np.nan, np.nan) if number == len(_BAND_COLOURS) else (limits[number], limits[number + 1])
         faces = np.concatenate(
             [np.column_stack([a[here], b[here], c[here]]), np.column_stack([a[here], c[here], d[here]])]
         )
         used, again = np.unique(faces, return_inverse=True)
-        found.append(DeviationBand(float(low), float(high), colour, corners[used], again.reshape(faces.shape)))
+        found.append(_DeviationBand(float(low), float(high), colour, corners[used], again.reshape(faces.shape)))
     return found
 
 
 ELECTRODE_COLOURS = {"A": (220, 38, 38), "B": (217, 119, 6), "C": (37, 99, 235), "D": (13, 148, 136)}
 _LINE_ABOVE = 0.001  # m above the side
 _LETTER_ABOVE = 0.006  # m: in front of its line from wherever the line is seen
-_PIECES = {"A": 89, "B": 89, "C": 19, "D": 19}
-_LETTERS = {"A": (0.1, 0.43, 0.76), "B": (0.1, 0.43, 0.76), "C": (0.5,), "D": (0.5,)}  # shares of the line
+_LINE_PIECES = {"A": 89, "B": 89, "C": 19, "D": 19}
+_LETTER_PLACES = {"A": (0.1, 0.43, 0.76), "B": (0.1, 0.43, 0.76), "C": (0.5,), "D": (0.5,)}  # shares of the line
 
 
-class ElectrodeMark(NamedTuple):
+class _ElectrodeMark(NamedTuple):
     """Mark of one electrode.
 
     Attributes:
@@ -127,16 +123,16 @@ class ElectrodeMark(NamedTuple):
     letters: NDArray[np.float64]
 
 
-def electrode_marks(design: SheetDesign) -> list[ElectrodeMark]:
+def electrode_marks(design: SheetDesign) -> list[_ElectrodeMark]:
     """Return the marks of a sheet's electrodes, on the side that it covers."""
     import numpy as np
 
     side, box, half = design.place.frustum, design.layout.field, 0.5 * design.layout.plan.electrode
     turn = half / min(side.radius1, side.radius2)
     found = []
-    for letter, pieces in _PIECES.items():
+    for letter, pieces in _LINE_PIECES.items():
         share = np.linspace(0.0, 1.0, pieces + 1)
-        stands = np.array(_LETTERS[letter])
+        stands = np.array(_LETTER_PLACES[letter])
 
         def place(at: NDArray[np.float64], above: float, letter: str = letter) -> NDArray[np.float64]:
             u = {"A": box.u2 + half, "B": box.u1 - half}.get(letter, box.u1 + at * (box.u2 - box.u1))
@@ -145,14 +141,14 @@ def electrode_marks(design: SheetDesign) -> list[ElectrodeMark]:
             return np.asarray(points + above * normals)
 
         line = place(share, _LINE_ABOVE).astype("float32")
-        found.append(ElectrodeMark(letter, np.stack([line[:-1], line[1:]], axis=1), place(stands, _LETTER_ABOVE)))
+        found.append(_ElectrodeMark(letter, np.stack([line[:-1], line[1:]], axis=1), place(stands, _LETTER_ABOVE)))
     return found
 
 
-_PANEL = 340.0  # pixels; of the panel's width, for a drawing
-_TALLEST = 230.0  # pixels of a drawing
-_READABLE = 9.0  # pixels of capitals; what is cut has smaller ones, to fit on its part
-_KINDS = {"cut": "cut", "hole": "hole", "score": "mark", "fold": "fold"}
+_PANEL_WIDTH = 340.0  # pixels; of the panel's width, for a drawing
+_MAX_DRAWING_HEIGHT = 230.0  # pixels of a drawing
+_MIN_LETTER_HEIGHT = 9.0  # pixels of capitals; what is cut has smaller ones, to fit on its part
+_STROKE_CLASSES = {"cut": "cut", "hole": "hole", "score": "mark", "fold": "fold"}
 
 
 def legend(tolerance: float) -> str:
@@ -161,10 +157,10 @@ def legend(tolerance: float) -> str:
     Args:
         tolerance: deviation of the strongest colours [m].
     """
-    share = 100.0 / len(BAND_COLOURS)
-    bands = "".join(f'<span style="width:{share:.3f}%;background:{_css(colour)}"></span>' for colour in BAND_COLOURS)
+    share = 100.0 / len(_BAND_COLOURS)
+    bands = "".join(f'<span style="width:{share:.3f}%;background:{_css(colour)}"></span>' for colour in _BAND_COLOURS)
     ends = f"{-1e3 * tolerance:g} mm: the link is below", f"it stands out: +{1e3 * tolerance:g} mm"
-    chips = [(HOLE_COLOUR, "a hole is spanned"), *((ELECTRODE_COLOURS[name], name) for name in ELECTRODE_COLOURS)]
+    chips = [(_HOLE_COLOUR, "a hole is spanned"), *((ELECTRODE_COLOURS[name], name) for name in ELECTRODE_COLOURS)]
     return (
         '<div id="coneskin-legend" style="font-size:12px;margin:4px 10px">'
         f'<div style="display:flex;height:12px">{bands}</div>'
@@ -210,17 +206,17 @@ def design_facts(designs: Sequence[SheetDesign]) -> str:
 def flat_drawing(sheet: CutSheet) -> str:
     """Return a layer as it is cut, to fit the width of the panel, with letters and lines that can be seen there."""
     left, low, right, high = sheet.bounds
-    pixel = max((right - left) / _PANEL, (high - low) / _TALLEST)  # m
-    drawn = to_svg((_with_readable_labels(sheet, _READABLE * pixel),), sheet.name)
+    pixel = max((right - left) / _PANEL_WIDTH, (high - low) / _MAX_DRAWING_HEIGHT)  # m
+    drawn = to_svg((_with_readable_labels(sheet, _MIN_LETTER_HEIGHT * pixel),), sheet.name)
     drawn = re.sub(r"^<\?xml[^>]*\?>\s*", "", drawn)
     drawn = re.sub(
         r'width="[^"]*mm" height="[^"]*mm"',
-        f'style="display:block;width:100%;max-height:{_TALLEST:g}px"',
+        f'style="display:block;width:100%;max-height:{_MAX_DRAWING_HEIGHT:g}px"',
         drawn,
         count=1,
     )
     kinds = {stroke.kind for part in sheet.parts for stroke in part.strokes}
-    chips = _chips([(LINE_COLOURS[kind], words) for kind, words in _KINDS.items() if kind in kinds])
+    chips = _chips([(LINE_COLOURS[kind], words) for kind, words in _STROKE_CLASSES.items() if kind in kinds])
     return (
         '<div id="coneskin-flat" style="margin:4px 10px;background:white;border:1px solid #d1d5db">'
         "<style>#coneskin-flat path{stroke-width:1.5px;vector-effect:non-scaling-stroke}</style>"

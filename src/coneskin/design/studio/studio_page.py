@@ -40,15 +40,15 @@ if TYPE_CHECKING:
 
 __all__ = ["StudioPage", "first_view", "seen_shares"]
 
-_AROUND = 24  # directions at each height
-_HEIGHTS = (20.0, 45.0, -15.0)  # deg above the horizon, the preferred one first
-_FIRST = -40.0  # deg; azimuth that is taken where none is better
-_ROWS, _COLUMNS = 4, 14  # places of a sheet that are looked at
-_ABOVE = 0.001  # m above the sheet, from where a place is looked for
-_FACING = 0.15  # cosine; what is turned away by more is seen as a line
-_SEAM = 0.3  # worth of seeing all of a seam, beside 1 for all of a sheet
-_PREFERRED = 0.1  # by which another height has to be better
-_AWAY = 1.55  # of the link's largest side
+_AZIMUTH_COUNT = 24  # directions at each height
+_VIEW_HEIGHTS = (20.0, 45.0, -15.0)  # deg above the horizon, the preferred one first
+_FIRST_AZIMUTH = -40.0  # deg; azimuth that is taken where none is better
+_PLACE_ROWS, _PLACE_COLUMNS = 4, 14  # places of a sheet that are looked at
+_EYE_LIFT = 0.001  # m above the sheet, from where a place is looked for
+_MIN_FACING = 0.15  # cosine; what is turned away by more is seen as a line
+_SEAM_WORTH = 0.3  # worth of seeing all of a seam, beside 1 for all of a sheet
+_HEIGHT_PREFERENCE = 0.1  # by which another height has to be better
+_VIEW_DISTANCE = 1.55  # of the link's largest side
 
 
 def first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArray[np.float64]) -> tuple[Vector, Vector]:
@@ -64,12 +64,12 @@ def first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArray
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, size = 0.5 * (low + high), float((high - low).max())
     ways = _directions()
-    worth = np.array([-_PREFERRED * (row // _AROUND > 0) for row in range(len(ways))])
+    worth = np.array([-_HEIGHT_PREFERENCE * (row // _AZIMUTH_COUNT > 0) for row in range(len(ways))])
     for design in designs:
         sheet, seam = seen_shares(design, rays, ways)
-        worth += sheet + _SEAM * seam
+        worth += sheet + _SEAM_WORTH * seam
     way = ways[int(np.argmax(worth))]  # the first of several that are as good
-    x, y, z = (middle + _AWAY * size * way).tolist()
+    x, y, z = (middle + _VIEW_DISTANCE * size * way).tolist()
     at_x, at_y, at_z = middle.tolist()
     return (x, y, z), (at_x, at_y, at_z)
 
@@ -92,15 +92,15 @@ def seen_shares(
     import numpy as np
 
     box = design.layout.field
-    u = np.linspace(box.u1, box.u2, _ROWS)
-    rows, columns = np.meshgrid(u, np.linspace(box.phi1, box.phi2, _COLUMNS), indexing="ij")
+    u = np.linspace(box.u1, box.u2, _PLACE_ROWS)
+    rows, columns = np.meshgrid(u, np.linspace(box.phi1, box.phi2, _PLACE_COLUMNS), indexing="ij")
     points, normals = (found.reshape(-1, 3) for found in design.place.place(rows, columns))
     cosine = normals @ ways.T  # places, ways
     seen = np.zeros_like(cosine)
-    at, way = np.nonzero(cosine > _FACING)
-    depth, _ = rays.cast(points[at] + _ABOVE * normals[at], ways[way])
+    at, way = np.nonzero(cosine > _MIN_FACING)
+    depth, _ = rays.cast(points[at] + _EYE_LIFT * normals[at], ways[way])
     seen[at, way] = np.where(np.isfinite(depth), 0.0, cosine[at, way])
-    grid = seen.reshape(_ROWS, _COLUMNS, len(ways))
+    grid = seen.reshape(_PLACE_ROWS, _PLACE_COLUMNS, len(ways))
     return seen.mean(axis=0), grid[:, [0, -1]].mean(axis=(0, 1))
 
 
@@ -108,18 +108,18 @@ def _directions() -> NDArray[np.float64]:
     import numpy as np
 
     found = []
-    for height in map(math.radians, _HEIGHTS):
-        for step in range(_AROUND):
-            turn = math.radians(_FIRST) + 2.0 * math.pi * step / _AROUND
+    for height in map(math.radians, _VIEW_HEIGHTS):
+        for step in range(_AZIMUTH_COUNT):
+            turn = math.radians(_FIRST_AZIMUTH) + 2.0 * math.pi * step / _AZIMUTH_COUNT
             found.append((math.cos(height) * math.cos(turn), math.cos(height) * math.sin(turn), math.sin(height)))
     return np.array(found)
 
 
-_LINK = (205, 208, 214)
-_SUFFIXES = {".stl", ".obj", ".dae", ".ply"}
-_LETTER = 1.6  # of viser's own size of letters, 12 pixels
+_LINK_COLOR = (205, 208, 214)
+_MESH_SUFFIXES = {".stl", ".obj", ".dae", ".ply"}
+_LETTER_SIZE = 1.6  # of viser's own size of letters, 12 pixels
 _SHOWN_FIRST = "lower conductive"  # layer of the flat drawing that says most
-_STEP = 0.5  # mm and deg of the handles
+_HANDLE_STEP = 0.5  # mm and deg of the handles
 
 
 class StudioPage:
@@ -174,7 +174,7 @@ class StudioPage:
             "/link",
             vertices.astype("float32"),
             bench.link.mesh.faces,
-            color=_LINK,
+            color=_LINK_COLOR,
             side="double",
             flat_shading=True,
             cast_shadow=False,
@@ -193,10 +193,10 @@ class StudioPage:
         room, widest = math.floor(1e3 * height - 10.0), round(math.degrees(wrap), 1)
         turn = 360.0 if wrap >= 2.0 * math.pi else widest
         sliders = [
-            gui.add_slider(name + "end 1 [mm off]", 0.0, float(max(room, 1)), _STEP, 0.0),
-            gui.add_slider(name + "end 2 [mm off]", 0.0, float(max(room, 1)), _STEP, 0.0),
+            gui.add_slider(name + "end 1 [mm off]", 0.0, float(max(room, 1)), _HANDLE_STEP, 0.0),
+            gui.add_slider(name + "end 2 [mm off]", 0.0, float(max(room, 1)), _HANDLE_STEP, 0.0),
             gui.add_slider(name + "wrap [deg]", 30.0, widest, 0.1, widest),
-            gui.add_slider(name + "seam [deg]", 0.0, turn, _STEP, 0.0),
+            gui.add_slider(name + "seam [deg]", 0.0, turn, _HANDLE_STEP, 0.0),
         ]
 
         def changed(_event: Any) -> None:
@@ -235,7 +235,7 @@ class StudioPage:
                             f"{line}/letter {place}",
                             mark.letter,
                             position=at,
-                            font_screen_scale=_LETTER,
+                            font_screen_scale=_LETTER_SIZE,
                             depth_test=True,
                             anchor="center-center",
                         )
@@ -260,8 +260,8 @@ class StudioPage:
         """Find the sheets of a mesh file that was put onto the page."""
         file = self._upload.value
         suffix = Path(file.name).suffix.lower()
-        if suffix not in _SUFFIXES:
-            self._say(f"{file.name} is no {', '.join(sorted(_SUFFIXES))} file")
+        if suffix not in _MESH_SUFFIXES:
+            self._say(f"{file.name} is no {', '.join(sorted(_MESH_SUFFIXES))} file")
             return
         self._say(f"looking for sheets in {file.name} ...")
         try:

@@ -17,11 +17,10 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 
 __all__ = ["Handles", "Workbench", "adjusted"]
 
-_TURN = 2.0 * math.pi
-_LEAST = 0.010  # m; a sheet cannot be shorter than this
-_TIGHT = 0.9  # of the tolerance, from which on a deviation is worth a warning
-_BRIDGED = 0.05  # share of a sheet over holes, from which on it is worth a warning
-_COARSE = 0.002  # m for one count of the converter, from which on it is worth a warning
+_MIN_LENGTH = 0.010  # m; a sheet cannot be shorter than this
+_TIGHT_SHARE = 0.9  # of the tolerance, from which on a deviation is worth a warning
+_BRIDGED_SHARE = 0.05  # share of a sheet over holes, from which on it is worth a warning
+_COARSE_COUNT = 0.002  # m for one count of the converter, from which on it is worth a warning
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +51,18 @@ def adjusted(placed: PlacedFrustum, handles: Handles) -> PlacedFrustum:
     if handles.from_end1 < 0.0 or handles.from_end2 < 0.0:
         raise GeometryError("a sheet may be shortened, not lengthened: beyond its ends the link has another shape")
     height = cone.height - handles.from_end1 - handles.from_end2
-    if height < _LEAST:
+    if height < _MIN_LENGTH:
         raise GeometryError(
             f"{1e3 * cone.height:.0f} mm less {1e3 * handles.from_end1:.0f} mm and {1e3 * handles.from_end2:.0f} mm "
-            f"leaves {1e3 * height:.0f} mm; a sheet needs {1e3 * _LEAST:.0f} mm along the axis"
+            f"leaves {1e3 * height:.0f} mm; a sheet needs {1e3 * _MIN_LENGTH:.0f} mm along the axis"
         )
     wrap = cone.wrap if handles.wrap is None else min(handles.wrap, cone.wrap)
     if wrap <= 0.0:
         raise GeometryError(f"the wrap must be above 0 deg, got {math.degrees(wrap):g} deg")
     turn = handles.seam
-    if cone.wrap < _TURN:  # a partial wrap can only be moved within what was found
+    if cone.wrap < math.tau:  # a partial wrap can only be moved within what was found
         turn = min(max(turn, 0.0), cone.wrap - wrap)
-    if cone.wrap == _TURN and turn % _TURN:
+    if cone.wrap == math.tau and turn % math.tau:
         placed, turn = placed.turned(turn), 0.0
     ends = handles.from_end1 / cone.cos_half_angle, cone.slant - handles.from_end2 / cone.cos_half_angle
     if turn == 0.0 and wrap == cone.wrap and ends == (0.0, cone.slant):
@@ -134,7 +133,7 @@ class Workbench:
             placed = adjusted(sheet.placed, handles)
             share = placed.frustum.height / sheet.frustum.height
             area = share * placed.frustum.wrap / sheet.frustum.wrap
-            azimuth = (sheet.start_azimuth + handles.seam) % _TURN
+            azimuth = (sheet.start_azimuth + handles.seam) % math.tau
             sheets.append(
                 replace(
                     sheet,
@@ -169,19 +168,19 @@ class Workbench:
         if self.refusal:
             found.insert(0, self.refusal)
         for number, sheet in enumerate(self.fit.sheets, 1):
-            if sheet.max_deviation > _TIGHT * self.fit.tolerance:
+            if sheet.max_deviation > _TIGHT_SHARE * self.fit.tolerance:
                 found.append(
                     f"sheet {number} is up to {1e3 * sheet.max_deviation:.2f} mm off the link, near the tolerance of "
                     f"{1e3 * self.fit.tolerance:g} mm"
                 )
-            if sheet.bridged_share > _BRIDGED:
+            if sheet.bridged_share > _BRIDGED_SHARE:
                 found.append(
                     f"{100.0 * sheet.bridged_share:.0f} % of sheet {number} spans holes, up to "
                     f"{1e3 * sheet.bridged_depth:.1f} mm deep: it can be pressed in there"
                 )
         for design in self.designs:
             worst = max(max(item.along, item.around) for item in design.forecasts())
-            if worst > _COARSE:
+            if worst > _COARSE_COUNT:
                 found.append(
                     f"{design.name}: one count of the converter is {1e3 * worst:.1f} mm; take one of more bits"
                 )

@@ -12,17 +12,17 @@ from coneskin.geometry.drawing.nesting import MaterialBed
 
 from .build_figures import BuildFigures
 
-__all__ = ["ADHESIVE", "BillItem", "bill_of_materials"]
+__all__ = ["ADHESIVE", "bill_of_materials"]
 
 ADHESIVE = 50e-6  # m; thickness of the tape between the layers
-_STRIP = 3e-3  # m; width of the tape in the margins of the isolation
-_OFFCUT = 1.15  # of the area of tape; it is trimmed at the borders
-_MASKED = 0.5  # m; of masking tape for an end of a sheet
+_STRIP_WIDTH = 3e-3  # m; width of the tape in the margins of the isolation
+_OFFCUT_FACTOR = 1.15  # of the area of tape; it is trimmed at the borders
+_MASKING_LENGTH = 0.5  # m; of masking tape for an end of a sheet
 _STRAP_LAP = 80e-3  # m; of a strap: it passes over the collar, and holds on itself
-_INSULATION = 10e-3  # m; width of the tape over leads and electrodes
+_INSULATION_WIDTH = 10e-3  # m; width of the tape over leads and electrodes
 
 
-class BillItem(NamedTuple):
+class _BillItem(NamedTuple):
     """One line of the bill."""
 
     item: str
@@ -32,7 +32,7 @@ class BillItem(NamedTuple):
 
 def bill_of_materials(
     designs: Sequence[SheetDesign], figures: Sequence[BuildFigures], beds: Sequence[MaterialBed] = ()
-) -> list[BillItem]:
+) -> list[_BillItem]:
     """List everything that the sheets of a design need, beside the electronics.
 
     Args:
@@ -47,7 +47,7 @@ def bill_of_materials(
             net[cut.material] += sum(part.area for part in cut.parts)
             parts[cut.material].append(f"{design.name} part {cut.number}")
     items = [
-        BillItem(
+        _BillItem(
             material if "foil" not in material else f"{material}, 0.05 mm, with electrically conductive adhesive",
             f"{1e4 * net[material]:.0f} cm2 net{_strips(material)}; "
             + ("; ".join(_blank(bed) for bed in beds if bed.material == material) or "larger than the bed"),
@@ -60,47 +60,49 @@ def bill_of_materials(
         area = {cut.number: sum(part.area for part in cut.parts) for cut in design.cuts}
         faces += area[1] + area[3] + area[5]
         side = design.place.frustum
-        strips += _STRIP * (2.0 * side.slant + side.wrap * (side.radius1 + side.radius2)) * 2.0
+        strips += _STRIP_WIDTH * (2.0 * side.slant + side.wrap * (side.radius1 + side.radius2)) * 2.0
         covered += 0.5 * sum(s.outline.length for k in (1, 5) for part in design.cuts[k].parts for s in part.strokes)
     wires = [wire for item in figures for wire in item.cable.wires]
     count = len(designs)
     pins = sum(len(design.layout.holes) for design in designs)
     stack, plan = designs[0].options.stack, designs[0].layout.plan
     items += [
-        BillItem(
+        _BillItem(
             f"double-sided silicone adhesive tape {ADHESIVE * 1e3:g} mm, without carrier",
-            f"{1e4 * _OFFCUT * (faces + strips):.0f} cm2",
+            f"{1e4 * _OFFCUT_FACTOR * (faces + strips):.0f} cm2",
             "link to part 1, part 1 to 3, part 5 to 7, margins of part 4",
         ),
-        BillItem(
-            f"polyimide tape 0.03 mm, {_INSULATION * 1e3:g} mm wide",
+        _BillItem(
+            f"polyimide tape 0.03 mm, {_INSULATION_WIDTH * 1e3:g} mm wide",
             f"{math.ceil(10.0 * covered) / 10.0:.1f} m",
             "over leads and electrodes",
         ),
         *(
-            BillItem(
+            _BillItem(
                 f"stranded wire 0.14 mm2, {colour}",
                 f"{1e3 * sum(wire.length for wire in wires if wire.electrode == name):.0f} mm",
                 f"electrode {name}: " + ", ".join(f"{1e3 * w.length:.0f} mm" for w in wires if w.electrode == name),
             )
             for name, colour in zip("ABCD", ("red", "black", "yellow", "green"), strict=True)
         ),
-        BillItem("4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts", f"{count}", "cable"),
-        BillItem("copper tape with electrically conductive adhesive, 6 x 12 mm", f"{4 * count}", "wire to tab"),
-        BillItem("heat-shrink tube 6 mm, 20 mm long", f"{4 * count}", "over the joint of wire and tab"),
-        BillItem("self-adhesive cable-tie mount 19 x 19 mm and cable tie 2.5 mm", f"{count}", "strain relief"),
+        _BillItem("4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts", f"{count}", "cable"),
+        _BillItem("copper tape with electrically conductive adhesive, 6 x 12 mm", f"{4 * count}", "wire to tab"),
+        _BillItem("heat-shrink tube 6 mm, 20 mm long", f"{4 * count}", "over the joint of wire and tab"),
+        _BillItem("self-adhesive cable-tie mount 19 x 19 mm and cable tie 2.5 mm", f"{count}", "strain relief"),
     ]
     items += [
-        BillItem("isopropanol, and a cloth that leaves no lint", "20 ml", "link, before the first layer"),
-        BillItem("masking tape 19 mm wide", f"{math.ceil(2e3 * _MASKED * count) / 1e3:.0f} m", "while adhesives set"),
+        _BillItem("isopropanol, and a cloth that leaves no lint", "20 ml", "link, before the first layer"),
+        _BillItem(
+            "masking tape 19 mm wide", f"{math.ceil(2e3 * _MASKING_LENGTH * count) / 1e3:.0f} m", "while adhesives set"
+        ),
     ]
     collars = [collar for item in figures for collar in item.collars]
     if collars:
         plastic = sum(part.surface.volume for collar in collars for part in collar.parts)
         around = 2.0 * math.pi * max(design.place.frustum.radius1 for design in designs) + _STRAP_LAP
         items += [
-            BillItem("PLA or PETG, for a 3D printer", f"{1e6 * plastic:.0f} cm3, and its support", "jig"),
-            BillItem(
+            _BillItem("PLA or PETG, for a 3D printer", f"{1e6 * plastic:.0f} cm3, and its support", "jig"),
+            _BillItem(
                 "hook-and-loop tape 15 to 20 mm wide",
                 f"{len(collars)} pieces of {10.0 * math.ceil(1e2 * around):.0f} mm",
                 "around the collars",
@@ -108,7 +110,7 @@ def bill_of_materials(
         ]
     if pins:
         items.append(
-            BillItem(
+            _BillItem(
                 f"plastic pin with flat head, {plan.hole * 1e3 - 0.1:.1f} x {stack.thickness * 1e3 + 2.0:.0f} mm",
                 f"{pins}",
                 "registration holes",

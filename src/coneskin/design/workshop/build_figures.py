@@ -36,14 +36,10 @@ __all__ = [
     "WIRE_COLOURS",
     "BuildFigures",
     "CableExit",
-    "PairReading",
-    "SheetWire",
     "cable_exit",
-    "expected_frame",
     "in_mm",
     "in_ohms",
     "measure_build",
-    "pair_readings",
     "side_name",
     "tie_place",
 ]
@@ -52,11 +48,11 @@ __all__ = [
 STRIPPED, IN_CONTACT, LOOP = 8e-3, 4e-3, 20e-3
 _ROUND_TO = 5e-3  # m; wires are cut to multiples of it
 _TIE_SHARE = 0.5  # of the way from the rim to the connector: where the wires are tied to the link
-_LEAST, _MOST = 0.03, 2.0  # m; from the rim to the connector
+_MIN_CONNECTOR, _MAX_CONNECTOR = 0.03, 2.0  # m; from the rim to the connector
 
 
 @dataclass(frozen=True, slots=True)
-class SheetWire:
+class _SheetWire:
     """One wire.
 
     Attributes:
@@ -92,7 +88,7 @@ class CableExit:
     phi: float
     tie: float
     connector: float
-    wires: tuple[SheetWire, ...]
+    wires: tuple[_SheetWire, ...]
 
 
 def cable_exit(layout: SheetLayout, connector: float = 0.06) -> CableExit:
@@ -105,9 +101,9 @@ def cable_exit(layout: SheetLayout, connector: float = 0.06) -> CableExit:
     Raises:
         GeometryError: that distance is out of range.
     """
-    if not _LEAST <= connector <= _MOST:
+    if not _MIN_CONNECTOR <= connector <= _MAX_CONNECTOR:
         raise GeometryError(
-            f"the connector must be {_LEAST * 1e3:g} to {_MOST * 1e3:g} mm from the rim, got {connector * 1e3:.4g} mm"
+            f"the connector must be {_MIN_CONNECTOR * 1e3:g} to {_MAX_CONNECTOR * 1e3:g} mm from the rim, got {connector * 1e3:.4g} mm"
         )
     sheet, side = layout.sheet, layout.plan.wires
     feet = {name: _foot(layout, name) for name in "ABCD"}
@@ -125,7 +121,7 @@ def cable_exit(layout: SheetLayout, connector: float = 0.06) -> CableExit:
         exit_at = (middle, feet["A"][1])
         ways = {name: abs(u - middle) for name, (u, _) in feet.items()}
     wires = tuple(
-        SheetWire(name, pin, *feet[name], _cut(STRIPPED + ways[name] + connector + LOOP + IN_CONTACT))
+        _SheetWire(name, pin, *feet[name], _cut(STRIPPED + ways[name] + connector + LOOP + IN_CONTACT))
         for pin, name in enumerate("ABCD", 1)
     )
     return CableExit(side, *exit_at, _TIE_SHARE * connector, connector, wires)
@@ -153,10 +149,10 @@ def _cut(length: float) -> float:
     return math.ceil(length / _ROUND_TO - 1e-9) * _ROUND_TO
 
 
-_LOWER, _UPPER = 1, 3  # indices of the conductive layers in the stack
+_LOWER_LAYER, _UPPER_LAYER = 1, 3  # indices of the conductive layers in the stack
 
 
-class PairReading(NamedTuple):
+class _PairReading(NamedTuple):
     """Reading of a multimeter between the two electrodes of a conductive sheet."""
 
     pair: str  #: "A-B" or "C-D"
@@ -165,7 +161,7 @@ class PairReading(NamedTuple):
     sheet_ohms: float  #: of the material, for which the reading holds [ohm per square]
 
 
-def pair_readings(design: SheetDesign) -> tuple[PairReading, PairReading]:
+def _pair_readings(design: SheetDesign) -> tuple[_PairReading, _PairReading]:
     """Return what a multimeter should read on a sheet, A-B first.
 
     The sensor's model ends at the inner edges of all four electrodes. The sheets themselves reach further, up to their
@@ -175,17 +171,17 @@ def pair_readings(design: SheetDesign) -> tuple[PairReading, PairReading]:
     layout, field = design.layout, design.layout.field
     phi1, phi2 = _span(layout.upper, 0.5 * (field.u1 + field.u2), along=False)
     u1, u2 = _span(layout.lower, 0.5 * (field.phi1 + field.phi2), along=True)
-    upper = _part(design, _UPPER, SurfaceRectangle(field.u1, field.u2, phi1, phi2))
-    lower = _part(design, _LOWER, SurfaceRectangle(u1, u2, field.phi1, field.phi2))
+    upper = _part(design, _UPPER_LAYER, SurfaceRectangle(field.u1, field.u2, phi1, phi2))
+    lower = _part(design, _LOWER_LAYER, SurfaceRectangle(u1, u2, field.phi1, field.phi2))
     radial, angular = sheet_resistances(design.active.frustum, 1.0, 1.0)
     upper_ohms, lower_ohms = (sheet.ohms for sheet in design.conductive)
     return (
-        PairReading("A-B", sheet_resistances(upper, upper_ohms, 1.0)[0], radial, upper_ohms),
-        PairReading("C-D", sheet_resistances(lower, 1.0, lower_ohms)[1], angular, lower_ohms),
+        _PairReading("A-B", sheet_resistances(upper, upper_ohms, 1.0)[0], radial, upper_ohms),
+        _PairReading("C-D", sheet_resistances(lower, 1.0, lower_ohms)[1], angular, lower_ohms),
     )
 
 
-def expected_frame(design: SheetDesign, index: int, frame: str = "mesh") -> dict[str, int]:
+def _expected_frame(design: SheetDesign, index: int, frame: str = "mesh") -> dict[str, int]:
     """Return the counts of the untouched sensor, by field of a frame, as ``coneskin monitor`` expects them.
 
     Args:
@@ -243,7 +239,7 @@ class BuildFigures:
     """
 
     cable: CableExit
-    pairs: tuple[PairReading, PairReading]
+    pairs: tuple[_PairReading, _PairReading]
     frame: dict[str, int]
     placement: SheetPlacement
     collars: tuple[Collar, ...] = ()
@@ -347,8 +343,8 @@ def measure_build(
     """
     return BuildFigures(
         cable_exit(design.layout, design.options.connector),
-        pair_readings(design),
-        expected_frame(design, index, frame),
+        _pair_readings(design),
+        _expected_frame(design, index, frame),
         find_placement(design.place, mesh, () if design.above else faces),
         *jig_collars(design, mesh, others),
     )

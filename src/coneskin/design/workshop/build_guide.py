@@ -28,10 +28,10 @@ from .bill_of_materials import ADHESIVE
 from .build_figures import STRIPPED, BuildFigures
 from .placement_text import placement_lines
 
-__all__ = ["cable_steps", "flat_steps", "guide_lines", "jig_lines", "reading_lines", "test_steps", "wrap_steps"]
+__all__ = ["guide_lines"]
 
 
-def flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
+def _flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the steps that are done while everything is flat."""
     cuts, plan, kerf = design.cuts, design.layout.plan, 1e3 * design.options.kerf
     one = cuts[0]
@@ -116,7 +116,7 @@ def _ends(cut: CutSheet) -> tuple[tuple[float, float], tuple[float, float]]:
     return surface.flat_point(0.0, -0.5 * surface.wrap), surface.flat_point(0.0, 0.5 * surface.wrap)
 
 
-def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
+def _wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the steps from the clean link to the sheet that holds on it."""
     stack, options = design.options.stack, design.options
     marks = "the blue outline on part 1"
@@ -207,10 +207,10 @@ def wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         yield f"Wind masking tape around both rims. {SETTING}"
 
 
-_MOUNT = 10e-3  # m; half of the mount of the cable tie
+_MOUNT_REACH = 10e-3  # m; half of the mount of the cable tie
 
 
-def cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
+def _cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the steps from the tabs to the connector."""
     cable, plan = figures.cable, design.layout.plan
     if plan.tab:
@@ -224,7 +224,7 @@ def cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         yield f"The tabs leave at {side_name(plan.wires)}: lead them out {between}."
     rooms = _rooms(figures)
     yield from _short_of_room(figures, rooms)
-    ground = "there" if rooms.get(cable.side, math.inf) < cable.tie + _MOUNT else "on the link"
+    ground = "there" if rooms.get(cable.side, math.inf) < cable.tie + _MOUNT_REACH else "on the link"
     yield (
         f"Glue the cable-tie mount {ground}, {in_mm(cable.tie)} beyond "
         f"{side_name(cable.side)}, at {tie_place(design, figures)}. "
@@ -259,20 +259,20 @@ def _short_of_room(figures: BuildFigures, rooms: dict[str, float]) -> Iterator[s
             f"the wires can leave at the other end, `--set sheet.wires={other}`, where {in_mm(more)} are free."
         )
         return
-    what = "connector lies" if room >= cable.tie + _MOUNT else "cable tie and the connector lie"
+    what = "connector lies" if room >= cable.tie + _MOUNT_REACH else "cable tie and the connector lie"
     yield (
         f"The link ends {in_mm(max(room, 0.0))} beyond {side_name(cable.side)}, so the {what} on what is bolted to the "
         "link there and moves with it, such as a flange or a cover; never on the far side of a joint. If nothing does, "
         + (
             f"design again with `--set sheet.wires={other}`, where there are {in_mm(more)} of link"
-            if more >= cable.tie + _MOUNT
+            if more >= cable.tie + _MOUNT_REACH
             else "glue the mount on part 7, over the margin of that end, and let the connector hang from it"
         )
         + "."
     )
 
 
-def test_steps(figures: BuildFigures, folder: str) -> Iterator[str]:
+def _test_steps(figures: BuildFigures, folder: str) -> Iterator[str]:
     """Yield the steps that test the sheet that is built.
 
     Args:
@@ -305,7 +305,7 @@ def test_steps(figures: BuildFigures, folder: str) -> Iterator[str]:
     )
 
 
-def reading_lines(figures: BuildFigures) -> Iterator[str]:
+def _reading_lines(figures: BuildFigures) -> Iterator[str]:
     """Yield the tables of what a multimeter and ``coneskin monitor`` should read."""
     yield "| between | multimeter | for a material of |"
     yield "|---|---|---|"
@@ -327,7 +327,7 @@ def reading_lines(figures: BuildFigures) -> Iterator[str]:
     )
 
 
-def jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iterator[str]:
+def _jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iterator[str]:
     """Yield the section.
 
     Args:
@@ -398,8 +398,8 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
         "of its four sides. End 1 is where B is, end 2 where A is, "
         "edge 0 where D is, the other edge where C is."
     )
-    steps = [*flat_steps(design, figures), *wrap_steps(design, figures), *cable_steps(design, figures)]
-    steps += test_steps(figures, folder)
+    steps = [*_flat_steps(design, figures), *_wrap_steps(design, figures), *_cable_steps(design, figures)]
+    steps += _test_steps(figures, folder)
     yield ""
     yield from (f"{number}. {step}" for number, step in enumerate(steps, 1))
     yield ""
@@ -409,7 +409,7 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
     yield ""
     yield f"### Jig of {design.name}"
     yield ""
-    yield from jig_lines(design, figures, folder)
+    yield from _jig_lines(design, figures, folder)
     yield ""
     yield f"### Wires of {design.name}"
     yield ""
@@ -423,7 +423,7 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
     yield ""
     yield f"### Readings of {design.name} that is built"
     yield ""
-    yield from reading_lines(figures)
+    yield from _reading_lines(figures)
     yield ""
     yield f"### Coordinates of {design.name}"
     yield ""

@@ -25,12 +25,12 @@ from coneskin.geometry.solid import ClosedSurface, shell_surface, widest_nearby,
 
 from .link_excess import LinkExcess
 
-__all__ = ["Collar", "CollarPart", "jig_collars", "lip_play", "meets_neighbour", "with_sheets"]
+__all__ = ["Collar", "CollarPart", "jig_collars", "lip_play", "with_sheets"]
 
 Floats = NDArray[np.float64]
 
 _BORDER_COLUMN = math.radians(2.0)  # step around the axis
-_RINGS = 9  # along a sheet
+_SHEET_RINGS = 9  # along a sheet
 
 
 def with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
@@ -40,7 +40,7 @@ def with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
         outer = parallel_frustum(other.place.frustum, other.options.stack.thickness)
         shift = -other.options.stack.thickness * outer.sin_half_angle
         phi = np.linspace(0.0, outer.wrap, max(8, math.ceil(outer.wrap / _BORDER_COLUMN)) + 1)
-        rings = [_ring(outer, u, phi, shift) for u in np.linspace(0.0, outer.slant, _RINGS)]
+        rings = [_ring(outer, u, phi, shift) for u in np.linspace(0.0, outer.slant, _SHEET_RINGS)]
         start = sum(len(block) for block in corners)
         index = start + np.arange(len(rings) * len(phi)).reshape(len(rings), len(phi))
         a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
@@ -58,7 +58,7 @@ def _ring(outer: Frustum, u: float, phi: Floats, shift: float) -> Floats:
     )
 
 
-def meets_neighbour(design: SheetDesign, others: Sequence[SheetDesign], end: int) -> bool:
+def _meets_neighbour(design: SheetDesign, others: Sequence[SheetDesign], end: int) -> bool:
     """Tell whether another sheet begins where this one ends."""
     if end == 2:
         return design.next_joint is not None
@@ -71,8 +71,8 @@ def meets_neighbour(design: SheetDesign, others: Sequence[SheetDesign], end: int
     return False
 
 
-_ROWS = 61  # along the lip
-_MOST = 12  # columns of a degree; a collar that can be turned further does not show its azimuth
+_LIP_ROWS = 61  # along the lip
+_MAX_PLAY = 12  # columns of a degree; a collar that can be turned further does not show its azimuth
 
 
 def lip_play(
@@ -94,8 +94,8 @@ def lip_play(
         clearance: gap between lip and link [m].
         facets: height of the corners of the mesh above its facets [m].
     """
-    share = np.linspace(0.0, 1.0, _ROWS)
-    ways = [_MOST + 1, _MOST + 1]
+    share = np.linspace(0.0, 1.0, _LIP_ROWS)
+    ways = [_MAX_PLAY + 1, _MAX_PLAY + 1]
     for phi, lengths, tabs in lips:
         excess = link.over(share, np.full(len(phi), wanted), phi, 0.0)
         cone = link.cone(link.height(share * wanted))[:, None]
@@ -108,24 +108,23 @@ def lip_play(
                     ways[way] = columns
                     break
     width = float(lips[0][0][1] - lips[0][0][0])
-    return None if max(ways) > _MOST else sum(ways) * width
+    return None if max(ways) > _MAX_PLAY else sum(ways) * width
 
 
-_TURN = 2.0 * math.pi
-_COLUMN = math.radians(1.0)  # step around the axis; an arc of 100 mm then lies 0.004 mm beside its chord
-_ROW = 2e-3  # m; step along the axis where the lip follows a mesh
+_COLUMN_STEP = math.radians(1.0)  # step around the axis; an arc of 100 mm then lies 0.004 mm beside its chord
+_ROW_STEP = 2e-3  # m; step along the axis where the lip follows a mesh
 _STOP_ROW = 0.25e-3  # m; step by which the end of a lip before what stands out is found
-_FLUSH = 40e-3  # m; an outermost face nearer than this is the datum of the lip
-_RISE = 8e-3  # m; what stands out further from the cone is not gripped: the lip ends before it
-_THINNEST = 1e-3  # m; a lip is left out where it would be shorter
-_SHORTEST = 4e-3  # m; a lip that is shorter everywhere holds nothing
-_SLOT = 4e-3  # m; between the parts, so that the seam is seen and a strap pulls them tight
-_CHANNEL = 8e-3  # m; height of the way out for tabs with their wires
-_BESIDE = 3e-3  # m; on both sides of the tabs
-_SEAT, _RIM = 2e-3, 1.5e-3  # m; width of the rims that keep a strap on its seat, and their height
-_NOTCH = 1e-3  # m; depth of the grooves that number a part
+_FLUSH_DISTANCE = 40e-3  # m; an outermost face nearer than this is the datum of the lip
+_MAX_RISE = 8e-3  # m; what stands out further from the cone is not gripped: the lip ends before it
+_MIN_LIP_PIECE = 1e-3  # m; a lip is left out where it would be shorter
+_MIN_LIP = 4e-3  # m; a lip that is shorter everywhere holds nothing
+_SLOT_WIDTH = 4e-3  # m; between the parts, so that the seam is seen and a strap pulls them tight
+_CHANNEL_HEIGHT = 8e-3  # m; height of the way out for tabs with their wires
+_TAB_ROOM = 3e-3  # m; on both sides of the tabs
+_SEAT_RIM_WIDTH, _SEAT_RIM_HEIGHT = 2e-3, 1.5e-3  # m; width of the rims that keep a strap on its seat, and their height
+_NOTCH_DEPTH = 1e-3  # m; depth of the grooves that number a part
 _LEAST_RADIUS = 4e-3  # m
-_FLATTEST = 0.5  # cosine of the half angle; a collar around a flatter cone has nothing to grip
+_MIN_CONE_COSINE = 0.5  # cosine of the half angle; a collar around a flatter cone has nothing to grip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,13 +192,13 @@ def jig_collars(
         return (), (f"{design.name} lies on a link that is not round, for which no jig is made: measure its place",)
     if design.above:
         return (), (f"{design.name} lies on {design.above}, whose ends and seam show its place",)
-    if design.place.frustum.cos_half_angle < _FLATTEST:
+    if design.place.frustum.cos_half_angle < _MIN_CONE_COSINE:
         return (), (f"{design.name} is too flat for collars: weigh it down with a board of its shape",)
     collars: list[Collar] = []
     without: list[str] = []
     body = None if mesh is None or plan.surface == "cone" else with_sheets(mesh, others)
     for end in (1, 2):
-        if meets_neighbour(design, others, end):
+        if _meets_neighbour(design, others, end):
             without.append(f"at end {end} it meets the sheet beside it: push it against that")
             continue
         try:
@@ -230,7 +229,7 @@ class _Builder:
         if mesh is not None:
             z = mesh.vertices @ np.array(pose.rotation[2]) + pose.translation[2]
             self.room = float(self.step - z.min() if end == 1 else z.max() - self.step)
-        self.flush = self.room is not None and _SHORTEST <= self.room <= _FLUSH
+        self.flush = self.room is not None and _MIN_LIP <= self.room <= _FLUSH_DISTANCE
         self.wanted = self.room if self.flush and self.room is not None else self.plan.grip
         self.link = LinkExcess(self.side, self.step, self.sign, self.wanted + self.plan.clearance, body, pose)
 
@@ -246,12 +245,12 @@ class _Builder:
             wanted = min(wanted, (float(self.link.cone(self.step)) - _LEAST_RADIUS) / -taper)
         if self.room is not None:
             wanted = min(wanted, self.room)
-        if wanted < _SHORTEST:
+        if wanted < _MIN_LIP:
             raise _NoRoomError(f"end {self.end} lies where the link ends: keep the sheet flush with its rim")
         spans = self._spans()
         free = [self._lip_lengths(np.linspace(*span), wanted) for span in spans]
         longest = max(float(lengths.max()) for lengths in free)
-        if longest < _SHORTEST:
+        if longest < _MIN_LIP:
             raise _NoRoomError(f"the link stands out right at end {self.end}: push the sheet against it there")
         shortest = min(float(lengths.min()) for lengths in free)
         stopped = shortest < wanted - 1e-9
@@ -269,34 +268,34 @@ class _Builder:
     def _spans(self) -> list[tuple[float, float, int]]:
         """Return start, end and number of columns of each part."""
         wrap, radius = self.side.wrap, min(self.outer.radius1, self.outer.radius2)
-        if wrap > _TURN - 0.5:
-            middle, count, whole = 0.5 * (wrap - _TURN), self.plan.parts, _TURN  # of the seam
+        if wrap > math.tau - 0.5:
+            middle, count, whole = 0.5 * (wrap - math.tau), self.plan.parts, math.tau  # of the seam
         else:
             middle, count, whole = 0.0, max(1, math.ceil(wrap / math.pi - 1e-9)), wrap
             count = max(count, self.plan.parts if wrap > math.pi else 1)
-        half = 0.5 * _SLOT / radius
+        half = 0.5 * _SLOT_WIDTH / radius
         spans = []
         for k in range(count):
             start, stop = middle + k * whole / count, middle + (k + 1) * whole / count
-            start += half if k or whole == _TURN else 0.0
-            stop -= half if k < count - 1 or whole == _TURN else 0.0
-            spans.append((start, stop, max(4, math.ceil((stop - start) / _COLUMN)) + 1))
+            start += half if k or whole == math.tau else 0.0
+            stop -= half if k < count - 1 or whole == math.tau else 0.0
+            spans.append((start, stop, max(4, math.ceil((stop - start) / _COLUMN_STEP)) + 1))
         return spans
 
     def _lip_lengths(self, phi: Floats, wanted: float) -> Floats:
         """Return the length of the lip at each azimuth [m]."""
         share = np.linspace(0.0, 1.0, max(2, math.ceil(wanted / _STOP_ROW)) + 1)
-        standing = self.link.over(share, np.full(len(phi), wanted), phi, self.plan.clearance) > _RISE
+        standing = self.link.over(share, np.full(len(phi), wanted), phi, self.plan.clearance) > _MAX_RISE
         first = np.where(standing.any(axis=0), standing.argmax(axis=0), len(share))
         before = wanted * share[np.clip(first - 1, 0, len(share) - 1)] - self.plan.clearance
         free = np.where(first < len(share), before, wanted)
         free = -widest_nearby(-free[None], 0, 1)[0]
-        return np.where(free < _THINNEST, 0.0, free)
+        return np.where(free < _MIN_LIP_PIECE, 0.0, free)
 
     def _part(self, phi: Floats, lengths: Floats, number: int) -> ClosedSurface:
         """Return the shell of one part."""
         plan = self.plan
-        count = max(2, math.ceil(float(lengths.max()) / _ROW)) + 1
+        count = max(2, math.ceil(float(lengths.max()) / _ROW_STEP)) + 1
         share = np.linspace(1.0, 0.0, count)[:, None]
         # without a lip the part ends before the step: what stands out may begin at the sheet itself
         start = np.where(lengths > 0.0, 0.0, 2.0 * plan.clearance)
@@ -304,9 +303,18 @@ class _Builder:
         cone = self.link.cone(lip_z)
         excess = self.link.over(share[::-1, 0], lengths, phi, plan.clearance)[::-1]
         lip = cone + widest_nearby(excess, 1, 1) + plan.clearance
-        lip = np.minimum(lip, cone + _RISE + plan.wall)  # where there is no lip, no wall either
-        lip = np.where(self._above_tabs(phi), np.maximum(lip, cone + _CHANNEL), lip)
-        into = np.array([0.0, _SEAT, _SEAT, plan.reach - _SEAT, plan.reach - _SEAT, plan.reach])
+        lip = np.minimum(lip, cone + _MAX_RISE + plan.wall)  # where there is no lip, no wall either
+        lip = np.where(self._above_tabs(phi), np.maximum(lip, cone + _CHANNEL_HEIGHT), lip)
+        into = np.array(
+            [
+                0.0,
+                _SEAT_RIM_WIDTH,
+                _SEAT_RIM_WIDTH,
+                plan.reach - _SEAT_RIM_WIDTH,
+                plan.reach - _SEAT_RIM_WIDTH,
+                plan.reach,
+            ]
+        )
         sleeve_z = self.step - self.sign * np.maximum(into[:, None], start)
         slope = (self.outer.radius2 - self.outer.radius1) / self.outer.height
         lifted = sleeve_z + self.design.options.stack.thickness * self.side.sin_half_angle
@@ -316,15 +324,17 @@ class _Builder:
         inside[:count] = np.where(lengths > 0.0, inside[:count], inside[count])  # no lip: the step is the end there
         near = np.abs(z[:, None] - z[None]) <= plan.wall
         outside = np.where(near, inside[None], 0.0).max(axis=1)
-        outside = widest_nearby(outside, 0, max(1, math.ceil(plan.wall / (float(inside.min()) * _COLUMN)))) + plan.wall
+        outside = (
+            widest_nearby(outside, 0, max(1, math.ceil(plan.wall / (float(inside.min()) * _COLUMN_STEP)))) + plan.wall
+        )
         seat = max(float(outside[-6:].max()), float((sleeve + plan.wall).max()))
         outside[-6:] = seat
-        outside[[-6, -5, -2, -1]] += _RIM
+        outside[[-6, -5, -2, -1]] += _SEAT_RIM_HEIGHT
         outside[:count] = np.where(lengths > 0.0, outside[:count], outside[count])
         notched = np.zeros(len(phi), bool)
         for k in range(number):
             notched[4 + 6 * k : 8 + 6 * k] = len(phi) > 12 + 6 * k
-        outside = np.where(notched, outside - _NOTCH, outside)
+        outside = np.where(notched, outside - _NOTCH_DEPTH, outside)
         z = self.sign * (z - self.step)
         z = z - z.min()
         flip = self.sign  # end 1 is turned over, so that both kinds stand on their sleeve
@@ -344,6 +354,6 @@ class _Builder:
         ]
         near = np.zeros(len(phi), bool)
         for tab in tabs:
-            away = np.abs((phi - tab.phi + math.pi) % _TURN - math.pi)
-            near |= away < (0.5 * tab.width + _BESIDE) / radius + _COLUMN
+            away = np.abs((phi - tab.phi + math.pi) % math.tau - math.pi)
+            near |= away < (0.5 * tab.width + _TAB_ROOM) / radius + _COLUMN_STEP
         return near

@@ -22,9 +22,8 @@ __all__ = ["LinkExcess"]
 
 Floats = NDArray[np.float64]
 
-_TURN = 2.0 * math.pi
 _EDGE_STEP = 0.4e-3  # m; between the points at which an edge is looked at
-_BESIDE = 1e-3  # m; before the end of the sheet, and beyond the reach, that is looked at too
+_GRID_MARGIN = 1e-3  # m; before the end of the sheet, and beyond the reach, that is looked at too
 _LEAST_RADIUS = 4e-3  # m; a cone is not followed nearer to its apex
 
 
@@ -94,7 +93,7 @@ class LinkExcess:
         rows, columns = result.shape
         width = float(phi[1] - phi[0])
         beside = margin / float(self.cone(self._step))
-        x = ((azimuth - phi[0] + beside) % _TURN - beside) / width
+        x = ((azimuth - phi[0] + beside) % math.tau - beside) / width
         near = (x <= columns - 1 + beside / width) & (outwards >= -margin)
         x = np.clip(x[near], 0.0, columns - 1)
         excess, outwards = excess[near], outwards[near]
@@ -112,7 +111,7 @@ class LinkExcess:
         lower, upper = np.divmod(np.unique(pairs[:, 0] * len(body.vertices) + pairs[:, 1]), len(body.vertices))
         first, last = body.vertices[lower], body.vertices[upper]
         a, b = (self._sign * (ends[:, 2] - self._step) for ends in (first, last))
-        low, high = -_BESIDE, reach + _BESIDE
+        low, high = -_GRID_MARGIN, reach + _GRID_MARGIN
         beside = (np.maximum(a, b) >= low) & (np.minimum(a, b) <= high)
         first, last, a, b = first[beside], last[beside], a[beside], b[beside]
         with np.errstate(divide="ignore", invalid="ignore"):  # the part of each edge that is beside the sheet's end
@@ -131,6 +130,6 @@ class LinkExcess:
 def _beside(body: Mesh, pose: Pose, step: float, sign: float, reach: float) -> Mesh | None:
     """Return the faces that rays or edges beside a sheet's end can meet, in its frame; None where there is none."""
     away = sign * (body.vertices @ np.array(pose.rotation[2]) + (pose.translation[2] - step))
-    beyond, before = ((away > reach + _BESIDE)[body.faces], (away < -_BESIDE)[body.faces])
+    beyond, before = ((away > reach + _GRID_MARGIN)[body.faces], (away < -_GRID_MARGIN)[body.faces])
     near = ~(beyond.all(axis=1) | before.all(axis=1))
     return body.part(near).moved(pose) if near.any() else None

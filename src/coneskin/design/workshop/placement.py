@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DatumFace",
-    "DatumHeight",
     "LinkFeature",
     "SheetPlacement",
     "datum_heights",
@@ -32,16 +31,16 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-_FLAT = 0.2e-3  # m; corners so near to a plane lie in it
-_ALIGNED = math.cos(math.radians(2.0))  # faces of the mesh that are tilted less against a plane belong to it
-_NEAR = math.sqrt(2.0 - 2.0 * _ALIGNED) + 1e-6  # between unit normals of such faces
-_NARROWEST = 25e-3  # m; on a narrower face a link rocks, and on the line that a round one touches it rolls
-_MATERIAL = 0.3  # of the outline of a face that the link must fill; else nobody sees a face there
-_MOST = 4  # faces; more are a nuisance
+_FLAT_DISTANCE = 0.2e-3  # m; corners so near to a plane lie in it
+_ALIGNED_COSINE = math.cos(math.radians(2.0))  # faces of the mesh that are tilted less against a plane belong to it
+_NEAR_NORMALS = math.sqrt(2.0 - 2.0 * _ALIGNED_COSINE) + 1e-6  # between unit normals of such faces
+_MIN_FACE_WIDTH = 25e-3  # m; on a narrower face a link rocks, and on the line that a round one touches it rolls
+_MIN_MATERIAL = 0.3  # of the outline of a face that the link must fill; else nobody sees a face there
+_MAX_FACES = 4  # faces; more are a nuisance
 _ALIKE_DIRECTIONS = math.cos(math.radians(20.0))  # faces whose normals differ by less say the same of a place
-_COVERED = 0.1  # of a face that a sheet may cover
-_STEEP = 0.7  # mm for each mm that a sheet is turned: such a height fixes edge 0
-_APART = 10e-3  # m; measured places of one rim are no nearer
+_MAX_COVERED = 0.1  # of a face that a sheet may cover
+_MIN_TURN_SLOPE = 0.7  # mm for each mm that a sheet is turned: such a height fixes edge 0
+_MIN_PLACE_DISTANCE = 10e-3  # m; measured places of one rim are no nearer
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +67,7 @@ class DatumFace:
 
 
 @dataclass(frozen=True, slots=True)
-class DatumHeight:
+class _DatumHeight:
     """Distances of one place of a bare link from the planes of its faces.
 
     Attributes:
@@ -105,27 +104,27 @@ def find_datum_faces(mesh: Mesh) -> tuple[DatumFace, ...]:
         if not left[first]:
             continue
         normal, offset = normals[first], -float(hull.equations[first, 3])
-        near = np.array(tree.query_ball_point(normal, _NEAR))
-        near = near[left[near] & (normals[near] @ normal > _ALIGNED)]
-        inside = near[np.abs(corners[near] @ normal - offset).max(axis=1) < _FLAT]
+        near = np.array(tree.query_ball_point(normal, _NEAR_NORMALS))
+        near = near[left[near] & (normals[near] @ normal > _ALIGNED_COSINE)]
+        inside = near[np.abs(corners[near] @ normal - offset).max(axis=1) < _FLAT_DISTANCE]
         left[inside] = False
         whole = float(area[inside].sum())
-        if whole < 0.5 * _NARROWEST**2:  # less than a triangle of that width has
+        if whole < 0.5 * _MIN_FACE_WIDTH**2:  # less than a triangle of that width has
             continue
         outline = _outline(np.unique(corners[inside].reshape(-1, 3), axis=0), normal)
         size = _size(outline, normal)
-        if size[1] < _NARROWEST:
+        if size[1] < _MIN_FACE_WIDTH:
             continue
-        flat = np.abs(own @ normal - offset).max(axis=1) < _FLAT
-        flat &= np.abs(own_normal @ normal) > _ALIGNED * 2.0 * own_area
-        if own_area[flat].sum() < _MATERIAL * whole:
+        flat = np.abs(own @ normal - offset).max(axis=1) < _FLAT_DISTANCE
+        flat &= np.abs(own_normal @ normal) > _ALIGNED_COSINE * 2.0 * own_area
+        if own_area[flat].sum() < _MIN_MATERIAL * whole:
             continue
         x, y, z = (float(value) + 0.0 for value in normal)
         found.append(DatumFace("", (x, y, z), offset, size, outline))
     ranked = sorted(found, key=_area, reverse=True)
     kept: list[DatumFace] = []
     for face in ranked:
-        if len(kept) < _MOST and all(np.dot(face.normal, other.normal) < _ALIKE_DIRECTIONS for other in kept):
+        if len(kept) < _MAX_FACES and all(np.dot(face.normal, other.normal) < _ALIKE_DIRECTIONS for other in kept):
             kept.append(DatumFace(f"F{len(kept) + 1}", face.normal, face.offset, face.size, face.outline))
     return tuple(kept)
 
@@ -144,12 +143,12 @@ def measured_faces(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[Da
         spread = np.concatenate([middle + share * (face.outline - middle) for share in (0.0, 0.3, 0.6, 0.9)])
         u, phi, above = place.locate_all(spread)
         within = (u > 0.0) & (u < side.slant) & (phi % (2.0 * math.pi) <= side.wrap) & (np.abs(above) < 2e-3)
-        if within.mean() < _COVERED:
+        if within.mean() < _MAX_COVERED:
             kept.append(face)
     return tuple(kept)
 
 
-def datum_heights(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[DatumHeight, ...]:
+def datum_heights(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[_DatumHeight, ...]:
     """Return distances from faces for places of a sheet: its corners, and where a height fixes edge 0 best.
 
     Args:
@@ -169,14 +168,14 @@ def datum_heights(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[Dat
             steepest = int((sign * slopes[:, column]).argmax())
             phi = float(turns[steepest])
             near = min(abs(math.remainder(phi - other, 2.0 * math.pi)) for other in phis) * side.radius1
-            if sign * slopes[steepest, column] >= _STEEP and near > _APART:
+            if sign * slopes[steepest, column] >= _MIN_TURN_SLOPE and near > _MIN_PLACE_DISTANCE:
                 phis.append(phi)
     rows = []
     for u in (0.0, side.slant):
         for phi in sorted(phis):
             heights = [float(face.height(place.place(u, phi)[0].reshape(3))) for face in faces]
             slope = slopes[round(phi / side.wrap * (len(turns) - 1))]
-            rows.append(DatumHeight(u, phi, tuple(heights), tuple(bool(abs(s) >= _STEEP) for s in slope)))
+            rows.append(_DatumHeight(u, phi, tuple(heights), tuple(bool(abs(s) >= _MIN_TURN_SLOPE) for s in slope)))
     return tuple(rows)
 
 
@@ -207,13 +206,13 @@ def _area(face: DatumFace) -> float:
     return face.size[0] * face.size[1]
 
 
-_CABLE = 4e-3  # m; height at which a cable on the link must not meet another part of it
+_CABLE_HEIGHT = 4e-3  # m; height at which a cable on the link must not meet another part of it
 _STANDS_OUT = 3e-3  # m; what stands out less is no feature that a person finds
-_ALIKE = 0.01  # bends of two strips that differ by less are alike: they are fitted
-_NEARLY = 0.05  # a strip that is bent less than another by less belongs to it
-_OUTERMOST = 1e-3  # m; points so near to the outermost one are its neighbours
-_ALONG = 0.35  # mm of a height for each mm along the axis: it then fixes the place along the axis
-_SQUARE = math.sin(math.radians(1.0))  # an axis is held square, or along a face, by a try square
+_ALIKE_BENDS = 0.01  # bends of two strips that differ by less are alike: they are fitted
+_ALIKE_STRIPS = 0.05  # a strip that is bent less than another by less belongs to it
+_OUTERMOST_DEPTH = 1e-3  # m; points so near to the outermost one are its neighbours
+_MIN_AXIS_SLOPE = 0.35  # mm of a height for each mm along the axis: it then fixes the place along the axis
+_SQUARE_SINE = math.sin(math.radians(1.0))  # an axis is held square, or along a face, by a try square
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +261,7 @@ class SheetPlacement:
     seam: tuple[float, float, float]
     feature: LinkFeature | None
     faces: tuple[DatumFace, ...] = ()
-    heights: tuple[DatumHeight, ...] = ()
+    heights: tuple[_DatumHeight, ...] = ()
     tilted: bool = False
     free: tuple[float, float] = (math.inf, math.inf)
 
@@ -292,7 +291,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
     feature = None
     furthest = int(radius.argmax())
     if not place.bends and radius[furthest] > max(side.radius1, side.radius2) + _STANDS_OUT:
-        near = radius > radius[furthest] - _OUTERMOST
+        near = radius > radius[furthest] - _OUTERMOST_DEPTH
         first = math.atan2(y[furthest], x[furthest])
         turns = (np.arctan2(y[near], x[near]) - first + math.pi) % (2.0 * math.pi) - math.pi
         # a collar stands out all around: it has no azimuth
@@ -304,7 +303,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
             feature = LinkFeature(float(radius[furthest]), azimuth, height, arc, end)
     usable = measured_faces(place, faces)
     along = [abs(math.fsum(a * b for a, b in zip(face.normal, axis, strict=True))) for face in usable]
-    held = any(cosine < _SQUARE or cosine > math.sqrt(1.0 - _SQUARE**2) for cosine in along)
+    held = any(cosine < _SQUARE_SINE or cosine > math.sqrt(1.0 - _SQUARE_SINE**2) for cosine in along)
     return SheetPlacement(
         *around,
         -float(z.min()),
@@ -313,7 +312,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
         feature,
         usable,
         datum_heights(place, usable) if usable else (),
-        max(along, default=0.0) >= _ALONG and not held,
+        max(along, default=0.0) >= _MIN_AXIS_SLOPE and not held,
         _free_ways(place, mesh),
     )
 
@@ -328,7 +327,7 @@ def _free_ways(place: PlacedFrustum, mesh: Mesh) -> tuple[float, float]:
     u = np.array([0.0, side.slant])
     points, normals = place.place(u, np.zeros(2))
     way = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
-    distances, _ = RayCaster(mesh).cast(points + _CABLE * normals, np.array([-way, way]))
+    distances, _ = RayCaster(mesh).cast(points + _CABLE_HEIGHT * normals, np.array([-way, way]))
     return float(distances[0]), float(distances[1])
 
 
@@ -357,9 +356,9 @@ def sharpest_bends(place: PlacedFrustum) -> list[tuple[float, float]]:
             k = first + way * step
             if (not closed and not 0 <= k < count) or away > side.wrap / 8.0:
                 break
-            if rates[k % count] > rates[first] * (1.0 + _ALIKE):
+            if rates[k % count] > rates[first] * (1.0 + _ALIKE_BENDS):
                 return on, True
-            whole = whole and rates[k % count] > rates[first] * (1.0 - _NEARLY)
+            whole = whole and rates[k % count] > rates[first] * (1.0 - _ALIKE_STRIPS)
             on += widths[k % count] if whole else 0.0
             away += widths[k % count]
         return on, False

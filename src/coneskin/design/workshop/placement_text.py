@@ -14,7 +14,7 @@ from .placement import LinkFeature, SheetPlacement, sharpest_bends
 __all__ = ["placement_lines"]
 
 _AT_END = 3e-3  # m; a sheet so near to the end of a link is placed by eye
-_FARTHEST = 0.2  # m; a ruler through the air
+_MAX_RULER = 0.2  # m; a ruler through the air
 
 
 def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
@@ -93,7 +93,7 @@ def _feature_way(design: SheetDesign, part: LinkFeature) -> str:
         radius, height = (side.radius1, 0.0) if part.end == 1 else (side.radius2, side.height)
         x, y = part.radius * math.cos(part.azimuth), part.radius * math.sin(part.azimuth)
         straight = math.dist((x, y, part.height), (radius, 0.0, height))
-        if straight > _FARTHEST:
+        if straight > _MAX_RULER:
             return ""
         way = f"{in_mm(straight)} straight through the air, from edge 0 at end {part.end}"
     return f"{what} | {way} ({math.degrees(part.azimuth):.1f} deg)"
