@@ -259,7 +259,8 @@ def _tiles(tiling: _PageTiling, title: str) -> Iterator[list[str]]:
         x, y = tiling.origin[0] + column * width, tiling.origin[1] + row * height
         content = [
             "q",
-            f"{_pdf_number(left - _BLEED_WIDTH)} {_pdf_number(bottom - _BLEED_WIDTH)} {_pdf_number(width + 2 * _BLEED_WIDTH)} ",
+            f"{_pdf_number(left - _BLEED_WIDTH)} {_pdf_number(bottom - _BLEED_WIDTH)} "
+            f"{_pdf_number(width + 2 * _BLEED_WIDTH)} ",
         ]
         content[-1] += f"{_pdf_number(height + 2 * _BLEED_WIDTH)} re W n"
         content += [f"1 0 0 1 {_pdf_number(left - x)} {_pdf_number(bottom - y)} cm /D Do", "Q"]

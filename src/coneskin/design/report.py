@@ -139,7 +139,8 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     yield ""
     yield "### Layers"
     yield ""
-    yield f"Assembly: {stack.assembly}. {_ASSEMBLY_WORDS[stack.assembly]} The patterns differ in radius, but not in theta0."
+    assembly = f"Assembly: {stack.assembly}. {_ASSEMBLY_WORDS[stack.assembly]}"
+    yield f"{assembly} The patterns differ in radius, but not in theta0."
     yield ""
     surfaces = {cut.name: cut.surface for cut in design.cuts}
     table = []

@@ -103,7 +103,8 @@ def cable_exit(layout: SheetLayout, connector: float = 0.06) -> CableExit:
     """
     if not _MIN_CONNECTOR <= connector <= _MAX_CONNECTOR:
         raise GeometryError(
-            f"the connector must be {_MIN_CONNECTOR * 1e3:g} to {_MAX_CONNECTOR * 1e3:g} mm from the rim, got {connector * 1e3:.4g} mm"
+            f"the connector must be {_MIN_CONNECTOR * 1e3:g} to {_MAX_CONNECTOR * 1e3:g} mm from the rim, "
+            f"got {connector * 1e3:.4g} mm"
         )
     sheet, side = layout.sheet, layout.plan.wires
     feet = {name: _foot(layout, name) for name in "ABCD"}
