@@ -119,7 +119,7 @@ class Day:
 
     def _serve(self) -> None:
         for output in self._out:
-            self._companions.take(output)
+            self._companions.feed(output)
             if isinstance(output, StopProgram):
                 self._braking = True
             elif isinstance(output, GuardEvent):

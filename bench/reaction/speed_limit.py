@@ -64,7 +64,7 @@ def run(legs: Sequence[Leg], seconds: float) -> str:
     for step in range(round(seconds / CYCLE)):
         now = 100.0 + CYCLE * step
         while waiting and waiting[0][0] <= step:
-            arm.take(waiting.pop(0)[1])
+            arm.feed(waiting.pop(0)[1])
         if step % SLIDER == 0:
             slider = arm.slider
         wanted = program.target(now, arm.q) if program is not None else None
@@ -75,7 +75,7 @@ def run(legs: Sequence[Leg], seconds: float) -> str:
             program = Waypoints([goal], speed, acceleration)
             wanted = program.target(now, arm.q) or ([0.0] * 6, acceleration)
         arm.go(*wanted)
-        state = UR_DRIVER.decode_state(now, arm.step())
+        state = UR_DRIVER.decode_state(now, arm.poll())
         ratios.append(surfaces.ratio(state.q, state.qd)[0])
         out: list[object] = []
         why = limit.sample(state, slider, out)  # type: ignore[arg-type]

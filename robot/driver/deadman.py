@@ -82,7 +82,7 @@ class Deadman:
         if self._ends_at is None:
             self._ends_at = self._clock() + _LAST_WHILE
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Send the heartbeat, or end the process, as is due."""
         now = self._clock()
         if now <= self._works_until:
@@ -97,7 +97,7 @@ class Deadman:
             if (now := self._clock()) - self._lock_timer_at >= _LOCK_PERIOD:
                 self._lock_timer_at = now
                 self._limit_lock(self._lock_timeout)
-            self.look()
+            self.poll()
 
     def _limit_lock(self, seconds: float) -> None:
         """End the process without Python's lock, unless this is called again within this time [s]."""

@@ -32,7 +32,7 @@ class PathHistory:
     def __init__(self) -> None:
         self._places: deque[tuple[float, Joints]] = deque(maxlen=_MAX_PLACES)
 
-    def note(self, time: float, q: Joints) -> None:
+    def update(self, time: float, q: Joints) -> None:
         """Take measured joint positions [rad] of a time [s]."""
         places = self._places
         if places:

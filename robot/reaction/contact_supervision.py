@@ -200,7 +200,7 @@ class ContactApproach:
         self.exceeded = 0
         self.way = 0.0
 
-    def note(self, q: Joints, qd: Joints, contacts: Sequence[ContactOnLink]) -> None:
+    def update(self, q: Joints, qd: Joints, contacts: Sequence[ContactOnLink]) -> None:
         """Take measured joint positions [rad] and speeds [rad/s], and the touches there are by their newest frames."""
         speeds = []
         lasting = {contact.number for contact in contacts}

@@ -42,7 +42,7 @@ class ReactionMotion(Protocol):
 
     how: str
 
-    def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
+    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
         """Return what to do in this control cycle, with the current touches."""
 
 
@@ -54,7 +54,7 @@ class RetreatMotion:
     def __init__(self, plan: RetreatPlan) -> None:
         self._plan = plan
 
-    def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
+    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
         """Return the next step; later touches do not change the direction."""
         return retreat_step(self._plan, state)
 
@@ -67,7 +67,7 @@ class BacktrackMotion:
     def __init__(self, plan: BacktrackPlan) -> None:
         self._plan = plan
 
-    def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
+    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
         """Return the next step; the touches do not change the path."""
         return backtrack_step(self._plan, state)
 
@@ -80,7 +80,7 @@ class AdmittanceMotion:
     def __init__(self, start: AdmittanceState) -> None:
         self._now = start
 
-    def step(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
+    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
         """Return the next step, as firm as the current push."""
         self._now, step = admittance_step(self._now, state, contacts)
         return step

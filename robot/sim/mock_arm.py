@@ -41,7 +41,7 @@ class MockArm:
     following: int = 0
     current: list[float] = field(default_factory=lambda: [0.0] * 6)
 
-    def take(self, command: object) -> None:
+    def feed(self, command: object) -> None:
         """Obey a command of the guard, if this arm does."""
         if isinstance(command, UseStopPath):
             command = command.path
@@ -79,12 +79,12 @@ class MockArm:
         """Speed of the leading joint [rad/s]."""
         return max(map(abs, self.qd))
 
-    def step(self) -> bytes:
+    def poll(self) -> bytes:
         """Go on by one control cycle and return the payload of its RTDE packet."""
-        self.advance()
+        self.update()
         return self.packet(self.q, self.qd, self.current)
 
-    def advance(self) -> None:
+    def update(self) -> None:
         """Go on by one control cycle."""
         self.clock += _CONTROL_CYCLE
         if self.following and self.registers is not None and self.registers.token == self.following:
@@ -120,7 +120,7 @@ class CompanionProcesses:
         self._release: Release | None = None
         self._latched_stop = self._request = 0
 
-    def take(self, output: object) -> None:
+    def feed(self, output: object) -> None:
         """Take an output of the core."""
         if isinstance(output, Release):
             self._release = output

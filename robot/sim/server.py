@@ -247,7 +247,7 @@ class Server:
             elif result.secondary or number == self._programs:  # a program is not started once a newer one has come
                 self.controller.load(result)
         self._interface.turn()
-        self.controller.step()
+        self.controller.update()
 
     def _publish(self) -> None:
         listening = frozenset(name for name in _SCRIPT_PORTS if self._clients[name])

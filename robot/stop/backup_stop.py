@@ -211,7 +211,7 @@ class StandstillHold:
         self._stop.read()
 
     def begin(self, deceleration: float | None = None, over: Callable[[], bool] = lambda: False) -> None:
-        """Stop the arm now; ``look`` then watches whether it stands. Arguments as of ``BackupStop.stop``."""
+        """Stop the arm now; ``poll`` then watches whether it stands. Arguments as of ``BackupStop.stop``."""
         self._watch.end()
         self.stands = False
         self.failed = not self._stop.stop(deceleration, over, self._watch.insists)
@@ -219,7 +219,7 @@ class StandstillHold:
         if not self.failed:
             self._watch.begin(self._clock(), WATCH_DURATION)
 
-    def look(self, over: Callable[[], bool] = lambda: False) -> bool:
+    def poll(self, over: Callable[[], bool] = lambda: False) -> bool:
         """Look at the arm, and stop it where it moves. To be called continuously.
 
         Returns:

@@ -59,10 +59,10 @@ class GuardWatchdog:
 
     def run(self) -> None:
         """Serve until the guard has left and the arm stands."""
-        while self.step(_POLL_PERIOD):
+        while self.poll(_POLL_PERIOD):
             pass
 
-    def step(self, timeout: float) -> bool:
+    def poll(self, timeout: float) -> bool:
         """Wait for messages [s] and serve them; return False once there is nothing left to do."""
         inputs: list[Channel | PayloadReader] = [one for one in (self._guard, self._session) if not one.closed]
         if (reader := self._hold.reader) is not None:
@@ -94,7 +94,7 @@ class GuardWatchdog:
             self._guard.send(StatusReport("error", what).encode())
             self._hold.begin(over=self._beat)
         else:
-            self._hold.look(self._beat)
+            self._hold.poll(self._beat)
         return not (gone and self._session.closed and (self._hold.stands or self._hold.failed))
 
     def _beat(self) -> bool:

@@ -195,7 +195,7 @@ class DriverProcess:
         """Serve until one of the channels ends, or until ``end``; then stop the arm."""
         self._guard.send(StatusReport("ready").encode())
         try:
-            while not self._quit and self.step(_MOVE_POLL_PERIOD if self._waiting else _IDLE_POLL_PERIOD):
+            while not self._quit and self.poll(_MOVE_POLL_PERIOD if self._waiting else _IDLE_POLL_PERIOD):
                 pass
         finally:
             self._on_end()
@@ -205,7 +205,7 @@ class DriverProcess:
         """End ``run``. May be called from a signal handler."""
         self._quit = True
 
-    def step(self, timeout: float) -> bool:
+    def poll(self, timeout: float) -> bool:
         """Wait for messages [s] and serve them; return False once a channel has ended."""
         self._work(timeout)
         wait_readable([self._guard, self._program], timeout)

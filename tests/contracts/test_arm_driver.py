@@ -50,7 +50,7 @@ def run(core, payload, seconds, start, packets, lose=None):
             core.feed(Block(BlockKind.LOST, now, lose[1]), out)
             lose = None
         for output in out[known:]:
-            companions.take(output)
+            companions.feed(output)
         known = len(out)
     return out
 

@@ -40,10 +40,10 @@ class ServedPlant(RemotePlant):
         super().__init__(Channel(ours), START, arm_model("UR5e"))
         self._other, self._served = Channel(theirs), physics()
 
-    def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
-        state = super().advance(q, qd)
+    def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
+        state = super().update(q, qd)
         for message in self._other.receive():
-            self._other.send(encode_state(self._served.advance(*decode_targets(message))))
+            self._other.send(encode_state(self._served.update(*decode_targets(message))))
         return state
 
     def close(self) -> None:
@@ -73,8 +73,8 @@ def drive(plant: Plant) -> list[tuple[list[float], list[float]]]:
     for cycle in range(250):
         if cycle == 100:
             controller.arm.motion = None
-        controller.arm.step(1.0, hold=False)
-        controller._advance_plant()
+        controller.arm.update(1.0, hold=False)
+        controller._update_plant()
         assert not controller.plant_lost
         measured.append((list(controller.arm.measured.q), list(controller.arm.measured.qd)))
     assert controller.arm.measured.current == pytest.approx([0.0] * 6, abs=1e-9)  # nothing was met
@@ -99,6 +99,6 @@ def test_the_same_targets_give_the_same_measurements_bit_by_bit(make: Callable[[
 def test_at_rest_it_stays_at_rest(make: Callable[[], Plant]) -> None:
     plant = make()
     for _ in range(50):
-        state = plant.advance(START, [0.0] * 6)
+        state = plant.update(START, [0.0] * 6)
     assert list(state.q) == pytest.approx(START, abs=1e-12)
     assert math.hypot(*state.qd) < 1e-12

@@ -169,7 +169,7 @@ class CollisionRig:
         for block in list(self._companions.blocks(self.now)):
             self._take(block)
         while self._commands and self._commands[0][0] <= self._steps:
-            self.arm.take(self._commands.popleft()[1])
+            self.arm.feed(self._commands.popleft()[1])
         presses: dict[Body, Press] = {}
         since = 0.0 if self._steps % 2 else STEP  # after the arm's last control cycle
         q = [x + since * v for x, v in zip(self.arm.q, self.arm.qd, strict=True)]
@@ -185,7 +185,7 @@ class CollisionRig:
         if self._steps % 2 == 0:
             if self._steps % 20 == 0 and self.core.needs.slider:
                 self._feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
-            self._feed(BlockKind.ARM, self.arm.step())
+            self._feed(BlockKind.ARM, self.arm.poll())
         self._feed(BlockKind.TICK)
 
     def _feed(self, kind: BlockKind, payload: bytes = b"") -> None:
@@ -195,7 +195,7 @@ class CollisionRig:
         out: list[object] = []
         self.core.feed(block, out)
         for output in out:
-            self._companions.take(output)
+            self._companions.feed(output)
             if isinstance(output, GuardEvent):
                 self.events.append(output)
             elif not isinstance(output, Release):

@@ -121,11 +121,11 @@ class GuardRig:
         out: list[object] = []
         self.core.feed(block, out)
         for output in out:
-            self.companions.take(output)
+            self.companions.feed(output)
             if isinstance(output, GuardEvent):
                 self.events.append(output)
             elif not isinstance(output, Release):
-                self.arm.take(output)
+                self.arm.feed(output)
         self.outputs += out
         return out
 
@@ -155,7 +155,7 @@ class GuardRig:
                     self.feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
                 if self.core.phase is Phase.ACTIVE and self.arm.target is None:
                     self.arm.go([self.speed, 0, 0, 0, 0, 0], 4.0)
-                payload = self.arm.step()
+                payload = self.arm.poll()
                 if not self.mute_arm:
                     self.feed(BlockKind.ARM, payload)
             self.feed(BlockKind.TICK)

@@ -105,7 +105,7 @@ class ReactionPlanner:
 
     def feed(self, time: float, q: Joints) -> None:
         """Take measured joint positions [rad] of a time [s]."""
-        self._history.note(time, q)
+        self._history.update(time, q)
 
     def begin(
         self,
@@ -228,7 +228,7 @@ class MotionStream:
             contacts: the touches there are now.
             out: takes commands and events.
         """
-        step = self._motion.step(ArmState(state.time, state.q, state.qd), contacts)
+        step = self._motion.update(ArmState(state.time, state.q, state.qd), contacts)
         self.progress = step.progress
         if self._braking is None:
             self._braking = max(-step.progress, 0.0)

@@ -182,7 +182,7 @@ class SpeedReduction:
         if before is None or state is None or not self.knows(time):
             return False
         approach = self._approach_of(self._model, state.q, state.qd, reaction.deceleration, reaction.press)
-        approach.note(state.q, state.qd, contacts)
+        approach.update(state.q, state.qd, contacts)
         if approach.exceeded:
             return False
         if self._last is not None and time - self._last[0] < CLEAR_TIME:  # slider and speed may not yet be as before
@@ -201,7 +201,7 @@ class SpeedReduction:
     def sample(self, state: ControllerState, contacts: Sequence[ContactOnLink]) -> None:
         """Take a measured state, and the touches there are by their newest frames."""
         if self.now is not None and self.approach is not None:
-            self.approach.note(state.q, state.qd, contacts)
+            self.approach.update(state.q, state.qd, contacts)
             self.now.sample(state.time, self.approach.speed, self.approach.certain)
             if self._currents is not None and contacts and not self._held:
                 self._held = self._currents.resistance(state)

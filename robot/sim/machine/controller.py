@@ -108,7 +108,7 @@ class Controller:
         """Share of the commanded speeds at which paths run; the safety system's own stops are not in it."""
         return self.slider * _REDUCED_SHARE if self.safety is SafetyMode.REDUCED else self.slider
 
-    def step(self) -> None:
+    def update(self) -> None:
         """Run one control cycle."""
         self.cycle += 1
         if self._due is not None and self.cycle >= self._due[0]:
@@ -118,8 +118,8 @@ class Controller:
         self._turn_programs()
         was_turning = self.arm.turning
         held = self.runtime.paused or self.safety not in MOVING
-        fault = self.arm.step(self.speed_scaling, hold=held)
-        self._advance_plant()
+        fault = self.arm.update(self.speed_scaling, hold=held)
+        self._update_plant()
         if was_turning and not self.arm.turning:
             self.log("standstill", q=self.arm.measured.q)
         if not self.arm.moving:
@@ -129,12 +129,12 @@ class Controller:
             self.stop_program("ended by the safety system")
         self.history.append(list(self.arm.measured.q))
 
-    def _advance_plant(self) -> None:
+    def _update_plant(self) -> None:
         """Let the plant follow the targets. Without it the arm has no power, and shows what was measured last."""
         if self.plant_lost:
             return
         try:
-            self.arm.measured = self.plant.advance(self.arm.q, self.arm.qd)
+            self.arm.measured = self.plant.update(self.arm.q, self.arm.qd)
         except PlantLost as exc:
             self.plant_lost = str(exc)
             self.plant.close()

@@ -86,7 +86,7 @@ class ScriptSocket:
         self._reads += 1
         return bool(self.unread) and self._reads > _MAX_READS
 
-    def take(self, count: int) -> bytes:
+    def pop(self, count: int) -> bytes:
         """Return the first bytes of what has come, and forget them."""
         data = bytes(self.unread[:count])
         del self.unread[:count]

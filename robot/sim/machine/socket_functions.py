@@ -116,7 +116,7 @@ class SocketFunctions:
                 connection.forget_if_full()
                 return False
             parts = match[1].split(b",")  # a match reads the bytes again, so before they are taken
-            connection.take(match.end())
+            connection.pop(match.end())
             for part in parts:
                 try:
                     values.append(float(part))
@@ -170,7 +170,7 @@ class SocketFunctions:
             if start < 0 or end < 0 or not unread:
                 connection.forget_if_full()
                 return False
-            found.append(connection.take(end + len(last))[start + len(first) : end][:MAX_LINE])
+            found.append(connection.pop(end + len(last))[start + len(first) : end][:MAX_LINE])
             return True
 
         yield from self._wait(socket_name, timeout, take)
@@ -183,7 +183,7 @@ class SocketFunctions:
         def take(connection: ScriptSocket) -> bool:
             if len(connection.unread) < count:
                 return False
-            found.append(connection.take(count))
+            found.append(connection.pop(count))
             return True
 
         yield from self._wait(name, timeout, take)

@@ -110,7 +110,7 @@ class Motion(Protocol):
     done: bool
     brakes: bool
 
-    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
         """Return joint positions [rad] and speeds [rad/s] after one cycle.
 
         Args:
@@ -147,12 +147,12 @@ class SimulatedArm:
         self.q = [float(angle) for angle in q]
         self.qd = [0.0] * 6
         self.qdd = [0.0] * 6
-        self.measured: PlantState = KinematicPlant().advance(self.q, self.qd)
+        self.measured: PlantState = KinematicPlant().update(self.q, self.qd)
         self.kinematic = True
         self.tcp = Pose()
         self.motion: Motion | None = None
 
-    def step(self, scale: float, hold: bool) -> MotionFault | None:
+    def update(self, scale: float, hold: bool) -> MotionFault | None:
         """Advance by one cycle; return why the safety system must stop the arm, if it must."""
         fault = None
         motion = self.motion
@@ -162,7 +162,7 @@ class SimulatedArm:
             if motion is None:
                 q, qd = decelerate(self.q, self.qd, DEFAULT_DECELERATION)
             else:
-                q, qd = motion.step(self, scale, hold)
+                q, qd = motion.update(self, scale, hold)
                 self._check(q, qd)
                 if not (hold or motion.brakes):
                     self._check_torques(qd)
@@ -179,7 +179,7 @@ class SimulatedArm:
     def put(self, q: Sequence[float]) -> None:
         """Put an arm that stands at joint positions [rad], without a motion."""
         self.q = [float(angle) for angle in q]
-        self.measured = KinematicPlant().advance(self.q, self.qd)
+        self.measured = KinematicPlant().update(self.q, self.qd)
 
     @property
     def moving(self) -> bool:

@@ -49,8 +49,8 @@ class SpeedJoints(_Sustained):
         self.target, self.acceleration = list(target), abs(acceleration)
         self.reached = False
 
-    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
-        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
             return decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
         delta = [scale * a - b for a, b in zip(self.target, arm.qd, strict=True)]
@@ -77,8 +77,8 @@ class SpeedTool(_Sustained):
         self.target, self.acceleration, self.angular = list(target), abs(acceleration), abs(angular)
         self.reached = False
 
-    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
-        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
             q, qd = decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
             self.twist = arm.twist()
@@ -104,7 +104,7 @@ class ServoJoints(_Sustained):
     what an arm's configuration has as its highest acceleration, and the speed to that of the joint.
 
     Raises:
-        MotionFault: from ``step``: such a target.
+        MotionFault: from ``update``: such a target.
     """
 
     scaled = False
@@ -119,8 +119,8 @@ class ServoJoints(_Sustained):
         self.lookahead = min(0.2, max(0.03, lookahead))
         self.gain = min(2000.0, max(100.0, gain))
 
-    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
-        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
             return decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
         largest = JOINT_ACCELERATION * CYCLE
@@ -154,8 +154,8 @@ class StopJoints:
         self.deceleration = max(abs(deceleration), 1e-3)
         self.done = False
 
-    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
-        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         q, qd = decelerate(arm.q, arm.qd, max(self.deceleration, DEFAULT_DECELERATION) if hold else self.deceleration)
         self.done = not any(qd)
         return q, qd
@@ -175,8 +175,8 @@ class StopTool:
         self.rate = min(lead / duration if duration > 0.0 else DEFAULT_DECELERATION, MAX_ACCELERATION / 2.0)
         self.done = False
 
-    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
-        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
+    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         q, qd = decelerate(arm.q, arm.qd, max(self.rate, DEFAULT_DECELERATION) if hold else self.rate)
         self.done = not any(qd)
         return q, qd

@@ -28,7 +28,7 @@ class _Profile:
         self.length, self.speed, self.acceleration = length, speed, acceleration
         self.s = self.sdot = 0.0
 
-    def advance(self, top: float, brake: float) -> None:
+    def update(self, top: float, brake: float) -> None:
         left = self.length - self.s - 0.5 * self.sdot * CYCLE
         step = self.acceleration * CYCLE
         # highest speed after this cycle from which the arm can still stop within the rest of the path
@@ -50,7 +50,7 @@ class _Residual:
         self.time = 0.0
         self.way = [speed * self.duration / 2.0 for speed in qd]  #: joint positions that it adds in all [rad]
 
-    def step(self) -> tuple[list[float], list[float]] | None:
+    def update(self) -> tuple[list[float], list[float]] | None:
         """Advance by one cycle; return minus the way still to go [rad] and the speed [rad/s], None when it is over."""
         if self.time >= self.duration:
             return None
@@ -85,18 +85,18 @@ class Path:
             return False
         return math.dist(arm.tcp_pose().translation, self.goal.translation) <= radius
 
-    def advance(self, arm: SimulatedArm, scale: float, hold: bool) -> None:
+    def _update_profile(self, arm: SimulatedArm, scale: float, hold: bool) -> None:
         """Advance along the path by one cycle."""
         profile = self.profile
         lead = max_abs(arm.qd)
         brake = profile.acceleration
         if hold and lead > 0.0:
             brake = max(brake, DEFAULT_DECELERATION * profile.sdot / lead)
-        profile.advance(0.0 if hold else profile.speed * scale, brake)
+        profile.update(0.0 if hold else profile.speed * scale, brake)
 
     def settle(self, q: list[float], qd: list[float]) -> tuple[list[float], list[float]]:
         """Return positions and speeds on the path with what is left of the speed before it."""
-        rest = self.residual.step()
+        rest = self.residual.update()
         if rest is None:
             self.done = self.profile.s >= self.profile.length
             return q, qd
@@ -138,9 +138,9 @@ class JointLine(Path):
         self.goal = arm.tcp_pose(target)
         super().__init__(arm, length, speed, acceleration, acceleration)
 
-    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
-        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
-        self.advance(arm, scale, hold)
+    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
+        self._update_profile(arm, scale, hold)
         s, sdot = self.profile.s, self.profile.sdot
         q = [a + b * s for a, b in zip(self.start, self.unit, strict=True)]
         return self.settle(q, [b * sdot for b in self.unit])
@@ -182,9 +182,9 @@ class _ToolPath(Path):
         except KinematicsError as exc:
             raise MotionFault(INVALID_SETPOINT, str(exc)) from exc
 
-    def step(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
-        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.step`."""
-        self.advance(arm, scale, hold)
+    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
+        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
+        self._update_profile(arm, scale, hold)
         profile = self.profile
         q = self._place(arm, profile.s / profile.length) if profile.length else self.q
         before, self.q = self.q, q

@@ -32,7 +32,7 @@ class PlantState(NamedTuple):
 class Plant(Protocol):
     """Plant of one arm. It stands at the controller's start position until the first cycle."""
 
-    def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
+    def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
         """Let one control cycle pass, and return what is measured.
 
         Args:
@@ -50,7 +50,7 @@ class Plant(Protocol):
 class KinematicPlant:
     """Plant without dynamics: it does what is commanded, so measured and commanded motion are the same."""
 
-    def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
+    def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
         """Return the targets; see `Plant`."""
         return PlantState(q, qd, _NO_CURRENT)
 

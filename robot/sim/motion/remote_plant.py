@@ -65,7 +65,7 @@ class RemotePlant:
         self._state = PlantState(tuple(q), (0.0,) * JOINTS, (0.0,) * JOINTS)
         self._behind = 0  # cycles that are not answered yet
 
-    def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
+    def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
         """Send the targets, and return what was measured last; see `Plant`."""
         self._channel.send(_TARGETS_MESSAGE.pack(*q, *qd))
         self._behind += 1

@@ -196,7 +196,7 @@ class FallbackStop:
         Returns:
             whether there is an outcome to report, which is ``stands``.
         """
-        return self._open().look(over)
+        return self._open().poll(over)
 
     @property
     def stands(self) -> bool:

@@ -33,7 +33,7 @@ def collide(bodies: Sequence[BodyScene], engine: type[MujocoPlant], **padding: f
         wanted = 1.0 if cycle < 200 else 0.0
         speed += max(-0.02, min(0.02, wanted - speed))
         q[0] += CYCLE * speed
-        plant.advance(q, [speed, 0.0, 0.0, 0.0, 0.0, 0.0])
+        plant.update(q, [speed, 0.0, 0.0, 0.0, 0.0, 0.0])
     return plant
 
 
@@ -72,7 +72,7 @@ def test_contacts_take_current_and_press_the_skin() -> None:
     q, state = list(START), None
     for _ in range(180):
         q[0] += CYCLE
-        state = plant.advance(q, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        state = plant.update(q, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     (press,) = plant.presses().values()
     assert press.force == pytest.approx(plant.physics.force)
     assert press.sensor == SCENE.sensors[0].sensor.name
@@ -85,4 +85,4 @@ def test_an_engine_that_has_diverged_is_lost_and_not_started_anew() -> None:
     plant = ScenePlant(replace(SCENE, bodies=(HAND,)), START)
     plant.physics._d.qvel[0] = float("nan")
     with pytest.raises(PlantLost, match="diverged"):
-        plant.advance(START, [0.0] * 6)
+        plant.update(START, [0.0] * 6)

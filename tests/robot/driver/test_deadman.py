@@ -37,17 +37,17 @@ def deadman(ends, now, ended):
 
 def test_it_beats_while_the_process_gets_on_and_no_longer(deadman, ends, now):
     deadman.work()
-    deadman.look()
+    deadman.poll()
     assert ends[1].receive() == [ALIVE]
     now[0] += 0.2
-    deadman.look()
+    deadman.poll()
     assert ends[1].receive() == []  # the process hangs
     deadman.work(2.0)  # a call that may take long
     now[0] += 2.05
-    deadman.look()
+    deadman.poll()
     assert ends[1].receive() == [ALIVE]
     now[0] += 0.1
-    deadman.look()
+    deadman.poll()
     assert ends[1].receive() == []
 
 
@@ -58,10 +58,10 @@ def test_when_a_channel_has_ended_the_process_does_within_its_last_while(deadman
     ends[side].close()
     for _ in range(16):
         deadman.work(100.0)
-        deadman.look()
+        deadman.poll()
         now[0] += 0.1
     assert ended == []
-    deadman.look()
+    deadman.poll()
     assert ended == [pytest.approx(11.6)]
 
 
@@ -70,7 +70,7 @@ def test_a_process_that_is_about_to_end_does(deadman, now, ended):
     now[0] += 1.0
     deadman.end_soon()  # no new while
     now[0] += 0.6
-    deadman.look()
+    deadman.poll()
     assert ended
 
 

@@ -121,7 +121,7 @@ def test_a_touch_that_came_and_went_within_one_read_refuses_a_reset():
     rig = reset(touch(1.51, 1.53))
     late = b"".join([next(rig._packets)[1] for _ in range(60)])
     rig.now += 0.04  # held up: what has come meanwhile is read at once
-    rig.feed(BlockKind.ARM, rig.arm.step())
+    rig.feed(BlockKind.ARM, rig.arm.poll())
     rig.feed(BlockKind.SKIN, late)
     rig.run(0.5)
     assert rig.core.phase is Phase.LATCHED

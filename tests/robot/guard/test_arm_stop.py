@@ -189,7 +189,7 @@ def late_burst(rig, seconds):
         rig.now += 0.001
         skin.append(next(rig._packets)[1])
         if step % 2 == 0:
-            states.append(rig.arm.step())
+            states.append(rig.arm.poll())
     return skin, states
 
 

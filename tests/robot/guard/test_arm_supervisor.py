@@ -44,7 +44,7 @@ def test_a_rules_deceleration_is_that_of_the_stop_in_external_mode_too():
 
 def test_a_controller_that_repeats_itself_is_silent():
     rig = GuardRig(speed=1.0).run(0.5)
-    state = rig.arm.step()
+    state = rig.arm.poll()
     rig.mute_arm = True
     for _ in range(200):
         rig.run(0.002)

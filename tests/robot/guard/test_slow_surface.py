@@ -75,9 +75,9 @@ def test_the_speed_of_the_surface_counts_and_not_that_of_the_joint():
     """0.24 rad/s of the base of a UR10e: 0.25 m/s and more at its forearm, which is not slow."""
     q, qd = (0.0, -0.5, 0.3, 0.0, 0.0, 0.0), (0.24, 0.0, 0.0, 0.0, 0.0, 0.0)
     approach = ContactApproach(arm_model("UR10e"), q, qd, 10.0, 0.001)
-    approach.note(q, qd, [FOREARM])
+    approach.update(q, qd, [FOREARM])
     assert 0.15 < approach.speed < 0.35
-    approach.note(q, qd, [replace(FOREARM, location_valid=False)])
+    approach.update(q, qd, [replace(FOREARM, location_valid=False)])
     assert approach.speed > 0.24  # any point, where the place is not certain
 
 
@@ -86,9 +86,9 @@ def test_where_the_place_is_not_certain_every_motion_counts():
     later = (-0.01, *q[1:])
     vague = replace(FOREARM, location_valid=False)
     approach = ContactApproach(arm_model("UR10e"), q, qd, 10.0, 0.001)
-    approach.note(q, qd, [vague])
+    approach.update(q, qd, [vague])
     assert not approach.exceeded
-    approach.note(later, qd, [vague])
+    approach.update(later, qd, [vague])
     assert approach.exceeded == 1
 
 
@@ -98,10 +98,10 @@ def test_a_place_that_comes_late_counts_from_the_beginning_of_the_touch():
     for way, exceeded in ((0.0004, 0), (0.0006, 1)):
         approach = ContactApproach(arm_model("UR10e"), q, still, 10.0, 0.0005)
         vague = replace(FOREARM, location_valid=False)
-        approach.note(q, still, [vague])
-        approach.note((0.5 * way / per_radian, *q[1:]), still, [vague])
+        approach.update(q, still, [vague])
+        approach.update((0.5 * way / per_radian, *q[1:]), still, [vague])
         assert not approach.exceeded
-        approach.note((way / per_radian, *q[1:]), still, [FOREARM])
+        approach.update((way / per_radian, *q[1:]), still, [FOREARM])
         assert approach.exceeded == exceeded
     assert approach.way == pytest.approx(0.0006, rel=0.01)
 
@@ -112,7 +112,7 @@ def test_the_way_of_a_stop_is_counted():
     per_radian = way_into(FOREARM, q, (1e-6, *q[1:])) / 1e-6
     for room, exceeded in ((1.01, 0), (0.99, 1)):
         approach = ContactApproach(arm_model("UR10e"), q, (0.1,) + (0.0,) * 5, 10.0, room * per_radian * 0.1**2 / 20.0)
-        approach.note(q, (0.1,) + (0.0,) * 5, [FOREARM])
+        approach.update(q, (0.1,) + (0.0,) * 5, [FOREARM])
         assert approach.exceeded == exceeded
 
 
@@ -143,8 +143,8 @@ def test_ways_into_touches_of_one_link_add_up_whether_their_places_were_certain_
     for number in range(1, 40):
         contact = replace(FOREARM, number=number, location_valid=number % 2 == 0)
         q = (q[0] + 1e-3, *q[1:])
-        approach.note(q, qd, [contact])
+        approach.update(q, qd, [contact])
     blind = approach._touches[39].blind
     other = replace(FOREARM, link=2, number=100, location_valid=False)
-    approach.note((q[0] + 1e-3, *q[1:]), qd, [other])
+    approach.update((q[0] + 1e-3, *q[1:]), qd, [other])
     assert blind > 15.0 * approach._touches[100].blind > 0.0

@@ -24,7 +24,7 @@ def planned(contacts, on_clamp, qd=(0.0, 0.0, 0.5, 0.0, 0.0, 0.0), at=Q):
     """What an arm does that was touched as it came with these joint speeds."""
     history = PathHistory()
     for k in range(200, -1, -1):
-        history.note(-k * CYCLE, tuple(q - k * CYCLE * v for q, v in zip(at, qd, strict=True)))
+        history.update(-k * CYCLE, tuple(q - k * CYCLE * v for q, v in zip(at, qd, strict=True)))
     reaction = Reaction("retreat", distance=0.03, on_clamp=on_clamp)
     touch, here = ArmState(0.0, at, qd), ArmState(0.1, at)
     return plan_reaction_motion(ARM, reaction, touch, here, contacts, history, Workspace(ARM, None))
@@ -68,7 +68,7 @@ def test_by_default_it_stays():
 def test_the_way_back_opens_an_elbow_that_has_closed():
     motion = planned(elbow_clamp(), "path")
     assert isinstance(motion, BacktrackMotion)
-    step = motion.step(ArmState(0.1, Q, ZERO_VELOCITY), ())
+    step = motion.update(ArmState(0.1, Q, ZERO_VELOCITY), ())
     assert step.qd[2] < 0.0
     assert step.qd[:2] == pytest.approx((0.0, 0.0))
 
@@ -111,7 +111,7 @@ def test_the_way_out_of_a_clamp_leads_into_no_touch(qd, touches):
         )
     motion = planned(contacts, "path", qd)
     assume(isinstance(motion, BacktrackMotion))
-    step = motion.step(ArmState(0.1, Q, ZERO_VELOCITY), ())
+    step = motion.update(ArmState(0.1, Q, ZERO_VELOCITY), ())
     assume(not isinstance(step, Done))
     for contact in contacts:
         pose = link_pose(ARM, Q, contact.link)

@@ -155,7 +155,7 @@ def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_wher
 def trail_of(points):
     history = PathHistory()
     for k, q in enumerate(points):
-        history.note(0.002 * k, q)
+        history.update(0.002 * k, q)
     return history
 
 
@@ -206,7 +206,7 @@ def test_a_trail_forgets():
     history = trail_of(arc(1.0))
     assert history.since(100.0) == []
     for k in range(100_000):
-        history.note(float(k), (0.01 * k, 0, 0, 0, 0, 0))
+        history.update(float(k), (0.01 * k, 0, 0, 0, 0, 0))
     assert len(history.since(-math.inf)) == 2000
 
 
@@ -230,7 +230,7 @@ def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
     space = Workspace(ARM, TablePlane(height), avoid_self=False)
     plan = plan_retreat(ARM, ArmState(0.0, q), [contact], Reaction(kind="retreat", distance=0.2), space)
     assume(not isinstance(plan, Done))
-    states, over = follow(lambda state: RetreatMotion(plan).step(state, ()), q)
+    states, over = follow(lambda state: RetreatMotion(plan).update(state, ()), q)
     assert isinstance(over, Done)
     before = skeleton(ARM, q)
     last = states[-1]

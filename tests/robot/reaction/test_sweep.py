@@ -109,8 +109,8 @@ def test_an_arm_that_something_else_has_moved_so_far_gets_no_step() -> None:
 def test_giving_way_is_bounded_too() -> None:
     motion = AdmittanceMotion(begin_admittance(arm_model("UR10e"), ArmState(0.0, STRETCHED), Reaction("comply")))
     for time in (0.0, 0.1):
-        assert not isinstance(motion.step(ArmState(time, STRETCHED), [NEAR_SHOULDER]), Done)
-    over = motion.step(ArmState(0.2, TURNED), [NEAR_SHOULDER])
+        assert not isinstance(motion.update(ArmState(time, STRETCHED), [NEAR_SHOULDER]), Done)
+    over = motion.update(ArmState(0.2, TURNED), [NEAR_SHOULDER])
     assert isinstance(over, Done)
     why = "a point of the arm has moved 100 mm, as far as arm_distance_mm lets it"
     assert over.reason == f"{why}, before the touched one had moved 50 mm"

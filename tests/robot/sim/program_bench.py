@@ -32,7 +32,7 @@ class Bench:
 
     def step(self, cycles: int) -> None:
         for _ in range(cycles):
-            self.controller.step()
+            self.controller.update()
 
     def events(self, kind: str) -> list[dict[str, Any]]:
         lines = [json.loads(line) for line in self.text.getvalue().splitlines()]

@@ -27,7 +27,7 @@ def run(
     """The arm's positions and speeds, until it stands with nothing to do."""
     track = []
     for _ in range(cycles):
-        assert arm.step(scale, hold) is None
+        assert arm.update(scale, hold) is None
         track.append((arm.q, arm.qd))
         if arm.motion is None and not arm.moving:
             break
@@ -96,7 +96,7 @@ def test_any_sequence_is_continuous_with_bounded_acceleration(seed: int) -> None
         scale, hold = draw.choice([1.0, 1.0, 0.5, 0.0]), draw.random() < 0.2
         for _ in range(draw.randint(1, 150)):
             q, qd = arm.q, arm.qd
-            if fault := arm.step(scale, hold):  # more than its motors can: a controller stops it
+            if fault := arm.update(scale, hold):  # more than its motors can: a controller stops it
                 assert "Position deviates from path" in str(fault)
                 return
             # servoj may take 40 rad/s2, and a new path may add its own acceleration to the dying speed of the last
@@ -148,7 +148,7 @@ def test_a_joint_limit_stops_the_arm_before_it_is_passed(joint: int, sign: float
     speeds = [0.0] * 6
     speeds[joint] = sign * 1.5
     arm.motion = SpeedJoints(speeds, 5.0)
-    faults = [fault for _ in range(6000) if (fault := arm.step(1.0, False))]
+    faults = [fault for _ in range(6000) if (fault := arm.update(1.0, False))]
     assert faults == [fault for fault in faults if f"joint {joint + 1}" in str(fault)]
     assert [str(fault.cause) for fault in faults] == ["C150A0"]
     assert not arm.moving
@@ -159,7 +159,7 @@ def test_a_joint_limit_stops_the_arm_before_it_is_passed(joint: int, sign: float
 def test_speeds_beyond_a_joints_limit_are_a_fault() -> None:
     arm = SimulatedArm(ARM, HOME)
     arm.motion = SpeedJoints([3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 40.0)
-    faults = [fault for _ in range(300) if (fault := arm.step(1.0, False))]
+    faults = [fault for _ in range(300) if (fault := arm.update(1.0, False))]
     assert "joint 1: speed 2." in str(faults[0])
     assert "above its limit 2.09" in str(faults[0])
     assert str(faults[0].cause) == "C204A5"
@@ -175,7 +175,7 @@ def test_a_move_is_slowed_to_what_its_joints_can_do() -> None:
 def test_a_singular_position_stops_a_tool_speed() -> None:
     arm = SimulatedArm(ARM, (0.1, -1.4, 0.3, -1.7, -1.4, 0.2))
     arm.motion = SpeedTool(arm, [-0.05, 0.0, 0.3, 0.0, 0.0, 0.0], 1.0, 1.0)
-    faults = [fault for _ in range(6000) if (fault := arm.step(1.0, False))]
+    faults = [fault for _ in range(6000) if (fault := arm.update(1.0, False))]
     assert str(faults[0].cause) in ("C154A0", "C204A7")
     assert not arm.moving
 
@@ -217,7 +217,7 @@ def test_servoj_is_the_second_order_follower_of_its_gain_and_look_ahead_time(loo
     arm.motion = ServoJoints([q + step for q in HOME], lookahead, gain)
     highest = 0.0
     for _ in range(2000):
-        assert arm.step(1.0, False) is None
+        assert arm.update(1.0, False) is None
         highest = max(highest, arm.q[0] - HOME[0])
     damping = lookahead * math.sqrt(gain) / 2.0
     ideal = math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2)) if damping < 1.0 else 0.0
@@ -232,7 +232,7 @@ def test_servoj_lags_a_moving_target_by_its_look_ahead_time() -> None:
     for cycle in range(1, 1001):
         target = [HOME[0] + speed * cycle * CYCLE, *HOME[1:]]
         motion.retarget(target, 0.1, 300.0)
-        arm.step(1.0, False)
+        arm.update(1.0, False)
     assert arm.qd[0] == pytest.approx(speed, abs=1e-6)
     assert target[0] - arm.q[0] == pytest.approx(speed * 0.1, abs=speed * CYCLE)
 
@@ -242,11 +242,11 @@ def test_a_servoj_target_that_jumps_is_a_sudden_change(gain: float, step: float)
     """What takes more than 100 rad/s2 is; what takes 40 to 100 is followed with 40 rad/s2."""
     arm = SimulatedArm(ARM, HOME)
     arm.motion = ServoJoints([*HOME[:5], HOME[5] + 0.95 * step], 0.1, gain)
-    assert arm.step(1.0, False) is None
+    assert arm.update(1.0, False) is None
     assert arm.qdd[5] == pytest.approx(math.copysign(40.0, step))
     arm = SimulatedArm(ARM, HOME)
     arm.motion = ServoJoints([*HOME[:5], HOME[5] + step], 0.1, gain)
-    fault = arm.step(1.0, False)
+    fault = arm.update(1.0, False)
     assert fault is not None
     assert str(fault.cause) == "C204A1"
     assert "joint 6" in str(fault)
@@ -264,7 +264,7 @@ def test_a_joint_stops_the_arm_just_beyond_what_its_motor_can_do(joint: int) -> 
     for share in (0.97, 1.03):
         arm = SimulatedArm(ARM, stretched)
         arm.motion = SpeedJoints(direction, share * most)
-        fault = next((fault for _ in range(5) if (fault := arm.step(1.0, False))), None)
+        fault = next((fault for _ in range(5) if (fault := arm.update(1.0, False))), None)
         found.append(str(fault.cause) if fault else "")
     assert found[0] == ""
     assert found[1].startswith("C153A")

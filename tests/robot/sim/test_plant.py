@@ -34,7 +34,7 @@ class OddPlant:
         self.lost = False
         self.closed = 0
 
-    def advance(self, q, qd):  # type: ignore[no-untyped-def]
+    def update(self, q, qd):  # type: ignore[no-untyped-def]
         if self.lost:
             raise PlantLost("it fell off")
         return ELSEWHERE
@@ -49,7 +49,7 @@ def moving() -> tuple[Controller, OddPlant, io.StringIO]:
     controller = Controller(Options("UR5e"), log, plant)
     controller.arm.motion = SpeedJoints(QD, 10.0)
     for _ in range(20):
-        controller.step()
+        controller.update()
         controller.arm.motion = SpeedJoints(QD, 10.0)
     return controller, plant, log
 
@@ -75,7 +75,7 @@ def test_without_its_plant_the_arm_has_no_power_and_nothing_says_that_it_stands(
     controller, plant, log = moving
     plant.lost = True
     for _ in range(200):
-        controller.step()
+        controller.update()
     assert controller.safety is SafetyMode.FAULT
     assert controller.robot_mode is RobotMode.POWER_OFF
     assert controller.program is None
@@ -101,11 +101,11 @@ def remote():  # type: ignore[no-untyped-def]
 
 def test_targets_arrive_and_the_answer_is_measured_in_the_next_cycle(remote) -> None:  # type: ignore[no-untyped-def]
     plant, other = remote
-    assert plant.advance(START_Q, QD).q == ELSEWHERE.q  # its start
+    assert plant.update(START_Q, QD).q == ELSEWHERE.q  # its start
     (message,) = other.receive()
     assert decode_targets(message) == (START_Q, tuple(QD))
     other.send(encode_state(ELSEWHERE))
-    assert plant.advance(START_Q, QD) == ELSEWHERE
+    assert plant.update(START_Q, QD) == ELSEWHERE
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_a_plant_that_is_gone_or_says_nonsense_is_lost(remote, answer, said) -> 
     else:
         other.send(answer)
     with pytest.raises(PlantLost, match=said):
-        plant.advance(START_Q, QD)
+        plant.update(START_Q, QD)
 
 
 def moved(joint: int, way: float) -> PlantState:
@@ -146,17 +146,17 @@ def test_a_joint_that_jumps_is_no_arm(remote, joint: int) -> None:  # type: igno
     plant, other = remote
     for share in (0.99, 0.0, -0.99, -1.98):  # each 0.99 or less from the one before
         other.send(encode_state(moved(joint, share * FARTHEST[joint])))
-        assert plant.advance(START_Q, QD) == moved(joint, share * FARTHEST[joint])
+        assert plant.update(START_Q, QD) == moved(joint, share * FARTHEST[joint])
     other.send(encode_state(moved(joint, -0.97 * FARTHEST[joint])))
     with pytest.raises(PlantLost, match=f"a way in 2 ms of joint {joint + 1} of"):
-        plant.advance(START_Q, QD)
+        plant.update(START_Q, QD)
 
 
 def test_a_joint_that_jumps_by_four_turns_is_said_with_how_far_it_could_go(remote) -> None:  # type: ignore[no-untyped-def]
     plant, other = remote
     other.send(encode_state(moved(1, 25.0)))
     with pytest.raises(PlantLost, match=r"a way in 2 ms of joint 2 of 25 rad; at most 0\.0628 is possible"):
-        plant.advance(START_Q, QD)
+        plant.update(START_Q, QD)
 
 
 def test_a_plant_that_stands_elsewhere_at_the_start_is_lost(remote) -> None:  # type: ignore[no-untyped-def]
@@ -164,31 +164,31 @@ def test_a_plant_that_stands_elsewhere_at_the_start_is_lost(remote) -> None:  # 
     plant, other = remote
     other.send(encode_state(ELSEWHERE._replace(q=START_Q)))
     with pytest.raises(PlantLost, match="a way in 2 ms of joint"):
-        plant.advance(START_Q, QD)
+        plant.update(START_Q, QD)
 
 
 def test_a_plant_that_answers_what_it_was_not_asked_is_lost(remote) -> None:  # type: ignore[no-untyped-def]
     """Answers ahead of their targets would hide as many that do not come."""
     plant, other = remote
     other.send(encode_state(ELSEWHERE))
-    assert plant.advance(START_Q, QD) == ELSEWHERE
+    assert plant.update(START_Q, QD) == ELSEWHERE
     other.send(encode_state(ELSEWHERE))
     other.send(encode_state(ELSEWHERE))
     with pytest.raises(PlantLost, match="was not sent"):
-        plant.advance(START_Q, QD)
+        plant.update(START_Q, QD)
 
 
 def test_a_plant_that_falls_behind_is_lost_and_one_that_catches_up_is_not(remote) -> None:  # type: ignore[no-untyped-def]
     plant, other = remote
     most = round(_MAX_LAG / CYCLE)
     for _ in range(most):
-        plant.advance(START_Q, QD)
+        plant.update(START_Q, QD)
     for _ in range(most):
         other.send(encode_state(ELSEWHERE))
     for _ in range(most):
-        assert plant.advance(START_Q, QD) == ELSEWHERE
+        assert plant.update(START_Q, QD) == ELSEWHERE
     with pytest.raises(PlantLost, match="250 ms behind real time: end what else"):
-        plant.advance(START_Q, QD)
+        plant.update(START_Q, QD)
 
 
 def test_targets_of_another_length_are_refused() -> None:

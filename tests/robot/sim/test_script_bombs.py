@@ -142,7 +142,7 @@ class Watched:
                 self.controller.program_arrived()
             self.controller.load(made)
         for _ in range(cycles):
-            self.controller.step()
+            self.controller.update()
             self._session.outputs()
             assert all(map(math.isfinite, self.controller.arm.q))
         return ""
@@ -155,7 +155,7 @@ def test_a_bomb_ends_itself_and_the_next_program_runs(name: str, kind: str) -> N
     watched.run(f"{kind} bomb():\n {BOMBS[name]}\nend\n")
     watched.controller.stop_program("test")
     for _ in range(500):  # the arm may have to brake
-        watched.controller.step()
+        watched.controller.update()
     assert watched.controller.unlock()  # a speed beyond the joints' is a protective stop, as on a controller
     assert watched.run("def good():\n write_output_integer_register(7, 6 * 7)\nend\n") == ""
     assert watched.controller.output_ints[7] == 42

@@ -125,14 +125,14 @@ def test_without_a_state_it_ends_in_time(world):
 def let_pass(world, hold, seconds):
     end, stops = world.now + seconds, 0
     while world.now < end:
-        stops += hold.look()
+        stops += hold.poll()
     return stops
 
 
 def test_a_program_is_stopped_again_and_a_person_is_left_alone(world):
     world.obeys = (StopPath.PROGRAM,)
     hold = StandstillHold(stopper(world), MonitoringLimits().standstill, world.clock)
-    assert hold.look() is False  # the first stop; it may be a standstill between two starts
+    assert hold.poll() is False  # the first stop; it may be a standstill between two starts
     assert hold.stands is False
     assert let_pass(world, hold, 1.0) == 1
     assert hold.stands is True

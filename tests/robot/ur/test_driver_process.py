@@ -19,12 +19,12 @@ from .fake_wheel import answers, ask, move, stops
 def test_the_program_is_refused_until_the_guard_clears_it(driver):
     served, made, guard, program = driver
     move(program)
-    assert served.step(0.0)
+    assert served.poll(0.0)
     assert answers(program)[0]["stopped"] is True
     assert "moveJ" not in stops(made._program.control)
     guard.send(Release(7).encode())
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control) == ["moveJ"]
 
 
@@ -32,11 +32,11 @@ def test_a_stop_comes_before_what_the_program_asked_and_ends_its_wait(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program) == []  # it waits for the end of the move
     move(program)
     guard.send(StopProgram(9.0).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control) == ["moveJ", "stopJ"]
     assert [answer["stopped"] for answer in answers(program)] == [True, True]
     assert StatusReport("done").encode() in guard.receive()
@@ -46,18 +46,18 @@ def test_the_end_of_a_move_is_told(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     made._program.control.running = False
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program) == [{"number": 1, "ok": True}]
 
 
 def test_a_retreat_and_its_halt(driver):
     served, made, guard, _ = driver
     guard.send(SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0).encode())
-    served.step(0.0)
+    served.poll(0.0)
     guard.send(EndReaction(8.0).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control) == ["speedJ", "speedStop"]
 
 
@@ -66,7 +66,7 @@ def test_when_either_side_ends_the_arm_is_stopped(driver, side):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     (guard if side == "guard" else program).close()
     served.run()
     assert stops(made._program.control)[-1] == "stopJ"
@@ -76,7 +76,7 @@ def test_an_error_of_the_wheel_goes_to_the_guard(driver):
     served, made, guard, _ = driver
     made._program.control.accepts = False
     guard.send(SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0).encode())
-    served.step(0.0)
+    served.poll(0.0)
     notes = [StatusReport.decode(message) for message in guard.receive()]
     assert notes[0].kind == "error"
     assert "speedJ" in notes[0].text
@@ -85,17 +85,17 @@ def test_an_error_of_the_wheel_goes_to_the_guard(driver):
 def test_the_program_starts_again_only_after_command_0(driver):
     """The register of a latched speedJ is still there: a new program would execute it at once (see test_lifecycle)."""
     served, made, guard, _ = driver
-    served.step(0.0)
+    served.poll(0.0)
     made._program.control.playing = False
     made._program.control.calls.clear()
     served._kicked = -1.0
-    served.step(0.0)
+    served.poll(0.0)
     assert made._program.control.calls == []  # no kick without a program: each would be a line on the terminal
     guard.send(Release(7).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert [call[0] for call in made._program.control.calls] == ["kick", "reuploadScript", "setWatchdog"]
     guard.send(Release(7).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert "reuploadScript" not in [call[0] for call in made._program.control.calls[3:]]
 
 
@@ -103,10 +103,10 @@ def test_a_program_that_does_not_start_again_is_an_error(driver):
     served, made, guard, program = driver
     made._program.control.playing = made._program.control.accepts = False
     guard.send(Release(7).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert "does not start ur_rtde's program again" in StatusReport.decode(guard.receive()[-1]).text
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program)[0]["stopped"] is True
 
 
@@ -114,23 +114,23 @@ def test_a_silent_guard_counts_as_dead(driver, now):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     for _ in range(40):
         now[0] += 0.05
         guard.send(Heartbeat().encode())
-        served.step(0.0)
+        served.poll(0.0)
     assert "stopJ" not in stops(made._program.control)
     now[0] += HEARTBEAT_TIMEOUT - 0.01
-    served.step(0.0)
+    served.poll(0.0)
     assert "stopJ" not in stops(made._program.control)
     now[0] += 0.02
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control)[-1] == "stopJ"
     assert "silent" in answers(program)[0]["why"]
     assert "silent" in StatusReport.decode(guard.receive()[-1]).text
     guard.send(Heartbeat().encode())
     move(program, now[0])
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program)[0]["stopped"] is True  # alive again is not enough: the guard has to clear it
 
 
@@ -139,17 +139,17 @@ def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(dr
     served, made, guard, _ = driver
     for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0)):
         guard.send(message.encode())
-    served.step(0.0)
+    served.poll(0.0)
     before = len(stops(made._program.control))
     now[0] += SETPOINT_TIMEOUT - 0.01
-    served.step(0.0)
+    served.poll(0.0)
     assert len(stops(made._program.control)) == before
     now[0] += 0.02
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control)[before:] == ["speedStop"]
     assert f"silent for {SETPOINT_TIMEOUT:g} s" in StatusReport.decode(guard.receive()[-1]).text
     now[0] += 100.0  # the arm stands, and no heartbeat is due any more
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control)[before:] == ["speedStop"]
 
 
@@ -157,12 +157,12 @@ def test_a_sign_of_life_is_no_new_speed(driver, now):
     served, made, guard, _ = driver
     for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0)):
         guard.send(message.encode())
-    served.step(0.0)
+    served.poll(0.0)
     before = len(stops(made._program.control))
     for _ in range(4):
         now[0] += 0.03
         guard.send(Heartbeat().encode())
-        served.step(0.0)
+        served.poll(0.0)
     assert stops(made._program.control)[before:] == ["speedStop"]
 
 
@@ -175,11 +175,11 @@ def test_speeds_that_waited_are_overtaken_by_what_came_later(driver):
         Heartbeat(),
     ):
         guard.send(message.encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert [call[2] for call in made._program.control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
     for message in (*[SetJointVelocity((0.1 * k,) * 6, 4.0) for k in range(9)], EndReaction(10.0)):
         guard.send(message.encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert [call[0] for call in made._program.control.calls if call[0].startswith("speed")] == ["speedJ", "speedStop"]
 
 
@@ -189,7 +189,7 @@ def test_it_ends_on_request_and_first_limits_its_own_end(driver):
     served._on_end = lambda: order.append([call[0] for call in made._program.control.calls])
     guard.send(Release(7).encode())
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     served.end()
     served.run()
     assert order == [["moveJ", "kick"]]  # before the stop, which may block for minutes
@@ -198,7 +198,7 @@ def test_it_ends_on_request_and_first_limits_its_own_end(driver):
 
 def test_the_watchdog_is_kicked(driver):
     served, made, _, _ = driver
-    served.step(0.0)
+    served.poll(0.0)
     assert ("kick",) in made._program.control.calls
 
 
@@ -206,7 +206,7 @@ def test_a_stop_of_the_program_that_fails_leaves_no_stream_going_on(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=0.5)
-    served.step(0.0)
+    served.poll(0.0)
     guard.receive()
 
     def fail(_):
@@ -214,12 +214,12 @@ def test_a_stop_of_the_program_that_fails_leaves_no_stream_going_on(driver):
 
     made._program.control.speedStop = fail
     ask(program, do="stop", acceleration=2.0, number=2)
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control) == ["speedJ", "stopJ"]
     (note,) = (StatusReport.decode(message) for message in guard.receive())
     assert (note.kind, "a stop of the program has failed" in note.text) == ("error", True)
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     assert [answer["ok"] for answer in answers(program)] == [True, False, False]
     assert stops(made._program.control) == ["speedJ", "stopJ"]
 
@@ -236,7 +236,7 @@ def test_a_stop_does_not_wait_behind_all_that_threads_have_asked_for(driver):
     made._program.control.speedJ = take
     for number in range(1, 4):
         ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=0.5, number=number)
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control) == ["speedJ", "speedStop"]
     assert [(answer["number"], answer["ok"]) for answer in answers(program)] == [(1, True), (2, False), (3, False)]
 
@@ -245,22 +245,22 @@ def test_the_retreat_of_the_guard_does_not_end_with_the_speeds_of_the_program(dr
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=0.05, sent=now[0])
-    served.step(0.0)
+    served.poll(0.0)
     guard.send(SetJointVelocity((0.1,) * 6, 4.0).encode())
-    served.step(0.0)
+    served.poll(0.0)
     now[0] += 0.09
-    served.step(0.0)
+    served.poll(0.0)
     assert "speedStop" not in stops(made._program.control)
 
 
 def test_a_release_is_acknowledged_by_its_number_and_not_where_the_program_does_not_start(driver):
     served, made, guard, _ = driver
     guard.send(Release(41).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert StatusReport("released", "41").encode() in guard.receive()
     made._program.control.playing = made._program.control.accepts = False
     guard.send(Release(42).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert StatusReport("released", "42").encode() not in guard.receive()
 
 
@@ -269,7 +269,7 @@ def test_it_says_before_a_call_that_may_block_for_how_long(driver):
     announced = []
     served._work = announced.append
     guard.send(StopProgram(7.0).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert announced == [0.0, pytest.approx(3.5 / 7.0 + 0.3), 0.0]
 
 
@@ -283,11 +283,11 @@ def test_a_stop_that_the_program_asks_for_is_not_ended_by_the_watchdog_and_one_o
         ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=1.0)
         made._program.control.calls.clear()
         ask(program, number=2, **end)
-        served.step(0.0)
+        served.poll(0.0)
         calls = [call for call in made._program.control.calls if call[0] in ("setWatchdog", "speedStop")]
         assert [call[0] for call in calls] == ["setWatchdog", "speedStop", "setWatchdog"], number
         assert (1.0 / calls[0][1], calls[2][1]) == (pytest.approx(3.5 / 2.0 + 0.3), 4.0)  # as long as it may take
     made._program.control.calls.clear()
     guard.send(StopProgram(9.0).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert [call[0] for call in made._program.control.calls if call[0] != "kick"] == ["servoStop"]

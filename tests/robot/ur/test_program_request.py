@@ -17,17 +17,17 @@ from .fake_wheel import answers, ask, move, path, stops
 def test_a_tool_is_set_for_the_program_unless_the_guard_forbids_it(driver):
     served, made, guard, program = driver
     ask(program, do="set_tcp", pose=[0.1] * 6)
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program)[0]["stopped"] is True
     guard.send(Release(7).encode())
     ask(program, do="set_tcp", pose=[0.1] * 6)
     ask(program, do="set_payload", mass=2.0, centre=[0.0] * 3, number=2)
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program) == [{"number": 1, "ok": True}, {"number": 2, "ok": True}]
     assert stops(made._program.control) == ["setTcp", "setPayload"]
     ask(program, do="move_j_ik", pose=[0.1] * 6, speed=1.0, acceleration=2.0, number=3)
     ask(program, do="set_tcp", pose=[0.2] * 6, number=4)
-    served.step(0.0)
+    served.poll(0.0)
     (refused,) = answers(program)
     assert (refused["number"], refused["ok"], refused["stopped"]) == (4, False, False)
     assert stops(made._program.control)[-1] == "moveJ_IK"
@@ -40,7 +40,7 @@ def test_a_bad_request_is_answered(driver, request_):
     served, _, guard, program = driver
     guard.send(Release(7).encode())
     program.send(json.dumps(request_).encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program)[0]["ok"] is False
 
 
@@ -48,7 +48,7 @@ def test_a_number_beyond_all_floats_is_answered_and_does_not_end_the_driver(driv
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     ask(program, do="move_j", q=[0.0] * 6, speed=1.0, acceleration=10**400)
-    assert served.step(0.0)
+    assert served.poll(0.0)
     assert answers(program)[0]["ok"] is False
     assert "moveJ" not in stops(made._program.control)
 
@@ -58,14 +58,14 @@ def test_a_request_from_later_holds_no_longer_than_one_from_now(driver, now, sen
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=0.5, sent=sent)
-    served.step(0.0)
+    served.poll(0.0)
     now[0] += 0.49
     guard.send(Heartbeat().encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control) == ["speedJ"]
     now[0] += 0.02
     guard.send(Heartbeat().encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert "speedStop" in stops(made._program.control)
 
 
@@ -73,11 +73,11 @@ def test_a_request_from_later_holds_no_longer_than_one_from_now(driver, now, sen
 def test_a_request_that_has_waited_for_long_is_void_and_says_its_number(driver, now):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
-    served.step(0.0)
+    served.poll(0.0)
     ask(program, do="move_j", q=[0.0] * 6, speed=1.0, acceleration=2.0, number=41, sent=now[0] - 0.21)
     ask(program, do="speed_j", qd=[1.0] * 6, acceleration=2.0, duration=0.5, number=42, sent=now[0] - 3.0)
     ask(program, do="stop", acceleration=2.0, number=43, sent=now[0] - 3.0)  # a stop is never too late
-    served.step(0.0)
+    served.poll(0.0)
     told = answers(program)
     assert [(answer["number"], answer["ok"]) for answer in told] == [(41, False), (42, False), (43, True)]
     assert "it is void: it was sent 3.00 s ago" in told[1]["why"]
@@ -99,24 +99,24 @@ def test_speeds_and_positions_are_not_kept_for_a_program_that_sends_no_more(driv
     guard.send(Release(7).encode())
     for _ in range(5):  # renewed in time
         ask(program, sent=now[0], **request_)
-        served.step(0.0)
+        served.poll(0.0)
         now[0] += 0.4
         guard.send(Heartbeat().encode())
-        served.step(0.0)
+        served.poll(0.0)
     assert stop not in stops(made._program.control)
     guard.receive()
     now[0] += 0.11
     guard.send(Heartbeat().encode())
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control)[-1] == stop
     reports = [StatusReport.decode(message) for message in guard.receive()]
     assert any(report.kind == "remark" and "no new speed or servo command" in report.text for report in reports)
     count = len(stops(made._program.control))
     now[0] += 0.1
-    served.step(0.0)
+    served.poll(0.0)
     assert len(stops(made._program.control)) == count  # once
     ask(program, sent=now[0], **request_)  # the program may go on
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control)[-1] == start
 
 
@@ -138,13 +138,13 @@ def test_a_request_that_is_refused_does_not_renew_what_is_under_way(driver, now,
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=0.3, sent=now[0])
-    served.step(0.0)
+    served.poll(0.0)
     now[0] += 0.1
     ask(program, sent=now[0], **refused)
-    served.step(0.0)
+    served.poll(0.0)
     assert [answer["ok"] for answer in answers(program)] == [True, False]
     now[0] += 0.21
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control)[-1] == "speedStop"
 
 
@@ -153,7 +153,7 @@ def test_a_duration_that_cannot_be_moves_nothing(driver, duration):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=duration)
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program)[0]["ok"] is False
     assert "speedJ" not in stops(made._program.control)
 
@@ -162,7 +162,7 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     path(program)
-    served.step(0.0)
+    served.poll(0.0)
     assert [call[0] for call in made._program.control.calls] == ["movePath", "setWatchdog", "kick"]
     (_, *entries), _ = made._program.control.calls[-3:-1]
     assert entries == [
@@ -173,7 +173,7 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
     assert [StatusReport.decode(m).kind for m in guard.receive()][-2:] == ["restarts", "restarted"]
     assert answers(program) == []  # it waits
     made._program.control.running = False
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program) == [{"number": 1, "ok": True}]
 
 
@@ -182,7 +182,7 @@ def test_a_path_that_gets_no_watchdog_is_stopped_and_not_reported_as_restarted(d
     guard.send(Release(7).encode())
     made._program.control.setWatchdog = lambda frequency: False
     path(program)
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control) == ["movePath", "stopJ"]
     (answer,) = answers(program)
     assert "did not take the watchdog of a path: it was stopped" in answer["why"]
@@ -200,9 +200,9 @@ def test_a_stop_that_came_while_a_path_was_taken_is_the_next_thing_that_is_done(
 
     made._program.control.movePath = take
     path(program)
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program) == []
-    served.step(0.0)
+    served.poll(0.0)
     assert stops(made._program.control) == ["movePath", "stopJ"]
     assert [answer["stopped"] for answer in answers(program)] == [True]
 
@@ -215,7 +215,7 @@ def test_a_path_that_cannot_be_moves_nothing(driver, waypoints):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     ask(program, do="move_path", waypoints=waypoints)
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program)[0]["ok"] is False
     assert "movePath" not in stops(made._program.control)
 
@@ -227,16 +227,16 @@ def test_progress_is_told_and_several_may_wait_for_the_end(driver):
     ask(program, do="progress", number=2)
     ask(program, do="wait", number=3)
     ask(program, do="wait", number=4)
-    served.step(0.0)
+    served.poll(0.0)
     assert answers(program) == [
         {"number": 1, "ok": True},
         {"number": 2, "ok": True, "waypoint": 2, "mode": "move"},
     ]
     made._program.control.running = False
-    served.step(0.0)
+    served.poll(0.0)
     ask(program, do="progress", number=5)
     ask(program, do="wait", number=6)
-    served.step(0.0)
+    served.poll(0.0)
     assert [(a["number"], a.get("waypoint", "-")) for a in answers(program)] == [
         (3, "-"),
         (4, "-"),
@@ -256,9 +256,9 @@ def test_who_waits_for_a_move_that_the_program_has_ended_is_told_that_it_did_not
     served, _, guard, program = driver
     guard.send(Release(7).encode())
     move(program)
-    served.step(0.0)
+    served.poll(0.0)
     ask(program, number=2, **then)
-    served.step(0.0)
+    served.poll(0.0)
     first = answers(program)[0]
     assert (first["number"], first["ok"], first["stopped"]) == (1, False, False)
     assert why in first["why"]
@@ -271,7 +271,7 @@ def test_a_question_is_answered_while_nothing_moves_with_the_tool_that_is_set(dr
     ask(program, do="ask", what="stopScript", values=[], number=2)
     ask(program, do="speed_l", twist=[0.1] * 6, acceleration=1.0, duration=0.5, number=3)
     ask(program, do="ask", what="getForwardKinematics", values=[], number=4)
-    served.step(0.0)
+    served.poll(0.0)
     told = answers(program)
     assert told[0] == {"number": 1, "ok": True, "value": [0.5] * 6}
     assert [a["ok"] for a in told] == [True, False, True, False]

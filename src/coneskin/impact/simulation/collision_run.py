@@ -235,7 +235,7 @@ class CollisionRun:
             self._obey(self._commands.popleft()[1])
         if first:
             self._drive()
-            self.arm.advance()
+            self.arm.update()
         if moving:
             since = CYCLE if first else _STEP_TIME
             start = [q - since * v for q, v in zip(self.arm.q, self.arm.qd, strict=True)]
@@ -259,7 +259,7 @@ class CollisionRun:
     def _obey(self, command: object) -> None:
         if not isinstance(command, SetSpeedSlider | JointVelocitySetpoint):
             self._program = None
-        self.arm.take(command)
+        self.arm.feed(command)
 
     def _send(self, command: object, late: int) -> None:
         self.meter.notice(self.now)
@@ -301,7 +301,7 @@ class CollisionRun:
         out: list[object] = []
         self._core.feed(block, out)
         for output in out:
-            self._companions.take(output)
+            self._companions.feed(output)
             if isinstance(output, GuardEvent):
                 self.events.append(output)
                 self._note(output.block())

@@ -48,7 +48,7 @@ def main(arguments: list[str]) -> int:
     try:
         scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
         plant = ScenePlant(scene, start["q"])
-        plant.advance(start["q"], (0.0,) * 6)  # what is loaded on first use is loaded now
+        plant.update(start["q"], (0.0,) * 6)  # what is loaded on first use is loaded now
     except (ConeSkinError, PlantLost) as exc:
         program.send(encode_json({"refused": str(exc), "missing": isinstance(exc, MissingExtra)}))
         return 1
@@ -63,7 +63,7 @@ def main(arguments: list[str]) -> int:
         ready = wait_readable([program, controller], _POLL_TIMEOUT)
         for message in controller.receive():
             try:
-                state = plant.advance(*decode_targets(message))
+                state = plant.update(*decode_targets(message))
             except (PlantLost, ValueError) as exc:
                 print(f"coneskin physics: {exc}", file=sys.stderr, flush=True)
                 return 1

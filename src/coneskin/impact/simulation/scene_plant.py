@@ -36,7 +36,7 @@ class LiveMujocoPlant(MujocoPlant):
     ``lost`` stays 0: energy is not accounted for.
     """
 
-    def advance(self, q: Sequence[float], qd: Sequence[float], duration: float) -> None:
+    def update(self, q: Sequence[float], qd: Sequence[float], duration: float) -> None:
         """Let time pass while the controller's targets move evenly; see `MujocoPlant.advance`."""
         m, d, step, padding = self._m, self._d, self._step, self._padding
         step1, step2 = self._mj.mj_step1, self._mj.mj_step2
@@ -134,7 +134,7 @@ class ScenePlant:
             arm_model(scene.arm.model), self._skins, scene.bodies, scene.padding or Padding(), list(q)
         )
 
-    def advance(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
+    def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
         """Let one control cycle pass; see the protocol."""
         start = [at - CYCLE * speed for at, speed in zip(q, qd, strict=True)]
         self.physics.advance(start, qd, CYCLE)

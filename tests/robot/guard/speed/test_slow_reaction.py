@@ -147,7 +147,7 @@ def test_a_stop_just_after_it_slowed_leaves_no_slider_low():
     out = []
     rig.core._arm.touch(rig.now, felt(0.9), False, out)
     assert isinstance(out[0], StopProgram)
-    rig.arm.take(out[0])
+    rig.arm.feed(out[0])
     rig.run(1.0)
     assert rig.core.phase is Phase.LATCHED
     assert rig.arm.slider == 1.0

@@ -110,10 +110,10 @@ class Loop:
         self.now += 0.002
         self.steps += 1
         while self.waiting and self.waiting[0][0] <= self.steps:
-            self.arm.take(self.waiting.pop(0)[1])
+            self.arm.feed(self.waiting.pop(0)[1])
         if self.steps % 10 == 0 and self.slider is not None:
             self.slider = self.arm.slider
-        state = UR_DRIVER.decode_state(self.now, self.arm.step())
+        state = UR_DRIVER.decode_state(self.now, self.arm.poll())
         self.top = max(self.top, self.surfaces.ratio(state.q, state.qd)[0])
         out: list[object] = []
         self.why = self.limit.sample(state, self.slider, out)  # type: ignore[arg-type]
@@ -254,7 +254,7 @@ def test_a_persons_setting_right_after_the_guards_own_is_not_exceeded_later() ->
 def test_a_slider_at_zero_beside_a_moving_arm_does_not_end_the_guard() -> None:
     loop = Loop(heeds=False)
     limit, out = loop.limit, []  # type: ignore[var-annotated]
-    state = UR_DRIVER.decode_state(100.0, loop.arm.step())
+    state = UR_DRIVER.decode_state(100.0, loop.arm.poll())
     limit.sample(state._replace(qd=(50.0, 0, 0, 0, 0, 0)), 1.0, out)
     assert out[0] == SetSpeedSlider(0.01)
     assert limit.sample(state._replace(time=101.0, qd=(0.1, 0, 0, 0, 0, 0)), 0.0, out) == ""

@@ -31,9 +31,9 @@ def test_the_example_of_each_function_holds(name: str) -> None:
     body = [*before, f"if {last}:", "write_output_integer_register(0, 1)", "end"]
     controller = Controller(Options(start_delay=0.0, start_q=HOME))
     controller.load(translate("def p():\n" + "\n".join(body) + "\nend\n", Builtins.names(), Builtins.blocking()))
-    controller.step()
+    controller.update()
     for _ in range(3000):
-        controller.step()
+        controller.update()
         if controller.program is None:
             break
     assert f"{name}(" in _ALL[name]
@@ -61,7 +61,7 @@ end
     controller = Controller(Options(model="UR10e", start_delay=0.0, start_q=HOME))
     controller.load(translate(text, Builtins.names(), Builtins.blocking()))
     for _ in range(20):
-        controller.step()
+        controller.update()
     arm, inertia = arm_model("UR10e"), arm_inertia("UR10e")
     if not rotors:
         inertia = replace(inertia, rotor=ZERO_VELOCITY)
@@ -111,7 +111,7 @@ def test_what_no_controller_takes_ends_the_program(example: str, words: str) -> 
     controller.fail = lambda _, problem: failed.append(str(problem))  # type: ignore[method-assign]
     controller.load(translate(f"def p():\n{example}\nend\n", Builtins.names(), Builtins.blocking()))
     for _ in range(6):
-        controller.step()
+        controller.update()
     assert words in failed[0]
     assert controller.program is None
 
@@ -125,7 +125,7 @@ def test_a_force_that_would_move_the_arm_is_told_once_and_moves_nothing(call: st
     text = f"def p():\n  while True:\n    {call}\n    sync()\n  end\nend\n"
     controller.load(translate(text, Builtins.names(), Builtins.blocking()))
     for _ in range(20):
-        controller.step()
+        controller.update()
     assert ["not simulated" in str(notice) for notice in controller.notices].count(True) == 1
     assert not controller.arm.moving
 
@@ -164,7 +164,7 @@ end
 """
     controller.load(translate(text, Builtins.names(), Builtins.blocking()))
     for _ in range(30):
-        controller.step()
+        controller.update()
     assert controller.program is not None
     outputs = RtdeOutputs(controller)
     names = ("tool_output_mode", "tool_digital_output0_mode", "tool_digital_output1_mode")

@@ -38,11 +38,11 @@ class Peer:
 
     def step(self, cycles: int) -> None:
         for _ in range(cycles):
-            self.controller.step()
+            self.controller.update()
 
     def finish(self) -> None:
         while self.controller.program is not None:
-            self.controller.step()
+            self.controller.update()
 
     def close(self) -> None:
         self.controller.stop_program("end of the test")

@@ -44,7 +44,7 @@ class Console:
     def step(self, cycles: int) -> None:
         for _ in range(cycles):
             self.interface.turn()
-            self.controller.step()
+            self.controller.update()
 
     def say(self, line: str) -> str:
         return self.dashboard.answer(line)

@@ -161,7 +161,7 @@ def test_a_realtime_packet_has_the_length_of_its_version(version, size):
 def test_a_realtime_packet_has_its_numbers_at_their_places():
     """The places (of 8 bytes, from 1) are those that python-urx reads: q at 31, the tool at 55, its speed at 61."""
     controller = Controller(Options(model="ur5e", start_q=Q))
-    controller.step()
+    controller.update()
     packet = struct.unpack(">152d", _encode_realtime(controller)[4:])
     assert packet[0] == controller.timestamp
     assert packet[1:7] == packet[31:37] == Q

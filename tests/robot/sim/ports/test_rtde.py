@@ -60,19 +60,19 @@ def test_outputs_flow_after_start_at_their_frequency() -> None:
     names = ("timestamp", "actual_q", "robot_mode", "actual_digital_output_bits", "actual_tool_accelerometer")
     types = ask(connection, pack_outputs_request(names, 125.0))
     assert types == b"\x01DOUBLE,VECTOR6D,INT32,UINT64,VECTOR3D"
-    controller.step()
+    controller.update()
     assert connection.outputs() == b""
     assert ask(connection, pack(PacketKind.START)) == b"\x01"
     sent = []
     for _ in range(8):
-        controller.step()
+        controller.update()
         sent += split(connection.outputs())[0]
     assert len(sent) == 2
     stamp, q, mode, bits, acceleration = Recipe(names).unpack(sent[-1].payload)
     assert (stamp, q, mode, bits) == (0.016, tuple(controller.arm.q), 7, 0)
     assert acceleration == (0.0, 0.0, -9.81)
     assert ask(connection, pack(PacketKind.PAUSE)) == b"\x01"
-    controller.step()
+    controller.update()
     assert connection.outputs() == b""
 
 
@@ -85,7 +85,7 @@ def test_every_output_of_the_table_can_be_asked_for() -> None:
         part = tuple(names[start : start + 40])
         assert ask(connection, pack_outputs_request(part))[0] == 1
         ask(connection, pack(PacketKind.START))
-        controller.step()
+        controller.update()
         (packet,), _ = split(connection.outputs())
         assert len(Recipe(part).unpack(packet.payload)) == len(part)
 

@@ -27,7 +27,7 @@ def ints(text: str, cycles: int = 5) -> list[int]:
     """The first output registers after a program ran."""
     controller = started(text)
     for _ in range(cycles):
-        controller.step()
+        controller.update()
     return controller.output_ints[:4]
 
 
@@ -261,7 +261,7 @@ def test_python_cannot_be_reached_from_a_program() -> None:
 def test_an_endless_loop_ends_the_program_not_the_simulator() -> None:
     controller = started(program("while True:\n  x = 1\nend"))
     for _ in range(3):
-        controller.step()
+        controller.update()
     assert controller.program is None
 
 
@@ -292,5 +292,5 @@ def test_a_definition_can_be_replaced() -> None:
     controller = Controller(Options(start_delay=0.0))
     controller.load(mended)
     for _ in range(3):
-        controller.step()
+        controller.update()
     assert controller.output_ints[0] == 2
