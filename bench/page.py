@@ -16,12 +16,12 @@ from bench.table import BENCHES
 
 __all__ = ["main", "page"]
 
-_PAGE = Path(__file__).with_name("RESULTS.md")
+_PAGE_FILE = Path(__file__).with_name("RESULTS.md")
 #: rows of a table on the page, of the usual run of a bench and of one with other options; the JSON file has all
 _ROWS_SHOWN = 8
 _OTHER_ROWS_SHOWN = 4
 _LINES_SHOWN = 30  # of a run without a table
-_HEAD = """# Results
+_PAGE_HEAD = """# Results
 
 `python -m bench page` makes this page from the JSON files in `bench/results`. `python -m bench NAME --save` measures
 again and writes one of them. The machines are small virtual ones with two shared cores. Compare the times of one table
@@ -35,7 +35,7 @@ def page() -> str:
     for file in sorted(RESULTS.glob("*.json")):
         run = json.loads(file.read_text(encoding="utf-8"))
         runs.setdefault(run["bench"], []).append((file, run))
-    parts = [_HEAD]
+    parts = [_PAGE_HEAD]
     for name in [*BENCHES, *sorted(set(runs) - set(BENCHES))]:
         for number, (file, run) in enumerate(sorted(runs.get(name, []), key=lambda each: len(each[0].name))):
             parts += [] if number else [f"## {name}\n"]
@@ -63,7 +63,7 @@ def main() -> int:
     args = parser.parse_args()
     text = page()
     if args.check:
-        return int(not _PAGE.exists() or _PAGE.read_text(encoding="utf-8") != text)
-    _PAGE.write_text(text, encoding="utf-8")
-    print(f"{_PAGE.name}: {len(text.split())} words of {len(list(RESULTS.glob('*.json')))} files")
+        return int(not _PAGE_FILE.exists() or _PAGE_FILE.read_text(encoding="utf-8") != text)
+    _PAGE_FILE.write_text(text, encoding="utf-8")
+    print(f"{_PAGE_FILE.name}: {len(text.split())} words of {len(list(RESULTS.glob('*.json')))} files")
     return 0

@@ -15,7 +15,7 @@ from pathlib import Path
 from .urcl import TEST_TIMEOUT, Trial, controller
 
 #: program that loads and plays the client's own program
-_PLAY = """
+_PLAY_PROGRAM = """
 import socket
 with socket.create_connection(({host!r}, 29999), 5.0) as sock:
     file = sock.makefile("rw")
@@ -67,14 +67,14 @@ def rtde_client(source: Path) -> Iterator[Trial]:
             )
             text = text.replace("keep_running = True", "keep_running = True\nmoves = 0", 1)
             loop.write_text(text.replace("while keep_running:", "while moves < 2:"))
-            (examples / "play.py").write_text(_PLAY.format(host=simulated.host))
+            (examples / "play.py").write_text(_PLAY_PROGRAM.format(host=simulated.host))
             # the program watches for its client: that comes first
             command = f"{sys.executable} {loop.name} & sleep 3; {sys.executable} play.py && wait %1"
             yield _run(label, "example_control_loop.py", ["bash", "-c", command], examples)
 
 
 #: part of python-urx's own examples that asks for no person: what each does, as a line of its class
-_URX = {
+_URX_TRIALS = {
     "positions and pose": "print(rob.getj(), rob.getl(), rob.get_pose())",
     "movej": "rob.movej((0.1, -1.4, 1.4, -1.5, -1.5, 0), acc=1.0, vel=1.0)",
     "simple.py": (
@@ -99,7 +99,7 @@ _URX = {
 
 
 #: before python-urx is imported: names that Python has moved since, and numbers of numpy 2 as text that URScript knows
-_COMPATIBLE = """
+_URX_SHIM = """
 import collections, collections.abc as c, numpy
 collections.Iterable, collections.Sequence = c.Iterable, c.Sequence
 if int(numpy.__version__.split(".")[0]) >= 2:
@@ -114,13 +114,13 @@ def urx(source: Path) -> Iterator[Trial]:
     """
     label = "python-urx"
     with tempfile.TemporaryDirectory() as folder:
-        for test, line in _URX.items():
+        for test, line in _URX_TRIALS.items():
             body = "\n    ".join(part.strip() for part in line.split(";"))
 
             def attempt(test: str = test, body: str = body) -> Trial:
                 with controller() as simulated:
                     text = (
-                        f"import sys; sys.path[:0] = {[str(source), str(source / 'packages')]!r}\n{_COMPATIBLE}\n"
+                        f"import sys; sys.path[:0] = {[str(source), str(source / 'packages')]!r}\n{_URX_SHIM}\n"
                         f"import urx\nrob = urx.Robot({simulated.host!r}, use_rt=True, urFirm=5.9)\n"
                         f"rob.set_tcp((0,) * 6)\nrob.set_payload(0.5, (0, 0, 0))\n"
                         f"try:\n    {body}\nfinally:\n    rob.close()\n"

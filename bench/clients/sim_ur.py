@@ -27,9 +27,9 @@ from bench.report import head, quantile
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.rtde_codec import PacketKind, Recipe, pack_outputs_request, pack_start_request, split
 
-HOME = (0.0, -1.4, 1.5, -1.7, -1.4, 0.2)
+START_JOINTS = (0.0, -1.4, 1.5, -1.7, -1.4, 0.2)
 # command -> event in the controller's log for its arrival, and for its execution
-EVENTS = {
+LOG_EVENTS = {
     "stopJ": ("received", "motion"),
     "stopJ async": ("received", "motion"),
     "speedStop": ("received", "motion"),
@@ -86,7 +86,7 @@ def measure(host: str, calls: int, stops: int) -> dict[str, Any]:
     dashboard.connect()
     raw = socket.create_connection((host, 30003))
     raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    zero, q = [0.0] * 6, list(HOME)
+    zero, q = [0.0] * 6, list(START_JOINTS)
 
     def ready() -> None:
         while not control.isProgramRunning():
@@ -202,10 +202,12 @@ def cell(values: Sequence[float]) -> str:
 
 def rows(timed: dict[str, list[list[float]]], events: list[dict[str, Any]]) -> dict[str, tuple[list[float], ...]]:
     """Return command -> delays from the call to arrival, execution and return [s]."""
-    when = {kind: [e["monotonic"] for e in events if e["event"] == kind] for kinds in EVENTS.values() for kind in kinds}
+    when = {
+        kind: [e["monotonic"] for e in events if e["event"] == kind] for kinds in LOG_EVENTS.values() for kind in kinds
+    }
     out = {}
     for name, calls in timed.items():
-        arrival, execution = EVENTS[name]
+        arrival, execution = LOG_EVENTS[name]
         delays: tuple[list[float], ...] = ([], [], [])
         for begin, end in calls:
             for column, kind in enumerate((arrival, execution)):
@@ -228,7 +230,7 @@ def main() -> int:
         os._exit(0)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.jsonl"
-        with SimulatedController(host=free_host(), start_q=HOME, log=log, unlock_after=0.0) as simulated:
+        with SimulatedController(host=free_host(), start_q=START_JOINTS, log=log, unlock_after=0.0) as simulated:
             command = [sys.executable, "-m", "bench", "sim-ur", "--measure", simulated.host]
             command += ["--calls", str(args.calls), "--stops", str(args.stops)]
             child = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)

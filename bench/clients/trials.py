@@ -39,7 +39,7 @@ from .urcl import Trial, urcl
 from .wheels import installed_wheel, wheels
 
 #: words of a test's name, or of what it said -> whose fault its failure is, and the evidence
-EXPLAINED: dict[str, str] = {
+EXPLAINED_FAILURES: dict[str, str] = {
     "Did not receive a valid data packet from robot in 0.5": (
         "The machine's: the client gives up after 0.5 s without a packet (ursecmon.py, wait); beside a load of 14 for "
         "each core the simulator stood still for up to 1.2 s. At half of that load the test passed."
@@ -52,7 +52,9 @@ EXPLAINED: dict[str, str] = {
 
 def explain(trial: Trial) -> str:
     """Return whose fault a failure is, and the evidence; empty where that is not known."""
-    return next((why for words, why in EXPLAINED.items() if words in f"{trial.client} {trial.test} {trial.why}"), "")
+    return next(
+        (why for words, why in EXPLAINED_FAILURES.items() if words in f"{trial.client} {trial.test} {trial.why}"), ""
+    )
 
 
 _IN_OWN_NETWORK = "UR_CLIENTS_IN_OWN_NETWORK"  # environment variable that says so

@@ -21,7 +21,7 @@ from coneskin.robot.sim.process import SimulatedController, free_host
 START_Q = (-1.6006, -1.7271, -2.2030, -0.8080, 1.5951, -0.0310)
 TEST_TIMEOUT = 90.0  # s
 #: program of tests -> its arguments, and options of the controller
-SUITES: tuple[tuple[str, tuple[str, ...], dict[str, Any]], ...] = (
+TEST_PROGRAMS: tuple[tuple[str, tuple[str, ...], dict[str, Any]], ...] = (
     ("primary_client_test_headless", (), {}),
     ("rtde_tests", (), {}),
     ("dashboard_client_g5_tests", (), {"remote_control": False}),
@@ -42,7 +42,7 @@ SUITES: tuple[tuple[str, tuple[str, ...], dict[str, Any]], ...] = (
     ),
 )
 #: example -> its arguments after the address
-EXAMPLES: dict[str, tuple[str, ...]] = {
+EXAMPLE_PROGRAMS: dict[str, tuple[str, ...]] = {
     "dashboard_example": (),
     "direct_torque_control_example": ("2",),
     "driver_example": (),
@@ -62,7 +62,12 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "trajectory_streaming_example": (),
 }
 #: words of tests against a server of their own, which wants a port of the controller on every address: they are not run
-APART = ("FakeTest", "fake_server", "destroy_client_after_server_stops_sending", "RTDEClientTest.test_initialization")
+OWN_SERVER_WORDS = (
+    "FakeTest",
+    "fake_server",
+    "destroy_client_after_server_stops_sending",
+    "RTDEClientTest.test_initialization",
+)
 
 
 class Trial(NamedTuple):
@@ -88,7 +93,7 @@ def controller(**options: Any) -> Iterator[SimulatedController]:
 
 def urcl(build: Path, source: Path, only: Sequence[str]) -> Iterator[Trial]:
     """Run all tests that ask for a robot, and all examples."""
-    for name, arguments, options in SUITES:
+    for name, arguments, options in TEST_PROGRAMS:
         program = _program(build / "tests", name)
         label = " ".join(["URCL", name, *arguments[1:], options.get("version", "")]).strip()
         if not any(word in name for word in only):
@@ -97,7 +102,7 @@ def urcl(build: Path, source: Path, only: Sequence[str]) -> Iterator[Trial]:
             yield Trial(label, "*", "skip", 0.0, f"{name} is not built")
             continue
         yield from suite(label, [str(program), *arguments], source, options)
-    for name, arguments in EXAMPLES.items():
+    for name, arguments in EXAMPLE_PROGRAMS.items():
         if any(word in name for word in only):
             trial = example(build / "examples" / name, arguments, source)
             for try_ in ("second", "third") if trial.result == "fail" else ():
@@ -121,7 +126,7 @@ def suite(label: str, command: Sequence[str], source: Path, options: dict[str, A
     """
     with robot(source, options) as host:
         for test in _listed(command):
-            if any(word in test for word in APART):
+            if any(word in test for word in OWN_SERVER_WORDS):
                 yield Trial(label, test, "apart", 0.0)
                 continue
             result, seconds, why = run(command, source, host, test)

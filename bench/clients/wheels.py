@@ -20,7 +20,7 @@ from coneskin.robot.sim.process import SimulatedController, free_host
 
 from .urcl import Trial
 
-_HEAD = """
+_TRIAL_HEAD = """
 import sys, time, math
 import rtde_control, rtde_receive, rtde_io
 host = sys.argv[1]
@@ -36,8 +36,8 @@ def near(get, b, tolerance=1e-3):
     raise AssertionError((a, b))
 def moved(n=6): assert max(abs(x - y) for x, y in zip(r.getActualQ(), home)) > 1e-3
 """
-_TAIL = "\nc.stopScript()\n"
-TRIALS = {
+_TRIAL_TAIL = "\nc.stopScript()\n"
+WHEEL_TRIALS = {
     "move, asynchronously, and stop": """
 q = list(home); q[0] += 0.3
 assert c.moveJ(q, 1.0, 2.0); near(lambda: r.getActualQ(), q)
@@ -80,12 +80,12 @@ for _ in range(50):
     c.forceMode([0] * 6, [0, 0, 1, 0, 0, 0], [0, 0, -10, 0, 0, 0], 2, [2, 2, 1.5, 1, 1, 1]); time.sleep(0.002)
 c.forceModeStop(); near(lambda: r.getActualQ(), home)""",
 }
-TOLD = {"force mode": "force_mode"}  #: what the controller must have said is not simulated
+TOLD_NAMES = {"force mode": "force_mode"}  #: what the controller must have said is not simulated
 
 
 #: versions of the controller's software that the package tells apart; the examples run on the last
-SOFTWARE = ("5.4", "5.11", "5.23", "5.25")
-_CONNECT = """
+SOFTWARE_VERSIONS = ("5.4", "5.11", "5.23", "5.25")
+_CONNECT_TRIAL = """
 import dashboard_client
 i = rtde_io.RTDEIOInterface(host); d = dashboard_client.DashboardClient(host); d.connect()
 q = r.getActualQ(); q[0] += 0.1
@@ -102,7 +102,7 @@ def wheels(archives: Path) -> Iterator[Trial]:
             with zipfile.ZipFile(archive) as file:
                 file.extractall(folder / "wheel")
             label = f"ur_rtde wheel {archive.name.split('-')[1]}"
-            for name, lines in TRIALS.items():
+            for name, lines in WHEEL_TRIALS.items():
                 yield _tried(label, name, lines, folder, wheel=folder / "wheel")
 
 
@@ -114,21 +114,21 @@ def installed_wheel() -> Iterator[Trial]:
         yield Trial("ur_rtde wheel", "*", "skip", 0.0, "ur_rtde is not installed")
         return
     with tempfile.TemporaryDirectory() as scratch:
-        for software in SOFTWARE:
-            yield _tried(label, f"PolyScope {software}", _CONNECT, Path(scratch), software)
-        for name, lines in TRIALS.items():
+        for software in SOFTWARE_VERSIONS:
+            yield _tried(label, f"PolyScope {software}", _CONNECT_TRIAL, Path(scratch), software)
+        for name, lines in WHEEL_TRIALS.items():
             yield _tried(label, name, lines, Path(scratch))
 
 
 def _tried(
-    label: str, name: str, lines: str, folder: Path, software: str = SOFTWARE[-1], wheel: Path | None = None
+    label: str, name: str, lines: str, folder: Path, software: str = SOFTWARE_VERSIONS[-1], wheel: Path | None = None
 ) -> Trial:
     """Run a trial, and once more where it fails; say how it went."""
     begin = time.monotonic()
-    first = problem = run(lines, TOLD.get(name, ""), folder, software, wheel)
+    first = problem = run(lines, TOLD_NAMES.get(name, ""), folder, software, wheel)
     if first:
         begin = time.monotonic()
-        problem = run(lines, TOLD.get(name, ""), folder, software, wheel)
+        problem = run(lines, TOLD_NAMES.get(name, ""), folder, software, wheel)
     why = problem or (first and f"on the second try; on the first: {first}")
     trial = Trial(label, name, "fail" if problem else "pass", time.monotonic() - begin, why)
     print(f"{trial.result:5} {trial.seconds:6.1f} {label} {name} {trial.why[:200]}", file=sys.stderr, flush=True)
@@ -142,7 +142,7 @@ def run(lines: str, told: str, folder: Path, software: str, wheel: Path | None) 
     start_q = (0.1, -1.4, 1.5, -1.7, -1.4, 0.2)
     with SimulatedController(host=free_host(), start_q=start_q, log=log, version=software) as simulated:
         path = f"import sys; sys.path.insert(0, {str(wheel)!r})\n" if wheel else ""
-        command = [sys.executable, "-c", path + _HEAD + lines + _TAIL, simulated.host]
+        command = [sys.executable, "-c", path + _TRIAL_HEAD + lines + _TRIAL_TAIL, simulated.host]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
         except subprocess.TimeoutExpired:

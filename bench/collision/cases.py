@@ -16,16 +16,16 @@ from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene, Scene
 from coneskin.testing.scenes import commissioned
 
-ARMS = ("UR5e", "UR10e", "UR3e")
-SPEED = 0.1, 1.5  # m/s of the touched place along its normal
-KINDS = ("hand", "mass", "person", "grip", "wall", "post")
-STIFFNESS = 10e3, 75e3  # N/m; ISO/TS 15066, table A.3: abdomen, hand
-MASSES = (0.6, 1.2, 4.4, 40.0)  # kg; the same table: hand, neck, head, chest
-HANDS = MASSES[:2]  # that push or grip
+ARM_MODELS = ("UR5e", "UR10e", "UR3e")
+SPEED_RANGE = 0.1, 1.5  # m/s of the touched place along its normal
+BODY_KINDS = ("hand", "mass", "person", "grip", "wall", "post")
+STIFFNESS_RANGE = 10e3, 75e3  # N/m; ISO/TS 15066, table A.3: abdomen, hand
+MASS_RANGE = (0.6, 1.2, 4.4, 40.0)  # kg; the same table: hand, neck, head, chest
+HAND_MASSES = MASS_RANGE[:2]  # that push or grip
 _TOUCHING, _APART = -1e-4, 0.01  # m that skin and body must be apart before they meet; those that are not to meet
 RUN_UP, RUN_UP_ACCELERATION = 0.12, 40.0  # s, rad/s^2
 
-_LINK = """
+_LINK_TABLE = """
 [[link]]
 name = "{name}"
 [[link.sensor]]
@@ -72,7 +72,7 @@ def scene_text(arm: str, reaction: str, links: tuple[str, ...] = ("upper_arm", "
             continue
         length = 1e3 * abs(model.a[number])
         radius = 380.0 * model.d[4] * (1.3 if name == "upper_arm" else 1.0)
-        text += _LINK.format(
+        text += _LINK_TABLE.format(
             name=name, number=number, radius1=radius, radius2=0.99 * radius, height=0.65 * length, start=0.2 * length
         )
     return f"{text}[reaction]\n{reaction}\n"
@@ -81,13 +81,13 @@ def scene_text(arm: str, reaction: str, links: tuple[str, ...] = ("upper_arm", "
 def draw(seed: int) -> RandomImpact:
     """Return the collision of a seed; the kinds of body take turns."""
     rng = random.Random(f"impact {seed}")
-    while (found := _try(rng, KINDS[seed % len(KINDS)])) is None:
+    while (found := _try(rng, BODY_KINDS[seed % len(BODY_KINDS)])) is None:
         pass
     return found
 
 
 def _try(rng: random.Random, kind: str) -> RandomImpact | None:
-    arm = rng.choice(ARMS)
+    arm = rng.choice(ARM_MODELS)
     model = arm_model(arm)
     angle = rng.uniform
     lift, elbow = math.radians(angle(-150.0, -30.0)), math.radians(rng.choice((-1.0, 1.0)) * angle(35.0, 140.0))
@@ -105,7 +105,7 @@ def _try(rng: random.Random, kind: str) -> RandomImpact | None:
     along = sum(n * v for n, v in zip(normal, velocity, strict=True))
     if along < 0.6 * math.hypot(*velocity):
         return None  # a brush along the skin is no blow
-    approach = math.exp(angle(*map(math.log, SPEED)))
+    approach = math.exp(angle(*map(math.log, SPEED_RANGE)))
     a, b, c, d, e, f = (approach / along * value for value in raw)
     qd: Joints = (a, b, c, d, e, f)
     if any(abs(v) > 0.95 * most for v, most in zip(qd, model.joint_speed, strict=True)):
@@ -148,8 +148,8 @@ def _body(rng: random.Random, kind: str, point: Vector, normal: Vector, tube: Ve
     """Return a body that a place of the skin meets."""
     across = _cross(normal, tube)
     size = rng.uniform(0.02, 0.06)
-    mass = rng.choice(HANDS if kind in ("person", "grip") else MASSES)
-    stiffness = math.exp(rng.uniform(*map(math.log, STIFFNESS)))
+    mass = rng.choice(HAND_MASSES if kind in ("person", "grip") else MASS_RANGE)
+    stiffness = math.exp(rng.uniform(*map(math.log, STIFFNESS_RANGE)))
     force = math.exp(rng.uniform(math.log(15.0), math.log(100.0)))
     tilt = [math.radians(rng.uniform(-15.0, 15.0)) for _ in range(2)]
     if kind == "wall":

@@ -32,13 +32,13 @@ from bench.report import commit, head, quantile
 from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
 from coneskin.skin.materials import Padding
 
-from .cases import KINDS, RUN_UP_ACCELERATION, draw
+from .cases import BODY_KINDS, RUN_UP_ACCELERATION, draw
 
 REACTIONS = ("stop", "retreat", "comply", "slow")
 WAYS = (*REACTIONS, "force limit", "nothing")
-_FELT = 5.0  # N from which on a collision that nothing noticed counts as missed
+_FELT_FORCE = 5.0  # N from which on a collision that nothing noticed counts as missed
 _LEAST, _FEW = 0.3, 5  # N that the picture shows for nothing; collisions below which it shows no median
-_BANDS = ((0.0, 0.25), (0.25, 0.5), (0.5, 1.0), (1.0, 2.0))  # m/s
+_SPEED_BANDS = ((0.0, 0.25), (0.25, 0.5), (0.5, 1.0), (1.0, 2.0))  # m/s
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Row:
     @property
     def missed(self) -> bool:
         """Whether a body felt it and nothing stopped the arm."""
-        return self.peak > _FELT and math.isnan(self.noticed)
+        return self.peak > _FELT_FORCE and math.isnan(self.noticed)
 
 
 def play(seed: int, way: str) -> tuple[CollisionRun, Row]:
@@ -149,10 +149,10 @@ def lines_of(found: dict[int, dict[str, Row]], most: float) -> list[dict[str, ob
     table = []
     for way in WAYS:
         pairs = [(row[way], row.get("stop")) for row in found.values() if way in row and row[way].met]
-        cases = [(kind, [pair for pair in pairs if pair[0].kind == kind]) for kind in KINDS]
+        cases = [(kind, [pair for pair in pairs if pair[0].kind == kind]) for kind in BODY_KINDS]
         cases += [
             (f"{low:g} to {high:g} m/s", [pair for pair in pairs if low <= pair[0].approach < high])
-            for low, high in _BANDS
+            for low, high in _SPEED_BANDS
         ]
         for case, chosen in (*cases, ("all", pairs)):
             if chosen:
@@ -202,8 +202,8 @@ def draw_picture(found: dict[int, dict[str, Row]], path: Path) -> None:
         for axis, name in zip(axes, ("peak", "clamp"), strict=True):
             speeds, forces = [row.approach for row in rows], [max(_LEAST, getattr(row, name)) for row in rows]
             axis.scatter(speeds, forces, s=5, color=colour, alpha=0.35, linewidths=0)
-            bands = [[getattr(row, name) for row in rows if low <= row.approach < high] for low, high in _BANDS]
-            at = [math.sqrt(max(low, 0.1) * high) for low, high in _BANDS]
+            bands = [[getattr(row, name) for row in rows if low <= row.approach < high] for low, high in _SPEED_BANDS]
+            at = [math.sqrt(max(low, 0.1) * high) for low, high in _SPEED_BANDS]
             middles = [max(_LEAST, quantile(band, 0.5)) if len(band) >= _FEW else math.nan for band in bands]
             axis.plot(at, middles, color=colour, marker="o", label=way)
     for axis, title in zip(axes, ("peak force", "force 0.5 s after the first contact"), strict=True):

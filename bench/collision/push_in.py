@@ -28,7 +28,7 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.types import Reaction
 from tests.support.collision_rig import CollisionRig
 
-from .push_in_cases import CASES, RandomCollision, case_of, draw
+from .push_in_cases import ALL_CASES, RandomCollision, case_of, draw
 
 REACTIONS = {
     "stop": Reaction("stop"),
@@ -180,7 +180,7 @@ def table(found: Found, reactions: list[str], as_json: bool) -> float:
         print(f"{'mm towards the body':30}{'':16}{'surface':>24}{'excess over the stop':>24}")
         print(f"{'reaction, case':30}{columns}{'> 2':>6}{'> 5':>6}  worst seeds")
     for reaction in reactions:
-        for case in (*CASES, "all"):
+        for case in (*ALL_CASES, "all"):
             line = summary(found, reaction, case)
             if line is None:
                 continue

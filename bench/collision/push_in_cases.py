@@ -19,10 +19,10 @@ from tests.support.collision_rig import SkinOnLink
 from tests.support.pressing_body import Body
 
 ARMS = ("UR5e", "UR10e", "UR3e")
-SPEED = 0.1, 1.5  # rad/s, of the leading joint
-APPROACH = 0.05  # m/s, the least of the touched place towards its body
-SEAM = math.radians(5.0), math.radians(60.0)  # of a palm, on either side of the seam
-PALM = 2.0, 60.0  # N on each side, at which a palm gives way
+SPEED_RANGE = 0.1, 1.5  # rad/s, of the leading joint
+MIN_APPROACH_SPEED = 0.05  # m/s, the least of the touched place towards its body
+PALM_ANGLES = math.radians(5.0), math.radians(60.0)  # of a palm, on either side of the seam
+PALM_FORCES = 2.0, 60.0  # N on each side, at which a palm gives way
 SOFT, HARD = 10e3, 75e3  # N/m; ISO/TS 15066, table A.3: abdomen, hand
 
 
@@ -83,7 +83,7 @@ class _Scenery:
             angle(-math.pi, math.pi),
         )
         raw = [rng.uniform(-1.0, 1.0) for _ in range(6)]
-        scale = math.exp(rng.uniform(*map(math.log, SPEED))) / max(map(abs, raw[:3]))
+        scale = math.exp(rng.uniform(*map(math.log, SPEED_RANGE))) / max(map(abs, raw[:3]))
         a, b, c, d, e, f = (max(-2.5, min(2.5, scale * value)) for value in raw)
         self.qd: Joints = (a, b, c, d, e, f)
 
@@ -126,7 +126,7 @@ class _Scenery:
         for _ in range(40):
             u, phi = self.along(link), self.rng.uniform(0.0, 2.0 * math.pi)
             velocity = math.hypot(*self.velocity(link, u, phi))
-            if self.approach(link, u, phi) > max(APPROACH, 0.4 * velocity):
+            if self.approach(link, u, phi) > max(MIN_APPROACH_SPEED, 0.4 * velocity):
                 return link, u, phi
         return None
 
@@ -162,10 +162,12 @@ def _palm(s: _Scenery) -> list[Body] | None:
     """Return a palm over the seam: it presses both ends of the sheet at the same u."""
     link = s.rng.choice(("forearm", "forearm", "upper_arm"))
     for _ in range(40):
-        u, half = s.along(link), s.rng.uniform(*SEAM)
+        u, half = s.along(link), s.rng.uniform(*PALM_ANGLES)
         sides = half * s.rng.uniform(0.7, 1.0), 2.0 * math.pi - half
-        if all(s.approach(link, u, phi) > APPROACH for phi in sides):
-            palm = Body(link, u, 0.0, stiffness=0.5 * s.stiff(), hardest=math.exp(s.rng.uniform(*map(math.log, PALM))))
+        if all(s.approach(link, u, phi) > MIN_APPROACH_SPEED for phi in sides):
+            palm = Body(
+                link, u, 0.0, stiffness=0.5 * s.stiff(), hardest=math.exp(s.rng.uniform(*map(math.log, PALM_FORCES)))
+            )
             palm = replace(palm, push=s.rng.choice((0.0, 0.5 * palm.hardest)))
             return [replace(palm, phi=phi) for phi in sides]
     return None
@@ -176,8 +178,10 @@ def _seam(s: _Scenery) -> list[Body] | None:
     link = s.rng.choice(("forearm", "forearm", "upper_arm"))
     for _ in range(40):
         u, sides = s.along(link), (s.rng.uniform(0.0, 0.12), 2.0 * math.pi - s.rng.uniform(0.0, 0.12))
-        if all(s.approach(link, u, phi) > APPROACH for phi in sides):
-            body = Body(link, u, 0.0, stiffness=0.5 * s.stiff(), hardest=math.exp(s.rng.uniform(*map(math.log, PALM))))
+        if all(s.approach(link, u, phi) > MIN_APPROACH_SPEED for phi in sides):
+            body = Body(
+                link, u, 0.0, stiffness=0.5 * s.stiff(), hardest=math.exp(s.rng.uniform(*map(math.log, PALM_FORCES)))
+            )
             body = replace(body, push=s.rng.choice((0.0, 0.5 * body.hardest)))
             return [replace(body, phi=phi) for phi in sides]
     return None
@@ -233,7 +237,7 @@ def _growing(s: _Scenery) -> list[Body] | None:
 
 
 #: by the name in the table
-CASES: dict[str, Callable[[_Scenery], list[Body] | None]] = {
+ALL_CASES: dict[str, Callable[[_Scenery], list[Body] | None]] = {
     "one hand": _one,
     "two hands": _two,
     "palm over the seam": _palm,
@@ -242,7 +246,7 @@ CASES: dict[str, Callable[[_Scenery], list[Body] | None]] = {
     "growing press": _growing,
 }
 #: collisions with more than one contact, for bench `decode`
-SEVERAL: dict[str, Callable[[_Scenery], list[Body] | None]] = {
+SEVERAL_CASES: dict[str, Callable[[_Scenery], list[Body] | None]] = {
     "seam press": _seam,
     "palm over the seam": _palm,
     "grip": _grip,
@@ -253,12 +257,12 @@ SEVERAL: dict[str, Callable[[_Scenery], list[Body] | None]] = {
 _Cases = dict[str, Callable[[_Scenery], list[Body] | None]]
 
 
-def case_of(seed: int, cases: _Cases = CASES) -> str:
+def case_of(seed: int, cases: _Cases = ALL_CASES) -> str:
     """Return the case of a seed; they take turns."""
     return list(cases)[seed % len(cases)]
 
 
-def draw(seed: int, cases: _Cases = CASES) -> RandomCollision:
+def draw(seed: int, cases: _Cases = ALL_CASES) -> RandomCollision:
     """Return the collision of a seed."""
     case = case_of(seed, cases)
     rng = random.Random(f"collision {seed}")

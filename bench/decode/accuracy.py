@@ -27,8 +27,8 @@ from . import cells, disturbances, several, tables
 from .collisions import collide
 from .plants import RADII, SHEETS, STIFFNESSES, SolvedPlants, disc_cases
 
-ALL = "cells,several,power,disturbances,collisions,time"
-QUICK = "cells,several,power,disturbances,time"
+ALL_PARTS = "cells,several,power,disturbances,collisions,time"
+QUICK_PARTS = "cells,several,power,disturbances,time"
 
 
 def agreement(plants: SolvedPlants, places: int) -> dict[str, float]:
@@ -58,7 +58,7 @@ def main() -> int:
     parser.add_argument("--collisions", type=int, default=300, help="collisions, end to end (%(default)s)")
     parser.add_argument("--places", type=int, help="places in each cell")
     parser.add_argument("--draws", type=int, default=24, help="of the noise at each place (%(default)s)")
-    parser.add_argument("--parts", default="", help=f"what to measure ({ALL})")
+    parser.add_argument("--parts", default="", help=f"what to measure ({ALL_PARTS})")
     cache = Path(tempfile.gettempdir()) / "coneskin-bench-decode"
     parser.add_argument("--cache", type=Path, default=cache, help="folder of solved plants (%(default)s)")
     args = parser.parse_args()
@@ -66,7 +66,7 @@ def main() -> int:
 
     ngsolve.SetNumThreads(1)
     args.cache.mkdir(exist_ok=True, parents=True)
-    quick, parts = args.quick, (args.parts or (QUICK if args.quick else ALL)).split(",")
+    quick, parts = args.quick, (args.parts or (QUICK_PARTS if args.quick else ALL_PARTS)).split(",")
     plants = SolvedPlants(args.cache / "plants.jsonl")
     places = args.places or (1 if quick else 6)
     goals: list[list[str]] = []
@@ -81,7 +81,7 @@ def main() -> int:
     note(f"{plants.solved} plants solved")
     if "cells" in parts:
         grid = ((3e-3, 15e-3), (1.0, math.inf)) if quick else (RADII, STIFFNESSES)
-        baselines = (0.0, 1e-2) if quick else cells.BASELINES
+        baselines = (0.0, 1e-2) if quick else cells.BASELINE_DRIFTS
         found = []
         for sheet in ("UR5e",) if quick else ("UR5e", "paper"):
             for name in cells.electronics(sheet):

@@ -10,10 +10,10 @@ import numpy as np
 from tests.support.field.converter_plant import ConverterPlant
 
 from .plants import (
+    DIFFERENCE_STEP,
     RADII,
-    RELATIVE,
+    RELATIVE_STEP,
     SHEETS,
-    STEP,
     STIFFNESSES,
     Case,
     SolvedPlants,
@@ -21,7 +21,7 @@ from .plants import (
     radius_at,
     solve_bare,
 )
-from .runs import LEARNED, Sitting, decode
+from .runs import LEARNED_FRAMES, Sitting, decode
 
 PRIOR_RADIUS, PRIOR_CONDUCTANCE = 0.5, 1.0  # standard deviation of the logarithms
 
@@ -29,7 +29,7 @@ PRIOR_RADIUS, PRIOR_CONDUCTANCE = 0.5, 1.0  # standard deviation of the logarith
 def varied(plants: SolvedPlants, case: Case) -> list[np.ndarray]:
     """Return Y of a disc, then its derivatives: by u and s [1/m], ln a, ln g, ln Ru, ln Rl."""
     plant, patch = SHEETS[case.sheet], case.patches[0]
-    turn = STEP / radius_at(plant, patch.u)
+    turn = DIFFERENCE_STEP / radius_at(plant, patch.u)
     g = plant.conductance(patch)
 
     def at(**changes: float) -> np.ndarray:
@@ -41,14 +41,14 @@ def varied(plants: SolvedPlants, case: Case) -> list[np.ndarray]:
 
     middle = at()
     out = [middle]
-    for name, step, unit in (("u", STEP, STEP), ("phi", turn, STEP)):
+    for name, step, unit in (("u", DIFFERENCE_STEP, DIFFERENCE_STEP), ("phi", turn, DIFFERENCE_STEP)):
         value = getattr(patch, name)
         out.append((at(**{name: value + step}) - at(**{name: value - step})) / (2.0 * unit))
-    wide = patch.along * (1.0 + RELATIVE)
-    out.append((at(along=wide, across=wide) - middle) / RELATIVE)
-    out.append(np.zeros((4, 4)) if math.isinf(g) else (at(g=g * (1.0 + RELATIVE)) - middle) / RELATIVE)
+    wide = patch.along * (1.0 + RELATIVE_STEP)
+    out.append((at(along=wide, across=wide) - middle) / RELATIVE_STEP)
+    out.append(np.zeros((4, 4)) if math.isinf(g) else (at(g=g * (1.0 + RELATIVE_STEP)) - middle) / RELATIVE_STEP)
     for name in ("upper", "lower"):
-        out.append((at(**{name: getattr(plant, name) * (1.0 + RELATIVE)}) - middle) / RELATIVE)
+        out.append((at(**{name: getattr(plant, name) * (1.0 + RELATIVE_STEP)}) - middle) / RELATIVE_STEP)
     return out
 
 
@@ -78,11 +78,11 @@ def bound(
     return np.asarray(np.linalg.inv(information / np.outer(unit, unit))[:2, :2] / np.outer(unit, unit)[:2, :2])
 
 
-MATCHED = 2.2  # of the larger untouched drive current
-BASELINES = (0.0, 3e-3, 1e-2)  # ratio; standard deviation of the drift of each sheet since it was learned
-FRAMES = 2  # of a touch; with the second comes its place, and by then the currents may have drifted, as told
-DRIFTS = 6  # drawn at each place; the draws of the noise are shared out among them
-ELLIPSE = 5.991  # chi-squared of two degrees of freedom at 95 %
+MATCHED_RATIO = 2.2  # of the larger untouched drive current
+BASELINE_DRIFTS = (0.0, 3e-3, 1e-2)  # ratio; standard deviation of the drift of each sheet since it was learned
+CELL_FRAMES = 2  # of a touch; with the second comes its place, and by then the currents may have drifted, as told
+DRIFT_DRAWS = 6  # drawn at each place; the draws of the noise are shared out among them
+ELLIPSE_CHI2 = 5.991  # chi-squared of two degrees of freedom at 95 %
 
 
 @dataclass
@@ -121,8 +121,8 @@ def electronics(sheet: str) -> dict[str, ConverterPlant]:
     drive = 2.5 / min(plant.upper * squares, plant.lower / squares)
     return {
         "12 bit, 20 mA": ConverterPlant(),
-        "12 bit, matched": ConverterPlant(full_scale=MATCHED * drive),
-        "16 bit, matched": ConverterPlant(bits=16, full_scale=MATCHED * drive),
+        "12 bit, matched": ConverterPlant(full_scale=MATCHED_RATIO * drive),
+        "16 bit, matched": ConverterPlant(bits=16, full_scale=MATCHED_RATIO * drive),
     }
 
 
@@ -148,16 +148,16 @@ def measure(
                 solved, patch = varied(plants, case), case.patches[0]
                 exact = circuit.exact(solved[0])
                 for baseline in baselines:
-                    alone = [math.sqrt((circuit.noise**2 + 1.0 / 12.0) / LEARNED) / still[k] for k in (5, 8)]
+                    alone = [math.sqrt((circuit.noise**2 + 1.0 / 12.0) / LEARNED_FRAMES) / still[k] for k in (5, 8)]
                     known = math.hypot(alone[0], baseline), math.hypot(alone[1], baseline)
-                    least = bound(circuit, solved, known, FRAMES)
-                    drifts = min(DRIFTS, draws) if baseline else 1
+                    least = bound(circuit, solved, known, CELL_FRAMES)
+                    drifts = min(DRIFT_DRAWS, draws) if baseline else 1
                     for _ in range(drifts):
                         off = rng.normal(0.0, baseline, 2) if baseline else np.zeros(2)
                         before = replace(plant, upper=plant.upper * (1.0 + off[0]), lower=plant.lower * (1.0 + off[1]))
                         untouched = circuit.exact(solve_bare(before))
-                        touches = circuit.counts(np.repeat(exact[None], draws // drifts, 0), FRAMES, rng)
-                        learned = circuit.counts(untouched, LEARNED, rng)
+                        touches = circuit.counts(np.repeat(exact[None], draws // drifts, 0), CELL_FRAMES, rng)
+                        learned = circuit.counts(untouched, LEARNED_FRAMES, rng)
                         sittings.append(Sitting(plant, circuit, learned, touches, baseline))
                         keys.append((radius, ka, baseline, least, (patch.u, patch.phi)))
     answers = [decode(sitting) for sitting in sittings]
@@ -184,10 +184,10 @@ def _gather(sheet: str, name: str, keys: list, answers: list[dict[str, np.ndarra
             determinant = uu * ss - us * us
             with np.errstate(invalid="ignore", divide="ignore"):
                 held.append((ss * du**2 - 2 * us * du * ds + uu * ds**2) / determinant)
-            places.setdefault((u, phi), []).append(held[-1] < ELLIPSE)
+            places.setdefault((u, phi), []).append(held[-1] < ELLIPSE_CHI2)
         squares, distances = np.concatenate(errors), np.concatenate(held)
         rms = math.sqrt(squares.mean()) if squares.size else math.nan
-        inside = float(np.mean(distances < ELLIPSE)) if np.isfinite(distances).any() else math.nan
+        inside = float(np.mean(distances < ELLIPSE_CHI2)) if np.isfinite(distances).any() else math.nan
         interval = spread_of([np.concatenate(part) for part in places.values()])
         of = sum(answers[n]["touched"].shape[0] for n in numbers)
         found.append(Cell(sheet, name, radius, ka, baseline, trace, rms, inside, interval, squares.size, of))

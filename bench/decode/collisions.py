@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from bench.collision.push_in import measure
-from bench.collision.push_in_cases import SEVERAL, draw
+from bench.collision.push_in_cases import SEVERAL_CASES, draw
 
 MAX_EXCESS = 2.0  # mm; what contact supervision needs to end a motion that presses on something else
 
@@ -19,10 +19,10 @@ MAX_EXCESS = 2.0  # mm; what contact supervision needs to end a motion that pres
 def collide(count: int) -> list[list[str]]:
     """Return a row for each kind of collision: collisions, motions away, towards a body, worst [mm], seeds."""
     found: dict[str, dict[str, Any]] = {
-        case: {"collisions": 0, "moved": 0, "towards": 0, "worst": 0.0, "seeds": []} for case in SEVERAL
+        case: {"collisions": 0, "moved": 0, "towards": 0, "worst": 0.0, "seeds": []} for case in SEVERAL_CASES
     }
     for seed in range(count):
-        collision = draw(seed, SEVERAL)
+        collision = draw(seed, SEVERAL_CASES)
         outcome = measure(seed, ("stop", "retreat"), "field", collision)
         excess, row = outcome["retreat"].excess(outcome["stop"]), found[collision.case]
         row["collisions"] += 1

@@ -11,9 +11,9 @@ from tests.support.field.converter_plant import leak_admittance
 
 from .cells import electronics
 from .plants import RADII, SHEETS, Case, SolvedPlants, disc_cases, radius_at, shape_cases
-from .runs import LEARNED, Sitting, decode
+from .runs import LEARNED_FRAMES, Sitting, decode
 
-BITS = "16 bit, matched"  # so that noise hides nothing
+ELECTRONICS_NAME = "16 bit, matched"  # so that noise hides nothing
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Errors:
 
 def measure(plants: SolvedPlants, places: int) -> list[Errors]:
     """Measure each disturbance on discs all over the forearm, then contacts that are no whole discs."""
-    circuit = electronics("UR5e")[BITS]
+    circuit = electronics("UR5e")[ELECTRONICS_NAME]
     discs = [case for radius in RADII[1:3] for ka in (1.0, 3.0) for case in disc_cases("UR5e", radius, ka, places)]
     rng = np.random.default_rng(8)
     unequal = [replace(circuit, leads=tuple(rng.uniform(3.0, 12.0, 4).tolist())) for _ in range(4)]
@@ -78,7 +78,7 @@ def _errors(what: str, plants: SolvedPlants, cases: list[Case], circuits: list, 
     places = np.array([centroid(case) for case in cases])
     errors, certain = [], []
     for c in circuits:
-        untouched, touches = c.counts(c.exact(still), LEARNED, rng), c.counts(c.exact(y), 20, rng)
+        untouched, touches = c.counts(c.exact(still), LEARNED_FRAMES, rng), c.counts(c.exact(y), 20, rng)
         answer = decode(Sitting(plant, c, untouched, touches))
         du = answer["u"] - places[:, :1]
         ds = plant.radius1 * (answer["phi"] - places[:, 1:])
@@ -99,7 +99,7 @@ def run_time(plants: SolvedPlants, rounds: int) -> tuple[float, ...]:
     sitting = Sitting(
         plant,
         circuit,
-        circuit.counts(circuit.exact(plants.admittance(plant, ())), LEARNED, rng),
+        circuit.counts(circuit.exact(plants.admittance(plant, ())), LEARNED_FRAMES, rng),
         circuit.counts(exact, 200, rng),
     )
     seconds = np.min([decode(sitting)["seconds"] for _ in range(rounds)], axis=0)

@@ -32,17 +32,17 @@ from .fault_kinds import FaultCase, draw_kind
 
 Answers = dict[str, dict[str, int]]  # fault -> verdict and last name, or what was counted -> how often
 
-BEGINS = 70, 90  # frame
-NAMED = 230  # frames after fault and touch, in which the name comes
-TIMED = 3  # one in so many cases is compared with a healthy sensor, frame by frame
-SILENCE = 0.03  # s
-STUCK = 25  # frames in a row that count as stuck here
-CONES = {
+FAULT_FRAMES = 70, 90  # frame
+NAMING_FRAMES = 230  # frames after fault and touch, in which the name comes
+TIMING_EVERY = 3  # one in so many cases is compared with a healthy sensor, frame by frame
+SILENCE_TIME = 0.03  # s
+STUCK_FRAMES = 25  # frames in a row that count as stuck here
+SENSOR_CONES = {
     "forearm": Frustum(0.0375, 0.0375, 0.24, math.radians(350)),
     "cone": Frustum(0.03, 0.06, 0.15, math.radians(340)),
     "upper arm": Frustum(0.054, 0.054, 0.434),
 }
-_REST = 0.005  # m; a certain place that is farther off is a wrong one
+_PLACE_TOLERANCE = 0.005  # m; a certain place that is farther off is a wrong one
 
 
 @dataclass
@@ -59,7 +59,7 @@ class Account:
 
 def sensor_of(rng: random.Random) -> Sensor:
     """Return one of the sensors, with one of the polarities, of 12 or 16 bits."""
-    cone = CONES[rng.choice(list(CONES))]
+    cone = SENSOR_CONES[rng.choice(list(SENSOR_CONES))]
     polarity = Polarity(rng.choice(("B", "A")), rng.choice(("C", "D")))
     plain = Sensor(cone, polarity=polarity)
     parts = match_electronics(plain.radial_ohms, plain.angular_ohms)
@@ -80,14 +80,14 @@ def touch_of(rng: random.Random, sensor: Sensor, begins: int, case: FaultCase) -
 
 def listen(sensor: Sensor, skin: VirtualSkin, touch: ScriptedTouch | None) -> Account:
     """Return what a detector says of a skin."""
-    stream, said = TouchStream([sensor], DetectorSettings(stuck_frames=STUCK)), Account()
+    stream, said = TouchStream([sensor], DetectorSettings(stuck_frames=STUCK_FRAMES)), Account()
     now, frame = 0.0, -1
     detector = stream.detectors[0]
     radius = max(sensor.frustum.radius1, sensor.frustum.radius2)
     try:
         for frame, (time, data) in enumerate(skin.packets()):
             now = time
-            for event in (*(stream.feed(data, now) if data else ()), *stream.silence(now, SILENCE)):
+            for event in (*(stream.feed(data, now) if data else ()), *stream.silence(now, SILENCE_TIME)):
                 if isinstance(event, SkinFault):
                     said.first = said.first or event.fault.name
                     if event.fault.name != said.last:
@@ -126,7 +126,7 @@ def play(number: int) -> Outcome:
     """Run a case."""
     rng = random.Random(f"fault {number}")
     sensor = sensor_of(rng)
-    begins = rng.randint(*BEGINS)
+    begins = rng.randint(*FAULT_FRAMES)
     length = rng.choice(FRAME_LENGTHS)
     case = draw_kind(rng, number, sensor, begins, driven=length == FRAME_LENGTHS[-1])
     touch = touch_of(rng, sensor, begins, case)
@@ -143,13 +143,15 @@ def play(number: int) -> Outcome:
             frame_length=length,
         )
 
-    ends = max(1e-3 * begins, touch.start if touch else 0.0) + 1e-3 * NAMED
+    ends = max(1e-3 * begins, touch.start if touch else 0.0) + 1e-3 * NAMING_FRAMES
     said = listen(sensor, skin(case.faults, ends), touch)
-    outcome = Outcome(case, said, case.judge(said.last, said.began, said.place_off > _REST, touch is not None))
-    if touch is not None and not case.swallows and number % TIMED == 0:
+    outcome = Outcome(
+        case, said, case.judge(said.last, said.began, said.place_off > _PLACE_TOLERANCE, touch is not None)
+    )
+    if touch is not None and not case.swallows and number % TIMING_EVERY == 0:
         until = 1e-3 * math.ceil(1e3 * touch.start + 8.0)
         healthy = listen(sensor, skin(FaultInjection(), until), None)
-        shown = said.first_frame if said.first_frame >= 0 else NAMED
+        shown = said.first_frame if said.first_frame >= 0 else NAMING_FRAMES
         outcome.late = max(0, shown - healthy.first_frame)
     return outcome
 

@@ -15,9 +15,9 @@ from tests.support.field.flat_plant import FlatPlant, PressedPatch
 
 RADII = (1e-3, 3e-3, 7.5e-3, 15e-3)  # m
 STIFFNESSES = (0.3, 1.0, 3.0, math.inf)  # ka
-MARGIN = 2e-3  # m; of a disc to the edges, beyond a twentieth of its radius
-STEP = 2.5e-4  # m; of a place, for its derivative
-RELATIVE = 1e-3  # of a sheet's resistance, a conductance; likewise
+EDGE_MARGIN = 2e-3  # m; of a disc to the edges, beyond a twentieth of its radius
+DIFFERENCE_STEP = 2.5e-4  # m; of a place, for its derivative
+RELATIVE_STEP = 1e-3  # of a sheet's resistance, a conductance; likewise
 PAIR_ORDER = 3  # degree of the elements where a normal within a degree is all that counts
 
 SHEETS = {
@@ -109,7 +109,7 @@ def disc_cases(sheet: str, radius: float, ka: float, count: int) -> list[Case]:
     plant, rng = SHEETS[sheet], random.Random(f"disc {sheet} {radius} {ka}")
     found = []
     for _ in range(count):
-        room = 1.05 * radius + MARGIN
+        room = 1.05 * radius + EDGE_MARGIN
         u = rng.uniform(room, plant.slant - room)
         edge = math.asin(min(1.0, room / _turn_radius(plant, u))) / _share(plant)
         phi = rng.uniform(edge, plant.wrap - edge)
@@ -147,7 +147,16 @@ def shape_cases(sheet: str, count: int) -> list[Case]:
     return found
 
 
-SEVERAL = ("seam press", "palm over seam", "grip", "clamp", "two fingers", "three fingers", "four fingers", "palm")
+SEVERAL_KINDS = (
+    "seam press",
+    "palm over seam",
+    "grip",
+    "clamp",
+    "two fingers",
+    "three fingers",
+    "four fingers",
+    "palm",
+)
 
 
 def several_cases(count: int) -> Iterator[Case]:
@@ -155,7 +164,7 @@ def several_cases(count: int) -> Iterator[Case]:
     names = list(SHEETS)
     for number in range(count):
         rng = random.Random(f"several {number}")
-        kind, sheet = SEVERAL[number % len(SEVERAL)], names[number // len(SEVERAL) % len(names)]
+        kind, sheet = SEVERAL_KINDS[number % len(SEVERAL_KINDS)], names[number // len(SEVERAL_KINDS) % len(names)]
         while (patches := _several(kind, SHEETS[sheet], rng)) is None:
             pass
         yield Case(kind, sheet, tuple(patches), PAIR_ORDER)

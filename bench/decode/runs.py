@@ -24,9 +24,9 @@ from coneskin.skin.sensor import Sensor
 from tests.support.field.converter_plant import ConverterPlant
 from tests.support.field.flat_plant import FlatPlant
 
-LEARNED = 300  # frames of each sitting without a touch
+LEARNED_FRAMES = 300  # frames of each sitting without a touch
 FRAME_PERIOD = 1e-3  # s
-_BODY = struct.Struct("<HBBHBBHI10H")
+_FRAME_BODY = struct.Struct("<HBBHBBHI10H")
 
 
 @dataclass
@@ -71,7 +71,7 @@ class Sitting:
 def packet(sequence: int, counts: list[int]) -> bytes:
     """Return the bytes of a frame of 36 bytes, device 0, sensor 0."""
     head = (0x3AC5, 1, 36, 0, 0, 0, sequence & 0xFFFF, round(1e6 * FRAME_PERIOD * sequence) & 0xFFFFFFFF)
-    body = _BODY.pack(*head, *counts)
+    body = _FRAME_BODY.pack(*head, *counts)
     return body + crc_hqx(body, 0).to_bytes(2, "big")
 
 

@@ -11,11 +11,11 @@ import numpy as np
 from tests.support.field.flat_plant import FlatPlant, PressedPatch
 
 from .cells import electronics
-from .plants import SEVERAL, SHEETS, Case, SolvedPlants, disc_cases, several_cases
-from .runs import LEARNED, Sitting, decode
+from .plants import SEVERAL_KINDS, SHEETS, Case, SolvedPlants, disc_cases, several_cases
+from .runs import LEARNED_FRAMES, Sitting, decode
 
-FRAMES = 20
-DANGEROUS = math.radians(20.0)
+PRESS_FRAMES = 20
+MAX_NORMAL_ERROR = math.radians(20.0)
 _AT_ONCE = 500  # presses that are decoded together
 
 
@@ -54,11 +54,11 @@ def off_normals(plant: FlatPlant, phi: np.ndarray, patches: tuple[PressedPatch, 
 def measure(plants: SolvedPlants, count: int, electric: str) -> list[Several]:
     """Measure so many presses, of every kind on every sensor in turn."""
     rng = np.random.default_rng(5)
-    found = {k: Several(k, 0, 0, 0, 0, 0, []) for k in SEVERAL}
+    found = {k: Several(k, 0, 0, 0, 0, 0, []) for k in SEVERAL_KINDS}
     learned = {}
     for name, plant in SHEETS.items():
         circuit = electronics(name)[electric]
-        learned[name] = circuit, circuit.counts(circuit.exact(plants.admittance(plant, ())), LEARNED, rng)
+        learned[name] = circuit, circuit.counts(circuit.exact(plants.admittance(plant, ())), LEARNED_FRAMES, rng)
     cases = list(islice(several_cases(count), count))
     for start in range(0, count, _AT_ONCE):
         part = cases[start : start + _AT_ONCE]
@@ -68,14 +68,14 @@ def measure(plants: SolvedPlants, count: int, electric: str) -> list[Several]:
         for name, numbers in by_sheet.items():
             circuit, untouched = learned[name]
             exact = np.array([circuit.exact(plants.of(part[n])) for n in numbers])
-            answer = decode(Sitting(SHEETS[name], circuit, untouched, circuit.counts(exact, FRAMES, rng)))
+            answer = decode(Sitting(SHEETS[name], circuit, untouched, circuit.counts(exact, PRESS_FRAMES, rng)))
             for row, n in enumerate(numbers):
                 _count(found[part[n].kind], part[n], {k: v[row] for k, v in answer.items()}, start + n)
     return list(found.values())
 
 
 def _count(into: Several, case: Case, said: dict[str, np.ndarray], number: int) -> None:
-    off = off_normals(SHEETS[case.sheet], said["phi"], case.patches) > DANGEROUS
+    off = off_normals(SHEETS[case.sheet], said["phi"], case.patches) > MAX_NORMAL_ERROR
     valid = said["valid"]
     into.cases += 1
     into.touched += bool(said["touched"].any())
@@ -128,7 +128,7 @@ def power(plants: SolvedPlants, places: int, draws: int) -> list[Power]:
         circuit = electronics("UR5e")[electric]
         for what, cases in groups.items():
             exact = np.repeat(np.array([circuit.exact(plants.of(case)) for case in cases]), draws, axis=0)
-            untouched = circuit.counts(circuit.exact(still), LEARNED, rng)
+            untouched = circuit.counts(circuit.exact(still), LEARNED_FRAMES, rng)
             answer = decode(Sitting(plant, circuit, untouched, circuit.counts(exact, frames, rng)))
             share, valid = (float(answer[word][:, -1].mean()) for word in ("notone", "valid"))
             found.append(Power(what, electric, frames, share, valid, len(exact)))

@@ -10,10 +10,10 @@ from .cells import Cell
 from .disturbances import Errors
 from .several import Power, Several
 
-BAND = (0.93, 0.97)  # of the truths that an ellipse of 95 % may hold
+ELLIPSE_BAND = (0.93, 0.97)  # of the truths that an ellipse of 95 % may hold
 MAX_FRAME_TIME = 25.0  # us, bytes to event
 #: the largest rms over the bound that is asked for, by sensor and electronics
-LIMITS = {
+RATIO_LIMITS = {
     ("UR5e", "12 bit, matched"): 1.3,
     ("UR5e", "16 bit, matched"): 1.3,
     ("UR5e", "12 bit, 20 mA"): 1.8,
@@ -81,13 +81,13 @@ def show_goals(rows: list[list[str]]) -> None:
 
 def _goals_of(cells: list[Cell]) -> list[list[str]]:
     rows = []
-    for (sheet, electric), most in LIMITS.items():
+    for (sheet, electric), most in RATIO_LIMITS.items():
         some = [c for c in cells if (c.sheet, c.electronics, c.baseline) == (sheet, electric, 0.0)]
         if some:
             ratio = _ratio(some)
             rows.append(_goal(f"rms over the bound, {sheet}, {electric}: {most:g}", f"{ratio:.2f}", ratio <= most))
-    few = sum(c.interval[1] < BAND[0] for c in cells)
-    many = sum(c.interval[0] > BAND[1] for c in cells)
+    few = sum(c.interval[1] < ELLIPSE_BAND[0] for c in cells)
+    many = sum(c.interval[0] > ELLIPSE_BAND[1] for c in cells)
     found = f"fewer in {few}, more in {many} of {len(cells)} cells, beyond what chance explains"
     return [*rows, _goal("95 % ellipse holds 93 to 97 % of the truths", found, not few and not many)]
 

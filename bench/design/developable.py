@@ -22,23 +22,23 @@ from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.pose import Pose
 from tests.support.ruled_tube import RuledTube, ellipse_section, rounded_box_section, stadium_section
 
-POSE = Pose.from_xyz_rpy((0.1, 0.2, -0.1), (0.5, -0.3, 0.8))
-TUBES = {
-    "circle": RuledTube(ellipse_section(0.05, 0.05), 0.2, pose=POSE),
-    "ellipse 1.05": RuledTube(ellipse_section(0.0525, 0.05), 0.2, pose=POSE),
-    "ellipse 1.2": RuledTube(ellipse_section(0.06, 0.05), 0.2, pose=POSE),
-    "ellipse 1.5": RuledTube(ellipse_section(0.06, 0.04), 0.2, pose=POSE),
-    "stadium": RuledTube(stadium_section(0.04, 0.04), 0.2, pose=POSE),
-    "rounded box": RuledTube(rounded_box_section(0.1, 0.07, 0.02), 0.2, pose=POSE),
-    "oblique cone": RuledTube(ellipse_section(0.06, 0.045), 0.2, (0.05, 0.0, 0.8), POSE),
-    "tapered box": RuledTube(rounded_box_section(0.1, 0.08, 0.025), 0.2, (0.0, 0.0, 1.2), POSE),
+TUBE_POSE = Pose.from_xyz_rpy((0.1, 0.2, -0.1), (0.5, -0.3, 0.8))
+TUBE_SHAPES = {
+    "circle": RuledTube(ellipse_section(0.05, 0.05), 0.2, pose=TUBE_POSE),
+    "ellipse 1.05": RuledTube(ellipse_section(0.0525, 0.05), 0.2, pose=TUBE_POSE),
+    "ellipse 1.2": RuledTube(ellipse_section(0.06, 0.05), 0.2, pose=TUBE_POSE),
+    "ellipse 1.5": RuledTube(ellipse_section(0.06, 0.04), 0.2, pose=TUBE_POSE),
+    "stadium": RuledTube(stadium_section(0.04, 0.04), 0.2, pose=TUBE_POSE),
+    "rounded box": RuledTube(rounded_box_section(0.1, 0.07, 0.02), 0.2, pose=TUBE_POSE),
+    "oblique cone": RuledTube(ellipse_section(0.06, 0.045), 0.2, (0.05, 0.0, 0.8), TUBE_POSE),
+    "tapered box": RuledTube(rounded_box_section(0.1, 0.08, 0.025), 0.2, (0.0, 0.0, 1.2), TUBE_POSE),
 }
-MESHES = {"160 facets": (160, 8, 0.0), "48 facets": (48, 1, 0.0), "0.1 mm noise": (160, 40, 1e-4)}
+MESH_KINDS = {"160 facets": (160, 8, 0.0), "48 facets": (48, 1, 0.0), "0.1 mm noise": (160, 40, 1e-4)}
 
 
 def row(name: str, tube: RuledTube, kind: str) -> str:
     """Return one row of the table."""
-    around, along, noise = MESHES[kind]
+    around, along, noise = MESH_KINDS[kind]
     mesh = tube.mesh(around, along, noise)
     start = time.perf_counter()
     options = FitOptions()
@@ -69,13 +69,13 @@ def row(name: str, tube: RuledTube, kind: str) -> str:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--mesh", choices=MESHES, action="append", help="kinds of mesh; by default all")
+    parser.add_argument("--mesh", choices=MESH_KINDS, action="append", help="kinds of mesh; by default all")
     args = parser.parse_args()
     print(head("numpy", "scipy"))
     print(
         "\n| link | mesh | cones cover | sheets cover | first sheet | distance, worst [mm] | rms [mm] | outer layer "
         "beside its sector [mm] | folded back [mm] | seconds, cones + developables |\n" + "|---" * 10 + "|"
     )
-    for kind in args.mesh or MESHES:
-        for name, tube in TUBES.items():
+    for kind in args.mesh or MESH_KINDS:
+        for name, tube in TUBE_SHAPES.items():
             print(row(name, tube, kind), flush=True)

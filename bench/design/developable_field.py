@@ -31,7 +31,7 @@ from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-from .developable import MESHES, TUBES
+from .developable import MESH_KINDS, TUBE_SHAPES
 
 Floats = NDArray[np.float64]
 
@@ -130,8 +130,8 @@ def main() -> None:
     print(head("numpy", "scipy"))
     places = {}
     for name in LINKS:
-        around, along, noise = MESHES["160 facets"]
-        mesh = TUBES[name].mesh(around, along, noise)
+        around, along, noise = MESH_KINDS["160 facets"]
+        mesh = TUBE_SHAPES[name].mesh(around, along, noise)
         options = FitOptions()
         link = sample_link(mesh, options, lambda _: None)
         cones = fit_cones(link, options, lambda _: None)

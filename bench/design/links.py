@@ -44,12 +44,12 @@ from coneskin.geometry.fit.surface_samples import SurfaceSamples, sample_surface
 from coneskin.geometry.mesh import Mesh, load_mesh
 from coneskin.geometry.ray_casting import RayCaster
 
-TOLERANCE = 0.001
-SEEDS = 3
+FIT_TOLERANCE = 0.001
+SEARCH_SEEDS = 3
 MAX_AXES = 200  # the most often found
-STARTS = 16  # packings
-FINE = 4  # packings made on fine profiles
-APART = (math.radians(0.5), 0.001)  # rad, m: starts about axes nearer to each other are one
+START_COUNT = 16  # packings
+FINE_PACKINGS = 4  # packings made on fine profiles
+MIN_APART = (math.radians(0.5), 0.001)  # rad, m: starts about axes nearer to each other are one
 
 
 def brute_axes(samples: SurfaceSamples) -> list[AxisCandidate]:
@@ -68,7 +68,7 @@ def brute_axes(samples: SurfaceSamples) -> list[AxisCandidate]:
 
     middle = samples.points.mean(axis=0)
     size = float(np.ptp(samples.points, axis=0).max())
-    for seed in range(10, 10 + SEEDS):
+    for seed in range(10, 10 + SEARCH_SEEDS):
         for distance in (0.001, max(0.0015, 0.004 * size)):
             for start in hypotheses.cone_hypotheses(samples, distance, 20, seed):
                 line = find_revolution_axis(samples, (start.origin, start.axis))
@@ -97,11 +97,11 @@ def starts_apart(singles: list[Choice]) -> list[Choice]:
             gap = frame.origin - there.origin
             tilt = float(np.linalg.norm(np.cross(frame.axis, there.axis)))
             shift = float(np.linalg.norm(gap - (gap @ there.axis) * there.axis))
-            if tilt < APART[0] and shift < APART[1] and len(other.plan.sides) == len(one.plan.sides):
+            if tilt < MIN_APART[0] and shift < MIN_APART[1] and len(other.plan.sides) == len(one.plan.sides):
                 break
         else:
             kept.append(one)
-        if len(kept) == STARTS:
+        if len(kept) == START_COUNT:
             break
     return kept
 
@@ -112,7 +112,7 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
     hull = sample_surface(mesh, rays, 12_000, seed=7)
     whole = len(hull) * hull.area
     wanted = SheetRequirements(
-        TOLERANCE,
+        FIT_TOLERANCE,
         sheets,
         None,
         0.025,
@@ -134,10 +134,10 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
     packings = [grown([start], surveys, alone, loose) for start in starts_apart(singles)]
     packings.sort(key=lambda packing: -sum(choice.plan.score(loose) for choice in packing))
     best = 0.0
-    for packing in packings[:FINE]:
+    for packing in packings[:FINE_PACKINGS]:
         made = stage.completed(stage.made(packing), surveys)
         if made is not None:
-            fitted = [fitted_sheet(about, side, 0, hull, TOLERANCE) for about in made.axes for side in about.sides]
+            fitted = [fitted_sheet(about, side, 0, hull, FIT_TOLERANCE) for about in made.axes for side in about.sides]
             best = max(best, sum(sheet.frustum.area for sheet in fitted))
     return best / whole, len(axes)
 
@@ -159,7 +159,7 @@ def main() -> None:
         except MeshError:  # metres by its header, and 200 of them
             mesh = load_mesh(path, "mm")
         start = time.process_time()
-        fit = find_cones(mesh, tolerance=TOLERANCE, max_sheets=arguments.sheets)
+        fit = find_cones(mesh, tolerance=FIT_TOLERANCE, max_sheets=arguments.sheets)
         spent = time.process_time() - start
         area = sum(sheet.frustum.area for sheet in fit.sheets) / fit.hull_area
         top = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

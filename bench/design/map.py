@@ -33,9 +33,9 @@ from coneskin.geometry.ray_casting import RayCaster
 
 Floats = NDArray[np.float64]
 
-GRIDS = ((32, 64), (64, 128), (128, 256), (256, 512))
-PLACES = 20_000
-TOLERANCE = 0.001
+GRID_SIZES = ((32, 64), (64, 128), (128, 256), (256, 512))
+PLACE_COUNT = 20_000
+FIT_TOLERANCE = 0.001
 
 
 def barrel() -> Mesh:
@@ -65,12 +65,12 @@ def map_rows(mesh: Mesh, sheet: FittedSheet) -> Iterator[tuple[str, Floats, floa
     """Name, errors [m], seconds of 1, 1000 and 1e6 places, seconds to build, bytes."""
     rng = np.random.default_rng(5)
     f = sheet.frustum
-    u, phi = rng.uniform(0.005, f.slant - 0.005, PLACES), rng.uniform(0.0, f.wrap, PLACES)
+    u, phi = rng.uniform(0.005, f.slant - 0.005, PLACE_COUNT), rng.uniform(0.0, f.wrap, PLACE_COUNT)
     turn, shift = np.array(sheet.placed.link_frustum.rotation), np.array(sheet.placed.link_frustum.translation)
     feet, out = f.points(u, phi) @ turn.T + shift, f.normals(phi) @ turn.T
     rays = RayCaster(mesh)
     true = 0.02 - rays.cast(feet + 0.02 * out, -out)[0]
-    sound = true > -TOLERANCE
+    sound = true > -FIT_TOLERANCE
     target = (feet + true[:, None] * out)[sound]
     many_u, many_phi = np.resize(u, 1_000_000), np.resize(phi, 1_000_000)
 
@@ -86,9 +86,9 @@ def map_rows(mesh: Mesh, sheet: FittedSheet) -> Iterator[tuple[str, Floats, floa
         0.0,
         0.0,
     )
-    for rows, columns in GRIDS:
+    for rows, columns in GRID_SIZES:
         start = time.perf_counter()
-        grid = measure_displacement(mesh, sheet.placed, rows, columns, TOLERANCE, rays=rays)
+        grid = measure_displacement(mesh, sheet.placed, rows, columns, FIT_TOLERANCE, rays=rays)
         built = time.perf_counter() - start
         yield (
             f"cone + grid {rows}x{columns}",
@@ -160,7 +160,7 @@ def print_steps(name: str, path: Path) -> None:
     """From the file to the map, with the time of every step."""
     marks: list[tuple[str, float]] = [("reading the file", time.perf_counter())]
     mesh = load_mesh(path)
-    fit = find_cones(mesh, tolerance=TOLERANCE, progress=lambda step: marks.append((step, time.perf_counter())))
+    fit = find_cones(mesh, tolerance=FIT_TOLERANCE, progress=lambda step: marks.append((step, time.perf_counter())))
     if fit.sheets:
         marks.append(("building the map", time.perf_counter()))
         measure_displacement(mesh, fit.sheets[0].placed)
@@ -179,7 +179,7 @@ def main() -> None:
     for file in arguments.links:
         print_steps(file.name, file)
     for name, mesh in [*((file.name, load_mesh(file)) for file in arguments.links), ("barrel", barrel())]:
-        fit = find_cones(mesh, tolerance=TOLERANCE, samples=60_000)
+        fit = find_cones(mesh, tolerance=FIT_TOLERANCE, samples=60_000)
         if fit.sheets:
             print_map(name, mesh, fit)
         else:

@@ -44,8 +44,8 @@ from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.sector import unroll
 
 Floats = NDArray[np.float64]
-TOLERANCE = 0.001
-POSE = Pose.from_xyz_rpy((0.12, -0.34, 0.56), (0.3, -0.7, 1.1))
+FIT_TOLERANCE = 0.001
+LINK_POSE = Pose.from_xyz_rpy((0.12, -0.34, 0.56), (0.3, -0.7, 1.1))
 Profile = list[tuple[float, float]]
 
 
@@ -88,7 +88,7 @@ def body(
     sheets: int = 2,
 ) -> Body:
     corners = made[0] + np.random.default_rng(4).normal(0.0, 1.0, made[0].shape) * noise
-    return Body(name, make_mesh(POSE.apply_all(corners), made[1], name), sides, sheets)
+    return Body(name, make_mesh(LINK_POSE.apply_all(corners), made[1], name), sides, sheets)
 
 
 def elbow(radius: float = 0.04, bend: float = 0.12) -> tuple[Floats, NDArray[np.int64]]:
@@ -137,7 +137,10 @@ def bodies() -> Iterator[Body]:
 
 def errors(origin: Floats, axis: Floats, radius: Callable[[float], float], side: Profile) -> tuple[float, float, float]:
     """Tilt [deg], shift [mm] and error of the radius [mm] against a planted side."""
-    way, middle = np.array(POSE.rotation)[:, 2], np.array(POSE.apply((0.0, 0.0, 0.5 * (side[0][0] + side[1][0]))))
+    way, middle = (
+        np.array(LINK_POSE.rotation)[:, 2],
+        np.array(LINK_POSE.apply((0.0, 0.0, 0.5 * (side[0][0] + side[1][0])))),
+    )
     axis = axis / np.linalg.norm(axis)
     gap = middle - origin
     foot = float(gap @ axis)
@@ -210,7 +213,7 @@ def ransac(one: Body, hull: SurfaceSamples) -> tuple[float, float, float]:
 
     random.seed(1)  # it draws from the global generators
     np.random.seed(1)
-    found = pyransac3d.Cylinder().fit(hull.points, thresh=TOLERANCE, maxIteration=1000)
+    found = pyransac3d.Cylinder().fit(hull.points, thresh=FIT_TOLERANCE, maxIteration=1000)
     origin, axis, radius = np.asarray(found[0], float), np.asarray(found[1], float), float(found[2])
     axis, slope = axis / np.linalg.norm(axis), 0.0
     for gate in (0.006, 0.003, 0.002, 0.001):  # the consensus is taken anew, with the normals, after each refinement
@@ -234,7 +237,7 @@ def bounding(one: Body) -> tuple[float, float, float]:
     import trimesh
 
     side = max(one.sides, key=lambda ends: ends[1][0] - ends[0][0])
-    local = POSE.inverse().apply_all(one.mesh.vertices)
+    local = LINK_POSE.inverse().apply_all(one.mesh.vertices)
     low, high = side[0][0] - 1e-6, side[1][0] + 1e-6
     corners = one.mesh.vertices[(local[:, 2] >= low) & (local[:, 2] <= high)]
     found = trimesh.bounds.minimum_cylinder(corners)
@@ -242,7 +245,7 @@ def bounding(one: Body) -> tuple[float, float, float]:
 
 
 #: prints the slant and the angle of the sector of cones given as r1 r2 h, by the exact face of Open CASCADE's kernel
-KERNEL = """
+KERNEL_PROGRAM = """
 import sys, time, math
 from build123d import Cone, Cylinder, GeomType
 for row in sys.stdin:
@@ -260,7 +263,7 @@ def print_kernel() -> None:
     python = os.environ.get("CAD_PYTHON", sys.executable)
     cones = [(50.0, 50.0, 250.0), (45.0, 60.0, 200.0), (30.0, 80.0, 60.0), (37.6, 37.2, 261.0), (50.0, 50.00001, 250.0)]
     text = "\n".join(" ".join(map(repr, cone)) for cone in cones)
-    run = subprocess.run([python, "-c", KERNEL], input=text, capture_output=True, text=True, check=False)
+    run = subprocess.run([python, "-c", KERNEL_PROGRAM], input=text, capture_output=True, text=True, check=False)
     if run.returncode:
         print(f"\nUNROLLING by Open CASCADE: left out: {run.stderr.strip().splitlines()[-1]}")
         return
@@ -292,7 +295,7 @@ def main() -> None:
         rays = RayCaster(one.mesh)
         hull = sample_surface(one.mesh, rays)
         start = time.process_time()
-        fit = find_cones(one.mesh, tolerance=TOLERANCE, max_sheets=one.sheets)
+        fit = find_cones(one.mesh, tolerance=FIT_TOLERANCE, max_sheets=one.sheets)
         spent = time.process_time() - start
         area = sum(sheet.frustum.area for sheet in fit.sheets)
         off = f"{furthest(one, fit):8.3f}" if fit.sheets else f"{'-':>8}"

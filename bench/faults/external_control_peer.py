@@ -23,8 +23,8 @@ from pathlib import Path
 VERSION = (5, 25, 0)  # of the controller that coneskin simulates
 SPEED, ACCELERATION = 1.0, 2.0  # rad/s, rad/s2
 PERIOD = 0.008  # s
-SILENCE = 200  # ms for which the script waits for the next setpoint
-UNIT = 1_000_000  # of a number on the wire
+SILENCE_TIME = 200  # ms for which the script waits for the next setpoint
+JOINT_UNIT = 1_000_000  # of a number on the wire
 MODES = {"servoj": 1, "speedj": 2}  # as in the script
 SOCKETS = ("TRAJECTORY_SERVER", "SCRIPT_COMMAND_SERVER", "SERVER")  # in the order in which it opens them
 _COMPARE = {"<": operator.lt, ">=": operator.ge}
@@ -52,7 +52,12 @@ def chosen_lines(text: str) -> Iterator[str]:
 def filled_in(text: str, ports: dict[str, int]) -> str:
     """Return the script as a program, with the ports of this process."""
     values: dict[str, object] = {f"{name}_PORT_REPLACE": port for name, port in ports.items()}
-    values |= {"BEGIN_REPLACE": "", "JOINT_STATE_REPLACE": UNIT, "TIME_REPLACE": 1000, "SERVER_IP_REPLACE": "127.0.0.1"}
+    values |= {
+        "BEGIN_REPLACE": "",
+        "JOINT_STATE_REPLACE": JOINT_UNIT,
+        "TIME_REPLACE": 1000,
+        "SERVER_IP_REPLACE": "127.0.0.1",
+    }
     values["SERVO_J_REPLACE"] = "lookahead_time=0.03, gain=2000"  # as the library has them
     body = re.sub(r"\{\{(\w+)\}\}", lambda found: str(values[found[1]]), "\n".join(chosen_lines(text)))
     return "def external_control():\n" + body + "\nend\n"
@@ -86,7 +91,9 @@ def main(host: str, script: str, start: str, goal: str, mode: str) -> None:
     try:
         while not select.select([reverse], [], [], 0)[0]:  # it sends nothing; readable is closed
             values = setpoint(mode, json.loads(start), json.loads(goal), time.monotonic() - begin)
-            reverse.sendall(struct.pack(">8i", SILENCE, *(round(UNIT * value) for value in values), MODES[mode]))
+            reverse.sendall(
+                struct.pack(">8i", SILENCE_TIME, *(round(JOINT_UNIT * value) for value in values), MODES[mode])
+            )
             due += PERIOD
             time.sleep(max(0.0, due - time.monotonic()))
     except OSError:

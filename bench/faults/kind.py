@@ -9,18 +9,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .setup import ARM_SILENCE, CLOCK, GOAL, LONG_SLOW, USUAL, Setup
+from .setup import ARM_SILENCE, CLOCK, GOAL, LONG_SLOW, USUAL_SETUP, Setup
 from .trial import Trial
 
 BOTH, INTERNAL, EXTERNAL = ("internal", "external"), ("internal",), ("external",)
-FRAME = 0.001  # s
-WATCHDOG = 0.25  # s; 1 / watchdog_hz
-FEW = 0.02  # s; a fault in the frames themselves shows within a few of them, and the loop has to run
-DEVIATION = 0.35  # s; an arm that takes up its speed may deviate from the command for 0.25 s and v / a
-SLOWER = 0.2  # s; a touched arm that becomes faster again is given the time of a slowdown
-STARTS = 0.05  # s; a program needs 10 ms to start, and five states have to show that the arm moves
-SILENT = 0.25  # s; a latched arm without states is stopped again and again, at least every 0.2 s
-FALLBACK = 1.05  # s; the process that started the guard has heard nothing for 1 s, and opens its sockets
+FRAME_TIME = 0.001  # s
+WATCHDOG_TIME = 0.25  # s; 1 / watchdog_hz
+FEW_FRAMES_TIME = 0.02  # s; a fault in the frames themselves shows within a few of them, and the loop has to run
+DEVIATION_TIME = 0.35  # s; an arm that takes up its speed may deviate from the command for 0.25 s and v / a
+SLOWDOWN_TIME = 0.2  # s; a touched arm that becomes faster again is given the time of a slowdown
+START_TIME = 0.05  # s; a program needs 10 ms to start, and five states have to show that the arm moves
+LATCHED_SILENCE = 0.25  # s; a latched arm without states is stopped again and again, at least every 0.2 s
+FALLBACK_TIME = 1.05  # s; the process that started the guard has heard nothing for 1 s, and opens its sockets
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class FaultKind:
 
     name: str
     inject: Callable[[Trial], float]
-    notice: float = FEW
+    notice: float = FEW_FRAMES_TIME
     controls: tuple[str, ...] = BOTH
     touched: bool = False
     tolerated: bool = False
@@ -57,7 +57,7 @@ class FaultKind:
     arm: bool = True
     after: Callable[[Trial], object] | None = None
     variant: bool = False
-    setup: Setup = USUAL
+    setup: Setup = USUAL_SETUP
     still: bool = False
     restarts: bool = False
 
@@ -122,7 +122,11 @@ def shorted(a: str, b: str, touched: bool = False, variant: bool = False) -> Fau
 
 
 def away(
-    name: str, inject: Callable[[Trial], float], notice: float = FEW, controls: tuple[str, ...] = BOTH, **more: Any
+    name: str,
+    inject: Callable[[Trial], float],
+    notice: float = FEW_FRAMES_TIME,
+    controls: tuple[str, ...] = BOTH,
+    **more: Any,
 ) -> FaultKind:
     """Inject while the arm moves away from a touch."""
     return FaultKind(
@@ -131,7 +135,11 @@ def away(
 
 
 def slow(
-    name: str, inject: Callable[[Trial], float], notice: float = FEW, controls: tuple[str, ...] = BOTH, **more: Any
+    name: str,
+    inject: Callable[[Trial], float],
+    notice: float = FEW_FRAMES_TIME,
+    controls: tuple[str, ...] = BOTH,
+    **more: Any,
 ) -> FaultKind:
     """Inject while the arm goes on slowly, away from a touch."""
     injects = then(Trial.go_slow, inject)

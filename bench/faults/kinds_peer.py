@@ -11,10 +11,10 @@ from collections.abc import Callable
 
 from .kind import (
     EXTERNAL,
-    FEW,
-    FRAME,
+    FEW_FRAMES_TIME,
+    FRAME_TIME,
     INTERNAL,
-    WATCHDOG,
+    WATCHDOG_TIME,
     FaultKind,
     a_program,
     away,
@@ -33,7 +33,7 @@ from .kind import (
     unplug,
     wires,
 )
-from .setup import ARM_SILENCE, SKIN_SILENCE, STUCK, Setup
+from .setup import ARM_SILENCE, SKIN_SILENCE, STUCK_FRAMES, Setup
 from .trial import Trial
 
 SKIN_KINDS = (
@@ -42,15 +42,18 @@ SKIN_KINDS = (
     # the skin
     FaultKind("skin silent", breaks(stall_after=0), SKIN_SILENCE),
     FaultKind("skin silent for 0.3 s", breaks(stall_after=0, stall_frames=300), SKIN_SILENCE, variant=True),
-    FaultKind("skin skips 50 frames", breaks(stall_after=0, stall_frames=50), 0.05 + FEW),
+    FaultKind("skin skips 50 frames", breaks(stall_after=0, stall_frames=50), 0.05 + FEW_FRAMES_TIME),
     FaultKind("skin drops every third frame", breaks(drop_every=3)),
     FaultKind("skin drops every 60th frame", breaks(drop_every=60), tolerated=True, variant=True),
     FaultKind("skin corrupt, every second frame", breaks(corrupt_every=2)),
     FaultKind("skin corrupt, every frame", breaks(corrupt_every=1), SKIN_SILENCE, variant=True),
     FaultKind("skin sends garbage between frames", breaks(garbage_every=1)),
-    FaultKind("skin stuck", breaks(stuck_after=0), STUCK * FRAME + FEW),
+    FaultKind("skin stuck", breaks(stuck_after=0), STUCK_FRAMES * FRAME_TIME + FEW_FRAMES_TIME),
     FaultKind(
-        "skin stuck, supply alone", breaks(stuck_after=0, stuck_channel="supply"), STUCK * FRAME + FEW, variant=True
+        "skin stuck, supply alone",
+        breaks(stuck_after=0, stuck_channel="supply"),
+        STUCK_FRAMES * FRAME_TIME + FEW_FRAMES_TIME,
+        variant=True,
     ),
     FaultKind("skin saturated", breaks(saturate_after=0)),
     FaultKind("skin saturated, one guide", breaks(saturate_after=0, stuck_channel="radial_c"), variant=True),
@@ -60,7 +63,7 @@ SKIN_KINDS = (
     FaultKind("skin sends everything twice", breaks(duplicate_every=1), variant=True),
     FaultKind("skin cut in a frame, once", breaks(cut_after=0), tolerated=True),
     FaultKind("skin cut in a frame, then silent", breaks(cut_after=0, stall_after=1), SKIN_SILENCE, variant=True),
-    FaultKind("skin later and later", lambda t: t.skins(slow=1.0), 2.0 * SKIN_SILENCE + FEW),
+    FaultKind("skin later and later", lambda t: t.skins(slow=1.0), 2.0 * SKIN_SILENCE + FEW_FRAMES_TIME),
     FaultKind("skin's process frozen", halt("skin"), SKIN_SILENCE, after=Trial.thaw_all, variant=True),
     FaultKind("skin unplugged", unplug, variant=True),
     FaultKind("skin unplugged and back", unplug, after=lambda t: t.skins(plug=True)),
@@ -95,8 +98,8 @@ CONTROLLER_KINDS = (
 )
 
 
-UPLOAD = 0.2  # s; the stop that goes through is not the first one
-CUT = says("cut network")
+UPLOAD_TIME = 0.2  # s; the stop that goes through is not the first one
+CUT_NETWORK_SAID = says("cut network")
 
 
 def restore(t: Trial) -> None:
@@ -105,49 +108,64 @@ def restore(t: Trial) -> None:
 
 
 NETWORK_KINDS = (
-    FaultKind("network cut", CUT, ARM_SILENCE + WATCHDOG, controls=INTERNAL, after=restore),
-    FaultKind("network cut, then a touch", then(CUT, touch), WATCHDOG, controls=INTERNAL, touched=True, after=restore),
+    FaultKind("network cut", CUT_NETWORK_SAID, ARM_SILENCE + WATCHDOG_TIME, controls=INTERNAL, after=restore),
+    FaultKind(
+        "network cut, then a touch",
+        then(CUT_NETWORK_SAID, touch),
+        WATCHDOG_TIME,
+        controls=INTERNAL,
+        touched=True,
+        after=restore,
+    ),
     FaultKind(
         "network cut for 0.1 s",
-        then(CUT, pause(0.1), says("restore network")),
-        WATCHDOG,
+        then(CUT_NETWORK_SAID, pause(0.1), says("restore network")),
+        WATCHDOG_TIME,
         controls=INTERNAL,
         tolerated=True,
     ),
-    FaultKind("network cut and program killed", then(CUT, kill("program")), WATCHDOG, INTERNAL, answers=False),
+    FaultKind(
+        "network cut and program killed",
+        then(CUT_NETWORK_SAID, kill("program")),
+        WATCHDOG_TIME,
+        INTERNAL,
+        answers=False,
+    ),
     FaultKind(
         "network cut, controller's heartbeat",
-        CUT,
-        ARM_SILENCE + WATCHDOG,
+        CUT_NETWORK_SAID,
+        ARM_SILENCE + WATCHDOG_TIME,
         controls=EXTERNAL,
         setup=Setup(arm='controller_heartbeat = "required"', mover="heartbeat"),
         after=restore,
     ),
-    FaultKind("RTDE cut", says("cut rtde"), ARM_SILENCE + UPLOAD),
-    FaultKind("script ports cut, then a touch", then(says("cut scripts"), touch), UPLOAD, touched=True),
+    FaultKind("RTDE cut", says("cut rtde"), ARM_SILENCE + UPLOAD_TIME),
+    FaultKind("script ports cut, then a touch", then(says("cut scripts"), touch), UPLOAD_TIME, touched=True),
     FaultKind("dashboard cut, then a touch", then(says("cut dashboard"), touch), touched=True),
     FaultKind(
         "script ports and dashboard cut, then a touch",
         then(says("cut scripts"), says("cut dashboard"), touch),
-        2.0 * UPLOAD,
+        2.0 * UPLOAD_TIME,
         touched=True,
     ),
     FaultKind(
         "script ports and dashboard cut and guard killed",
         then(says("cut scripts"), says("cut dashboard"), kill("guard")),
-        2.0 * UPLOAD,
+        2.0 * UPLOAD_TIME,
     ),
-    away("network cut", CUT, WATCHDOG, after=restore),
-    slow("network cut", CUT, ARM_SILENCE + WATCHDOG, INTERNAL, after=restore),
+    away("network cut", CUT_NETWORK_SAID, WATCHDOG_TIME, after=restore),
+    slow("network cut", CUT_NETWORK_SAID, ARM_SILENCE + WATCHDOG_TIME, INTERNAL, after=restore),
 )
 
 
 CHILD_SILENCE = 0.34  # s; without a sign of life of the driver process or of the guard watchdog
 HEARTBEAT_TIMEOUT = 0.55  # s; without one of the guard
-DRIVERS = ("servoj", "speedj")  # how the script moves the arm
+DRIVER_MODES = ("servoj", "speedj")  # how the script moves the arm
 
 
-def driven(name: str, inject: Callable[[Trial], float], notice: float = FEW, **more: object) -> list[FaultKind]:
+def driven(
+    name: str, inject: Callable[[Trial], float], notice: float = FEW_FRAMES_TIME, **more: object
+) -> list[FaultKind]:
     """Return the kinds of a fault in both ways in which the script moves the arm."""
     return [
         FaultKind(
@@ -159,7 +177,7 @@ def driven(name: str, inject: Callable[[Trial], float], notice: float = FEW, **m
             variant=how == "speedj",
             **more,  # type: ignore[arg-type]
         )
-        for how in DRIVERS
+        for how in DRIVER_MODES
     ]
 
 

@@ -10,9 +10,9 @@ from coneskin.testing.scenes import ESCALATE
 from .kind import (
     BOTH,
     EXTERNAL,
-    FALLBACK,
+    FALLBACK_TIME,
     INTERNAL,
-    WATCHDOG,
+    WATCHDOG_TIME,
     FaultKind,
     away,
     breaks,
@@ -37,7 +37,7 @@ PROCESS_KINDS = (
     FaultKind("guard frozen", halt("guard"), HEARTBEAT_TIMEOUT, after=Trial.thaw_all),
     FaultKind("guard told to end", end("guard")),
     FaultKind("driver killed", kill("driver"), controls=INTERNAL),
-    FaultKind("driver frozen", halt("driver"), WATCHDOG, controls=INTERNAL, after=Trial.thaw_all),
+    FaultKind("driver frozen", halt("driver"), WATCHDOG_TIME, controls=INTERNAL, after=Trial.thaw_all),
     FaultKind(
         "driver frozen, then a touch",
         then(halt("driver"), touch),
@@ -68,11 +68,11 @@ PROCESS_KINDS = (
     ),
     FaultKind("disk full, then a touch", then(full_disk, touch), touched=True, recorder=False),
     # two at once
-    FaultKind("guard and driver killed", together(kill("guard"), kill("driver")), WATCHDOG, controls=INTERNAL),
+    FaultKind("guard and driver killed", together(kill("guard"), kill("driver")), WATCHDOG_TIME, controls=INTERNAL),
     FaultKind(
         "guard frozen and driver killed",
         together(halt("guard"), kill("driver")),
-        WATCHDOG,
+        WATCHDOG_TIME,
         controls=INTERNAL,
         after=Trial.thaw_all,
         variant=True,
@@ -80,7 +80,7 @@ PROCESS_KINDS = (
     FaultKind(
         "guard and driver frozen",
         together(halt("guard"), halt("driver")),
-        WATCHDOG,
+        WATCHDOG_TIME,
         controls=INTERNAL,
         after=Trial.thaw_all,
     ),
@@ -88,7 +88,7 @@ PROCESS_KINDS = (
     FaultKind(
         "guard and watchdog frozen",
         together(halt("guard"), halt("watchdog")),
-        FALLBACK,
+        FALLBACK_TIME,
         controls=EXTERNAL,
         after=Trial.thaw_all,
     ),
@@ -113,9 +113,9 @@ PROCESS_KINDS = (
 
 PROGRAM_SILENCE = 0.25  # s; without a sign of life of the program
 CHILD_SILENCE = 0.34  # s; without one of the driver process or of the guard watchdog
-STAYS = 0.9  # s; until an arm that is started again after each stop stands for good
-RESTARTS = (5, 10, 20, 50, 100, 300)  # ms
-BROKEN = "raise SystemExit('a file of the current folder was imported')\n"
+SETTLE_TIME = 0.9  # s; until an arm that is started again after each stop stands for good
+RESTART_DELAYS = (5, 10, 20, 50, 100, 300)  # ms
+BROKEN_MODULE = "raise SystemExit('a file of the current folder was imported')\n"
 
 
 def restarted(how: str, wait: int) -> FaultKind:
@@ -123,7 +123,7 @@ def restarted(how: str, wait: int) -> FaultKind:
     return FaultKind(
         f"touch; {how} starts again after {wait} ms",
         then(Trial.start_again, touch) if how == "raw" else touch,
-        STAYS,
+        SETTLE_TIME,
         controls=EXTERNAL,
         touched=True,
         restarts=True,
@@ -144,7 +144,11 @@ def thaw_and_ask(t: Trial) -> float:
 def with_files(name: str, variant: bool = False) -> FaultKind:
     """Return the kind of a file in the current folder with the name of a module that the guard imports."""
     return FaultKind(
-        f"{name} in the current folder", touch, touched=True, variant=variant, setup=Setup(files=((name, BROKEN),))
+        f"{name} in the current folder",
+        touch,
+        touched=True,
+        variant=variant,
+        setup=Setup(files=((name, BROKEN_MODULE),)),
     )
 
 
@@ -192,7 +196,7 @@ PROGRAM_KINDS = (
     with_files("serial.py"),
     with_files("json.py", variant=True),
     # started again after each stop
-    *[restarted(how, wait) for how in ("loop", "raw") for wait in RESTARTS],
+    *[restarted(how, wait) for how in ("loop", "raw") for wait in RESTART_DELAYS],
     # late frames that creep
     *[
         FaultKind(

@@ -8,14 +8,14 @@ from __future__ import annotations
 from coneskin.robot.driver.messages import HEARTBEAT_TIMEOUT
 
 from .kind import (
-    DEVIATION,
+    DEVIATION_TIME,
     EXTERNAL,
-    FEW,
+    FEW_FRAMES_TIME,
     INTERNAL,
-    SILENT,
-    SLOWER,
-    STARTS,
-    WATCHDOG,
+    LATCHED_SILENCE,
+    SLOWDOWN_TIME,
+    START_TIME,
+    WATCHDOG_TIME,
     FaultKind,
     a_program,
     away,
@@ -37,20 +37,20 @@ from .trial import Trial
 
 SLOW_MAY_TAKE = 2.0  # s; an arm that goes on slowly stops when it presses, not before
 REACTIONS = {"retreat": RETREAT, "path": PATH, "comply": COMPLY, "slow": SLOW}
-SEAM = 0.35  # rad on each side
-LATER = 0.25  # s; by then an arm that was stopped moves away
+SEAM_WIDTH = 0.35  # rad on each side
+SECOND_HAND_DELAY = 0.25  # s; by then an arm that was stopped moves away
 
 #: name -> touches, model of the sheets, sensors
 CONTACTS = {
-    "palm over the seam": ((Touch(phi=SEAM, force=4.0), Touch(phi=6.28 - SEAM, force=4.0)), "field", 1),
+    "palm over the seam": ((Touch(phi=SEAM_WIDTH, force=4.0), Touch(phi=6.28 - SEAM_WIDTH, force=4.0)), "field", 1),
     "wide palm over the seam": ((Touch(phi=1.0, force=3.0), Touch(phi=5.28, force=3.0)), "field", 1),
     "grip": ((Touch(phi=AHEAD), Touch(phi=BEHIND)), "field", 1),
-    "second hand behind": ((Touch(), Touch(phi=BEHIND, after=LATER)), "field", 1),
-    "second hand beside": ((Touch(), Touch(u=0.22, phi=2.6, after=LATER)), "field", 1),
+    "second hand behind": ((Touch(), Touch(phi=BEHIND, after=SECOND_HAND_DELAY)), "field", 1),
+    "second hand beside": ((Touch(), Touch(u=0.22, phi=2.6, after=SECOND_HAND_DELAY)), "field", 1),
     "growing press": ((Touch(force=2.0), Touch(after=0.05, force=18.0, rise=0.5)), "ladder", 1),
     "hard growing press": ((Touch(force=2.0), Touch(after=0.05, force=98.0, rise=0.5)), "ladder", 1),
     "clamp of two links": ((Touch(), Touch(sensor="1", phi=BEHIND)), "ladder", 2),
-    "second hand on another skin": ((Touch(), Touch(sensor="1", phi=BEHIND, after=LATER)), "ladder", 2),
+    "second hand on another skin": ((Touch(), Touch(sensor="1", phi=BEHIND, after=SECOND_HAND_DELAY)), "ladder", 2),
 }
 #: contacts that are close to others, and left out of a quick campaign but for a retreat
 VARIANTS = ("wide palm over the seam", "second hand beside", "growing press")
@@ -62,7 +62,7 @@ def contact(reaction: str, name: str) -> FaultKind:
     return FaultKind(
         f"{reaction}: {name}",
         lambda t: Trial.press(t, *touches),
-        SLOW_MAY_TAKE if reaction == "slow" else FEW,
+        SLOW_MAY_TAKE if reaction == "slow" else FEW_FRAMES_TIME,
         touched=True,
         variant=reaction != "retreat" and name in VARIANTS,
         setup=Setup(reaction=REACTIONS[reaction], sheets=sheets, skins=skins),
@@ -75,20 +75,26 @@ CONTACT_KINDS = tuple(contact(reaction, name) for name in CONTACTS for reaction 
 REACTION_KINDS = (
     # while it moves away from a touch
     away("guard killed", kill("guard")),
-    away("guard frozen", halt("guard"), WATCHDOG, after=Trial.thaw_all),
-    away("driver killed", kill("driver"), WATCHDOG, controls=INTERNAL, variant=True),
-    away("driver frozen", halt("driver"), WATCHDOG, controls=INTERNAL, after=Trial.thaw_all),
-    away("guard and driver frozen", together(halt("guard"), halt("driver")), WATCHDOG, INTERNAL, after=Trial.thaw_all),
+    away("guard frozen", halt("guard"), WATCHDOG_TIME, after=Trial.thaw_all),
+    away("driver killed", kill("driver"), WATCHDOG_TIME, controls=INTERNAL, variant=True),
+    away("driver frozen", halt("driver"), WATCHDOG_TIME, controls=INTERNAL, after=Trial.thaw_all),
+    away(
+        "guard and driver frozen",
+        together(halt("guard"), halt("driver")),
+        WATCHDOG_TIME,
+        INTERNAL,
+        after=Trial.thaw_all,
+    ),
     away(
         "guard and watchdog frozen",
         together(halt("guard"), halt("watchdog")),
-        WATCHDOG,
+        WATCHDOG_TIME,
         EXTERNAL,
         after=Trial.thaw_all,
     ),
-    away("guard and watchdog killed", together(kill("guard"), kill("watchdog")), WATCHDOG, EXTERNAL, variant=True),
+    away("guard and watchdog killed", together(kill("guard"), kill("watchdog")), WATCHDOG_TIME, EXTERNAL, variant=True),
     away("program killed", kill("program"), recorder=False, answers=False, variant=True),
-    away("another program", a_program, DEVIATION),
+    away("another program", a_program, DEVIATION_TIME),
     away("skin unplugged", unplug),
     away("RTDE closed", says("close rtde")),
     away("script ports closed", says("close scripts"), variant=True),
@@ -96,18 +102,18 @@ REACTION_KINDS = (
     # while it goes on slowly under a touch
     slow("guard killed", kill("guard")),
     slow("guard frozen", halt("guard"), HEARTBEAT_TIMEOUT, after=Trial.thaw_all),
-    slow("driver killed", kill("driver"), WATCHDOG, controls=INTERNAL, variant=True),
-    slow("driver frozen", halt("driver"), WATCHDOG, controls=INTERNAL, after=Trial.thaw_all, variant=True),
+    slow("driver killed", kill("driver"), WATCHDOG_TIME, controls=INTERNAL, variant=True),
+    slow("driver frozen", halt("driver"), WATCHDOG_TIME, controls=INTERNAL, after=Trial.thaw_all, variant=True),
     slow("skin unplugged", unplug),
     slow("RTDE closed", says("close rtde"), variant=True),
     slow("program killed", kill("program"), recorder=False, answers=False, variant=True),
-    slow("another program", a_program, SLOWER, controls=INTERNAL),  # an external one just goes on slowly as well
+    slow("another program", a_program, SLOWDOWN_TIME, controls=INTERNAL),  # an external one just goes on slowly as well
     # while it stands latched
-    FaultKind("latched: a program starts", then(Trial.latch, a_program), STARTS, touched=True, still=True),
+    FaultKind("latched: a program starts", then(Trial.latch, a_program), START_TIME, touched=True, still=True),
     FaultKind(
         "latched: RTDE silent, then a program",
         then(Trial.latch, says("rtde silent"), pause(), a_program),
-        SILENT,
+        LATCHED_SILENCE,
         controls=EXTERNAL,
         touched=True,
         still=True,

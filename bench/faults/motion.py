@@ -22,18 +22,18 @@ from coneskin.robot.ur.driver import UR_DRIVER
 from .setup import give_precedence
 
 AHEAD, BEHIND = 1.55, 4.70  # rad; the side of the forearm that runs ahead while the base turns, and the other
-MODEL = arm_model("UR5e")
+ARM_MODEL = arm_model("UR5e")
 #: by the sensor's name
-PLACES = {
-    name: (LINK_INDEX[link], PlacedFrustum(shape, dh_mesh(MODEL, link) @ Pose(translation=(0.0, 0.0, 0.08))))
+SKIN_PLACES = {
+    name: (LINK_INDEX[link], PlacedFrustum(shape, dh_mesh(ARM_MODEL, link) @ Pose(translation=(0.0, 0.0, 0.08))))
     for name, link, shape in (
         ("0", "forearm", Frustum(0.0376, 0.0372, 0.26)),
         ("1", "upper_arm", Frustum(0.048, 0.048, 0.26)),
     )
 }
 REACTION_TIME = 0.05  # s; from a contact to an arm that brakes, on a machine that does other things too
-DECELERATION = 10.0  # rad/s2
-STANDS = 1e-3  # rad/s
+STOP_DECELERATION = 10.0  # rad/s2
+STANDING_SPEED = 1e-3  # rad/s
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,8 @@ class ArmMotion:
     def moved_after(self, since: float) -> float:
         """Return for how long after a time the arm was still, or again, seen to move [s]; 0 where it was not."""
         return max(
-            (state.time - since for state in self.states if state.time > since and state.speed > STANDS), default=0.0
+            (state.time - since for state in self.states if state.time > since and state.speed > STANDING_SPEED),
+            default=0.0,
         )
 
     def pushed_in(self, touch: Touch, notice: float = 0.0) -> float | None:
@@ -116,21 +117,21 @@ class ArmMotion:
         states = [state for state in states if state.time <= touch.after + touch.duration]
         if not states:
             return None
-        link, cone = PLACES[touch.sensor]
+        link, cone = SKIN_PLACES[touch.sensor]
         point, first = cone.point(touch.u, touch.phi), states[0]
-        normal = link_pose(MODEL, first.q, link).rotate(cone.normal(touch.phi))
-        rows = point_jacobian(MODEL, first.q, link, point)
+        normal = link_pose(ARM_MODEL, first.q, link).rotate(cone.normal(touch.phi))
+        rows = point_jacobian(ARM_MODEL, first.q, link, point)
         speed = sum(
             n * sum(j * v for j, v in zip(row, first.qd, strict=True)) for n, row in zip(normal, rows, strict=True)
         )
-        stop = max(0.0, speed) * (REACTION_TIME + notice + first.speed / (2.0 * DECELERATION))
+        stop = max(0.0, speed) * (REACTION_TIME + notice + first.speed / (2.0 * STOP_DECELERATION))
         begin = math.nan
         furthest = stood = -math.inf
         for state in states[::2]:
-            way = sum(n * x for n, x in zip(normal, link_pose(MODEL, state.q, link).apply(point), strict=True))
+            way = sum(n * x for n, x in zip(normal, link_pose(ARM_MODEL, state.q, link).apply(point), strict=True))
             begin = way if math.isnan(begin) else begin
             furthest = max(furthest, way)
-            if stood == -math.inf and state.speed < STANDS:
+            if stood == -math.inf and state.speed < STANDING_SPEED:
                 stood = furthest = way
         excess = furthest - begin - stop
         return max(excess, furthest - stood) if stood > -math.inf else excess

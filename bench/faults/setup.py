@@ -14,13 +14,13 @@ from coneskin.testing.scenes import ESCALATE, start_with
 GOAL = start_with(140.0)
 SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
 SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
-STUCK = 200  # frames
+STUCK_FRAMES = 200  # frames
 RETREAT = 'kind = "retreat"\ndistance_mm = 60'
 PATH = 'kind = "retreat"\ndistance_mm = 60\nfallback = "path"'
 COMPLY = 'kind = "comply"\ndistance_mm = 100'
 SLOW = 'kind = "slow"\nslow_to = 0.5\ntime_budget_s = 30'
 LONG_SLOW = f"{SLOW}\npress_mm = 30"  # an arm that goes on until the place of the touch is certain
-MONITORING = (
+MONITORING_TABLE = (
     "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nstuck_frames = 200\nprogram_silence_ms = 250"
 )
 SECOND_SKIN = """
@@ -34,7 +34,7 @@ height_mm = 260
 xyz_mm = [0, 0, 80]
 """
 #: s; v / a and four times escalate_ms, which docs/safety.md promises once the fault is known
-STOP = SPEED / DECELERATION + 4.0 * ESCALATE
+STOP_BUDGET = SPEED / DECELERATION + 4.0 * ESCALATE
 CLOCK = time.monotonic
 
 
@@ -98,7 +98,7 @@ class Setup:
     files: tuple[tuple[str, str], ...] = ()
 
 
-USUAL = Setup()
+USUAL_SETUP = Setup()
 
 
 @dataclass

@@ -29,7 +29,7 @@ from coneskin.scene.reader import load_scene
 from coneskin.testing.scenes import START, forearm_scene, write_passed_record
 
 from .motion import BEHIND, ArmMotion, Touch
-from .setup import ACCELERATION, CLOCK, GOAL, MONITORING, SECOND_SKIN, SPEED, USUAL, Setup, give_precedence
+from .setup import ACCELERATION, CLOCK, GOAL, MONITORING_TABLE, SECOND_SKIN, SPEED, USUAL_SETUP, Setup, give_precedence
 
 
 class Child:
@@ -124,7 +124,7 @@ class Trial:
     _starting = threading.Lock()  # two trials must not choose the same address
     _hosts: ClassVar[set[str]] = set()  # a killed controller's address must stay dead while its trial lasts
 
-    def __init__(self, control: str, seed: str, setup: Setup = USUAL) -> None:
+    def __init__(self, control: str, seed: str, setup: Setup = USUAL_SETUP) -> None:
         self.control = control
         self.setup = setup
         self.motion: ArmMotion | None = None
@@ -154,7 +154,7 @@ class Trial:
             stack.callback(self.skin.close)
             if not self.skin.hear(30.0):
                 raise RuntimeError(f"the skin did not start: {self.skin.errors}")
-            scene = forearm_scene(self.host, self.control, str(port), self.setup.reaction, MONITORING)
+            scene = forearm_scene(self.host, self.control, str(port), self.setup.reaction, MONITORING_TABLE)
             if self.setup.arm:
                 scene = scene.replace("[[link]]", f"{self.setup.arm}\n[[link]]", 1)
             (self.folder / "scene.toml").write_text(scene + SECOND_SKIN * (self.setup.skins - 1), encoding="utf-8")

@@ -15,8 +15,8 @@ from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.replay.run import Run, read_run, replay
 from coneskin.skin.wire import FrameDecoder
 
-from .kind import FEW, FaultKind
-from .setup import CLOCK, GOAL, SLOW, STOP, MachineWatch, Outcome
+from .kind import FEW_FRAMES_TIME, FaultKind
+from .setup import CLOCK, GOAL, SLOW, STOP_BUDGET, MachineWatch, Outcome
 from .trial import Trial
 
 
@@ -65,25 +65,25 @@ def _missing_frames(run: Run, since: float, until: float) -> int:
     return missing
 
 
-PATIENCE = 3.0  # s beyond the budget for which a late standstill is waited for
+STOP_TIMEOUT = 3.0  # s beyond the budget for which a late standstill is waited for
 RESTARTS_END = 8.0  # s after which an arm that is started again and again does not stand any more
-STAYS = 1.0  # s without motion; then it stands for good, because programs start again within 0.3 s
-SAME = 1e-4  # rad; within it the arm has not moved
+STILL_TIME = 1.0  # s without motion; then it stands for good, because programs start again within 0.3 s
+SAME_POSITION = 1e-4  # rad; within it the arm has not moved
 PUSH_IN = 0.005  # m beyond a bare stop that the surface may go towards a touch
-STANDS = "the arm stands"  # what a program is told
-SPOKEN = 0.02  # s between the last look of the guard and the time at which the program notes what it was told
+STANDING_TEXT = "the arm stands"  # what a program is told
+REPORT_DELAY = 0.02  # s between the last look of the guard and the time at which the program notes what it was told
 HELD_UP = 0.1  # s for which the machine may hold up the virtual skin, or the campaign itself
-REPEATS = 4  # trials at most, in which it held them up for longer
+MAX_REPEATS = 4  # trials at most, in which it held them up for longer
 
 
 def budget_of(kind: FaultKind, slack: float) -> float:
-    return kind.notice + STOP + slack
+    return kind.notice + STOP_BUDGET + slack
 
 
 def run_trial(kind: FaultKind, control: str, seed: str, slack: float) -> Outcome:
     """Make one trial and return its outcome; it is made again where it failed and the machine held it up."""
     discarded: list[str] = []
-    for repeated in range(REPEATS):
+    for repeated in range(MAX_REPEATS):
         with MachineWatch() as machine:
             outcome = _try(kind, control, f"{seed}/{repeated}", slack)
         outcome.repeated, outcome.discarded, outcome.machine_late = repeated, discarded, machine.late
@@ -168,22 +168,22 @@ def _judge_motion(kind: FaultKind, trial: Trial, outcome: Outcome, informed: dic
     if motion is None:
         return
     at_once = kind.restarts or kind.setup.reaction == SLOW  # it is to be stopped, or slower, long before it must stand
-    notice = 0.0 if at_once else max(0.0, kind.notice - FEW)
+    notice = 0.0 if at_once else max(0.0, kind.notice - FEW_FRAMES_TIME)
     ways = [way for touch in trial.touches if (way := motion.pushed_in(touch, notice)) is not None]
     outcome.pushed_in = max(ways, default=None)
     if outcome.pushed_in is not None and outcome.pushed_in > PUSH_IN:
         outcome.failures.append(
             f"the arm pushed {1e3 * outcome.pushed_in:.1f} mm further into a touch than a stop does"
         )
-    told = kind.arm and not kind.still and STANDS in outcome.why
-    if told and (later := motion.moved_after(informed["at"] + SPOKEN)) > 0.0:
+    told = kind.arm and not kind.still and STANDING_TEXT in outcome.why
+    if told and (later := motion.moved_after(informed["at"] + REPORT_DELAY)) > 0.0:
         outcome.failures.append(f"it was said that the arm stands, {later:.3f} s before it did")
 
 
 def _see_it_stay(trial: Trial, outcome: Outcome, began: float) -> None:
     """See the arm stand for good, though it is started again after each stop."""
     end, moved = CLOCK() + RESTARTS_END, CLOCK()
-    while CLOCK() - moved < STAYS:
+    while CLOCK() - moved < STILL_TIME:
         if trial.moves():
             moved = CLOCK()
         if moved > end:
@@ -194,7 +194,7 @@ def _see_it_stay(trial: Trial, outcome: Outcome, began: float) -> None:
 
 
 def _see_it_stand(kind: FaultKind, trial: Trial, outcome: Outcome, began: float, budget: float) -> None:
-    q = trial.await_standing(budget + PATIENCE)
+    q = trial.await_standing(budget + STOP_TIMEOUT)
     stood = trial.stood_at(began)
     if kind.still and q is not None and stood is None:
         stood = began
@@ -212,5 +212,5 @@ def _see_it_stand(kind: FaultKind, trial: Trial, outcome: Outcome, began: float,
         kind.after(trial)
     time.sleep(0.3)
     now = trial.simulated.state()["q"]
-    if moved := [i for i, (a, b) in enumerate(zip(q, now, strict=True), 1) if abs(a - b) > SAME]:
+    if moved := [i for i, (a, b) in enumerate(zip(q, now, strict=True), 1) if abs(a - b) > SAME_POSITION]:
         outcome.failures.append(f"joints {moved} moved again after the arm stood")

@@ -108,8 +108,8 @@ def largest_error(readings: list[Readings], reference: PortSolution) -> float:
 # isort: split
 
 
-ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
-CELLS = ((8, 2), (12, 3), (16, 4), (24, 5), (32, 7), (48, 9), (64, 11))
+ORDER_LIST = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
+CELL_COUNTS = ((8, 2), (12, 3), (16, 4), (24, 5), (32, 7), (48, 9), (64, 11))
 
 
 def installed() -> list[Any]:
@@ -147,11 +147,11 @@ def our_runs(reference: Reference, quick: bool) -> Iterator[Run]:
     problem = reference.problem
     calls: list[tuple[str, str, Any]] = []
     if problem.discs and not problem.name.startswith("clipped"):
-        for order in ORDERS[:9] if quick else ORDERS:
+        for order in ORDER_LIST[:9] if quick else ORDER_LIST:
             batch = Batch(problem, order, count=400 if quick else 2000)
             calls.append(("coneskin batched", f"M={order}", batch))
             calls.append(("coneskin single", f"M={order}", Single(problem, order)))
-    for directions, rings in CELLS[:5:2] if quick else CELLS:
+    for directions, rings in CELL_COUNTS[:5:2] if quick else CELL_COUNTS:
         general = General(problem, directions, rings)
         calls.append(("coneskin general", f"{directions}x{rings}", general))
     for solver, configuration, call in calls:

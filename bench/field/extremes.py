@@ -34,7 +34,7 @@ from tests.support.field.rim_solution import solve_rims
 
 from .tables import print_table
 
-ROUNDING = 3e-13  # of the supply: what both sides' rounding may leave at these extremes
+ROUNDING_ERROR = 3e-13  # of the supply: what both sides' rounding may leave at these extremes
 
 
 class Case(NamedTuple):
@@ -101,7 +101,7 @@ def random_case(rng: np.random.Generator) -> Case:
 
 def reference(case: Case, model: FieldModel, order: int) -> tuple[Coupling, str] | None:
     """Return a coupling that two resolutions agree upon, and whose it is, or None."""
-    wanted = max(0.1 * case.tolerance, 0.5 * ROUNDING)
+    wanted = max(0.1 * case.tolerance, 0.5 * ROUNDING_ERROR)
     with np.errstate(all="ignore"):
         pair = [
             Coupling.of_matrix(solve_rims(case.sheet, 1.0, case.lower, case.discs, n)[None], np.zeros((1, 2)))
@@ -169,7 +169,7 @@ def main() -> int:
         error = float(np.abs(volts(model, case, found) - exact).max())
         judged += 1
         row[kind] += 1
-        over = error / max(case.tolerance, ROUNDING)
+        over = error / max(case.tolerance, ROUNDING_ERROR)
         worst[case.family] = max(worst.get(case.family, 0.0), over)
         if over > 1.0:
             row["above"] += 1

@@ -13,7 +13,7 @@ from tests.support.field.port_solution import PortSolution
 from tests.support.field.problems import Problem
 from tests.support.field.reference import Reference
 
-TARGETS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+TARGET_ERRORS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def print_work(runs: list[Run]) -> None:
         short = [name.removeprefix("coneskin ") for name in ours]
         head = ["error", *short, *peers, *(f"ratio {name}" for name in short)]
         rows = []
-        for target in TARGETS:
+        for target in TARGET_ERRORS:
             own = [cheapest(mine, name, target) for name in ours]
             theirs = [(cheapest(mine, p, target), cheapest(mine, p, target, mesh=False)) for p in peers]
             best = [min((pair[i] for pair in theirs), default=math.inf) for i in (0, 1)]

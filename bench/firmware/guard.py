@@ -30,7 +30,7 @@ from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard, 
 from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 from tests.support.firmware.guarded_board import board_scene
 
-NAMES = ("frame", "stop written", "slower", "standstill")
+STAGE_NAMES = ("frame", "stop written", "slower", "standstill")
 
 
 def one_touch(programs: BoardPrograms, path: Path) -> dict[str, float]:
@@ -80,7 +80,7 @@ def main() -> int:
             draw_run(read_run(folder / f"run{args.touches - 1}.rec"), args.picture)
     print(head("ur-rtde"))
     print(f"\n{'from the touch, ms':<22}{'p50':>8}{'worst':>8}   {args.touches} touches")
-    for what in NAMES:
+    for what in STAGE_NAMES:
         values = [one[what] for one in found]
         print(f"{what:<22}{quantile(values, 0.5):>8.1f}{max(values):>8.1f}")
     return 0

@@ -34,8 +34,8 @@ from tests.support.firmware.firmware_build import build_emulator, build_sketch, 
 
 SENSOR = board_circuit("uno", Sensor(Frustum(0.0375, 0.0375, 0.24, math.radians(350)))).sensor
 SETTLING_TIMES = (20, 50, 150, 500)  # us
-PLACES = ((0.05, 1.0), (0.2, 5.0))  # u [m], phi [rad]
-HELD = "drive_all(a == FREE ? GROUND : a, b == FREE ? GROUND : b, c == FREE ? GROUND : c, d == FREE ? GROUND : d);"
+CONTACT_PLACES = ((0.05, 1.0), (0.2, 5.0))  # u [m], phi [rad]
+HELD_LINE = "drive_all(a == FREE ? GROUND : a, b == FREE ? GROUND : b, c == FREE ? GROUND : c, d == FREE ? GROUND : d);"
 
 
 def held_sheets(contacts: Sequence[LayerContact]) -> str:
@@ -94,7 +94,7 @@ def settling(programs: BoardPrograms, folder: Path) -> list[list[str]]:
         row, conductance = [], 1.0 / ohms
         for time in SETTLING_TIMES:
             worst = 0.0
-            for u, phi in PLACES if conductance else PLACES[:1]:
+            for u, phi in CONTACT_PLACES if conductance else CONTACT_PLACES[:1]:
                 contacts = [LayerContact(u, phi, conductance, 0.004)] if conductance else []
                 commands = [held_sheets(contacts), f"0.02 port settle_us={time}"]
                 run = run_board(programs, SENSOR, 0.12, commands=commands, trace=folder / "trace")
@@ -116,8 +116,8 @@ def main() -> int:
         folder = Path(name)
         programs = BoardPrograms(build_emulator(folder), build_sketch(folder))
         text = (firmware_folder() / "coneskin" / "coneskin.ino").read_text(encoding="utf-8")
-        assert HELD in text, "the sketch no longer holds the guides as this bench knows it"
-        (folder / "floating.ino").write_text(text.replace(HELD, "drive_all(a, b, c, d);"), encoding="utf-8")
+        assert HELD_LINE in text, "the sketch no longer holds the guides as this bench knows it"
+        (folder / "floating.ino").write_text(text.replace(HELD_LINE, "drive_all(a, b, c, d);"), encoding="utf-8")
         floating = BoardPrograms(programs.emulator, build_sketch(folder, folder / "floating.ino"))
         show("frames per second, back to back", ["frame", "1 a reading", "2", "4", "8"], rates(programs))
         columns = ["", "frames", "p50 us", "p99 us", "worst us"]

@@ -22,10 +22,10 @@ from coneskin.impact.simulation.mujoco_plant import MujocoPlant
 from coneskin.impact.simulation.scene_description import SheetOnLink
 from coneskin.scene.values.scene import BodyScene
 
-from .neglected import LIMIT, Neglected, neglected
-from .pushes import CONE, HORIZON, LINK, MODEL, RADIUS, RATIO, Push, draw_push
+from .neglected import CHANGE_LIMIT, Neglected, neglected
+from .pushes import DAMPING_RATIO, HORIZON, LINK, LINK_CONE, MODEL, RADIUS, Push, draw_push
 
-AGREED = 0.05
+AGREED_SHARE = 0.05
 _CYCLE, _STEP = 5e-4, 1e-4  # s from one target to the next; of the engine
 
 
@@ -68,10 +68,10 @@ def compare(seed: int, by_mass: bool, permissible: bool) -> Comparison | None:
 def _engine(push: Push, braked: float) -> tuple[float, float, float]:
     """Return peak [N], impulse [N s] and compression [m] of a push in MuJoCo."""
     body = push.body
-    hand = BodyScene("hand", push.ball, radius=RADIUS, mass=body.mass, stiffness=body.support, damping=RATIO)
+    hand = BodyScene("hand", push.ball, radius=RADIUS, mass=body.mass, stiffness=body.support, damping=DAMPING_RATIO)
     qd = [0.0] * 6
     qd[push.joint] = push.rate
-    plant = MujocoPlant(MODEL, [SheetOnLink("one", LINK, CONE)], [hand], push.padding, push.q, qd, step=_STEP)
+    plant = MujocoPlant(MODEL, [SheetOnLink("one", LINK, LINK_CONE)], [hand], push.padding, push.q, qd, step=_STEP)
     target = list(push.q)
     for step in range(round(HORIZON / _CYCLE)):
         before, _ = push.turned(step * _CYCLE, braked)
@@ -106,19 +106,19 @@ def main() -> int:
         " " * 44 + "".join(f"{name:>{w}}" for name, w in (*columns, ("impulse: worst", 16), ("compression: worst", 20)))
     )
     held = [one for one in found if one.left_out.holds]
-    line(f"holds: what is left out changes under {LIMIT:.0%}", held)
+    line(f"holds: what is left out changes under {CHANGE_LIMIT:.0%}", held)
     line("... padding does not bottom out", [one for one in held if not one.bottoms])
     line("... padding bottoms out", [one for one in held if one.bottoms])
     line("does not hold", [one for one in found if not one.left_out.holds])
     reasons = Counter(one.left_out.reason for one in found if not one.left_out.holds)
     for reason, _ in reasons.most_common():
         line(f"... {reason}", [one for one in found if one.left_out.reason == reason])
-    low = [one.errors[0] for one in found if one.errors[0] < -AGREED]
+    low = [one.errors[0] for one in found if one.errors[0] < -AGREED_SHARE]
     worst = abs(min(low, default=0.0))
-    print(f"peak more than {AGREED:.0%} below MuJoCo's: {len(low)} of {len(found)}, at most {worst:.1%}")
+    print(f"peak more than {AGREED_SHARE:.0%} below MuJoCo's: {len(low)} of {len(found)}, at most {worst:.1%}")
     if args.permissible:
         return 1 if low else 0
-    return 0 if all(one.worst <= AGREED for one in held) else 1
+    return 0 if all(one.worst <= AGREED_SHARE for one in held) else 1
 
 
 def line(name: str, rows: list[Comparison]) -> None:
@@ -126,7 +126,7 @@ def line(name: str, rows: list[Comparison]) -> None:
     if not rows:
         return
     peaks = [abs(one.errors[0]) for one in rows]
-    within = sum(one.worst <= AGREED for one in rows)
+    within = sum(one.worst <= AGREED_SHARE for one in rows)
     median = quantile([one.errors[0] for one in rows], 0.5)
     impulse, deepest = (max(abs(one.errors[n]) for one in rows) for n in (1, 2))
     print(

@@ -19,15 +19,23 @@ from pathlib import Path
 from bench.report import head
 
 _PAGE = Path(__file__).parents[2] / "docs" / "do" / "impact.md"
-_SCENE = re.compile(r'```toml title="scene\.toml"\n(.*?)```', re.DOTALL)
-_DECELERATION = re.compile(r"^deceleration_rad_s2 = .*$", re.MULTILINE)
-_COLUMNS = {"approach": 1.0, "peak": 1.0, "clamp": 1.0, "impulse": 1.0, "depth": 1e3, "noticed": 1e3, "standstill": 1e3}
-_UNITS = ("m/s", "N", "N", "Ns", "mm", "ms", "ms")
+_SCENE_BLOCK = re.compile(r'```toml title="scene\.toml"\n(.*?)```', re.DOTALL)
+_DECELERATION_LINE = re.compile(r"^deceleration_rad_s2 = .*$", re.MULTILINE)
+_COLUMN_FACTORS = {
+    "approach": 1.0,
+    "peak": 1.0,
+    "clamp": 1.0,
+    "impulse": 1.0,
+    "depth": 1e3,
+    "noticed": 1e3,
+    "standstill": 1e3,
+}
+_COLUMN_UNITS = ("m/s", "N", "N", "Ns", "mm", "ms", "ms")
 
 
 def page_scene() -> str:
     """Return the scene of the page."""
-    found = _SCENE.search(_PAGE.read_text(encoding="utf-8"))
+    found = _SCENE_BLOCK.search(_PAGE.read_text(encoding="utf-8"))
     if found is None:
         raise SystemExit(f"{_PAGE} has no block scene.toml")
     return found[1]
@@ -35,7 +43,7 @@ def page_scene() -> str:
 
 def strike(scene: str, deceleration: float) -> dict[str, float]:
     """Return what `coneskin impact` says of a scene whose stop brakes so [rad/s^2]."""
-    text, changed = _DECELERATION.subn(f"deceleration_rad_s2 = {deceleration}", scene)
+    text, changed = _DECELERATION_LINE.subn(f"deceleration_rad_s2 = {deceleration}", scene)
     if changed != 1:
         raise SystemExit(f"the scene must have one line deceleration_rad_s2, has {changed}")
     with tempfile.TemporaryDirectory() as folder:
@@ -54,8 +62,13 @@ def main() -> None:
     args = parser.parse_args()
     scene = args.scene.read_text(encoding="utf-8") if args.scene else page_scene()
     print(head("mujoco"))
-    print(f"{'rad/s2':>8}" + "".join(f"{f'{name} {unit}':>15}" for name, unit in zip(_COLUMNS, _UNITS, strict=True)))
+    print(
+        f"{'rad/s2':>8}"
+        + "".join(f"{f'{name} {unit}':>15}" for name, unit in zip(_COLUMN_FACTORS, _COLUMN_UNITS, strict=True))
+    )
     for deceleration in args.rad_s2:
         found = strike(scene, deceleration)
-        cells = "".join(f"{factor * found[name]:15.{2 if factor == 1.0 else 1}f}" for name, factor in _COLUMNS.items())
+        cells = "".join(
+            f"{factor * found[name]:15.{2 if factor == 1.0 else 1}f}" for name, factor in _COLUMN_FACTORS.items()
+        )
         print(f"{deceleration:8g}{cells}", flush=True)

@@ -30,21 +30,21 @@ from coneskin.skin.materials import Padding
 
 from .reference import closed_form, reference
 
-HAND = StruckBody(0.6, tissue=75e3, support=20e3, damping=2.0 * 0.3 * math.sqrt(20e3 * 0.6))
-TURN = 2.0 * math.pi * 16.0
-METHODS = ("Radau", "BDF", "LSODA")
+HAND_BODY = StruckBody(0.6, tissue=75e3, support=20e3, damping=2.0 * 0.3 * math.sqrt(20e3 * 0.6))
+SERVO_RATE = 2.0 * math.pi * 16.0
+SCIPY_METHODS = ("Radau", "BDF", "LSODA")
 TOLERANCES = tuple(10.0**-n for n in (3, 5, 7, 9, 11))
 
 
 def driven(speed: float, mass: float = 8.0) -> DrivenArm:
     """An arm on its servo that brakes 12 ms after the layers close."""
-    return DrivenArm(speed, mass, mass * TURN**2, 2.0 * mass * TURN, 0.012, 3.0)
+    return DrivenArm(speed, mass, mass * SERVO_RATE**2, 2.0 * mass * SERVO_RATE, 0.012, 3.0)
 
 
 CASES: dict[str, tuple[TwoMassContact, float]] = {
-    "free hand, soft, 0.2 m/s": (TwoMassContact(driven(0.2), replace(HAND, support=0.0, damping=0.0)), 0.1),
-    "held hand, braked to rest": (TwoMassContact(driven(0.2), HAND), 0.5),
-    "held hand, bottoms out": (TwoMassContact(driven(0.5), HAND), 0.5),
+    "free hand, soft, 0.2 m/s": (TwoMassContact(driven(0.2), replace(HAND_BODY, support=0.0, damping=0.0)), 0.1),
+    "held hand, braked to rest": (TwoMassContact(driven(0.2), HAND_BODY), 0.5),
+    "held hand, bottoms out": (TwoMassContact(driven(0.5), HAND_BODY), 0.5),
     "wall, 1e6 N/m": (TwoMassContact(driven(0.5), StruckBody(math.inf)), 0.1),
     "wall, 1e7 N/m": (TwoMassContact(driven(0.5), StruckBody(math.inf), Padding(hard_stiffness=1e7)), 0.1),
     "free 1 kg, 1e7 N/m, 2 m/s": (TwoMassContact(driven(2.0), StruckBody(1.0), Padding(hard_stiffness=1e7)), 0.05),
@@ -160,7 +160,7 @@ def compare(name: str, contact: TwoMassContact, horizon: float) -> None:
     print(f"\n{name}: peak {float(exact['peak']):.6g} N, at {horizon:g} s {float(exact['force']):.6g} N")
     missed = error(fine.peak, fine.last, exact)
     print(f"  ours   {1e3 * ours:9.2f} ms   error {missed:.1e}   {len(fine.stretches)} steps")
-    for method in METHODS:
+    for method in SCIPY_METHODS:
         points = []
         for tolerance in TOLERANCES:
             try:

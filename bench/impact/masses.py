@@ -25,14 +25,14 @@ MOTIONS = {
     "elbow through stretched out": "[[0, -90, -60, -90, -90, 0], [40, -60, 60, -90, -60, 0]]",
 }
 
-MOTION = """
+MOTION_TABLE = """
 [motion]
 waypoints_deg = {motion}
 speed_deg_s = 60
 acceleration_deg_s2 = 400
 """
-COUNT = 4000
-GRID = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)  # kg; a speed is computed with the next step of these
+POSITION_COUNT = 4000
+MASS_GRID = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, math.inf)  # kg; a speed is computed with the next step of these
 
 
 def main() -> None:
@@ -43,17 +43,17 @@ def main() -> None:
         f"{'48 patches of the forearm':28} heavier than sampled: median  95 %   worst   lighter: worst   above its step"
     )
     for name, motion in MOTIONS.items():
-        scene = parse_scene(forearm_scene() + MOTION.format(motion=motion))
+        scene = parse_scene(forearm_scene() + MOTION_TABLE.format(motion=motion))
         patches, sample = patches_of(scene), motion_positions(scene)
         assert scene.motion is not None
         box = list(zip(*scene.motion.waypoints, strict=True))
         chance = random.Random(1)
-        others = [tuple(chance.uniform(min(joint), max(joint)) for joint in box) for _ in range(COUNT)]
+        others = [tuple(chance.uniform(min(joint), max(joint)) for joint in box) for _ in range(POSITION_COUNT)]
         found, dense = weigh("UR5e", patches, sample), weigh("UR5e", patches, others)
         heavier = np.maximum(dense.max(axis=0) / found.max(axis=0) - 1.0, 0.0)
         lighter = np.maximum(1.0 - dense.min(axis=0) / found.min(axis=0), 0.0)
         median, high = np.percentile(heavier, [50.0, 95.0])
-        taken = np.array([min(m for m in GRID if m >= mass) for mass in found.max(axis=0)])
+        taken = np.array([min(m for m in MASS_GRID if m >= mass) for mass in found.max(axis=0)])
         above = int(np.sum(dense.max(axis=0) > taken))
         print(
             f"{name:28} {median:30.1%} {high:6.1%} {heavier.max():7.1%} {lighter.max():15.1%} {above:8} of {len(taken)}"

@@ -18,12 +18,12 @@ from coneskin.impact.permissible_speed.contact_course import ContactCourse
 from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.kinematics import link_pose
 
-from .pushes import CONE, HORIZON, LINK, MODEL, RADIUS, SERVO, Push
+from .pushes import HORIZON, LINK, LINK_CONE, MODEL, RADIUS, SERVO_RATE, Push
 
-LIMIT = 0.05  # change of peak, impulse or compression up to which the model is said to hold
-SATURATED = 0.99  # of a joint's highest torque
-_SHIFT = 0.01  # share of the way by which this estimate may itself be off
-_FACETS = 1e-5  # m by which the engine's sheet, a prism of 96 sides, is off
+CHANGE_LIMIT = 0.05  # change of peak, impulse or compression up to which the model is said to hold
+TORQUE_LIMIT = 0.99  # of a joint's highest torque
+_WAY_SHIFT = 0.01  # share of the way by which this estimate may itself be off
+_FACET_DEPTH = 1e-5  # m by which the engine's sheet, a prism of 96 sides, is off
 _STEP, _LOOKS = 2e-5, 61  # s of the integration; at which the way is looked at
 
 
@@ -46,18 +46,18 @@ class Neglected:
     @property
     def holds(self) -> bool:
         """Whether the model holds."""
-        return self.most < LIMIT and self.torque < SATURATED
+        return self.most < CHANGE_LIMIT and self.torque < TORQUE_LIMIT
 
     @property
     def reason(self) -> str:
         """First of the parts for which it does not; empty where it does."""
         if self.holds:
             return ""
-        if self.torque >= SATURATED:
+        if self.torque >= TORQUE_LIMIT:
             return "a joint at its highest torque"
-        if self.joints >= LIMIT:
+        if self.joints >= CHANGE_LIMIT:
             return "six joints, not one"
-        return "the surface turns or slides" if self.way >= LIMIT else "1 % of the way, or facets, change it"
+        return "the surface turns or slides" if self.way >= CHANGE_LIMIT else "1 % of the way, or facets, change it"
 
 
 def neglected(push: Push, course: ContactCourse) -> Neglected:
@@ -67,7 +67,7 @@ def neglected(push: Push, course: ContactCourse) -> Neglected:
         return Neglected(math.nan, math.inf, math.inf, 0.0)
     looks = np.linspace(0.0, HORIZON, _LOOKS)
     straight = np.array([abs(push.levers[push.joint] * push.turned(t, course.braked)[0]) for t in looks])
-    off = _SHIFT * straight + _FACETS
+    off = _WAY_SHIFT * straight + _FACET_DEPTH
     answers, torque = _six_joints(push, course.braked, np.array([0.0 * bend, bend, bend - off, bend + off]))
     model = np.array([course.peak, course.impulse, course.deepest])
     joints, way, less, more = np.max(np.abs(model[:, None] / answers - 1.0), axis=0).tolist()
@@ -80,9 +80,9 @@ def _bend(push: Push, braked: float) -> NDArray[np.float64]:
     for time in np.linspace(0.0, HORIZON, _LOOKS):
         way, _ = push.turned(float(time), braked)
         q = [at + (way if joint == push.joint else 0.0) for joint, at in enumerate(push.q)]
-        back = CONE.link_frustum.inverse() @ link_pose(MODEL, q, LINK).inverse()
-        u, _, distance = CONE.frustum.locate(*back.apply(push.ball))
-        on_sheet = 0.0 <= u <= CONE.frustum.slant
+        back = LINK_CONE.link_frustum.inverse() @ link_pose(MODEL, q, LINK).inverse()
+        u, _, distance = LINK_CONE.frustum.locate(*back.apply(push.ball))
+        on_sheet = 0.0 <= u <= LINK_CONE.frustum.slant
         found.append(RADIUS - distance - abs(push.levers[push.joint] * way) if on_sheet else math.nan)
     return np.array(found)
 
@@ -91,7 +91,7 @@ def _six_joints(push: Push, braked: float, bends: NDArray[np.float64]) -> tuple[
     """Return peak [N], impulse [N s] and compression [m] with each of some bends of the way, and the torque's share."""
     levers, padding, body, count = push.levers, push.padding, push.body, len(bends)
     diagonal = np.diag(push.masses)
-    stiffness, damping = diagonal * SERVO**2, 2.0 * diagonal * SERVO
+    stiffness, damping = diagonal * SERVO_RATE**2, 2.0 * diagonal * SERVO_RATE
     mobility = np.linalg.inv(push.masses)
     pull, drag, shove = mobility * stiffness, mobility * damping, mobility @ levers
     highest = np.array(arm_inertia(MODEL).torque)[:, None]

@@ -27,11 +27,11 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.skin.materials import Padding
 
 MODEL, LINK = arm_model("UR5e"), LINK_INDEX["forearm"]
-CONE = PlacedFrustum(Frustum(0.0376, 0.0372, 0.26), dh_mesh(MODEL, "forearm") @ Pose(translation=(0.0, 0.0, 0.08)))
+LINK_CONE = PlacedFrustum(Frustum(0.0376, 0.0372, 0.26), dh_mesh(MODEL, "forearm") @ Pose(translation=(0.0, 0.0, 0.08)))
 RADIUS, REACTION, HORIZON = 0.04, 0.012, 0.3  # m of the ball; s; s
-SERVO = 2.0 * math.pi * 15.0  # of the plant's joints
-RATIO = 0.3  # of the damping of the ball's spring
-_SLOWEST = 0.02  # m/s along the normal
+SERVO_RATE = 2.0 * math.pi * 15.0  # of the plant's joints
+DAMPING_RATIO = 0.3  # of the damping of the ball's spring
+_MIN_SPEED = 0.02  # m/s along the normal
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class Push:
     def ball(self) -> Vector:
         """Place of the ball at the first contact, in the base frame [m]."""
         pose = link_pose(MODEL, self.q, LINK)
-        x, y, z = np.array(pose.apply(CONE.point(self.u, self.phi))) + RADIUS * np.array(
-            pose.rotate(CONE.normal(self.phi))
+        x, y, z = np.array(pose.apply(LINK_CONE.point(self.u, self.phi))) + RADIUS * np.array(
+            pose.rotate(LINK_CONE.normal(self.phi))
         )
         return float(x), float(y), float(z)
 
@@ -95,21 +95,21 @@ class Push:
             extra: way of the patch beyond the straight one; implies by_mass.
         """
         pose = link_pose(MODEL, self.q, LINK)
-        normal = pose.rotate(CONE.normal(self.phi))
-        mass = effective_mass(MODEL, arm_inertia(MODEL), self.q, LINK, CONE.point(self.u, self.phi), normal)
+        normal = pose.rotate(LINK_CONE.normal(self.phi))
+        mass = effective_mass(MODEL, arm_inertia(MODEL), self.q, LINK, LINK_CONE.point(self.u, self.phi), normal)
         lever = abs(float(self.levers[self.joint]))
         if by_mass or extra is not None:
             ball = BodyRegion("ball", self.body, ForceLimits(math.inf, math.inf))
-            measured = MeasuredReaction(REACTION, self.braking, "bench", SERVO / (2.0 * math.pi))
+            measured = MeasuredReaction(REACTION, self.braking, "bench", SERVO_RATE / (2.0 * math.pi))
             contact = contact_at(self.speed, lever, mass, ball, measured, self.padding, extra or ExtraWay())
             return integrate(contact, HORIZON)
-        stiffness = float(1.0 / np.sum(self.levers**2 / (np.diag(self.masses) * SERVO**2)))
-        arm = DrivenArm(self.speed, mass, stiffness, 2.0 * stiffness / SERVO, REACTION, self.braking * lever)
+        stiffness = float(1.0 / np.sum(self.levers**2 / (np.diag(self.masses) * SERVO_RATE**2)))
+        arm = DrivenArm(self.speed, mass, stiffness, 2.0 * stiffness / SERVO_RATE, REACTION, self.braking * lever)
         return integrate(TwoMassContact(arm, self.body, self.padding), HORIZON)
 
     def extra(self) -> ExtraWay:
         """Return the extra way that ``coneskin permissible`` takes for the patch in this position of the joints."""
-        patch = ArmPatch("one", LINK, self.u, self.phi, CONE.point(self.u, self.phi), CONE.normal(self.phi))
+        patch = ArmPatch("one", LINK, self.u, self.phi, LINK_CONE.point(self.u, self.phi), LINK_CONE.normal(self.phi))
         return extra_ways(MODEL, [patch], [self.q])[0].rounded_up()
 
 
@@ -128,9 +128,9 @@ def draw_push(seed: int) -> Push | None:
     joint, rate, braking = chance.randrange(3), chance.uniform(0.2, 1.5), chance.choice([5.0, 10.0, 20.0])
     mass, support = 10.0 ** chance.uniform(-0.5, 1.3), 10.0 ** chance.uniform(3.0, 4.6)
     padding = Padding(loss=chance.choice([0.0, 0.3, 1.0]))
-    normal = np.array(link_pose(MODEL, q, LINK).rotate(CONE.normal(phi)))
-    levers = normal @ np.array(point_jacobian(MODEL, q, LINK, CONE.point(u, phi)))
-    body = StruckBody(mass, support=support, damping=2.0 * RATIO * math.sqrt(support * mass))
+    normal = np.array(link_pose(MODEL, q, LINK).rotate(LINK_CONE.normal(phi)))
+    levers = normal @ np.array(point_jacobian(MODEL, q, LINK, LINK_CONE.point(u, phi)))
+    body = StruckBody(mass, support=support, damping=2.0 * DAMPING_RATIO * math.sqrt(support * mass))
     masses = np.array(mass_matrix(MODEL, arm_inertia(MODEL), q))
     push = Push(q, u, phi, joint, math.copysign(rate, levers[joint]), braking, body, padding, levers, masses)
-    return push if push.speed >= _SLOWEST else None
+    return push if push.speed >= _MIN_SPEED else None

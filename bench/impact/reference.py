@@ -15,8 +15,8 @@ from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
 __all__ = ["closed_form", "reference"]
 
 mp.mp.dps = 64
-_ORDER = 44
-_EPS = mp.mpf(10) ** -61
+_TAYLOR_ORDER = 44
+_TIME_TOLERANCE = mp.mpf(10) ** -61
 
 
 def reference(contact: TwoMassContact, horizon: float) -> dict[str, Any]:
@@ -43,7 +43,7 @@ def reference(contact: TwoMassContact, horizon: float) -> dict[str, Any]:
         ss, ww, xx, vv, ff, ee = [s], [w], [x], [v], [], []
         p = (way, drive, -braking / 2)
         d = (drive, -braking)
-        for n in range(_ORDER):
+        for n in range(_TAYLOR_ORDER):
             if mode == "free":
                 ff.append(num(0))
             else:
@@ -75,7 +75,7 @@ def reference(contact: TwoMassContact, horizon: float) -> dict[str, Any]:
         grid = [h * i / 16 for i in range(17)]
         values = [sign * (at(poly, g) - level) for g in grid]
         for i in range(16):
-            if (values[i] < 0 or i == 0) and values[i + 1] > 0 and (i > 0 or values[0] < -_EPS):
+            if (values[i] < 0 or i == 0) and values[i + 1] > 0 and (i > 0 or values[0] < -_TIME_TOLERANCE):
                 low, high = grid[i], grid[i + 1]
                 for _ in range(230):
                     mid = (low + high) / 2
@@ -88,9 +88,9 @@ def reference(contact: TwoMassContact, horizon: float) -> dict[str, Any]:
         h = min(b for b in (last, braked, stands) if b > t) - t
         for poly in (ss, ww, xx, vv):
             scale = max(abs(poly[0]), num(10) ** -12)
-            for power in (_ORDER, _ORDER - 1):
+            for power in (_TAYLOR_ORDER, _TAYLOR_ORDER - 1):
                 if poly[power]:
-                    h = min(h, (_EPS * scale / abs(poly[power])) ** (num(1) / power))
+                    h = min(h, (_TIME_TOLERANCE * scale / abs(poly[power])) ** (num(1) / power))
         event = ""
         wanted = {
             "soft": [("hard", ss, end, True), ("free", ss, num(0), False)],
@@ -115,11 +115,11 @@ def reference(contact: TwoMassContact, horizon: float) -> dict[str, Any]:
         elif event:
             s = {"hard": end, "free": num(0), "soft": num(0) if mode == "free" else end}[event]
             mode = event
-        if mp.isfinite(stands) and abs(t - stands) < _EPS:
+        if mp.isfinite(stands) and abs(t - stands) < _TIME_TOLERANCE:
             drive = braking = num(0)
             stands, t = mp.inf, +t
             w = w if m1 else -v
-        elif mp.isfinite(braked) and abs(t - braked) < _EPS and not braking:
+        elif mp.isfinite(braked) and abs(t - braked) < _TIME_TOLERANCE and not braking:
             braking = num(arm.deceleration)
             stands, braked = t + drive / braking, mp.inf
     return {"peak": peak, "force": force, "s": s, "w": w, "closed": closed}

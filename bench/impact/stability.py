@@ -24,7 +24,7 @@ from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
 
-from .integrators import TURN, by_scipy
+from .integrators import SERVO_RATE, by_scipy
 
 MASSES = tuple(10.0 ** (n / 3.0) for n in range(-9, 10))  # kg
 SPEEDS = (0.0, 1e-6, 1e-3, 1e-2, 0.1, 0.3, 1.0, 2.0, 5.0)  # m/s
@@ -62,8 +62,8 @@ def held(masses: Sequence[float], against: int) -> None:
     times: list[tuple[float, str]] = []
     contacts = []
     for arm, body, speed in itertools.product((*masses, math.inf), masses, (1e-3, 0.1, 1.0, 5.0)):
-        servo = 0.0 if math.isinf(arm) else arm * TURN
-        driven = DrivenArm(speed, arm, servo * TURN, 2.0 * servo, 0.012, 3.0)
+        servo = 0.0 if math.isinf(arm) else arm * SERVO_RATE
+        driven = DrivenArm(speed, arm, servo * SERVO_RATE, 2.0 * servo, 0.012, 3.0)
         struck = StruckBody(body, support=SUPPORT, damping=0.6 * math.sqrt(SUPPORT * body))
         contact = TwoMassContact(driven, struck, Padding(1e-3, 1e4, HARD))
         begin = time.process_time()

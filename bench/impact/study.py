@@ -24,7 +24,7 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.skin.materials import Padding
 
 SPRING, STRUCK = 75e3, 5.6  # N/m, kg; as the group's code has them
-BARE = Padding(thickness=1.0, stiffness=1e9, loss=0.0)
+BARE_PADDING = Padding(thickness=1.0, stiffness=1e9, loss=0.0)
 
 
 def peak(speed: float, mass: float, padding: Padding) -> float:
@@ -39,7 +39,7 @@ def main() -> None:
     inertia = arm_inertia(model)
     whole = sum(link.mass for link in inertia.links)
     print(f"UR10e: moving mass {whole:.1f} kg; half of it, as ISO/TS 15066 takes it without a load: {whole / 2:.1f} kg")
-    bare = peak(0.3, whole / 2, BARE)
+    bare = peak(0.3, whole / 2, BARE_PADDING)
     print(f"bare at 0.3 m/s: {bare:.0f} N; formula v sqrt(mu k): {_formula(0.3, whole / 2):.0f} N")
     print("padding of 12 mm, of a stiffness; force at 0.3 m/s over the bare one; speed with the bare one's force:")
     for stiffness in (20e3, 42.2e3, 100e3):

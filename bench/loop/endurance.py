@@ -43,7 +43,7 @@ from coneskin.testing.scenes import forearm_scene
 RATE_HZ = 1000
 QUIET, SCRIPTS, TOUCHED = 5000, 50, 150  # frames of each
 SPEED, DECELERATION = 1.0, 10.0  # of the arm, rad/s and rad/s2
-GROWTH = 1 << 20  # bytes of resident memory after the first report that still count as none
+MAX_GROWTH = 1 << 20  # bytes of resident memory after the first report that still count as none
 
 
 def contents(sensor: Sensor, seed: int) -> tuple[list[tuple[int, ...]], list[list[tuple[int, ...]]]]:
@@ -231,7 +231,7 @@ def judge(day: Day, reports: list[dict[str, Any]]) -> Iterator[str]:
     """Yield what must not be, one line each."""
     if len(reports) > 1:
         first, last = reports[0], reports[-1]
-        if last["resident"] - first["resident"] > GROWTH:
+        if last["resident"] - first["resident"] > MAX_GROWTH:
             yield f"memory grew from {first['resident']} to {last['resident']} bytes"
         if last["descriptors"] != first["descriptors"]:
             yield f"descriptors went from {first['descriptors']} to {last['descriptors']}"

@@ -20,12 +20,12 @@ from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import encode
 
 SENSOR = Sensor(Frustum(0.0376, 0.0372, 0.26))
-CYCLE = 160  # frames from one touch to the next; while the last of them last, it is touched
-TOUCHED = 30  # frames; in the others the detector settles and the guard becomes active
-_CYCLES = 60  # touches that are made beforehand
-_READY = b"!"  # sent by the far end once its frames are made
-STANDS = (0.0, -1.5, 1.5, -1.5, -1.5, 0.0)
-ZEROS = (0.0,) * 6
+CYCLE_FRAMES = 160  # frames from one touch to the next; while the last of them last, it is touched
+TOUCHED_FRAMES = 30  # frames; in the others the detector settles and the guard becomes active
+_CYCLE_COUNT = 60  # touches that are made beforehand
+_READY_MESSAGE = b"!"  # sent by the far end once its frames are made
+STANDING_JOINTS = (0.0, -1.5, 1.5, -1.5, -1.5, 0.0)
+ZERO_JOINTS = (0.0,) * 6
 CLOCK = time.monotonic
 
 
@@ -56,7 +56,7 @@ class FarEnd:
         self._process = subprocess.Popen(command, pass_fds=descriptors)
         os.close(master)
         states.close()
-        self.states.recv(len(_READY))  # making the frames takes seconds, which are no part of a turn
+        self.states.recv(len(_READY_MESSAGE))  # making the frames takes seconds, which are no part of a turn
         return self
 
     def written(self) -> dict[int, float]:
@@ -75,12 +75,18 @@ class FarEnd:
 def write_frames(rate_hz: float, master: int, states: int, stamps: int) -> None:
     """Write frames and states, and note the times, until the reader goes away."""
     touches = [
-        ScriptedTouch((k * CYCLE + CYCLE - TOUCHED) / rate_hz, ((k + 1) * CYCLE) / rate_hz, 0.13, 1.0, rise=1e-4)
-        for k in range(_CYCLES)
+        ScriptedTouch(
+            (k * CYCLE_FRAMES + CYCLE_FRAMES - TOUCHED_FRAMES) / rate_hz,
+            ((k + 1) * CYCLE_FRAMES) / rate_hz,
+            0.13,
+            1.0,
+            rise=1e-4,
+        )
+        for k in range(_CYCLE_COUNT)
     ]
-    skin = VirtualSkin(SENSOR, touches, rate_hz=rate_hz, model="ladder", duration=_CYCLES * CYCLE / rate_hz)
+    skin = VirtualSkin(SENSOR, touches, rate_hz=rate_hz, model="ladder", duration=_CYCLE_COUNT * CYCLE_FRAMES / rate_hz)
     frames = [(due, encode(frame), frame.sequence) for due, frame in skin.frames()]
-    os.write(states, _READY)
+    os.write(states, _READY_MESSAGE)
     with mmap.mmap(stamps, 0) as memory, memoryview(memory) as raw, raw.cast("d") as times:
         start = CLOCK() + 0.1
         try:
@@ -89,7 +95,9 @@ def write_frames(rate_hz: float, master: int, states: int, stamps: int) -> None:
                 times[sequence] = CLOCK()
                 os.write(master, data)
                 if number % 2 == 0:
-                    os.write(states, RECIPE.pack((due, STANDS, ZEROS, 7, 1, 2, ZEROS, ZEROS)))
+                    os.write(
+                        states, RECIPE.pack((due, STANDING_JOINTS, ZERO_JOINTS, 7, 1, 2, ZERO_JOINTS, ZERO_JOINTS))
+                    )
         except OSError:
             return
 

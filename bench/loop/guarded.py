@@ -30,10 +30,10 @@ from coneskin.skin.detection.frame.timing import TimingLimits
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sources.serial_port import SerialPort
 
-from .far_end import CLOCK, CYCLE, SENSOR, TOUCHED, FarEnd
+from .far_end import CLOCK, CYCLE_FRAMES, SENSOR, TOUCHED_FRAMES, FarEnd
 from .stamps import Stamp, Stamps
 
-LATE = 0.5  # s; frames that the machine holds up are no matter here
+SKIN_TIMEOUT = 0.5  # s; frames that the machine holds up are no matter here
 RESET_PERIOD = 0.02  # s
 
 
@@ -131,8 +131,8 @@ class Guarded:
         touches: dict[int, list[Stamp]] = {}
         for stamp in stamps:
             for sequence in stamp.sequences:
-                if sequence % CYCLE >= CYCLE - TOUCHED:
-                    touches.setdefault(sequence // CYCLE, []).append(stamp)
+                if sequence % CYCLE_FRAMES >= CYCLE_FRAMES - TOUCHED_FRAMES:
+                    touches.setdefault(sequence // CYCLE_FRAMES, []).append(stamp)
             if stamp.sent and stamp.why != "touch":
                 self.other[stamp.why] += 1
         touches.pop(max(touches, default=0), None)  # the turn may have ended before it was answered
@@ -147,8 +147,8 @@ class Guarded:
 
 def make_core(stamps: Stamps) -> Any:
     """Return the guard's core with one sensor, which stamps."""
-    limits = MonitoringLimits(LATE, LATE, 0, LATE, settle=0.01)
-    settings = DetectorSettings(timing=TimingLimits(late=LATE))
+    limits = MonitoringLimits(SKIN_TIMEOUT, SKIN_TIMEOUT, 0, SKIN_TIMEOUT, settle=0.01)
+    settings = DetectorSettings(timing=TimingLimits(late=SKIN_TIMEOUT))
     cone = PlacedFrustum(SENSOR.frustum)
     placed = GuardedSensor(SENSOR.name, "forearm", 3, lambda u, phi: (cone.point(u, phi), cone.normal(phi)))
     arm = ArmSupervisor(arm_model("UR5e"), UR_DRIVER, Reaction(kind="stop"), limits, (StopPath.DRIVER,))

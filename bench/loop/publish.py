@@ -18,9 +18,9 @@ from coneskin.scene.reader import parse_scene
 from coneskin.session.event_publisher import EventPublisher
 from coneskin.session.session import Session, guard
 
-RATE = 1000.0  # Hz
-TOUCHES = 10  # a second
-SCENE = """\
+FRAME_RATE = 1000.0  # Hz
+TOUCH_RATE = 10  # a second
+SCENE_TEXT = """\
 [[link]]
 name = "tube"
 [[link.sensor]]
@@ -34,14 +34,14 @@ model = "ladder"
 skin_silence_ms = 1000
 skin_late_ms = 1000
 """
-TOUCH = "[[source.touch]]\nstart_s = {}\nend_s = {}\nu_mm = 120\nphi_deg = 90\n"
+TOUCH_TEXT = "[[source.touch]]\nstart_s = {}\nend_s = {}\nu_mm = 120\nphi_deg = 90\n"
 
 
 def scene_text(seconds: float) -> str:
     """The scene with its touches."""
-    times = [number / TOUCHES for number in range(int((seconds + 5.0) * TOUCHES))]
-    touches = "".join(TOUCH.format(1.0 + time, 1.0 + time + 0.5 / TOUCHES) for time in times)
-    return SCENE.replace("[monitoring]", touches + "[monitoring]")
+    times = [number / TOUCH_RATE for number in range(int((seconds + 5.0) * TOUCH_RATE))]
+    touches = "".join(TOUCH_TEXT.format(1.0 + time, 1.0 + time + 0.5 / TOUCH_RATE) for time in times)
+    return SCENE_TEXT.replace("[monitoring]", touches + "[monitoring]")
 
 
 def processor_time(pid: int) -> float:
@@ -77,7 +77,7 @@ def measure(seconds: float, publish: bool) -> tuple[float, int, int]:
         came += 1
     publisher.close()
     receiver.close()
-    return 1e6 * spent / (seconds * RATE), events, came
+    return 1e6 * spent / (seconds * FRAME_RATE), events, came
 
 
 def main() -> None:

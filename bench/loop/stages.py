@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from bench.report import head, quantile
 from coneskin.skin.wire import FRAME_LENGTH
 
-from .far_end import CLOCK, CYCLE, FarEnd
+from .far_end import CLOCK, CYCLE_FRAMES, FarEnd
 from .guarded import Guarded
 
 
@@ -84,7 +84,7 @@ def main() -> int:
     args = parser.parse_args()
     print(head())
     turns = max(1, args.touches // TOUCHES)
-    seconds = TOUCHES * CYCLE / args.rate_hz
+    seconds = TOUCHES * CYCLE_FRAMES / args.rate_hz
     baseline, guarded = Baseline(), Guarded()
     for turn in range(turns):
         for reader in (baseline, guarded):

@@ -12,7 +12,7 @@ import sys
 
 from bench.report import head, show
 
-_SCENE = """
+_SCENE_TEXT = """
 [[link]]
 name = "forearm"
 [[link.sensor]]
@@ -22,11 +22,11 @@ height_mm = 260
 [source]
 kind = "virtual"
 """
-_RUN = f"""
+_START_PROGRAM = f"""
 import time
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
-scene = parse_scene({_SCENE!r})
+scene = parse_scene({_SCENE_TEXT!r})
 began = time.monotonic()
 with guard(scene):
     print(time.monotonic() - began)
@@ -38,7 +38,7 @@ def main() -> None:
     parser.add_argument("--times", type=int, default=10, help="starts (%(default)s)")
     args = parser.parse_args()
     done = (
-        subprocess.run([sys.executable, "-c", _RUN], capture_output=True, text=True, check=True)
+        subprocess.run([sys.executable, "-c", _START_PROGRAM], capture_output=True, text=True, check=True)
         for _ in range(args.times)
     )
     times = [float(each.stdout) for each in done]

@@ -35,8 +35,8 @@ from bench.report import head, show
 
 from .mutants import Mutant, draw
 
-_ROOT = Path(__file__).parents[2]
-_ROOMS = ("geometry", "skin", "robot", "src/coneskin")
+_TREE_ROOT = Path(__file__).parents[2]
+_PRODUCT_ROOMS = ("geometry", "skin", "robot", "src/coneskin")
 _SHORT, _LONG = "not long", "long"  # marker expressions
 #: exit code of pytest -> verdict; 2: a file could not be collected, 5: no test was selected
 _VERDICTS = {0: "passed", 1: "failed", 2: "failed", 5: "passed", None: "timeout"}
@@ -45,7 +45,7 @@ _TIMEOUTS = {_SHORT: 300.0, _LONG: 900.0}  # s, of the tests of a room
 
 def product(root: Path) -> list[str]:
     """Return the files that are changed: all of the product but what users test with."""
-    files = _listed(root, *(f"{room}/*.py" for room in _ROOMS))
+    files = _listed(root, *(f"{room}/*.py" for room in _PRODUCT_ROOMS))
     return [file for file in files if not file.startswith("src/coneskin/testing/") and "__main__" not in file]
 
 
@@ -85,9 +85,9 @@ class Tree:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        files = "\0".join(file for file in _listed(_ROOT, "*") if (_ROOT / file).exists())
+        files = "\0".join(file for file in _listed(_TREE_ROOT, "*") if (_TREE_ROOT / file).exists())
         copy = ["cp", "--parents", "--no-dereference", "--target-directory", str(folder)]
-        subprocess.run(["xargs", "-0", *copy], cwd=_ROOT, input=files, text=True, check=True)
+        subprocess.run(["xargs", "-0", *copy], cwd=_TREE_ROOT, input=files, text=True, check=True)
         self._clock = int(time.time())
 
     def write(self, file: str, source: bytes) -> None:
@@ -127,12 +127,12 @@ class Campaign:
     def __init__(self, trees: queue.Queue[Tree], markers: tuple[str, ...]) -> None:
         self._trees = trees
         self._markers = markers
-        self._importers = imports_of(_ROOT)
+        self._importers = imports_of(_TREE_ROOT)
         self._failing: dict[str, bool] = {}  # test -> whether it fails on the copy as it is
 
     def judge(self, number: int, mutant: Mutant) -> dict[str, Any]:
         """Try a mutant; return its row."""
-        tests = tests_of(_ROOT, mutant.file, self._importers)
+        tests = tests_of(_TREE_ROOT, mutant.file, self._importers)
         row = {"number": number, "file": mutant.file, "line": mutant.line, "kind": mutant.kind}
         row |= {"before": mutant.before, "after": mutant.after, "tests": tests, "verdict": "survived", "by": ""}
         tree = self._trees.get()
@@ -182,8 +182,8 @@ def main() -> int:
     parser.add_argument("--most", type=float, default=25.0, help="percentage that may survive (%(default)s)")
     parser.add_argument("--list", action="store_true", help="print the mutants, and try none")
     args = parser.parse_args()
-    files = product(_ROOT)
-    mutants = {number: draw(_ROOT, files, f"{args.seed} {number}") for number in range(args.count)}
+    files = product(_TREE_ROOT)
+    mutants = {number: draw(_TREE_ROOT, files, f"{args.seed} {number}") for number in range(args.count)}
     if args.list:
         for number, each in mutants.items():
             print(f"{number:4d}  {each.file}:{each.line}  {each.kind}: {each.before!r} -> {each.after!r}")

@@ -20,19 +20,28 @@ from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, joint_torques, mass
 from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
 from coneskin.robot.arm.ur_models import arm_model
 
-PAYLOAD = {"UR3": 3.0, "UR5": 5.0, "UR10": 10.0, "UR3e": 3.0, "UR5e": 5.0, "UR10e": 12.5, "UR16e": 16.0, "UR20": 20.0}
+PAYLOAD_MASSES = {
+    "UR3": 3.0,
+    "UR5": 5.0,
+    "UR10": 10.0,
+    "UR3e": 3.0,
+    "UR5e": 5.0,
+    "UR10e": 12.5,
+    "UR16e": 16.0,
+    "UR20": 20.0,
+}
 #: speed [rad/s] and stopping times [s] of base, shoulder, elbow
-MEASURED = {"UR5": (0.244, 0.530, 0.164), "UR3": (0.159, 0.154, 0.092)}
-SPEED = math.radians(183.0)
-STRETCHED = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-STILL = (0.0,) * JOINTS
-NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
+MEASURED_STOPS = {"UR5": (0.244, 0.530, 0.164), "UR3": (0.159, 0.154, 0.092)}
+STOP_SPEED = math.radians(183.0)
+STRETCHED_JOINTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+ZERO_JOINTS = (0.0,) * JOINTS
+JOINT_NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 
 
 def possible(name: str, q: tuple[float, ...], payload: float) -> list[float]:
     """Return the deceleration that each joint's motor can give in the worse direction [rad/s2]."""
     model, inertia = arm_model(name), arm_inertia(arm_model(name))
-    turned, weight = mass_matrix(model, inertia, q), joint_torques(model, inertia, q, STILL, STILL)
+    turned, weight = mass_matrix(model, inertia, q), joint_torques(model, inertia, q, ZERO_JOINTS, ZERO_JOINTS)
     rows = point_jacobian(model, q, JOINTS)
     found = []
     for joint in range(JOINTS):
@@ -48,17 +57,17 @@ def measure(name: str, positions: int) -> list[dict[str, object]]:
     rng = random.Random(name)
     places = [tuple(rng.uniform(-math.pi, math.pi) for _ in range(JOINTS)) for _ in range(positions)]
     lines = []
-    for payload in (0.0, PAYLOAD[name]):
+    for payload in (0.0, PAYLOAD_MASSES[name]):
         by_joint = list(zip(*(possible(name, q, payload) for q in places), strict=True))
-        stretched = possible(name, STRETCHED, payload)
+        stretched = possible(name, STRETCHED_JOINTS, payload)
         for joint in range(3):
             values = list(by_joint[joint])
-            line: dict[str, object] = {"arm": name, "payload_kg": payload, "joint": NAMES[joint]}
+            line: dict[str, object] = {"arm": name, "payload_kg": payload, "joint": JOINT_NAMES[joint]}
             line |= {"stretched": stretched[joint], "least": min(values), "p5": quantile(values, 0.05)}
             line |= {"median": quantile(values, 0.5)}
             line |= {f"share_{rate}": sum(value >= rate for value in values) / len(values) for rate in (10, 20, 40)}
-            if payload and name in MEASURED:
-                line["measured_stretched"] = SPEED / MEASURED[name][joint]
+            if payload and name in MEASURED_STOPS:
+                line["measured_stretched"] = STOP_SPEED / MEASURED_STOPS[name][joint]
             lines.append(line)
     return lines
 
@@ -69,7 +78,7 @@ def main() -> None:
     parser.add_argument("--positions", type=int, default=2000, help="random joint positions (%(default)s)")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    lines = [line for name in PAYLOAD for line in measure(name, args.positions)]
+    lines = [line for name in PAYLOAD_MASSES for line in measure(name, args.positions)]
     if args.json:
         print("\n".join(json.dumps(line) for line in lines))
         return

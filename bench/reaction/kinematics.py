@@ -24,9 +24,9 @@ from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_s
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Reaction
 from tests.support.pinocchio_arm import load_pinocchio, pin_arm, pin_jacobian, pin_place
 
-Q = (0.3, -1.2, 1.1, 0.4, 0.5, 0.6)
-POINT = (0.1, 0.02, 0.05)
-AWAY = (0.0, 0.6, 0.8)
+TEST_JOINTS = (0.3, -1.2, 1.1, 0.4, 0.5, 0.6)
+TOOL_POINT = (0.1, 0.02, 0.05)
+AWAY_DIRECTION = (0.0, 0.6, 0.8)
 
 
 def main() -> None:
@@ -71,13 +71,15 @@ def errors() -> None:
 
 def rows(arm: ArmModel, link: int) -> list[tuple[str, Callable[[], Any]]]:
     written = compile_contact(arm, link)
-    plan = plan_retreat(arm, ArmState(0.0, Q), [ContactOnLink(link, POINT, AWAY)], Reaction(kind="retreat"))
+    plan = plan_retreat(
+        arm, ArmState(0.0, TEST_JOINTS), [ContactOnLink(link, TOOL_POINT, AWAY_DIRECTION)], Reaction(kind="retreat")
+    )
     if not isinstance(plan, RetreatPlan):
         raise SystemExit(f"no retreat is possible from the bench's own touch: {plan.reason}")
-    state = ArmState(0.01, Q)
+    state = ArmState(0.01, TEST_JOINTS)
     pin_model, data, frames = pin_arm(arm)
     held = pin_model.frames[frames[link]]
-    placed, q = held.placement.act(np.array(POINT)), np.array(Q)
+    placed, q = held.placement.act(np.array(TOOL_POINT)), np.array(TEST_JOINTS)
     pin = load_pinocchio()
     point = pin.SE3(np.eye(3), placed)
 
@@ -87,11 +89,11 @@ def rows(arm: ArmModel, link: int) -> list[tuple[str, Callable[[], Any]]]:
         return pin.getFrameJacobian(pin_model, data, held.parentJoint, point, pin.LOCAL_WORLD_ALIGNED)
 
     def readable() -> Any:
-        return link_pose(arm, Q, link).apply(POINT), point_jacobian(arm, Q, link, POINT)
+        return link_pose(arm, TEST_JOINTS, link).apply(TOOL_POINT), point_jacobian(arm, TEST_JOINTS, link, TOOL_POINT)
 
     return [
-        ("place and Jacobian", lambda: written.place(*Q, *POINT, *AWAY)),
-        ("the same and joint speeds (drive)", lambda: written.drive(*Q, *POINT, *AWAY)),
+        ("place and Jacobian", lambda: written.place(*TEST_JOINTS, *TOOL_POINT, *AWAY_DIRECTION)),
+        ("the same and joint speeds (drive)", lambda: written.drive(*TEST_JOINTS, *TOOL_POINT, *AWAY_DIRECTION)),
         ("retreat_step", lambda: retreat_step(plan, state)),
         ("readable kinematics", readable),
         ("pinocchio, numpy", pinocchio),

@@ -24,16 +24,16 @@ from coneskin.session.session import Session
 from coneskin.testing.scenes import START
 
 MODES = ("moveJ", "moveL", "speedJ", "servoJ", "sync", "script")
-EXTERNAL = ("sync", "script", "urcl")
+EXTERNAL_MODES = ("sync", "script", "urcl")
 URCL_MOVER = "CONESKIN_URCL_MOVER"  # environment variable: program and script of mode urcl, with a tab between
-REACH = 0.9  # rad of the base to both sides of START
+MOVE_REACH = 0.9  # rad of the base to both sides of START
 SPEED, ACCELERATION, DECELERATION = 1.0, 20.0, 10.0
 TOOL_SPEED, TOOL_ACCELERATION = 0.5, 10.0  # of moveL: about 0.8 rad/s of the base
 CLOCK = time.monotonic
 
 
 def goal(side: int) -> list[float]:
-    return [START[0] + side * REACH, *START[1:]]
+    return [START[0] + side * MOVE_REACH, *START[1:]]
 
 
 def poses(tool: Sequence[float]) -> dict[int, list[float]]:
@@ -47,7 +47,7 @@ def servo_target(start: Sequence[float], side: int, seconds: float) -> list[floa
     """Return the target after this time: speed up in 0.1 s, go on with SPEED, never farther than REACH."""
     ramp = min(seconds, 0.1)
     travel = SPEED * (0.5 * ramp * ramp / 0.1 + max(0.0, seconds - 0.1))
-    return [min(max(start[0] + side * travel, START[0] - REACH), START[0] + REACH), *start[1:]]
+    return [min(max(start[0] + side * travel, START[0] - MOVE_REACH), START[0] + MOVE_REACH), *start[1:]]
 
 
 def script(side: int) -> bytes:
@@ -210,7 +210,7 @@ def revive(control: Any) -> None:
 
 def run_baseline(host: str, mode: str, tool: list[float]) -> None:
     """Move in a child, wait so long, call the stop, and answer when it was called."""
-    if mode in EXTERNAL:
+    if mode in EXTERNAL_MODES:
         with ExitStack() as stack:
             arm, raw = ExternalArm(mode, host, stack), stack.enter_context(script_socket(host))
             stop = f"def bench_stop():\n  stopj({DECELERATION})\nend\n".encode()

@@ -22,8 +22,8 @@ from coneskin.robot.sim.mock_arm import MockArm
 from coneskin.robot.ur.driver import UR_DRIVER
 from tests.support.guard_rig import CONE, LINK, MODEL, START_Q
 
-CYCLE = 0.002  # s
-LATE = 10  # cycles from a command to its effect
+CYCLE_TIME = 0.002  # s
+SLIDER_DELAY = 10  # cycles from a command to its effect
 SLIDER = 10  # cycles between two readings of the slider
 LEVERS, CURVE = (0.1, 0.2, 0.4, 0.8), (0.05, 0.1, 0.2, 0.3)
 PATCHES = tuple(
@@ -61,8 +61,8 @@ def run(legs: Sequence[Leg], seconds: float) -> str:
     program: Waypoints | None = None
     waiting: list[tuple[int, SetSpeedSlider]] = []
     slider, changes, ratios, ends = 1.0, [], [], []
-    for step in range(round(seconds / CYCLE)):
-        now = 100.0 + CYCLE * step
+    for step in range(round(seconds / CYCLE_TIME)):
+        now = 100.0 + CYCLE_TIME * step
         while waiting and waiting[0][0] <= step:
             arm.feed(waiting.pop(0)[1])
         if step % SLIDER == 0:
@@ -80,15 +80,15 @@ def run(legs: Sequence[Leg], seconds: float) -> str:
         out: list[object] = []
         why = limit.sample(state, slider, out)  # type: ignore[arg-type]
         found = [item for item in out if isinstance(item, SetSpeedSlider)]
-        waiting += [(step + LATE, item) for item in found]
+        waiting += [(step + SLIDER_DELAY, item) for item in found]
         changes += [step] * len(found)
         if why:
-            return f"STOPPED after {CYCLE * step:.1f} s: {why}"
+            return f"STOPPED after {CYCLE_TIME * step:.1f} s: {why}"
     late = len(ratios) // 2
     half = [end for end in ends if end >= late]
     per = sum(change >= late for change in changes) / max(1, len(half))
     return (
-        f"{len(changes):7d} {per:9.2f} {max(ratios):9.3f} {1e3 * CYCLE * sum(r > 1.0 for r in ratios):9.0f}"
+        f"{len(changes):7d} {per:9.2f} {max(ratios):9.3f} {1e3 * CYCLE_TIME * sum(r > 1.0 for r in ratios):9.0f}"
         f" {max(ratios[late:]):9.3f} {len(half):8d} {arm.slider:8.2f}"
     )
 

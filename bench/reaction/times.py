@@ -36,8 +36,8 @@ from bench.report import head, quantile
 from .moves import MODES, URCL_MOVER
 from .turns import baseline_turn, guarded_turn
 
-EACH = 200  # collisions in a turn
-COLUMNS = (
+TURN_SIZE = 200  # collisions in a turn
+COLUMN_NAMES = (
     ("touch begins -> frame read", "touch_frame"),
     ("frame read -> stop sent", "frame_command"),
     ("stop sent -> come to the controller", "command_came"),
@@ -56,7 +56,7 @@ def summary(rows: list[dict[str, Any]], mode: str) -> dict[str, Any]:
         found[by] = {"count": len(mine), "missed": len(mine) - len(good)}
         found[by]["misnamed"] = sum(row.get("called", "touch") != "touch" for row in good)
         found[by]["escalated"] = sum(bool(row.get("escalated")) for row in good)
-        for _, key in COLUMNS:
+        for _, key in COLUMN_NAMES:
             values = [1e3 * row[key] for row in good if key in row and math.isfinite(row[key])]
             if values:
                 found[by][key] = [round(quantile(values, share), 3) for share in (0.5, 0.99, 0.999)]
@@ -72,7 +72,7 @@ def show(rows: list[dict[str, Any]], modes: Sequence[str]) -> None:
         found = summary(rows, mode)
         counts = [f"{found[by]['count']}" for by in ("guard", "baseline")]
         print(f"\n{mode:48}{counts[0]:>27}{counts[1]:>27}")
-        for words, key in COLUMNS:
+        for words, key in COLUMN_NAMES:
             cells = [found[by].get(key) for by in ("guard", "baseline")]
             print(f"  {words:46}" + "".join(f"{cell(values):>27}" for values in cells))
         print(f"  {'added: frame -> slower, over call -> slower':46}{cell(found.get('added')):>27}")
@@ -142,7 +142,7 @@ def measure(modes: Sequence[str], args: argparse.Namespace, rows: list[dict[str,
                 if done >= wanted:
                     continue
                 left += wanted - done
-                new = turn(mode, min(max(1, EACH * wanted // args.collisions), wanted - done), rng)
+                new = turn(mode, min(max(1, TURN_SIZE * wanted // args.collisions), wanted - done), rng)
                 rows += new
                 if args.keep:
                     with args.keep.open("a") as file:

@@ -26,10 +26,10 @@ from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
 from coneskin.testing.scenes import START, forearm_scene
 
-from .moves import CLOCK, EXTERNAL, Child, ExternalArm, GuardedArm
+from .moves import CLOCK, EXTERNAL_MODES, Child, ExternalArm, GuardedArm
 
-MOVES = "bench.reaction.moves"
-LIMITS = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nsettle_ms = 10"
+MOVES_MODULE = "bench.reaction.moves"
+TIME_LIMITS = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nsettle_ms = 10"
 
 
 def chosen(simulated: SimulatedController, mode: str, rng: random.Random) -> tuple[int, float, list[float]]:
@@ -45,13 +45,13 @@ def guarded_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, An
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         host, log = free_host(), folder / "log.jsonl"
         simulated = stack.enter_context(SimulatedController("UR5e", host, START, log=log))
-        control = "external" if mode in EXTERNAL else "internal"
-        text = forearm_scene(host, control, limits=LIMITS)
+        control = "external" if mode in EXTERNAL_MODES else "internal"
+        text = forearm_scene(host, control, limits=TIME_LIMITS)
         if mode == "urcl":  # the library takes the slider, as the ROS driver does
             text = text.replace("[arm]\n", "[arm]\nslider_stop = false\n")
         scene = parse_scene(text)
         session = stack.enter_context(guard(scene, recording=folder / "run.rec"))
-        external = mode in EXTERNAL
+        external = mode in EXTERNAL_MODES
         arm = ExternalArm(mode, host, stack) if external else GuardedArm(session, mode, simulated.state()["tcp"])
         touched, before = [], 0
         for _ in range(count):
@@ -84,7 +84,7 @@ def reset(session: Session) -> None:
 
 def came(mode: str, simulated: SimulatedController) -> list[float]:
     """Return when the stops came to the controller, in order [s]."""
-    if mode in EXTERNAL:
+    if mode in EXTERNAL_MODES:
         return [e["monotonic"] for e in simulated.events("script") if "stop" in e["first_line"]]
     return [e["monotonic"] for e in simulated.events("received") if e["command"] == STOP_COMMANDS[mode]]
 
@@ -128,7 +128,7 @@ def baseline_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, A
         simulated = stack.enter_context(SimulatedController("UR5e", host, START, log=log))
         reader = stack.enter_context(StateReader(host))
         child = stack.enter_context(
-            Child(sys.executable, "-m", MOVES, "baseline", host, mode, json.dumps(simulated.state()["tcp"]))
+            Child(sys.executable, "-m", MOVES_MODULE, "baseline", host, mode, json.dumps(simulated.state()["tcp"]))
         )
         samples: list[tuple[float, float]] = []
         over = threading.Event()

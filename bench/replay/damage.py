@@ -21,9 +21,9 @@ from coneskin.runs.replay.run import Verdict, read_run, replay
 
 __all__ = ["damage", "kill"]
 
-_REPLAYED = 10  # one trial in so many is replayed as well
-_HANG = 30.0  # s of processor time for one trial
-_CHILD = """
+_REPLAY_EVERY = 10  # one trial in so many is replayed as well
+_HANG_TIME = 30.0  # s of processor time for one trial
+_CHILD_PROGRAM = """
 import sys, time
 from pathlib import Path
 from coneskin.core.recording.block import Block
@@ -71,7 +71,7 @@ def damage(path: Path, folder: Path, trials: int) -> Iterator[str]:
             if hurt == data:
                 continue
             began = time.process_time()
-            seen.update(_judge(hurt, data, whole, folder, trial % _REPLAYED == 0))
+            seen.update(_judge(hurt, data, whole, folder, trial % _REPLAY_EVERY == 0))
             slowest = max(slowest, time.process_time() - began)
         yield (
             f"{kind:22} {count:6} {seen['unreadable']:11} {seen['same']:11} {seen['lost']:18} {seen['false']:12} "
@@ -161,7 +161,7 @@ def kill(path: Path, folder: Path, trials: int) -> Iterator[str]:
     seen: Counter[str] = Counter()
     for trial in range(trials):
         target = folder / f"killed-{trial}.rec"
-        command = [sys.executable, "-c", _CHILD, str(path), str(target)]
+        command = [sys.executable, "-c", _CHILD_PROGRAM, str(path), str(target)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
             assert child.stdout is not None
             child.stdout.readline()
@@ -173,7 +173,7 @@ def kill(path: Path, folder: Path, trials: int) -> Iterator[str]:
         first = next(iter(read_run(path).blocks)).time
         kept = max((block.time for block in run.blocks), default=first) - first
         lost.append(max(0.0, written - kept))
-        result = replay(run) if trial % _REPLAYED == 0 else None
+        result = replay(run) if trial % _REPLAY_EVERY == 0 else None
         seen.update(["not closed" if not run.complete else "CLOSED"])
         if result is not None:
             seen.update([str(result.verdict)])

@@ -15,7 +15,7 @@ from coneskin.core.recording.recorder import Recorder
 
 __all__ = ["formats"]
 
-_CAN = 64  # bytes of a frame of CAN FD
+_CAN_LENGTH = 64  # bytes of a frame of CAN FD
 
 
 def formats(path: Path, folder: Path) -> Iterator[str]:
@@ -133,7 +133,9 @@ def _write_can(path: Path, blocks: list[Block]) -> None:
     start = blocks[0].time
     with can.BLFWriter(path) as writer:
         for block in blocks:
-            parts = [block.payload[at : at + _CAN - 2] for at in range(0, len(block.payload), _CAN - 2)] or [b""]
+            parts = [
+                block.payload[at : at + _CAN_LENGTH - 2] for at in range(0, len(block.payload), _CAN_LENGTH - 2)
+            ] or [b""]
             for number, part in enumerate(parts):
                 data = bytes([number < len(parts) - 1, len(part)]) + part
                 data += bytes(next(n for n in (8, 12, 16, 20, 24, 32, 48, 64) if n >= len(data)) - len(data))

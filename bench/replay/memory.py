@@ -14,7 +14,7 @@ from coneskin.runs.replay.run import read_run
 
 __all__ = ["memory"]
 
-_SCAN = """
+_SCAN_PROGRAM = """
 import sys
 from coneskin.runs.replay.run import read_run
 from coneskin.runs.replay.touch_scan import scan_touches
@@ -35,7 +35,7 @@ def memory(model: Path, folder: Path, megabytes: int) -> Iterator[str]:
         "runs info": [*coneskin, "runs", "info", name],
         "runs verify": [*coneskin, "runs", "verify", name],
         "runs cut": [*coneskin, "runs", "cut", name, "--around", around, "-o", str(folder / "cut.out")],
-        "scan": [sys.executable, "-c", _SCAN, name],
+        "scan": [sys.executable, "-c", _SCAN_PROGRAM, name],
         "replay": [*coneskin, "replay", name],
         "runs diff": [*coneskin, "runs", "diff", name],
         **{

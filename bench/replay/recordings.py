@@ -29,12 +29,12 @@ from .formats import formats
 from .long_run import record_long_run
 from .memory import memory
 
-RUN = Path(__file__).parents[2] / "tests" / "data" / "collision.rec"
+RUN_FILE = Path(__file__).parents[2] / "tests" / "data" / "collision.rec"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--run", type=Path, default=RUN, help="a recording (default: %(default)s)")
+    parser.add_argument("--run", type=Path, default=RUN_FILE, help="a recording (default: %(default)s)")
     parser.add_argument("--damage", type=int, default=0, metavar="N", help="trials of random damage")
     parser.add_argument("--kill", type=int, default=0, metavar="N", help="recorders to kill")
     parser.add_argument("--memory", type=int, default=0, metavar="MB", help="size of the run for the table of memory")

@@ -34,12 +34,12 @@ from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.ladder import ResistorLadder
 from coneskin.skin.virtual.skin import VirtualSkin
 
-FOREARM = Frustum(0.0375, 0.0375, 0.24, math.radians(350.0))
+FOREARM_CONE = Frustum(0.0375, 0.0375, 0.24, math.radians(350.0))
 MARK_ERROR = 0.3e-3  # m, standard deviation along and around each
-FRAMES = 20  # of each touch of a mark
-PLACES = 40  # at which each skin is judged
-CONTACT = 2e-3  # S
-LEADS = {"leads of 3 to 12 ohm": (3.0, 12.0), "a perfect skin": (1.0, 1.0)}
+MARK_FRAMES = 20  # of each touch of a mark
+PLACE_COUNT = 40  # at which each skin is judged
+CONTACT_CONDUCTANCE = 2e-3  # S
+LEAD_RANGES = {"leads of 3 to 12 ohm": (3.0, 12.0), "a perfect skin": (1.0, 1.0)}
 
 
 class Bench:
@@ -64,14 +64,14 @@ class Bench:
         for mark in calibration_marks(self.known, count):
             around = self.rng.gauss(0.0, MARK_ERROR) / self.cone.radius_at(mark.u)
             true = Place(mark.u + self.rng.gauss(0.0, MARK_ERROR), mark.phi + around)
-            touches.append(KnownTouch(mark.place, self.touch(true, FRAMES)))
+            touches.append(KnownTouch(mark.place, self.touch(true, MARK_FRAMES)))
         return touches
 
     def judged(self) -> list[KnownTouch]:
         """Touch places anywhere."""
         places = [
             Place(self.rng.uniform(0.03, 0.97) * self.cone.slant, self.rng.uniform(0.03, 0.97) * self.cone.wrap)
-            for _ in range(PLACES)
+            for _ in range(PLACE_COUNT)
         ]
         return [KnownTouch(place, self.touch(place)) for place in places]
 
@@ -85,7 +85,7 @@ class _Held(ResistorLadder):
     """Sheets with one contact that is always there."""
 
     def __init__(self, place: Place) -> None:
-        self._contact = LayerContact(*place, CONTACT)
+        self._contact = LayerContact(*place, CONTACT_CONDUCTANCE)
 
     def admittances(self, sensor, scenes):  # type: ignore[no-untyped-def]
         return [self.admittance(sensor, [self._contact])] * len(scenes)
@@ -93,7 +93,7 @@ class _Held(ResistorLadder):
 
 def measure(leads: tuple[float, float], skins: int) -> dict[str, list[float]]:
     """Return all errors [mm], before a calibration and after one by each number of touches."""
-    known = Sensor(FOREARM)
+    known = Sensor(FOREARM_CONE)
     found: dict[str, list[float]] = {"before": [], **{f"{count} touches": [] for count in MARK_COUNTS}}
     for seed in range(skins):
         bench = Bench(known, leads, seed)
@@ -117,9 +117,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     args = parser.parse_args(arguments)
     skins = 20 if args.quick else 200
     if not args.json:
-        print(f"{head()}\n{skins} skins, {PLACES} places on each; errors in mm: median / 95 % / largest\n")
+        print(f"{head()}\n{skins} skins, {PLACE_COUNT} places on each; errors in mm: median / 95 % / largest\n")
         print(f"| | before | {' | '.join(f'{count} touches' for count in MARK_COUNTS)} |\n|---|---|---|---|---|")
-    for name, leads in LEADS.items():
+    for name, leads in LEAD_RANGES.items():
         found = measure(leads, skins)
         rows = {key: [round(quantile(values, share), 3) for share in (0.5, 0.95, 1.0)] for key, values in found.items()}
         if args.json:

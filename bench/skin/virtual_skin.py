@@ -21,13 +21,13 @@ from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import frame_at
 
-LINK = Frustum(0.03762, 0.0373, 0.24)
-SOON = 0.002  # as in coneskin.session.skin_process
+LINK_CONE = Frustum(0.03762, 0.0373, 0.24)
+TOUCH_DELAY = 0.002  # as in coneskin.session.skin_process
 
 
 def main() -> None:
     print(head())
-    equal, unequal = Sensor(LINK), Sensor(LINK, lower_sheet_ohms=300.0)
+    equal, unequal = Sensor(LINK_CONE), Sensor(LINK_CONE, lower_sheet_ohms=300.0)
     row("us per frame", ("median", "p99", "worst"))
     for model in ("ladder", "field"):
         for name, sensor, places in (
@@ -48,7 +48,7 @@ def main() -> None:
         ("one sensor, ladder", [equal], 1, "ladder"),
         ("one sensor", [equal], 1, "field"),
         ("one sensor, two touches at once", [equal], 2, "field"),
-        ("two sensors", [equal, Sensor(LINK, 1, lower_sheet_ohms=300.0)], 1, "field"),
+        ("two sensors", [equal, Sensor(LINK_CONE, 1, lower_sheet_ohms=300.0)], 1, "field"),
     ):
         row(name, in_real_time(sensors, several, model))
 
@@ -79,11 +79,11 @@ def in_real_time(sensors: list[Sensor], several: int, model: str, seconds: float
         now = time.monotonic() - began
         if now >= asked[0] + 0.25 and now < seconds - 0.3:
             asked[0] = now
-            starts.append(now + SOON)
+            starts.append(now + TOUCH_DELAY)
             for n in range(several):
                 for sensor in sensors:
                     place = (0.03 + 0.01 * (len(starts) % 15) + 0.04 * n, 1.0 + 2.0 * n)
-                    skin.touch(ScriptedTouch(now + SOON, now + 0.1, *place, rise=0.001, sensor=sensor.name))
+                    skin.touch(ScriptedTouch(now + TOUCH_DELAY, now + 0.1, *place, rise=0.001, sensor=sensor.name))
         return False
 
     def write(data: bytes) -> bool:

@@ -24,19 +24,22 @@ from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import FRAME_LENGTH, FrameDecoder, encode, frame_at
 
 SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))
-COUNT = 20_000
+FRAME_COUNT = 20_000
 
 
 def main() -> None:
     print(head())
-    quiet = [data for _, data in VirtualSkin(SENSOR, duration=COUNT / 1000).packets()]
-    held = [data for _, data in VirtualSkin(SENSOR, [ScriptedTouch(0, 1e9, 0.2, 1.0)], duration=COUNT / 1000).packets()]
+    quiet = [data for _, data in VirtualSkin(SENSOR, duration=FRAME_COUNT / 1000).packets()]
+    held = [
+        data
+        for _, data in VirtualSkin(SENSOR, [ScriptedTouch(0, 1e9, 0.2, 1.0)], duration=FRAME_COUNT / 1000).packets()
+    ]
     frames = [frame for data in quiet if (frame := frame_at(data))]
     held_frames = [frame for data in held if (frame := frame_at(data))]
     touched = held_frames[100:]
     halves = [half for data in quiet for half in (data[:17], data[17:])]
     rng = random.Random(0)
-    noise = [rng.randbytes(FRAME_LENGTH) for _ in range(COUNT)]
+    noise = [rng.randbytes(FRAME_LENGTH) for _ in range(FRAME_COUNT)]
 
     gc.collect()
     gc.freeze()

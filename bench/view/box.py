@@ -8,7 +8,7 @@ import time
 
 from coneskin.view.page_server import PageServer
 
-PERIOD = 1.0 / 30.0  # s between two places of the box
+MOVE_PERIOD = 1.0 / 30.0  # s between two places of the box
 
 
 def main() -> None:
@@ -22,7 +22,7 @@ def main() -> None:
         print(server.url, flush=True)
         while True:
             box.position = (0.0, math.sin(time.monotonic()), 0.0)
-            time.sleep(PERIOD)
+            time.sleep(MOVE_PERIOD)
 
 
 if __name__ == "__main__":

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 __all__ = [
-    "FLAGS",
-    "PROCESSES",
-    "PROGRAM",
+    "CHROMIUM_FLAGS",
+    "CHROMIUM_PROGRAM",
+    "PROCESS_KINDS",
     "browser_processes",
     "drawn_pictures",
     "first_picture",
@@ -19,11 +19,11 @@ __all__ = [
     "resident",
 ]
 
-PROGRAM = "/usr/bin/chromium"
-FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
-PROCESSES = ("renderer", "gpu-process")  # of the browser: the first runs the page, the second draws
+CHROMIUM_PROGRAM = "/usr/bin/chromium"
+CHROMIUM_FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
+PROCESS_KINDS = ("renderer", "gpu-process")  # of the browser: the first runs the page, the second draws
 #: counts what is drawn by what begins a picture: the clearing of the canvas; and the corners of the fullest picture
-COUNT = """() => {
+COUNT_SCRIPT = """() => {
   window.pictures = window.corners = 0;
   let corners = 0;
   const { clear, drawElements } = WebGL2RenderingContext.prototype;
@@ -38,9 +38,9 @@ COUNT = """() => {
     return drawElements.call(this, mode, count, ...more);
   };
 }"""
-_ARM = 3000  # corners that the first picture of a page with an arm has at least; an empty one has a few
+_MIN_ARM_CORNERS = 3000  # corners that the first picture of a page with an arm has at least; an empty one has a few
 #: what the browser offers to a page: turns of requestAnimationFrame in some seconds
-TURNS = """(seconds) => new Promise((done) => {
+TURN_SCRIPT = """(seconds) => new Promise((done) => {
   let turns = 0;
   const since = performance.now();
   const look = () => {
@@ -49,7 +49,7 @@ TURNS = """(seconds) => new Promise((done) => {
   };
   requestAnimationFrame(look);
 })"""
-_TWICE = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+_TWICE_DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
 def resident(pid: int) -> int:
@@ -76,7 +76,7 @@ def browser_processes() -> list[int]:
 def _browsers() -> dict[str, list[int]]:
     """The browser's processes below this one, by their types."""
     rows = _below()
-    return {kind: [int(row[0]) for row in rows if f"--type={kind}" in row[2]] for kind in PROCESSES}
+    return {kind: [int(row[0]) for row in rows if f"--type={kind}" in row[2]] for kind in PROCESS_KINDS}
 
 
 def memory_of() -> dict[str, int]:
@@ -107,26 +107,26 @@ def first_picture(driver: Any, url: str, phase: bool) -> tuple[Any, Any, float, 
     Returns:
         browser, page, how long it took from the address to the picture [s], and its processor time until then [s].
     """
-    browser = driver.chromium.launch(executable_path=PROGRAM, args=list(FLAGS))
+    browser = driver.chromium.launch(executable_path=CHROMIUM_PROGRAM, args=list(CHROMIUM_FLAGS))
     page = browser.new_page(viewport={"width": 960, "height": 540})
     page.set_default_timeout(120_000)
-    page.add_init_script(f"({COUNT})()")
+    page.add_init_script(f"({COUNT_SCRIPT})()")
     began, before = time.monotonic(), _processor_times()
     page.goto(url)
     page.wait_for_function(
         "([phase, arm]) => window.pictures > 0 && "
         "(!phase || (document.querySelector('.coneskin-phase') && window.corners > arm))",
-        arg=[phase, _ARM],
+        arg=[phase, _MIN_ARM_CORNERS],
     )
-    page.evaluate(_TWICE)
+    page.evaluate(_TWICE_DRAWN)
     after = _processor_times()
-    return browser, page, time.monotonic() - began, {kind: after[kind] - before[kind] for kind in PROCESSES}
+    return browser, page, time.monotonic() - began, {kind: after[kind] - before[kind] for kind in PROCESS_KINDS}
 
 
 def drawn_pictures(page: Any, seconds: float) -> tuple[float, float, dict[str, float]]:
     """Turns and pictures a second for a while, and the processor time of the browser's processes meanwhile [s]."""
     page.evaluate("() => { window.pictures = 0; }")
     before = _processor_times()
-    turns = page.evaluate(TURNS, seconds)
+    turns = page.evaluate(TURN_SCRIPT, seconds)
     after, pictures = _processor_times(), page.evaluate("() => window.pictures")
-    return turns, pictures / seconds, {kind: after[kind] - before[kind] for kind in PROCESSES}
+    return turns, pictures / seconds, {kind: after[kind] - before[kind] for kind in PROCESS_KINDS}

@@ -29,18 +29,20 @@ from coneskin.view.page_server import PageServer
 from .browser import resident
 from .collisions import collisions_again, header_of
 
-STEP = 0.05  # s of the run that are written together: the recorder's own
-DRAWN = 4  # steps between two pictures
-LOOK = 600.0  # s of the run between two lines of the table
-_HEAD = "run [min]  wall [min]  collisions  server [MB]  objects  frames  states  events  touches  messages"
-PART = 1 << 24  # bytes of a file of the recording; those before the newest are taken away
+WRITE_STEP = 0.05  # s of the run that are written together: the recorder's own
+DRAW_STEPS = 4  # steps between two pictures
+LOOK_PERIOD = 600.0  # s of the run between two lines of the table
+_TABLE_HEAD = "run [min]  wall [min]  collisions  server [MB]  objects  frames  states  events  touches  messages"
+TRACE_PART = 1 << 24  # bytes of a file of the recording; those before the newest are taken away
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=3.0, help="of the run")
-    parser.add_argument("--late", type=float, default=STEP, help="s of the run between two looks: of a starved page")
+    parser.add_argument(
+        "--late", type=float, default=WRITE_STEP, help="s of the run between two looks: of a starved page"
+    )
     parser.add_argument("--trace", action="store_true", help="tell where memory was allocated, three times slower")
     args = parser.parse_args()
     print(head("viser"), flush=True)
@@ -49,7 +51,7 @@ def main() -> None:
     )
     with (
         tempfile.TemporaryDirectory() as folder,
-        Recorder(Path(folder) / "run.rec", part_size=PART, keep=1) as recorder,
+        Recorder(Path(folder) / "run.rec", part_size=TRACE_PART, keep=1) as recorder,
         PageServer("endurance", port=18300) as server,
     ):
         first = header_of()
@@ -63,7 +65,7 @@ def main() -> None:
 def follow(args: argparse.Namespace, recorder: Recorder, server: PageServer, live: LiveRun, page: LivePage) -> None:
     """Write and draw, and print a line of the table every ten minutes of the run."""
     began = time.monotonic()
-    start, due, before = None, STEP, None
+    start, due, before = None, WRITE_STEP, None
     steps, look = 0, 0.0
     parcel: list[Block] = []
     for number, block in collisions_again():
@@ -75,16 +77,16 @@ def follow(args: argparse.Namespace, recorder: Recorder, server: PageServer, liv
         for old in recorder.parts[:-2]:
             old.unlink(missing_ok=True)
         parcel = [block]
-        if steps % round(args.late / STEP) == 0:
+        if steps % round(args.late / WRITE_STEP) == 0:
             page.poll(due)
-        if steps % max(DRAWN, round(args.late / STEP)) == 0:
+        if steps % max(DRAW_STEPS, round(args.late / WRITE_STEP)) == 0:
             page.draw(due)
-        steps, due = steps + 1, due + STEP
-        if due - STEP >= look:
+        steps, due = steps + 1, due + WRITE_STEP
+        if due - WRITE_STEP >= look:
             print(row(server, live, number, look, began), flush=True)
-            if args.trace and look >= LOOK:  # the first ten minutes fill what is kept
+            if args.trace and look >= LOOK_PERIOD:  # the first ten minutes fill what is kept
                 before = told(before)
-            look += LOOK
+            look += LOOK_PERIOD
             if look > 3600.0 * args.hours:
                 return
 

@@ -28,7 +28,7 @@ __all__ = ["guard_rounds", "print_lateness"]
 
 Spans = dict[str, list[tuple[float, float]]]
 
-_SETTLE = 2.0  # s after a change, before anything is measured
+_SETTLE_TIME = 2.0  # s after a change, before anything is measured
 
 
 def guard_rounds(
@@ -55,7 +55,7 @@ def guard_rounds(
     spans: Spans = {}
 
     def span(name: str, meanwhile: Callable[[float], object] = wait) -> None:
-        wait(_SETTLE)
+        wait(_SETTLE_TIME)
         began = time.monotonic()
         meanwhile(seconds)
         spans.setdefault(name, []).append((began, time.monotonic()))

@@ -20,11 +20,11 @@ from bench.report import head
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 
-from .browser import FLAGS, PROGRAM, memory_of, resident
+from .browser import CHROMIUM_FLAGS, CHROMIUM_PROGRAM, memory_of, resident
 from .collisions import collisions_again, header_of
 from .page import page_of
 
-STEP = 0.05  # s of the run that are written together: the recorder's own
+WRITE_STEP = 0.05  # s of the run that are written together: the recorder's own
 
 
 class Writer(threading.Thread):
@@ -50,7 +50,7 @@ class Writer(threading.Thread):
             while block.time - start > self.shown:
                 self._recorder.write(*found, flush=True)
                 found = []
-                if self.over.wait(STEP / self._rate):
+                if self.over.wait(WRITE_STEP / self._rate):
                     return
                 self.shown = self._rate * (time.monotonic() - began)
             found.append(block)
@@ -74,7 +74,7 @@ def main() -> None:
         writer = Writer(recorder, args.rate)
         writer.start()
         child, url, _ = page_of(Path(folder) / "run.rec")
-        browser = driver.chromium.launch(executable_path=PROGRAM, args=list(FLAGS))
+        browser = driver.chromium.launch(executable_path=CHROMIUM_PROGRAM, args=list(CHROMIUM_FLAGS))
         page = browser.new_page(viewport={"width": 480, "height": 320})
         page.set_default_timeout(300_000)
         page.goto(url)

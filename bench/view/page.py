@@ -31,13 +31,13 @@ from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
 from coneskin.testing.scenes import START, forearm_scene
 
-from .browser import PROCESSES, drawn_pictures, first_picture, resident
+from .browser import PROCESS_KINDS, drawn_pictures, first_picture, resident
 from .guard import guard_rounds, print_lateness
 from .viewer import Viewer, processor_time, waited
 
-LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000"
-VIRTUAL = '"virtual"\nrate_hz = 1000'
-MOVED = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # rad, between the two ends of the motion
+TIME_LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000"
+SKIN_TABLE = '"virtual"\nrate_hz = 1000'
+MOVED_JOINTS = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # rad, between the two ends of the motion
 
 
 def page_of(recording: Path) -> tuple[subprocess.Popen[str], str, float]:
@@ -84,7 +84,7 @@ def moving(session: Session) -> Iterator[None]:
     over = threading.Event()
 
     def move() -> None:
-        away = [a + b for a, b in zip(START, MOVED, strict=True)]
+        away = [a + b for a, b in zip(START, MOVED_JOINTS, strict=True)]
         with contextlib.suppress(ConeSkinError):  # touched by nobody, but the session may end
             while not over.is_set():
                 for goal in (away, START):
@@ -114,7 +114,7 @@ def served_box() -> Iterator[str]:
 def drawn(name: str, page: Any, seconds: float) -> None:
     """Print what a browser draws in some seconds."""
     turns, pictures, spent = drawn_pictures(page, seconds)
-    parts = ", ".join(f"{kind} {1e3 * spent[kind] / max(pictures * seconds, 1.0):.0f} ms" for kind in PROCESSES)
+    parts = ", ".join(f"{kind} {1e3 * spent[kind] / max(pictures * seconds, 1.0):.0f} ms" for kind in PROCESS_KINDS)
     rates = f"{turns:.1f} turns, {pictures:.1f} pictures a second"
     print(f"browser, {name}: {rates}; processor time of each: {parts}", flush=True)
 
@@ -123,7 +123,7 @@ def look(driver: Any, box_url: str, url: str, moving: Callable[[], Any], seconds
     """Look at the page in a browser, beside a page with a box, and print what it draws."""
     for name, address in (("a page of viser's with a box", box_url), ("the page", url)):
         browser, page, took, spent = first_picture(driver, address, phase=address == url)
-        parts = ", ".join(f"{kind} {1e3 * spent[kind]:.0f} ms" for kind in PROCESSES)
+        parts = ", ".join(f"{kind} {1e3 * spent[kind]:.0f} ms" for kind in PROCESS_KINDS)
         print(f"browser, {name}: {took:.2f} s until the first picture; processor time: {parts}", flush=True)
         if address == url:
             drawn("arm stands", page, seconds)
@@ -182,7 +182,7 @@ def main() -> None:
     parser.add_argument("--no-browser", action="store_true", help="measure without chromium")
     args = parser.parse_args()
     print(head("viser", "playwright"), flush=True)
-    scene = parse_scene(forearm_scene(host := free_host(), limits=LIMITS).replace('"virtual"', VIRTUAL))
+    scene = parse_scene(forearm_scene(host := free_host(), limits=TIME_LIMITS).replace('"virtual"', SKIN_TABLE))
     with contextlib.ExitStack() as stack:
         recording = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "run.rec"
         driver, box_url = None, ""

@@ -37,9 +37,9 @@ from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.solid import ClosedSurface, WrappedLayer, write_step
 
-SAMPLES = 40_000  # on the faces of a link beside a part, and on the part
-NEAREST = 800  # of them whose distance is computed
-_DONE = "; done"  # ends the last row of a link
+SAMPLE_COUNT = 40_000  # on the faces of a link beside a part, and on the part
+NEAREST_COUNT = 800  # of them whose distance is computed
+_DONE_MARK = "; done"  # ends the last row of a link
 
 
 def main() -> None:
@@ -63,7 +63,10 @@ def main() -> None:
             began = time.perf_counter()
             rows = earlier.get(name)
             if rows is None:
-                rows = [*jig(path), f"  {name}: {time.perf_counter() - began:.0f} s, {this.splitlines()[-1]}{_DONE}"]
+                rows = [
+                    *jig(path),
+                    f"  {name}: {time.perf_counter() - began:.0f} s, {this.splitlines()[-1]}{_DONE_MARK}",
+                ]
             print("\n".join(rows), flush=True)
 
 
@@ -73,7 +76,7 @@ def _finished(text: str) -> dict[str, list[str]]:
     rows: list[str] = []
     for line in text.split("from the printed part", 1)[-1].splitlines()[1:]:
         rows.append(line)
-        if line.endswith(_DONE):
+        if line.endswith(_DONE_MARK):
             links[line.split(": ")[0].strip()] = rows
             rows = []
     return links
@@ -194,15 +197,15 @@ def _gap(sheet: SheetDesign, collar: Collar, surface: ClosedSurface, body: Mesh)
         return math.inf, False
     link = trimesh.Trimesh(vertices, faces, process=False)
     link.remove_unreferenced_vertices()
-    points = np.concatenate([link.vertices, link.sample(SAMPLES, seed=1)])
+    points = np.concatenate([link.vertices, link.sample(SAMPLE_COUNT, seed=1)])
     points = points[((points > part.bounds[0] - 3e-3) & (points < part.bounds[1] + 3e-3)).all(axis=1)]
     if len(points) == 0:
         return math.inf, False
     inside = part.contains(points)
     if inside.any():
-        return -1e3 * float(_distances(part, points[inside][:NEAREST]).max()), True
-    near_first = np.argsort(KDTree(part.sample(SAMPLES, seed=2)).query(points)[0])
-    distance = _distances(part, points[near_first[:NEAREST]])
+        return -1e3 * float(_distances(part, points[inside][:NEAREST_COUNT]).max()), True
+    near_first = np.argsort(KDTree(part.sample(SAMPLE_COUNT, seed=2)).query(points)[0])
+    distance = _distances(part, points[near_first[:NEAREST_COUNT]])
     assert np.isfinite(distance).all()
     crossed = _crosses(link, part) or _crosses(part, link)
     return 1e3 * float(distance.min()), crossed or bool((distance == 0.0).any())
