@@ -131,7 +131,7 @@ def test_what_is_no_retreat_is_not_called_one(name: str, details: dict[str, Any]
 def test_the_words_are_those_of_the_robot() -> None:
     assert timeline._END_CAUSE in (ROOT / "robot" / "guard" / "loop.py").read_text(encoding="utf-8")
     comply = (ROOT / "robot" / "reaction" / "admittance.py").read_text(encoding="utf-8")
-    assert all(f'"{word}"' in comply for word in (timeline._RELEASE_CAUSE, *timeline._PUSH))
+    assert all(f'"{word}"' in comply for word in (timeline._RELEASE_CAUSE, *timeline._PUSH_LIMITS))
     others = [path for path in (ROOT / "robot").rglob("*.py") if path.name != "admittance.py"]
     assert not [path.name for path in others if timeline._RELEASE_CAUSE in path.read_text(encoding="utf-8")]
 
