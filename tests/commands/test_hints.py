@@ -82,7 +82,7 @@ def test_permissible_speeds_name_the_key_and_the_next_command(
 ) -> None:
     from coneskin.impact.permissible_speed import speed_map
 
-    monkeypatch.setattr(speed_map, "_MASSES", (1.0, float("inf")))
+    monkeypatch.setattr(speed_map, "_CURVE_MASSES", (1.0, float("inf")))
     words = write(tmp_path)
     assert main(words) == 0
     said = shlex.split(capsys.readouterr().out.splitlines()[-1])

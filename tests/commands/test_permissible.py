@@ -29,7 +29,7 @@ by = "a test"
 
 @pytest.fixture(autouse=True)
 def _few_masses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed_map, "_MASSES", (1.0, float("inf")))
+    monkeypatch.setattr(speed_map, "_CURVE_MASSES", (1.0, float("inf")))
 
 
 def write(folder: Path, scene: str = SCENE, limits: str = LIMITS) -> list[str]:
