@@ -57,7 +57,10 @@ def parsers(command: str) -> dict[str, argparse.ArgumentParser]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_help_shows_an_example_and_exit_codes(command: str, capsys: Output) -> None:
+def test_every_help_shows_an_example_and_exit_codes(
+    command: str, capsys: Output, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # an example of design writes a file as it is parsed
     for name, parser in parsers(command).items():
         assert run(*name.split(), "--help") == 0
         text = capsys.readouterr().out
@@ -211,7 +214,7 @@ def test_a_file_that_is_not_there_or_is_a_folder_or_is_nothing(
 def test_guard_check_says_what_is_in_a_scene(tmp_path: Path, capsys: Output) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(SKIN_ONLY)
-    assert run("guard", scene, "--check", "--json") == 0
+    assert run("doctor", scene, "--check", "--json") == 0
     assert json.loads(capsys.readouterr().out) == {
         "scene": "scene.toml",
         "sensor sensor 0/0": "id 0/0 on the tube: radius 54 to 54 mm, height 434 mm, wrap 360 deg, at (0, 0, 0) mm, "
@@ -222,10 +225,10 @@ def test_guard_check_says_what_is_in_a_scene(tmp_path: Path, capsys: Output) -> 
         "monitoring": "skin silent for 50 ms or late by 50 ms or without noise for 1000 frames: a fault",
         "touches": "1",
     }
-    assert run("guard", scene, "--check") == 0
+    assert run("doctor", scene, "--check") == 0
     assert "id 0/0 on the tube" in capsys.readouterr().out
     scene.write_text(SKIN_ONLY.replace("54", "0.054"))
-    assert run("guard", scene, "--check") == 1
+    assert run("doctor", scene, "--check") == 1
     assert "2 mistakes" in capsys.readouterr().err
 
 

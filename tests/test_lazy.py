@@ -112,7 +112,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     ),
     "a scene is only looked at": (
         SERIAL_RETREAT,
-        "from coneskin.cli import main; main(['guard', {scene!r}, '--check'])",
+        "from coneskin.cli import main; main(['doctor', {scene!r}, '--check'])",
         {*LOADED},
         HEAVY
         | VIRTUAL

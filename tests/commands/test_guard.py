@@ -29,7 +29,7 @@ slow_to = 0.3
 
 def check(tmp_path, text, capsys, *words):
     (tmp_path / "scene.toml").write_text(text)
-    code = main(["guard", str(tmp_path / "scene.toml"), "--check", *words])
+    code = main(["doctor", str(tmp_path / "scene.toml"), "--check", *words])
     return code, *capsys.readouterr()
 
 
@@ -103,7 +103,7 @@ def test_when_the_place_of_a_touch_is_certain_is_listed(tmp_path, capsys, electr
 
 def test_a_binary_file_is_said_to_be_no_toml_text(tmp_path, capsys):
     (tmp_path / "photo.toml").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
-    assert main(["guard", str(tmp_path / "photo.toml"), "--check"]) == 1
+    assert main(["doctor", str(tmp_path / "photo.toml"), "--check"]) == 1
     assert "this is not a TOML text" in capsys.readouterr().err
 
 

@@ -91,6 +91,6 @@ def test_permissible_speeds_name_the_key_and_the_next_command(
     monkeypatch.chdir(tmp_path / "speeds")
     assert main([*words, "-o", "impact.toml"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert shlex.split(lines[-1])[-4:] == ["coneskin", "guard", words[1], "--check"]
+    assert shlex.split(lines[-1])[-4:] == ["coneskin", "doctor", words[1], "--check"]
     value = next(line for line in lines if "speed_limit_from" in line).split(" = ")[1]
     assert json.loads(value) == "speeds/impact.toml"  # from the scene's folder, not from where the command runs

@@ -54,7 +54,7 @@ def test_a_simulated_scene_has_all_that_a_guard_needs(here: Path, capsys: Output
         0.5 * (0.425 - item.sensor.frustum.height), abs=1e-4
     )
     assert (scene.default_reaction.kind, scene.moves_away) == ("stop", False)
-    assert main(["guard", "scene.toml", "--check"]) == 0
+    assert main(["doctor", "scene.toml", "--check"]) == 0
 
 
 def test_the_padding_is_as_thick_as_the_sheets_of_the_design(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,7 +52,7 @@ def test_it_prints_draws_and_writes_what_a_scene_takes(tmp_path: Path, capsys: p
     (tmp_path / "scene.toml").write_text(
         SCENE.replace('model = "UR5e"', 'model = "UR5e"\nspeed_limit_from = "impact.toml"'), encoding="utf-8"
     )
-    assert main(["guard", str(tmp_path / "scene.toml"), "--check"]) == 0
+    assert main(["doctor", str(tmp_path / "scene.toml"), "--check"]) == 0
     assert "permissible speeds" in capsys.readouterr().out
 
 

@@ -25,7 +25,7 @@ def ask(line: str, tmp_path: Path) -> set[str]:
 def test_commands_and_the_options_of_the_one_that_was_typed_are_offered(tmp_path: Path) -> None:
     assert ask("coneskin d", tmp_path) == {"demo", "design", "doctor"}
     offered = ask("coneskin guard scene.toml --", tmp_path)
-    assert {"--check", "--publish", "--simulated", "--duration-s"} <= offered
+    assert {"--once", "--publish", "--simulated", "--duration-s"} <= offered
     assert "--no-touches" not in offered
     assert ask("coneskin unroll --wrap", tmp_path) == {"--wrap-deg"}
 

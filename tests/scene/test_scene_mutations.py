@@ -1,4 +1,4 @@
-"""Whatever a scene file holds, ``guard --check`` lists its mistakes: never a traceback, never a long wait."""
+"""Whatever a scene file holds, ``doctor --check`` lists its mistakes: never a traceback, never a long wait."""
 
 import io
 from contextlib import redirect_stderr, redirect_stdout
@@ -23,7 +23,7 @@ def test_no_mutated_scene_gives_a_traceback(tmp_path_factory: pytest.TempPathFac
     path = tmp_path_factory.getbasetemp() / "mutated.toml"
     path.write_bytes(mutate((FULL, SKIN_ONLY, SERIAL_RETREAT)[seed % 3], Random(seed)))
     with redirect_stdout(io.StringIO()) as printed, redirect_stderr(io.StringIO()) as said:
-        code = main(["guard", str(path), "--check", *(["--json"] if seed % 2 else [])])
+        code = main(["doctor", str(path), "--check", *(["--json"] if seed % 2 else [])])
     assert code in (0, 1)
     (printed.getvalue() + said.getvalue()).encode()
     assert "\x1b" not in said.getvalue()

@@ -96,5 +96,5 @@ def test_missing_packages_are_named_together(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_check_prints_them_and_still_passes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "scene.toml").write_text(PLAIN.replace("[0, 0, 80]", "[0, 0, 0.08]"))
-    assert main(["guard", str(tmp_path / "scene.toml"), "--check"]) == 0
+    assert main(["doctor", str(tmp_path / "scene.toml"), "--check"]) == 0
     assert capsys.readouterr().err.startswith("warning: link forearm, sensor 0/0: xyz_mm = [0.0, 0.0, 0.08]")

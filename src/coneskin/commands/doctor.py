@@ -7,6 +7,7 @@ import contextlib
 import json
 import shlex
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,12 +27,15 @@ __all__ = ["add_arguments", "run"]
 _EXAMPLE = """\
 example:
   coneskin doctor scene.toml                 the skin untouched, then touched near A, B, C and D; then the arm
+  coneskin doctor scene.toml --check         read the scene, list what is in it, open and start nothing
   coneskin doctor scene.toml --no-touches    nobody touches: what untouched frames and the controller say
   coneskin doctor scene.toml --simulated     a virtual skin is touched by the command, the arm is simulated
 
 Nothing is moved, and nothing is guarded. What is not there is not tried, and said to be. Where exchanged wires can be
 mended by the scene, the change is shown and made after a "y" (--yes makes it unasked). Exit code: 0 nothing is bad, 1
-something is, or was mended: run it again.
+something is, or was mended: run it again. With --check: 0 a guard can start with this scene, 1 it has mistakes or
+lacks something. Without a valid commissioning record a guard can start, so that is 0 as well. The arm then only stops,
+and the last line says so.
 """
 _VERDICT_COLORS = {"ok": "green", "warning": "yellow", "bad": "red", "not tried": "blue"}
 
@@ -41,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EXAMPLE
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    parser.add_argument("--check", action="store_true", help="list what is in the scene; open and start nothing")
     parser.add_argument("--simulated", action="store_true", help="start a simulated controller at the scene's host")
     parser.add_argument("--no-touches", action="store_true", help="ask for no touches: the wires are not tried")
     parser.add_argument("--yes", action="store_true", help="make the changes of the scene without asking")
@@ -49,11 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Examine a scene."""
-    from coneskin.commissioning.examination.doctor import Doctor
-    from coneskin.core.finding import exit_code
     from coneskin.scene.reader import load_scene
 
     scene = load_scene(args.scene)
+    if args.check:
+        return _check(scene, args.json)
+    from coneskin.commissioning.examination.doctor import Doctor
+    from coneskin.core.finding import exit_code
 
     def tell(finding: Finding) -> None:
         if args.json:
@@ -74,6 +81,29 @@ def run(args: argparse.Namespace) -> int:
     elif not args.json:
         _say_next(args, scene, code)
     return code
+
+
+def _check(scene: Scene, as_json: bool) -> int:
+    """List what is in a scene; return 1 where a guard would refuse it."""
+    from coneskin.scene.commissioning_record import with_commissioning
+    from coneskin.scene.summary import missing_parts, summarize
+    from coneskin.scene.suspicions import suspicions
+
+    scene = with_commissioning(scene, time.time())
+    found, missing, doubts = summarize(scene), missing_parts(scene), suspicions(scene)
+    if as_json:
+        lacks = {"cannot_be_guarded_yet": missing} if missing else {}
+        print(json.dumps({**found, **lacks, **({"warnings": doubts} if doubts else {})}))
+    else:
+        width = max(map(len, found))
+        print("\n".join(f"{key:<{width}}  {value}" for key, value in found.items()))
+        if scene.commissioning and not scene.commissioning.valid:
+            print(f"the arm will only stop when it is touched; to let it move away: coneskin commission {scene.name}")
+    for line in doubts:
+        print(f"warning: {line}", file=sys.stderr)
+    for line in missing:
+        print(f"coneskin doctor: {scene.name} cannot be guarded yet: {line}", file=sys.stderr)
+    return 1 if missing else 0
 
 
 def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None:

@@ -36,14 +36,11 @@ _LINE_PAUSE = 0.3  # s without a line after which all earlier ones have been rea
 _EXAMPLE = """\
 example:
   coneskin guard scene.toml              until Ctrl-C; type "reset" and Enter after a collision
-  coneskin guard scene.toml --check      read the scene, list what is in it, start nothing
   coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm;
                                          where the scene has bodies, the arm runs into them (extra physics)
 
 Keys of a scene: docs/look-up/scene.md. Exit code: 0 nothing happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
-SIGTERM do not change it. With --check: 0 a guard can start with this scene, 1 it has mistakes or lacks something.
-Without a valid commissioning record a guard can start, so that is 0 as well; the arm then only stops, and the last line
-says so.
+SIGTERM do not change it. `coneskin doctor scene.toml --check` tells whether a guard can start with a scene.
 coneskin is not a safety-rated device; read docs/safety.md before you use it.
 """
 
@@ -53,7 +50,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EXAMPLE
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    parser.add_argument("--check", action="store_true", help="list what is in the scene, and start nothing")
     parser.add_argument(
         "--simulated",
         action="store_true",
@@ -78,13 +74,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Guard the arm of a scene, or check the scene."""
-    from coneskin.scene.commissioning_record import with_commissioning
+    """Guard the arm of a scene."""
     from coneskin.scene.reader import load_scene
 
     scene = load_scene(args.scene)
-    if args.check:
-        return _check(with_commissioning(scene, time.time()), args.json)
     from coneskin.session.event_publisher import EventPublisher
 
     with contextlib.ExitStack() as stack:
@@ -127,27 +120,6 @@ def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPub
     if session.recording and session.recording.exists() and not args.json:  # none of a guard that did not start
         print_hint(f"next: coneskin replay {shlex.quote(str(session.recording))} --events")
     return max(work.code, exit_code(session.events, scene.arm is not None))
-
-
-def _check(scene: Scene, as_json: bool) -> int:
-    """List what is in a scene; return 1 where a guard would refuse it."""
-    from coneskin.scene.summary import missing_parts, summarize
-    from coneskin.scene.suspicions import suspicions
-
-    found, missing, doubts = summarize(scene), missing_parts(scene), suspicions(scene)
-    if as_json:
-        lacks = {"cannot_be_guarded_yet": missing} if missing else {}
-        print(json.dumps({**found, **lacks, **({"warnings": doubts} if doubts else {})}))
-    else:
-        width = max(map(len, found))
-        print("\n".join(f"{key:<{width}}  {value}" for key, value in found.items()))
-        if scene.commissioning and not scene.commissioning.valid:
-            print(f"the arm will only stop when it is touched; to let it move away: coneskin commission {scene.name}")
-    for line in doubts:
-        print(f"warning: {line}", file=sys.stderr)
-    for line in missing:
-        print(f"coneskin guard: {scene.name} cannot be guarded yet: {line}", file=sys.stderr)
-    return 1 if missing else 0
 
 
 def _last_words(session: Session) -> str:

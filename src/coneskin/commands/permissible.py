@@ -126,7 +126,7 @@ def _print(found: SpeedMap, args: argparse.Namespace) -> None:
     print("A model with assumed servos and your values: measure on the real arm. No safety assessment.")
     scene = shlex.quote(str(args.scene))
     if args.output is not None:
-        print_hint(f"next, once the scene names it: coneskin guard {scene} --check")
+        print_hint(f"next, once the scene names it: coneskin doctor {scene} --check")
     else:
         limits = shlex.quote(str(args.limits))
         print_hint(f"next: coneskin permissible {scene} --limits {limits} -o impact.toml")

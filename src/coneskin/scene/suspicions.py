@@ -1,6 +1,6 @@
 """Suspicions: values of a scene that are possible, and hardly meant: another unit, a sensor beside its link.
 
-A mistake is refused by the reader; what is said here may be right, so that it is a warning of ``guard --check`` and of
+A mistake is refused by the reader; what is said here may be right, so that it is a warning of ``doctor --check`` and of
 ``doctor``. Each names the key, what it looks like, and what to write, in the unit of the file.
 """
 

@@ -31,13 +31,13 @@ def wired(keys: str) -> Scene:
 @pytest.mark.processes
 def test_a_right_skin_passes_and_the_record_is_valid(tmp_path: Path, capsys: Output) -> None:
     path = saved(tmp_path)
-    assert main(["guard", str(path), "--check"]) == 0
+    assert main(["doctor", str(path), "--check"]) == 0
     assert "NOT VALID: the arm only stops; there is no commissioning record" in capsys.readouterr().out
     assert main(["commission", str(path), "--simulated", "--by", "a test", "--json"]) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [line["kind"] for line in lines if line["kind"] != "reading"] == ["mark", "passed"] * 5 + ["sensor", "end"]
     assert lines[-1]["passed"] is True
-    assert main(["guard", str(path), "--check", "--json"]) == 0
+    assert main(["doctor", str(path), "--check", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["commissioning"].endswith("by a test, 5 marks")
 
 

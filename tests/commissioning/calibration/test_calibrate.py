@@ -47,7 +47,7 @@ def test_unknown_leads_are_found_and_taken_off(tmp_path: Path, capsys: Output) -
     u, phi = sensor.place_map.apply(1e-3 * touch.read_u_mm, math.radians(touch.read_phi_deg))
     off = math.hypot(1e3 * u - touch.u_mm, 37.6 * (phi - math.radians(touch.phi_deg)))
     assert off < 0.3
-    assert main(["guard", scene, "--check"]) == 0
+    assert main(["doctor", scene, "--check"]) == 0
     assert "device-7.json of" in capsys.readouterr().out
 
 
