@@ -31,17 +31,17 @@ __all__ = ["MAP_LIMITS", "ForceTable", "PlaceMap", "map_terms"]
 
 #: largest magnitude of each number of a fraction; an offset or a gain beyond it is another sheet, or another wiring
 MAP_LIMITS = (0.05, 0.05, 0.1, 0.1, 0.1)
-_TWELFTH = 1.0 / 12.0
-_TURN = 2.0 * math.pi  # rad
-_ITERATIONS = 60  # of the inverse; each leaves at most a third of the error
-_CLOSE = 1e-15
+_SQUARE_MEAN = 1.0 / 12.0
+_FULL_TURN = 2.0 * math.pi  # rad
+_MAX_ITERATIONS = 60  # of the inverse; each leaves at most a third of the error
+_INVERSE_TOLERANCE = 1e-15
 _log1p, _expm1 = math.log1p, math.expm1
 
 
 def map_terms(x: float, y: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the terms that the numbers of a map belong to at the fractions x and y: those of x', then those of y'."""
     c, d = x - 0.5, y - 0.5
-    bends = c * d, c * c - _TWELFTH, d * d - _TWELFTH
+    bends = c * d, c * c - _SQUARE_MEAN, d * d - _SQUARE_MEAN
     return (1.0, c, *bends), (1.0, d, *bends)
 
 
@@ -81,9 +81,9 @@ class PlaceMap:
         (a0, a1, a2, a3, a4), (b0, b1, b2, b3, b4) = self.along, self.around
         growth = (cone.radius2 - cone.radius1) / (cone.radius1 * cone.slant)
         log_ratio = math.log1p(growth * cone.slant)
-        live = (growth, log_ratio, cone.slant, cone.wrap, a0 - _TWELFTH * (a3 + a4), a1, a2, a3, a4)
+        live = (growth, log_ratio, cone.slant, cone.wrap, a0 - _SQUARE_MEAN * (a3 + a4), a1, a2, a3, a4)
         object.__setattr__(self, "_scale", LogScale(cone.radius1, cone.radius2, cone.slant))
-        object.__setattr__(self, "_live", (*live, b0 - _TWELFTH * (b3 + b4), b1, b2, b3, b4))
+        object.__setattr__(self, "_live", (*live, b0 - _SQUARE_MEAN * (b3 + b4), b1, b2, b3, b4))
 
     def apply(self, u: float, phi: float) -> tuple[float, float]:
         """Return where a touch is that is read at a place.
@@ -104,7 +104,7 @@ class PlaceMap:
         if not 0.0 <= u <= slant:
             u = 0.0 if u < 0.0 else slant
         if not 0.0 <= phi <= wrap:
-            phi = phi % wrap if wrap == _TURN else 0.0 if phi < 0.0 else wrap
+            phi = phi % wrap if wrap == _FULL_TURN else 0.0 if phi < 0.0 else wrap
         return u, phi
 
     def jacobian(self, u: float, phi: float) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -116,7 +116,7 @@ class PlaceMap:
         x, y = scale.fraction(u), phi / wrap
         c, d = x - 0.5, y - 0.5
         (a0, a1, a2, a3, a4), (_, b1, b2, b3, b4) = self.along, self.around
-        moved = x + a0 + a1 * c + a2 * c * d + a3 * (c * c - _TWELFTH) + a4 * (d * d - _TWELFTH)
+        moved = x + a0 + a1 * c + a2 * c * d + a3 * (c * c - _SQUARE_MEAN) + a4 * (d * d - _SQUARE_MEAN)
         before = scale.slope(u)
         after = scale.slope(scale.distance(moved))
         return (
@@ -137,13 +137,13 @@ class PlaceMap:
         wrap, scale = self.frustum.wrap, self._scale
         x0, y0 = scale.fraction(u), phi / wrap
         x, y = x0, y0
-        for _ in range(_ITERATIONS):  # a contraction: rows of the correction's derivatives sum to at most 0.35
+        for _ in range(_MAX_ITERATIONS):  # a contraction: rows of the correction's derivatives sum to at most 0.35
             for_x, for_y = map_terms(x, y)
             new_x = x0 - sum(a * term for a, term in zip(self.along, for_x, strict=True))
             new_y = y0 - sum(b * term for b, term in zip(self.around, for_y, strict=True))
             step = max(abs(new_x - x), abs(new_y - y))
             x, y = new_x, new_y
-            if step < _CLOSE:
+            if step < _INVERSE_TOLERANCE:
                 break
         return scale.distance(x), wrap * y
 

@@ -198,18 +198,18 @@ class Thresholds:
 #: presses on both sides of the seam raise the larger current to 1.5 times, the smaller one to 2.4 times.
 HEADROOM = 2.2
 SENSE_GAIN = 50.0  #: voltage gain of the amplifier between the shunt and the converter
-_E24 = (
+_E24_SERIES = (
     *(1.0, 1.1, 1.2, 1.3, 1.5, 1.6, 1.8, 2.0, 2.2, 2.4, 2.7, 3.0),
     *(3.3, 3.6, 3.9, 4.3, 4.7, 5.1, 5.6, 6.2, 6.8, 7.5, 8.2, 9.1),
 )
-_E96 = tuple(round(10.0 ** (k / 96.0), 2) for k in range(96))  # IEC 60063; a shunt has 1 %
-_SUPPLIES = (4.096, 3.0, 2.5, 2.048, 1.25, 1.024, 0.512)  # V; voltage references
+_E96_SERIES = tuple(round(10.0 ** (k / 96.0), 2) for k in range(96))  # IEC 60063; a shunt has 1 %
+_SUPPLY_REFERENCES = (4.096, 3.0, 2.5, 2.048, 1.25, 1.024, 0.512)  # V; voltage references
 _SUPPLY_SHARE = 0.8  # of the converter's range that the supply may take: its tolerance of 10 % stays inside
 _MAX_DRIVE = 0.05  # A; what an operational amplifier drives
 _MIN_COUNTS = 100.0  # of the smaller drive current
-_MOST_BITS = 16
-_LEAST_PULLDOWN = 10e3  # ohm
-_MOST_PULLDOWN = 100e3  # ohm; above it, a leak of a few hundred kilo-ohms looks like a touch
+_MAX_BITS = 16
+_MIN_PULLDOWN = 10e3  # ohm
+_MAX_PULLDOWN = 100e3  # ohm; above it, a leak of a few hundred kilo-ohms looks like a touch
 _PULLDOWN_RATIO = 2.0  # over the larger sheet resistance: a guide behind the whole sheet still sees two thirds
 
 
@@ -257,7 +257,7 @@ def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElect
     loops = (radial_ohms + leads.a + leads.b, angular_ohms + leads.c + leads.d)
     supply = given.supply_volts
     if supply is None:
-        fitting = [volts for volts in _SUPPLIES if volts <= _SUPPLY_SHARE * given.adc_volts] or [
+        fitting = [volts for volts in _SUPPLY_REFERENCES if volts <= _SUPPLY_SHARE * given.adc_volts] or [
             _SUPPLY_SHARE * given.adc_volts
         ]
         supply = next((volts for volts in fitting if volts <= _MAX_DRIVE * min(loops)), fitting[-1])
@@ -268,12 +268,12 @@ def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElect
     bits = given.adc_bits
     if bits is None:
         bits = 12
-        while bits < _MOST_BITS and smallest / full_scale * ((1 << bits) - 1) < _MIN_COUNTS:
+        while bits < _MAX_BITS and smallest / full_scale * ((1 << bits) - 1) < _MIN_COUNTS:
             bits += 2
     pulldown = given.pulldown_ohms
     if pulldown is None:
         needed = _above(_PULLDOWN_RATIO * max(radial_ohms, angular_ohms))
-        pulldown = min(max(needed, _LEAST_PULLDOWN), _MOST_PULLDOWN, 0.1 * given.input_ohms)
+        pulldown = min(max(needed, _MIN_PULLDOWN), _MAX_PULLDOWN, 0.1 * given.input_ohms)
     return Electronics(
         supply_volts=supply,
         adc_volts=given.adc_volts,
@@ -297,10 +297,10 @@ def _decade(ohms: float) -> float:
 def _below(ohms: float) -> float:
     """Return the largest value of the E96 series that is not above a resistance."""
     decade = _decade(ohms)
-    return max((value for value in _E96 if value * decade <= ohms), default=1.0) * decade
+    return max((value for value in _E96_SERIES if value * decade <= ohms), default=1.0) * decade
 
 
 def _above(ohms: float) -> float:
     """Return the smallest value of the E24 series that is not below a resistance."""
     decade = _decade(ohms)
-    return min((value for value in _E24 if value * decade >= ohms), default=10.0) * decade
+    return min((value for value in _E24_SERIES if value * decade >= ohms), default=10.0) * decade

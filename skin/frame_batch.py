@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 __all__ = ["FrameBatch", "find_frames"]
 
 #: offset of each 16-bit field in a frame [bytes]; the shortest has one supply for all phases
-_OFFSETS = {
+_FIELD_OFFSETS = {
     **{"device": 4, "sequence": 8, "touch_c": 14, "touch_d": 16, "touch_current": 18},
     **{"radial_c": 20, "radial_d": 22, "radial_current": 24},
     **{"angular_a": 26, "angular_b": 28, "angular_current": 30, "touch_supply": 32},
 }
-_SUPPLIES = {"radial_supply": 34, "angular_supply": 36}  # of the longer ones
+_SUPPLY_OFFSETS = {"radial_supply": 34, "angular_supply": 36}  # of the longer ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +63,11 @@ class FrameBatch:
         """Return a 16-bit field of ``wire.Frame``, such as ``touch_c`` or ``device``."""
         import numpy as np
 
-        if name in _SUPPLIES:
-            return self._word(np.where(self.lengths == FRAME_LENGTH, _OFFSETS["touch_supply"], _SUPPLIES[name]))
-        return self._word(_OFFSETS[name])
+        if name in _SUPPLY_OFFSETS:
+            return self._word(
+                np.where(self.lengths == FRAME_LENGTH, _FIELD_OFFSETS["touch_supply"], _SUPPLY_OFFSETS[name])
+            )
+        return self._word(_FIELD_OFFSETS[name])
 
     def of(self, device: int, sensor: int) -> NDArray[np.bool_]:
         """Return which frames are those of a sensor."""

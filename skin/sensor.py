@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Bounds", "Sensor", "sheet_resistances"]
 
-_MATCHED = Electronics()  # this very object: to be chosen
+_MATCHED_ELECTRONICS = Electronics()  # this very object: to be chosen
 _MIN_NOMINAL_COUNTS = 16  # counts; half of it, the limit for an open wire, is well above noise
 
 
@@ -95,7 +95,7 @@ class Sensor:
 
     frustum: Frustum
     sensor_id: int = 0
-    electronics: Electronics = _MATCHED
+    electronics: Electronics = _MATCHED_ELECTRONICS
     polarity: Polarity = field(default_factory=Polarity)
     thresholds: Thresholds = field(default_factory=Thresholds)
     device_id: int = 0
@@ -128,7 +128,7 @@ class Sensor:
         put(self, "name", self.name or f"sensor {self.device_id}/{self.sensor_id}")
         put(self, "_from_end1", LogScale(cone.radius1, cone.radius2, cone.slant))
         put(self, "_from_end2", LogScale(cone.radius2, cone.radius1, cone.slant))
-        if self.electronics is _MATCHED:
+        if self.electronics is _MATCHED_ELECTRONICS:
             put(self, "electronics", match_electronics(self.radial_ohms, self.angular_ohms))
         put(self, "b_positive", self.polarity.radial == "B")
         put(self, "c_positive", self.polarity.angular == "C")

@@ -83,7 +83,7 @@ class LogScale:
         return self._mean / ((s - distance) + distance * self._ratio)
 
 
-_DIGITS = 9.0  # natural logarithm of the precision at which the series in exp(-Sigma) ends
+_LOG_PRECISION = 9.0  # natural logarithm of the precision at which the series in exp(-Sigma) ends
 
 
 class RobinFunction:
@@ -106,7 +106,7 @@ class RobinFunction:
         self._sigma = math.pi * max(length, breadth) / short
         across, along = (lower_ohms, upper_ohms) if self._along_x else (upper_ohms, lower_ohms)
         self._across, self._along = across / math.pi, along / math.pi
-        count = next(n for n in range(16) if (2 * n + 1) * self._sigma > _DIGITS)
+        count = next(n for n in range(16) if (2 * n + 1) * self._sigma > _LOG_PRECISION)
         self._powers = tuple(math.exp(-2.0 * n * self._sigma) for n in range(1, count + 1))
         self._inner = math.log(self._scale) + 2.0 * sum(math.log1p(-power) for power in self._powers)
 

@@ -106,7 +106,7 @@ _SUPPLY_AT: Final = Frame._fields.index("touch_supply")
 _DRIVEN_AT: Final = Frame._fields.index("driven")
 _ONE_SUPPLY, _THREE_SUPPLIES, _WITH_DRIVEN = map(_layout, FRAME_LENGTHS)
 DRIVEN_HEAD: Final = _WITH_DRIVEN.header  #: first bytes of a frame with the driven potentials
-_LAYOUTS: Final = {layout.header: layout for layout in (_ONE_SUPPLY, _THREE_SUPPLIES, _WITH_DRIVEN)}
+_LAYOUT_BY_HEADER: Final = {layout.header: layout for layout in (_ONE_SUPPLY, _THREE_SUPPLIES, _WITH_DRIVEN)}
 
 
 def encode(frame: Frame) -> bytes:
@@ -151,7 +151,7 @@ def frame_at(data: bytes, offset: int = 0) -> Frame | None:
     Returns:
         the frame, or None if no valid frame starts there.
     """
-    layout = _LAYOUTS.get(data[offset : offset + 4])
+    layout = _LAYOUT_BY_HEADER.get(data[offset : offset + 4])
     if layout is None:
         return None
     piece = data[offset : offset + layout.length]
@@ -218,7 +218,7 @@ class FrameDecoder:
         Returns:
             the frames that are complete now, in their order.
         """
-        layout = _LAYOUTS.get(data[:4])
+        layout = _LAYOUT_BY_HEADER.get(data[:4])
         if layout is not None and len(data) == layout.length and not self._rest and not crc_hqx(data, 0):
             self.frames += 1
             return [_read(layout, data, 0)]
@@ -247,7 +247,7 @@ class FrameDecoder:
             if end - at < 4:
                 break
             version, length = data[at + 2], data[at + 3]
-            layout = _LAYOUTS.get(data[at : at + 4])
+            layout = _LAYOUT_BY_HEADER.get(data[at : at + 4])
             plausible = layout is not None if version == VERSION else _MIN_LENGTH <= length <= MAX_LENGTH
             if plausible and end - at < length:
                 break

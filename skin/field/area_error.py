@@ -24,7 +24,6 @@ floats (`skin/sheet_functions.py`).
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -63,19 +62,8 @@ class Robin:
         count = next(n for n in range(16) if (2 * n + 1) * strip.sigma > 39.0)
         self._powers = tuple(math.exp(-2.0 * n * strip.sigma) for n in range(1, count + 1))
 
-    def gradient(self, x: float, x_far: float, y: float, y_far: float) -> tuple[float, float]:
-        """Return (d gamma/dx, d gamma/dy) [ohm/m] at distances from the four edges of the rectangle [m]."""
-        strip = self._strip
-        s, s_far, p, p_far = (x, x_far, y, y_far) if strip.along_x else (y, y_far, x, x_far)
-        flip_s, flip_p = s > s_far, p > p_far
-        k = strip.scale
-        s, p = k * (s_far if flip_s else s), k * (p_far if flip_p else p)
-        along, across = self._quarter(s, cmath.exp(-2.0 * complex(s, p)), math.exp(-2.0 * s), cmath.exp(-2j * p))
-        along, across = k * (-along if flip_s else along), k * (-across if flip_p else across)
-        return (along, across) if strip.along_x else (across, along)
-
     def gradients(self, sheet: SectorSheet, u: ArrayLike, phi: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the same for arrays of (u, phi)."""
+        """Return (d gamma/dx, d gamma/dy) [ohm/m] at (u, phi) [m, rad], arrays too."""
         x, x_far = sheet.along(u)
         y, y_far = sheet.across(phi)
         strip = self._strip

@@ -39,7 +39,7 @@ __all__ = [
 ELECTRODES = ("A", "B", "C", "D")
 
 # h = (h0, hx, hy) of the potentials of (A, B, C, D); its transpose gives the currents into the sensor.
-_H = np.array([[0.0, 1.0, 0.0, -1.0], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
+_DIFFERENCE_MATRIX = np.array([[0.0, 1.0, 0.0, -1.0], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +97,7 @@ def admittance(coupling: Coupling, sheet: SectorSheet, upper_resistance: float, 
     Symmetric exactly; rows sum to zero to rounding of their entries. Where contacts are so weak that they vanish
     beside the sheets, `fourport.solve_phase` is more accurate than this matrix, because it never adds the two.
     """
-    y = _H.T @ coupling.matrix() @ _H
+    y = _DIFFERENCE_MATRIX.T @ coupling.matrix() @ _DIFFERENCE_MATRIX
     y = 0.5 * (y + y.transpose(0, 2, 1))
     upper = sheet.breadth / (upper_resistance * sheet.length)
     lower = sheet.length / (lower_resistance * sheet.breadth)

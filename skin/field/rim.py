@@ -31,8 +31,8 @@ from .sheet import SectorSheet
 
 __all__ = ["RimPoints", "log_weights", "near_apex", "solve_rims"]
 
-_FACTOR = 4.0  # from one scale to the next
-_SMALLEST = 1e-9  # scale, in radii; nearer than that a rim counts as touching
+_SCALE_FACTOR = 4.0  # from one scale to the next
+_MIN_SCALE = 1e-9  # scale, in radii; nearer than that a rim counts as touching
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,9 +91,9 @@ def _maps(sheet: SectorSheet, discs: Discs, i: int) -> list[tuple[float, float]]
     out = []
     for gap, at in near:
         scale = 0.5
-        while gap < 2.0 * scale and scale > _SMALLEST:
+        while gap < 2.0 * scale and scale > _MIN_SCALE:
             out.append((1.0 - scale, at))
-            scale /= _FACTOR
+            scale /= _SCALE_FACTOR
     return out
 
 
@@ -135,10 +135,10 @@ def log_weights(n: int) -> Floats:
     return np.asarray(row[(np.arange(n)[:, None] - np.arange(n)[None, :]) % n])
 
 
-_DENSITIES = (16, 24, 36, 54)  # points for each scale; from change to change the error's rest is estimated
-_MOST_POINTS = 2400  # unknowns, beyond which a solution takes more than seconds
+_POINT_DENSITIES = (16, 24, 36, 54)  # points for each scale; from change to change the error's rest is estimated
+_MAX_POINTS = 2400  # unknowns, beyond which a solution takes more than seconds
 _SERIES_BELOW = 2.0  # kr below which the Bessel functions' small parts come from their series
-_WINDOW = 8.0  # kr beyond which the logarithm of K_0 is no longer split off: K_0 is smooth there, and I_0 large
+_LOGARITHM_WINDOW = 8.0  # kr beyond which the logarithm of K_0 is not split off: K_0 is smooth there, and I_0 large
 
 
 def near_apex(sheet: SectorSheet, discs: Discs) -> bool:
@@ -172,7 +172,7 @@ def solve_rims(
     )
     x, y = np.array([sheet.along(discs.u)[0].mean() / sheet.length]), np.array([(discs.phi / sheet.wrap).mean()])
     before = math.inf
-    for density in _DENSITIES:
+    for density in _POINT_DENSITIES:
         w = _solve(sheet, upper_resistance, lower_resistance, discs, density)
         if w is None:
             break
@@ -205,7 +205,7 @@ def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density
     density *= math.ceil(max(1.0, float(decay.max()) / 3.0))
     points = RimPoints.of(sheet, strip, discs, density)
     n = points.t.size
-    if n * k > _MOST_POINTS:
+    if n * k > _MAX_POINTS:
         return None
     weights = log_weights(n)
     matrix, charges, wanted = np.empty((k, n, k, n)), [], np.empty((k, n, 3))
@@ -322,7 +322,7 @@ def _small_parts(x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         far = x[large]
         r0[large] = special.k0(far) + log[large]
         r1[large] = far * special.k1(far) - 1.0
-        window = np.exp(-((far / _WINDOW) ** 12)) if float(far.max()) > 2.0 * _WINDOW else 1.0
+        window = np.exp(-((far / _LOGARITHM_WINDOW) ** 12)) if float(far.max()) > 2.0 * _LOGARITHM_WINDOW else 1.0
         i0[large] = special.ive(0, far) * np.exp(np.minimum(far, 600.0)) * window - 1.0
         i1[large] = far * special.ive(1, far) * np.exp(np.minimum(far, 600.0)) * window
     return i0, i1, r0, r1

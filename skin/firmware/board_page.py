@@ -105,7 +105,7 @@ def _settings(circuit: BoardCircuit) -> list[str]:
 _WIDTH, _HEIGHT = 1080, 840
 _BOARD, _SWITCH, _RAIL, _SHEET = 230, 430, 560, 880  # x of the board's edge, the switches, the rail, the electrodes
 _FIRST, _ROW = 230, 150  # y of electrode A, and from one to the next
-_STYLE = (
+_SVG_STYLE = (
     "text{font:14px sans-serif;fill:#222}.small{font-size:12px;fill:#555}.title{font-size:18px;font-weight:bold}"
     "path,rect,circle{fill:none;stroke:#222;stroke-width:1.5}.part{fill:#fff}.rail{stroke:#b02a1a;stroke-width:2.5}"
     ".sense{stroke:#1a5cb0}.dot{fill:#222}.body{fill:#eef3f6}"
@@ -117,7 +117,7 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
     board, parts = circuit.board, circuit.sensor.electronics
     out = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img">',
-        f"<style>{_STYLE}</style>",
+        f"<style>{_SVG_STYLE}</style>",
         f'<rect width="{_WIDTH}" height="{_HEIGHT}" style="fill:#fff;stroke:none"/>',
         _text(30, 36, f"{circuit.facts.title} and {circuit.sensor.name}", "title"),
         _text(30, 58, "red: rail; blue: wires that only read, each to its electrode; all grounds are joined", "small"),

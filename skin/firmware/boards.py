@@ -84,11 +84,11 @@ BOARD_FACTS: dict[str, BoardFacts] = {
 }
 
 
-_ROW = re.compile(r"^const Board BOARD = \{(.*)\};$", re.MULTILINE)
-_CONVERTER = re.compile(r'^const Converter CONVERTER = \{"(ads\d+)", (.*)\};$', re.MULTILINE)
-_CHOICE = "#define CONESKIN_ADS "
-_HEADER = Path("coneskin") / "coneskin_board.h"
-_WORD = re.compile(r'"([^"]*)"|\{([^{}]*)\}|([^,{}\s]+)')
+_BOARD_PATTERN = re.compile(r"^const Board BOARD = \{(.*)\};$", re.MULTILINE)
+_CONVERTER_PATTERN = re.compile(r'^const Converter CONVERTER = \{"(ads\d+)", (.*)\};$', re.MULTILINE)
+_CONVERTER_CHOICE = "#define CONESKIN_ADS "
+_HEADER_PATH = Path("coneskin") / "coneskin_board.h"
+_WORD_PATTERN = re.compile(r'"([^"]*)"|\{([^{}]*)\}|([^,{}\s]+)')
 _NO_PIN = "NONE"
 
 
@@ -135,29 +135,29 @@ def firmware_folder() -> Path:
 
 def boards() -> dict[str, Board]:
     """Return the rows of the table by name, in its order."""
-    text = (firmware_folder() / _HEADER).read_text(encoding="utf-8")
-    return {board.name: board for board in map(_board, _ROW.findall(text))}
+    text = (firmware_folder() / _HEADER_PATH).read_text(encoding="utf-8")
+    return {board.name: board for board in map(_board, _BOARD_PATTERN.findall(text))}
 
 
 def converters() -> dict[str, Converter]:
     """Return the rows of the table of converters by name, in its order."""
-    text = (firmware_folder() / _HEADER).read_text(encoding="utf-8")
+    text = (firmware_folder() / _HEADER_PATH).read_text(encoding="utf-8")
     found = {}
-    for name, row in _CONVERTER.findall(text):
-        bits, millivolts, _, _, _, extra_bits, _, rate, permille, _ = (w[1] or w[2] for w in _WORD.findall(row))
+    for name, row in _CONVERTER_PATTERN.findall(text):
+        bits, millivolts, _, _, _, extra_bits, _, rate, permille, _ = (w[1] or w[2] for w in _WORD_PATTERN.findall(row))
         found[name] = Converter(name, int(bits), 1e-3 * int(millivolts), int(extra_bits), int(rate), int(permille))
     return found
 
 
 def board_header(converter: str = BUILT_IN) -> bytes:
     """Return the sketch's header with the tables, set to a converter."""
-    data = (firmware_folder() / _HEADER).read_bytes()
+    data = (firmware_folder() / _HEADER_PATH).read_bytes()
     number = converter.removeprefix("ads") if converter != BUILT_IN else "0"
-    return data.replace(f"{_CHOICE}0\n".encode(), f"{_CHOICE}{number}\n".encode())
+    return data.replace(f"{_CONVERTER_CHOICE}0\n".encode(), f"{_CONVERTER_CHOICE}{number}\n".encode())
 
 
 def _board(row: str) -> Board:
-    words = [listed or quoted or word for quoted, listed, word in _WORD.findall(row)]
+    words = [listed or quoted or word for quoted, listed, word in _WORD_PATTERN.findall(row)]
     name, bits, baud, sense, current, supply, rail, ground, pull_down, select, common = words
     return Board(
         name=name,

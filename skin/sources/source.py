@@ -69,11 +69,11 @@ class Source(Openable, Protocol):
         ...
 
 
-_PERIOD = 0.5  # s between two attempts
-_ATTEMPTS = 1200  # ten minutes; after them somebody has to look at it anyway
+_ATTEMPT_PERIOD = 0.5  # s between two attempts
+_MAX_ATTEMPTS = 1200  # ten minutes; after them somebody has to look at it anyway
 
 
-def open_again(source: Source, wait: Callable[[float], bool], attempts: int = _ATTEMPTS) -> bool:
+def open_again(source: Source, wait: Callable[[float], bool], attempts: int = _MAX_ATTEMPTS) -> bool:
     """Close a source and open it, again and again; tell whether it is open.
 
     Args:
@@ -83,7 +83,7 @@ def open_again(source: Source, wait: Callable[[float], bool], attempts: int = _A
     """
     source.close()
     for _ in range(attempts):
-        if wait(_PERIOD):
+        if wait(_ATTEMPT_PERIOD):
             return False
         try:
             source.open()

@@ -18,7 +18,7 @@ from .source import Source
 
 __all__ = ["FrameBoundary", "SourceGroup"]
 
-_POLL = 0.001  # s for each source in turn, where there is nothing to wait on for all of them
+_TURN_TIME = 0.001  # s for each source in turn, where there is nothing to wait on for all of them
 
 
 class FrameBoundary:
@@ -134,7 +134,7 @@ class SourceGroup(Source):
         )
 
     def _read_in_turn(self) -> bytes:
-        return b"".join(self._read_one(source, _POLL) for source in self._sources)
+        return b"".join(self._read_one(source, _TURN_TIME) for source in self._sources)
 
     def _read_one(self, source: Source, timeout: float) -> bytes:
         try:

@@ -30,8 +30,8 @@ __all__ = [
 
 Matrix = tuple[tuple[float, ...], ...]
 _A, _B, _C, _D = range(4)
-_TERMINALS = "ABCD"
-_RAILS = ("ground", "supply", "rail")
+_TERMINAL_NAMES = "ABCD"
+_RAIL_NAMES = ("ground", "supply", "rail")
 _SHORT_CONDUCTANCE = 10.0  # S; a solid metallic short, 0.1 ohm
 
 
@@ -78,10 +78,12 @@ class WiringFaults:
 
     def __post_init__(self) -> None:
         for name in self.opened:
-            if name not in tuple(_TERMINALS):
+            if name not in tuple(_TERMINAL_NAMES):
                 raise SensorError(f"an open wire must be one of A, B, C, D, got {name!r}")
         for pair in self.shorts:
-            if not (len(pair) == 2 and pair[0] in tuple(_TERMINALS) and pair[1] in (*_TERMINALS, *_RAILS)):
+            if not (
+                len(pair) == 2 and pair[0] in tuple(_TERMINAL_NAMES) and pair[1] in (*_TERMINAL_NAMES, *_RAIL_NAMES)
+            ):
                 raise SensorError(
                     "a short must join one of A, B, C, D with another of them, with ground, supply or rail, "
                     f"got {'-'.join(pair)!r}"
@@ -167,16 +169,16 @@ def _phase(
     loads = {"pulldown": parts.pulldown_ohms, "input": parts.input_ohms, "supply": 0.0, "ground": 0.0}
     feeds = [0.0] * 4
     for k, terminal in enumerate(terminals):
-        feeds[k] = 0.0 if _TERMINALS[k] in wiring.opened else 1.0 / (parts.lead_ohms[k] + loads[terminal])
+        feeds[k] = 0.0 if _TERMINAL_NAMES[k] in wiring.opened else 1.0 / (parts.lead_ohms[k] + loads[terminal])
         matrix[k][k] += feeds[k] + 1e-15  # keeps a sheet that has lost all of its wires at ground
         sources[k] += feeds[k] * parts.supply_volts if terminal == "supply" else 0.0
     for first, second in wiring.shorts:
-        j = _TERMINALS.index(first)
+        j = _TERMINAL_NAMES.index(first)
         matrix[j][j] += _SHORT_CONDUCTANCE
         if second in ("supply", "rail"):
             sources[j] += _SHORT_CONDUCTANCE * parts.supply_volts
         elif second != "ground":
-            k = _TERMINALS.index(second)
+            k = _TERMINAL_NAMES.index(second)
             matrix[k][k] += _SHORT_CONDUCTANCE
             matrix[j][k] -= _SHORT_CONDUCTANCE
             matrix[k][j] -= _SHORT_CONDUCTANCE
@@ -185,7 +187,7 @@ def _phase(
         (parts.supply_volts - at[k]) * feeds[k] for k, terminal in enumerate(terminals) if terminal == "supply"
     )
     current += sum(
-        (parts.supply_volts - at[_TERMINALS.index(first)]) * _SHORT_CONDUCTANCE
+        (parts.supply_volts - at[_TERMINAL_NAMES.index(first)]) * _SHORT_CONDUCTANCE
         for first, second in wiring.shorts
         if second == "rail"
     )
@@ -220,8 +222,8 @@ def solve(matrix: list[list[float]], right: Iterable[float]) -> list[float]:
     return x
 
 
-_DRIVEN = DrivenPotentials._fields
-_ALWAYS = tuple(name for name in ConverterInputs._fields if name not in _DRIVEN)
+_DRIVEN_NAMES = DrivenPotentials._fields
+_COMMON_NAMES = tuple(name for name in ConverterInputs._fields if name not in _DRIVEN_NAMES)
 
 
 def frame_of(head: tuple[int, int, int, int, int, int], counts: Mapping[str, int]) -> Frame:
@@ -231,13 +233,13 @@ def frame_of(head: tuple[int, int, int, int, int, int], counts: Mapping[str, int
         head: length, device, sensor, status, sequence, clock.
         counts: by the names of ConverterInputs; without the driven potentials where the frame carries none.
     """
-    driven = DrivenPotentials._make(counts[name] for name in _DRIVEN) if _DRIVEN[0] in counts else None
-    return Frame._make((*head, *(counts[name] for name in _ALWAYS), driven))
+    driven = DrivenPotentials._make(counts[name] for name in _DRIVEN_NAMES) if _DRIVEN_NAMES[0] in counts else None
+    return Frame._make((*head, *(counts[name] for name in _COMMON_NAMES), driven))
 
 
 def counts_of(frame: Frame) -> dict[str, int]:
     """Return the readings that a frame carries."""
-    counts = {name: getattr(frame, name) for name in _ALWAYS}
+    counts = {name: getattr(frame, name) for name in _COMMON_NAMES}
     return counts if frame.driven is None else counts | frame.driven._asdict()
 
 

@@ -81,13 +81,14 @@ class FaultInjection:
             value = getattr(self, each.name)
             if each.name.endswith(("_every", "_after", "_frames")) and value is not None and not value >= 0:
                 raise SensorError(f"faults.{each.name} must not be negative, got {value!r}")
-        if self.stuck_channel not in (*_CHANNELS, "supply", "all"):
+        if self.stuck_channel not in (*_CHANNEL_NAMES, "supply", "all"):
             raise SensorError(
-                f"faults.stuck_channel must be one of {', '.join(_CHANNELS)}, supply, all, got {self.stuck_channel!r}"
+                f"faults.stuck_channel must be one of {', '.join(_CHANNEL_NAMES)}, supply, all, "
+                f"got {self.stuck_channel!r}"
             )
 
-        if self.gain_of not in _INPUTS:
-            raise SensorError(f"faults.gain_of must be one of {', '.join(_INPUTS)}, got {self.gain_of!r}")
+        if self.gain_of not in _INPUT_READINGS:
+            raise SensorError(f"faults.gain_of must be one of {', '.join(_INPUT_READINGS)}, got {self.gain_of!r}")
         if not 0.0 <= self.gain <= 10.0:
             raise SensorError(f"faults.gain must be from 0 to 10, got {self.gain!r}")
 
@@ -96,9 +97,9 @@ class FaultInjection:
         return self.wiring if _from(self.wiring_after, index) else WiringFaults()
 
 
-_CHANNELS = ConverterInputs._fields
+_CHANNEL_NAMES = ConverterInputs._fields
 #: Readings of an input of the converter, by their names.
-_INPUTS = {
+_INPUT_READINGS = {
     "A": ("angular_a",),
     "B": ("angular_b",),
     "C": ("touch_c", "radial_c"),
@@ -162,7 +163,7 @@ class FaultyLine:
             frame = with_counts(frame, dict.fromkeys(self._stuck_channels(frame), faults.saturate_count))
         if _from(faults.gain_after, index):
             counts = counts_of(frame)
-            spoilt = {name: min(round(faults.gain * counts[name]), 0xFFFF) for name in _INPUTS[faults.gain_of]}
+            spoilt = {name: min(round(faults.gain * counts[name]), 0xFFFF) for name in _INPUT_READINGS[faults.gain_of]}
             frame = with_counts(frame, spoilt)
         if _from(faults.status_after, index):
             frame = frame._replace(status=frame.status | faults.status)

@@ -18,7 +18,7 @@ from .circuit import ContactModel, LayerContact, Matrix
 __all__ = ["RIGHT_WIRES", "ResistorLadder", "RewiredSheets", "reorder", "wire_order"]
 
 _A, _B, _C, _D = range(4)
-_LEAST_PART = 1e-6  # part of a sheet between two nodes, so that nodes may coincide
+_MIN_PART = 1e-6  # part of a sheet between two nodes, so that nodes may coincide
 
 
 class ResistorLadder:
@@ -65,7 +65,7 @@ class ResistorLadder:
         for ladder, ohms in ((along, sensor.radial_ohms), (around, sensor.angular_ohms)):
             ladder.sort()
             for (start, j), (stop, k) in pairwise(ladder):
-                _join(y, j, k, 1.0 / (ohms * max(stop - start, _LEAST_PART)))
+                _join(y, j, k, 1.0 / (ohms * max(stop - start, _MIN_PART)))
         for node in range(size - 1, 3, -1):  # star-mesh: leave the inner nodes out one by one
             _eliminate(y, node)
         return tuple(tuple(row[:4]) for row in y[:4])

@@ -20,9 +20,9 @@ from .ladder import ResistorLadder
 
 __all__ = ["PlaceFrames"]
 
-_NOISE = 0.5  # counts; a reading without noise would be STUCK
-_MOST = 0.97  # level; the layers are never joined without any resistance
-_KEPT = 64  # places whose readings are kept
+_NOISE_COUNTS = 0.5  # counts; a reading without noise would be STUCK
+_MAX_LEVEL = 0.97  # level; the layers are never joined without any resistance
+_CACHE_SIZE = 64  # places whose readings are kept
 
 
 class PlaceFrames:
@@ -61,11 +61,13 @@ class PlaceFrames:
         if not (math.isfinite(time) and time >= 0.0):
             raise SensorError(f"the time of a frame must be finite and not negative, got {time!r} s")
         sensor, parts = self._sensor, self._sensor.electronics
-        volts = self._read(min(level, _MOST), u, phi)
+        volts = self._read(min(level, _MAX_LEVEL), u, phi)
         volt, ampere = parts.full_count / parts.adc_volts, parts.full_count / parts.current_full_scale
         counts = {}
         for name, value in volts._asdict().items():
-            count = round(value * (ampere if name.endswith("current") else volt) + self._noise.gauss(0.0, _NOISE))
+            count = round(
+                value * (ampere if name.endswith("current") else volt) + self._noise.gauss(0.0, _NOISE_COUNTS)
+            )
             counts[name] = min(max(count, 0), parts.full_count)
         status |= 0 if self._started else Status.RESTARTED
         self._started = True
@@ -80,7 +82,7 @@ class PlaceFrames:
         if known is None:
             contacts = [LayerContact(u, phi, self._siemens(level, u, phi))] if level > 0.0 else []
             sheets = ResistorLadder().admittance(self._sensor, contacts)
-            if len(self._readings) >= _KEPT:
+            if len(self._readings) >= _CACHE_SIZE:
                 self._readings.clear()
             known = self._readings[key] = measure(self._sensor, [sheets] * 3)
         return known

@@ -15,7 +15,7 @@ from .imperfections import Foam
 
 __all__ = ["PlacedTouch", "ScriptedTouch", "across_seam", "clamp", "fingers", "grip", "palm_over_seam"]
 
-_MEMORY = 40.0  # relaxation times; after them nothing is left of a touch
+_MEMORY_TIMES = 40.0  # relaxation times; after them nothing is left of a touch
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ class ScriptedTouch:
     def seated_at(self, time: float, foam: Foam) -> float:
         """Return the force that would in the end press the foam as far as it is pressed at a time [N]."""
         since, length = time - self.start, self.end - self.start
-        if since <= 0.0 or since > length + _MEMORY * foam.relaxation_time:
+        if since <= 0.0 or since > length + _MEMORY_TIMES * foam.relaxation_time:
             return 0.0
         swing, state, slope = 0.5 * self.force, 0.0, self._slope
         ramp = min(self.rise, 0.5 * length)  # a short touch turns back on its way up
@@ -147,7 +147,7 @@ class ScriptedTouch:
 
 
 _SLIDE_STEP = 1e-3  # m between the places of a touch that slides; the exact field of a new one costs about 2 ms
-_ROUNDING = 1e-12  # m, rad; of where a slide ends
+_PLACE_TOLERANCE = 1e-12  # m, rad; of where a slide ends
 
 
 class PlacedTouch(NamedTuple):
@@ -167,7 +167,10 @@ class PlacedTouch(NamedTuple):
         """
         cone = sensor.frustum
         for u, phi in (touch.u, touch.phi), touch.place_at(touch.end):
-            if not (-_ROUNDING <= u <= cone.slant + _ROUNDING and -_ROUNDING <= phi <= cone.wrap + _ROUNDING):
+            if not (
+                -_PLACE_TOLERANCE <= u <= cone.slant + _PLACE_TOLERANCE
+                and -_PLACE_TOLERANCE <= phi <= cone.wrap + _PLACE_TOLERANCE
+            ):
                 raise SensorError(
                     f"a touch must lie on {sensor.name}: u up to {cone.slant:g} m and phi up to {cone.wrap:g} rad, got "
                     f"{u!r} m and {phi!r} rad"
@@ -185,7 +188,7 @@ class PlacedTouch(NamedTuple):
         return min(max(u, 0.0), cone.slant), min(max(phi, 0.0), cone.wrap)
 
 
-_LEAST = 0.01  # part of a contact; less on the other side does nothing
+_MIN_SHARE = 0.01  # part of a contact; less on the other side does nothing
 
 
 def across_seam(cone: Frustum, u: float, phi: float, reach: float) -> tuple[float, float] | None:
@@ -209,7 +212,7 @@ def across_seam(cone: Frustum, u: float, phi: float, reach: float) -> tuple[floa
     ratio = distance / reach
     sine = math.sqrt(1.0 - ratio * ratio)
     share = (math.acos(ratio) - ratio * sine) / math.pi
-    if share < _LEAST:
+    if share < _MIN_SHARE:
         return None
     inside = (2.0 / 3.0 * sine**3 / (math.pi * share) - ratio) * reach / radius  # from the other edge
     return (cone.wrap - inside if over_start else inside), share

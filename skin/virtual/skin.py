@@ -25,12 +25,12 @@ from .scripted_touch import PlacedTouch, ScriptedTouch, across_seam
 __all__ = ["MODELS", "Press", "PressedSkin", "VirtualSkin"]
 
 MODELS = ("field", "ladder")
-_CURRENTS = frozenset({"touch_current", "radial_current", "angular_current"})  # the rest are potentials
+_CURRENT_NAMES = frozenset({"touch_current", "radial_current", "angular_current"})  # the rest are potentials
 _FORCE_DIGITS = 6  # decimals of a force [N]: far below a count, and a relaxing touch comes to rest
 _MAX_RATE = 1e6  # Hz; frames of a microsecond, the unit of the device clock
 _FRAMES_AHEAD = 8  # frames; solved at once while touches change
 # Conductance of 1 S spread evenly over the rectangle of the field: the mean of f f^T, f = (x, 1 - x, -y, y - 1)
-_SPREAD = (
+_LEAK_MATRIX = (
     (1 / 3, 1 / 6, -1 / 4, -1 / 4),
     (1 / 6, 1 / 3, -1 / 4, -1 / 4),
     (-1 / 4, -1 / 4, 1 / 3, 1 / 6),
@@ -239,7 +239,7 @@ class VirtualSkin:
         volt, ampere = full / parts.adc_volts * real.supply_ratio, full / parts.current_full_scale * real.supply_ratio
         for name in self._channels:
             value = values[name]
-            count = value * (ampere if name in _CURRENTS else volt)
+            count = value * (ampere if name in _CURRENT_NAMES else volt)
             if real.noise_counts:
                 count += rng.gauss(0.0, real.noise_counts)
             counts[name] = min(max(round(count), 0), full)
@@ -275,7 +275,7 @@ def _leaking(sheets: Matrix, leak: float) -> Matrix:
         return sheets
     return tuple(
         tuple(y + leak * part for y, part in zip(row, parts, strict=True))
-        for row, parts in zip(sheets, _SPREAD, strict=True)
+        for row, parts in zip(sheets, _LEAK_MATRIX, strict=True)
     )
 
 
@@ -283,7 +283,7 @@ _PRESS_DIGITS = 3  # decimals of a force [N]: below a count, and a pressure that
 _FINE_STEPS = 1e-5, 1e-5  # of u [m] and phi [rad]: a contact that rests within 10 um is the same
 _COARSE_STEPS = 2e-4, 1e-3  # the same where time counts: the field of a new place takes 0.8 ms
 _REACH_STEP = 1e-3  # m; the field of a place is solved for contacts up to a multiple of this
-_RESTED = 1e-3  # N of the foam's state from which on a body that is gone is forgotten
+_FORGOTTEN_FORCE = 1e-3  # N of the foam's state from which on a body that is gone is forgotten
 
 
 class Press(NamedTuple):
@@ -331,7 +331,7 @@ class PressedSkin(VirtualSkin):
             if press is None:
                 continue
             state = foam.advance(before, press.force, step)
-            if press.force > 0.0 or state > _RESTED:
+            if press.force > 0.0 or state > _FORGOTTEN_FORCE:
                 kept[body] = state, press
             seated = round(foam.seated(state, press.force), _PRESS_DIGITS)
             if seated > layers.threshold_force:

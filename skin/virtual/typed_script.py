@@ -18,13 +18,13 @@ from .scripted_touch import ScriptedTouch, fingers, grip, palm_over_seam
 __all__ = ["FAULT_NAMES", "TOUCH_SHAPES", "parse_fault", "parse_press", "parse_touch", "read_script"]
 
 _MAX_SCRIPT = 1 << 20  # bytes of a script
-_PALM = 0.03  # m; radius of its face
-_FINGERS = ((-0.02, 0.0), (0.0, 0.0), (0.02, 0.0))  # m; three, 20 mm apart along the link
+_PALM_RADIUS = 0.03  # m; radius of its face
+_FINGER_OFFSETS = ((-0.02, 0.0), (0.0, 0.0), (0.02, 0.0))  # m; three, 20 mm apart along the link
 #: Shape of a touch, as it is typed -> what makes its contacts of the first one.
 TOUCH_SHAPES: dict[str, Callable[[Frustum, ScriptedTouch], list[ScriptedTouch]]] = {
     "finger": lambda _, touch: [touch],
-    "palm": lambda _, touch: [replace(touch, radius=_PALM)],
-    "fingers": lambda cone, touch: fingers(cone, touch, _FINGERS),
+    "palm": lambda _, touch: [replace(touch, radius=_PALM_RADIUS)],
+    "fingers": lambda cone, touch: fingers(cone, touch, _FINGER_OFFSETS),
     "grip": grip,
     "seam": lambda cone, touch: palm_over_seam(cone, touch, touch.phi),
 }

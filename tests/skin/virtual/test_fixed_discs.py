@@ -7,9 +7,9 @@ import pytest
 
 from coneskin.core.errors import FieldError
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.field.fixed_discs import FixedDiscs
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
+from coneskin.skin.virtual.field_contacts import FixedDiscs
 
 TUBE, CONE = Frustum(0.0376, 0.0373, 0.24), Frustum(0.04, 0.07, 0.15, 5.0)
 U, PHI, LARGEST = np.array([0.08, 0.11, 0.04]), np.array([2.0, 2.35, 0.5]), np.array([0.0095, 0.0095, 0.008])
