@@ -77,7 +77,7 @@ class CaptureWindow:
         self._pieces: deque[tuple[float, bytes]] = deque()
         self._held = 0
 
-    def add(self, data: bytes, now: float) -> None:
+    def feed(self, data: bytes, now: float) -> None:
         """Take the next bytes, which came at a host time [s]."""
         pieces = self._pieces
         pieces.append((now, data))

@@ -17,20 +17,18 @@ from .cause import Cause, Diagnosis
 from .checksum import crc16
 
 __all__ = [
-    "BAUD_RATES",
     "find_baud",
     "find_coding",
     "find_constant",
     "find_protocol",
     "find_text",
     "first_line",
-    "receive_at",
     "undo_newlines",
     "undo_slip",
 ]
 
 #: Rates that are tried [1/s].
-BAUD_RATES = (
+_BAUD_RATES = (
     *(9600, 19200, 38400, 57600, 74880, 115200, 230400, 250000, 460800, 500000),
     *(921600, 1000000, 1500000, 2000000, 3000000),
 )
@@ -50,7 +48,7 @@ _INVERTED_BITS = bytes(n ^ 0xFF for n in range(256))
 _SWAPPED_NIBBLES = bytes(n >> 4 | n << 4 & 0xFF for n in range(256))
 
 
-def receive_at(sent: bytes, ratio: float, inverted: bool = False, waits: bool = True) -> bytes:
+def _receive_at(sent: bytes, ratio: float, inverted: bool = False, waits: bool = True) -> bytes:
     """Return what a receiver makes of bytes, the first of it.
 
     Args:
@@ -88,7 +86,7 @@ def find_baud(data: bytes, baud: int | None) -> Diagnosis | None:
     best, rate, inverted = (
         max(
             (_gain(data, frequency, candidate / baud, inverted), candidate, inverted)
-            for candidate in BAUD_RATES
+            for candidate in _BAUD_RATES
             for inverted in (False, True)
             if candidate != baud or inverted
         )
@@ -101,7 +99,7 @@ def find_baud(data: bytes, baud: int | None) -> Diagnosis | None:
         return Diagnosis(Cause.BAUD, f"the device sends at {rate} baud, the port listens at {baud}", rate)
     run = _shortest_run(data)
     if run >= _MIN_RUN:
-        nearest = min(BAUD_RATES, key=lambda item: abs(math.log(item * run / baud))) if baud else 0
+        nearest = min(_BAUD_RATES, key=lambda item: abs(math.log(item * run / baud))) if baud else 0
         words = f"the device sends about {run:.0f} times more slowly than the port listens"
         return Diagnosis(Cause.BAUD, f"{words}{f', at about {nearest} baud' if nearest else ''}", nearest)
     return None
@@ -111,7 +109,7 @@ def _gain(data: bytes, frequency: Counter[int], ratio: float, inverted: bool) ->
     """Return how much more often than by chance frames begin in these bytes; 0 where it may be chance."""
     best = 0.0
     for header, waits in product(_FRAME_HEADERS if ratio < 1.0 else _NUMBERED_HEADERS, (True, False)):
-        pattern = receive_at(header, ratio, inverted, waits)
+        pattern = _receive_at(header, ratio, inverted, waits)
         if len(pattern) < 2:
             continue
         hits = data.count(pattern)

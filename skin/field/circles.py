@@ -32,7 +32,6 @@ from .sheet import SectorSheet
 __all__ = [
     "PHASE",
     "Circles",
-    "EdgeImage",
     "circle",
     "edge_images",
     "green_block",
@@ -51,7 +50,7 @@ _NEAR_ALPHA = 0.25  # |alpha| of an edge that counts as near: two radii between 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EdgeImage:
+class _EdgeImage:
     """One edge as each of n discs sees it.
 
     Attributes:
@@ -67,14 +66,14 @@ class EdgeImage:
     delta: Floats
 
 
-def edge_images(sheet: SectorSheet, discs: Discs, place: int) -> list[EdgeImage]:
+def edge_images(sheet: SectorSheet, discs: Discs, place: int) -> list[_EdgeImage]:
     """Find the near edges of the discs at one place of every scene; edges that no disc is near are left out."""
     u, phi, a = discs.u[:, place], discs.phi[:, place], discs.radius[:, place]
     kappa = sheet.curvature
     h = sheet.stretch(u)
     bend = kappa * a / h
     last = float(sheet.stretch(sheet.width))
-    out: list[EdgeImage] = []
+    out: list[_EdgeImage] = []
     with np.errstate(divide="ignore", invalid="ignore"):
         for sign, sum_u, edge_h in ((1.0, (1.0 + h) * u, 1.0), (-1.0, (h + last) * (sheet.width - u), last)):
             alpha = sign * h * a / sum_u
@@ -82,7 +81,7 @@ def edge_images(sheet: SectorSheet, discs: Discs, place: int) -> list[EdgeImage]
             if near.any():
                 alpha = np.where(near, alpha, 0.0)
                 delta = np.where(near, (a * edge_h / sum_u) ** 2, 0.0)
-                out.append(EdgeImage(True, alpha.astype(np.complex128), alpha * bend, delta))
+                out.append(_EdgeImage(True, alpha.astype(np.complex128), alpha * bend, delta))
         for sign, y in zip((-1.0, 1.0), sheet.across(phi), strict=True):
             turn = kappa * y
             distance = h * y * np.sinc(turn / math.pi)
@@ -91,11 +90,11 @@ def edge_images(sheet: SectorSheet, discs: Discs, place: int) -> list[EdgeImage]
             if near.any():
                 size = np.where(near, size, 0.0)
                 alpha_c = sign * 1j * size * np.exp(-sign * 1j * turn)
-                out.append(EdgeImage(False, alpha_c, np.zeros_like(size), size * size))
+                out.append(_EdgeImage(False, alpha_c, np.zeros_like(size), size * size))
     return out
 
 
-def image_distance(image: EdgeImage, zeta: Complex) -> Floats:
+def image_distance(image: _EdgeImage, zeta: Complex) -> Floats:
     """Return the squared distance from each point to the image of each, to a constant, shape (n, N, N)."""
     alpha = image.alpha[:, None]
     one, two = alpha * zeta, (alpha * zeta).conj()
@@ -115,7 +114,7 @@ def _binomials(order: int) -> Floats:
     return out
 
 
-def image_coefficients(image: EdgeImage, order: int) -> Floats:
+def image_coefficients(image: _EdgeImage, order: int) -> Floats:
     """Return the Fourier coefficients of ln of `image_distance`, shape (n, 2M+1, 2M+1), as of the Green function."""
     m = np.arange(1, order + 1)
     size = np.abs(image.alpha)
@@ -222,7 +221,7 @@ class Circles:
     p_far: Floats
     x: Floats
     y: Floats
-    images: tuple[tuple[EdgeImage, ...], ...] = ()
+    images: tuple[tuple[_EdgeImage, ...], ...] = ()
 
 
 @lru_cache(maxsize=64)
@@ -296,7 +295,7 @@ def places_of(sheet: SectorSheet, strip: Strip, discs: Discs) -> tuple[Floats, F
     return s * k, s_far * k, p * k, p_far * k
 
 
-class RimPlaces(Protocol):
+class _RimPlaces(Protocol):
     """Points on the rims of n scenes of k discs; attributes as those of `Circles`."""
 
     @property
@@ -312,7 +311,7 @@ class RimPlaces(Protocol):
 
 
 def pair_points(
-    strip: Strip, circles: RimPlaces, i: int, j: int, equal: bool
+    strip: Strip, circles: _RimPlaces, i: int, j: int, equal: bool
 ) -> tuple[StripPoints, StripPoints, Floats, Floats, Floats]:
     """Return the points of discs i and j, mirrored to the near corner, and the linear part of the Green function.
 

@@ -23,7 +23,14 @@ from .fourport import Coupling
 from .green import Strip
 from .sheet import SectorSheet
 
-__all__ = ["FIRST", "LADDER", "Moments", "higher", "resolution", "solve_discs", "solve_to_tolerance", "truncation"]
+__all__ = [
+    "FIRST",
+    "LADDER",
+    "higher",
+    "resolution",
+    "solve_discs",
+    "solve_to_tolerance",
+]
 
 #: Orders to choose from, so that a batch falls into few groups.
 LADDER = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 80, 96, 128, 192, 288, 432)
@@ -89,7 +96,7 @@ def higher(order: int, error: float = math.inf, tolerance: float = 0.0) -> int:
     return min((m for m in LADDER if m >= min(max(more, 1.1), 1.6) * order), default=LADDER[-1])
 
 
-def truncation(order: int, from_half: Floats, from_last: Floats) -> Floats:
+def _truncation(order: int, from_half: Floats, from_last: Floats) -> Floats:
     """Estimate the error of order M from what its last multipoles still changed, shape (n,).
 
     Args:
@@ -109,7 +116,7 @@ def truncation(order: int, from_half: Floats, from_last: Floats) -> Floats:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moments:
+class _Moments:
     """Multipole moments of the current for each unit of h0, hx, hy.
 
     Attributes:
@@ -129,7 +136,7 @@ def solve_discs(
     order: int,
     points: int | None = None,
     with_moments: bool = False,
-) -> tuple[Coupling, Moments | None]:
+) -> tuple[Coupling, _Moments | None]:
     """Solve n scenes of k discs at one order.
 
     Args:
@@ -205,11 +212,11 @@ def solve_discs(
     norm = reach[:, :, None] * reach[:, None, :]
     norm[:, 0, 1:] = norm[:, 1:, 0] = np.maximum(1.0 / g, 0.0)[:, None]
     tails = [_tail(flat, solved, k * (2 * kept + 1), norm) for kept in _kept(order)]
-    coupling = Coupling.of_matrix(w, centre, np.maximum(truncation(order, *tails), aliasing))
+    coupling = Coupling.of_matrix(w, centre, np.maximum(_truncation(order, *tails), aliasing))
     if not with_moments:
         return coupling, None
     values = (solved.reshape(n, size, k, 3) * scale[..., None] / rs).transpose(0, 2, 1, 3)
-    return coupling, Moments(order, values)
+    return coupling, _Moments(order, values)
 
 
 def _kept(order: int) -> tuple[int, int]:
@@ -239,7 +246,7 @@ def _solve_single(
     order: int,
     aspects: tuple[float, float],
     with_moments: bool,
-) -> tuple[Coupling, Moments | None]:
+) -> tuple[Coupling, _Moments | None]:
     """Solve one disc in each scene; eliminating the total current first keeps even a weak contact exact."""
     n, size = block.shape[0], 2 * order
     scale = np.repeat(root, 2, axis=1)
@@ -261,7 +268,7 @@ def _solve_single(
     norm = reach[:, :, None] * reach[:, None, :]
     # X and Y themselves, and the rest relative to the conductances beside it.
     norm[:, 0, 1:] = norm[:, 1:, 0] = 1.0
-    error = truncation(order, *(_tail(inner, solved, 2 * kept, norm) for kept in _kept(order)))
+    error = _truncation(order, *(_tail(inner, solved, 2 * kept, norm) for kept in _kept(order)))
     error = np.maximum(error, aliased * (1.0 / np.abs(spread) + root[:, 0] ** 2))
     coupling = Coupling(1.0 / (rs * spread), x, y, gram[:, 1, 1] / rs, gram[:, 1, 2] / rs, gram[:, 2, 2] / rs, error)
     if not with_moments:
@@ -272,12 +279,12 @@ def _solve_single(
     rest = -solved[:, :, :1] * total[:, None, :] * rs
     rest[:, :, 1:] += solved[:, :, 1:]
     values[:, 0, 1:] = rest * scale[:, :, None] / rs
-    return coupling, Moments(order, values)
+    return coupling, _Moments(order, values)
 
 
 def solve_to_tolerance(
     sheet: SectorSheet, upper_resistance: float, lower_resistance: float, discs: Discs, order: int, tolerance: float
-) -> tuple[Coupling, Moments]:
+) -> tuple[Coupling, _Moments]:
     """Solve one scene by multipoles at the first order from `order` on whose error is within the tolerance.
 
     Raises:

@@ -31,7 +31,7 @@ from .green import Strip, direct_features, kernel, mirrored
 from .model import FieldModel
 from .sheet import SectorSheet
 
-__all__ = ["ContactPatch", "Outline", "Region", "clip", "disc", "ellipse", "rectangle", "solve_patch"]
+__all__ = ["ContactPatch", "Outline", "clip", "disc", "ellipse", "rectangle", "solve_patch"]
 
 #: Distance of the outline [m] in each direction [rad].
 Outline = Callable[[Floats], Floats]
@@ -41,7 +41,7 @@ _FINE_DIRECTIONS = 4096  # directions in which an outline is sampled; a chord mi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Region:
+class _Region:
     """A piece of the sheet that can be seen whole from its centre.
 
     Attributes:
@@ -84,7 +84,7 @@ def _positive(name: str, value: float) -> None:
         raise FieldError(f"{name} of an outline must be positive and finite [m], got {value!r}")
 
 
-def clip(sheet: SectorSheet, u: float, phi: float, outline: Outline, directions: int) -> Region:
+def clip(sheet: SectorSheet, u: float, phi: float, outline: Outline, directions: int) -> _Region:
     """Return the part of an outline that lies on the sheet.
 
     Args:
@@ -121,7 +121,7 @@ def clip(sheet: SectorSheet, u: float, phi: float, outline: Outline, directions:
         raise FieldError("a contact cut by an edge must be visible whole from its middle; split it in two")
     if not cut and not _cornered(radius):
         ray = 2.0 * math.pi * np.arange(directions) / directions
-        return Region(u, phi, np.asarray(outline(ray), dtype=np.float64), np.exp(1j * ray), False)
+        return _Region(u, phi, np.asarray(outline(ray), dtype=np.float64), np.exp(1j * ray), False)
     # Sectors keep the area and the centroid of the piece that they stand for, so that corners need no cell of their
     # own.
     count = directions * _RAYS_PER_SECTOR
@@ -133,7 +133,7 @@ def clip(sheet: SectorSheet, u: float, phi: float, outline: Outline, directions:
     # The mean direction within a sector shortens the centroid of a circle too; a ring's own curvature is exact already.
     straight = np.sinc(1.0 / directions)
     radius = np.sqrt(square)
-    return Region(u1, phi1, radius, cube / (square * radius * straight), cut)
+    return _Region(u1, phi1, radius, cube / (square * radius * straight), cut)
 
 
 def _cornered(radius: Floats) -> bool:
@@ -262,7 +262,7 @@ def _ring_edges(rings: int) -> Floats:
     return edges
 
 
-def _conductance(model: FieldModel, patch: ContactPatch, region: Region, local: NDArray[np.complex128]) -> Floats:
+def _conductance(model: FieldModel, patch: ContactPatch, region: _Region, local: NDArray[np.complex128]) -> Floats:
     if callable(patch.conductance):
         sheet = model.sheet
         turn = sheet.curvature * sheet.arc * (region.phi - patch.phi) / sheet.wrap
@@ -279,7 +279,7 @@ def _conductance(model: FieldModel, patch: ContactPatch, region: Region, local: 
 
 
 def _images(
-    model: FieldModel, strip: Strip, region: Region, local: NDArray[np.complex128], a: float, b: float
+    model: FieldModel, strip: Strip, region: _Region, local: NDArray[np.complex128], a: float, b: float
 ) -> Floats:
     """Return (Ra G_a + Rb G_b)/(Ra + Rb) between the cells without -ln|z - z'| / 2 pi, shape (N, N)."""
     sheet = model.sheet

@@ -21,23 +21,25 @@ from numpy.typing import ArrayLike, NDArray
 from coneskin.core.arrays import Floats
 from coneskin.core.errors import FieldError
 
-__all__ = ["ConeShape", "SectorSheet", "log1p_over"]
+__all__ = [
+    "SectorSheet",
+]
 
 
-class ConeShape(Protocol):
+class _ConeShape(Protocol):
     """The dimensions of a link that a sheet needs; `coneskin.geometry.frustum.Frustum` has them."""
 
     @property
-    def radius1(self) -> float: ...  # noqa: D102
+    def radius1(self) -> float: ...
     @property
-    def wrap(self) -> float: ...  # noqa: D102
+    def wrap(self) -> float: ...
     @property
-    def slant(self) -> float: ...  # noqa: D102
+    def slant(self) -> float: ...
     @property
-    def sin_half_angle(self) -> float: ...  # noqa: D102
+    def sin_half_angle(self) -> float: ...
 
 
-def log1p_over(kappa: float, distance: ArrayLike) -> Floats:
+def _log1p_over(kappa: float, distance: ArrayLike) -> Floats:
     """Compute log1p(kappa d) / kappa, and d where kappa is zero [m]."""
     d = np.asarray(distance, dtype=np.float64)
     return d.copy() if kappa == 0.0 else np.log1p(kappa * d) / kappa
@@ -76,7 +78,7 @@ class SectorSheet:
             raise FieldError(f"the sector angle must be at most a full turn (6.2832 rad), got {self.angle:.6g} rad")
 
     @classmethod
-    def of_frustum(cls, frustum: ConeShape) -> SectorSheet:
+    def of_frustum(cls, frustum: _ConeShape) -> SectorSheet:
         """Make the sheet that covers a truncated cone or a cylinder."""
         return cls(
             width=frustum.slant,
@@ -106,7 +108,7 @@ class SectorSheet:
     @property
     def length(self) -> float:
         """Side L of the rectangle between the arcs A and B [m]."""
-        return float(log1p_over(self.curvature, self.width))
+        return float(_log1p_over(self.curvature, self.width))
 
     @property
     def breadth(self) -> float:
@@ -126,7 +128,7 @@ class SectorSheet:
         """Return x and L - x at slant distance u [m], each without cancellation."""
         u = np.asarray(u, dtype=np.float64)
         rest = (self.width - u) / self.stretch(u)
-        return log1p_over(self.curvature, u), log1p_over(self.curvature, rest)
+        return _log1p_over(self.curvature, u), _log1p_over(self.curvature, rest)
 
     def across(self, phi: ArrayLike) -> tuple[Floats, Floats]:
         """Return y and T - y at azimuth phi [m]."""

@@ -309,7 +309,7 @@ class HeardLine:
             from coneskin.skin.diagnosis.capture import CaptureWindow
 
             self._window = CaptureWindow(block.time)
-        self._window.add(block.payload, block.time)
+        self._window.feed(block.payload, block.time)
 
     def describe(self, scene: Scene, reasons: Sequence[str]) -> str:
         """Return what is wrong with the line, where a guard waits for its skin.

@@ -33,7 +33,7 @@ def heard(program: Path, mistake: str, sensors: tuple[Sensor, ...] = ()) -> Diag
     pieces = bytes_of(program, mistake, seconds)
     window = CaptureWindow(0.0)
     for time, piece in pieces:
-        window.add(piece, time)
+        window.feed(piece, time)
     return diagnose(window.capture(seconds), sensors, BAUD)
 
 
@@ -64,7 +64,7 @@ def test_the_ratio_of_the_clocks_is_measured_to_one_per_cent(program: Path, mist
 def test_a_line_of_two_seconds_is_not_kept_for_ever() -> None:
     window = CaptureWindow(0.0, span=2.0, size=1000)
     for number in range(500):
-        window.add(bytes(10), 0.01 * number)
+        window.feed(bytes(10), 0.01 * number)
     assert len(window.capture(5.0).data) == 1000
     assert len(CaptureWindow(0.0).capture(3.0).data) == 0
 
@@ -108,7 +108,7 @@ def test_a_skin_on_which_all_is_right_is_not_blamed(length: int, count: int, rat
     )
     window = CaptureWindow(0.0)
     for number, (time, data) in enumerate(skin.packets()):
-        window.add(data[17:] if number == 0 else data, time)
+        window.feed(data[17:] if number == 0 else data, time)
     for scene in ((), sensors):
         named = diagnose(window.capture(1.2), scene, BAUD)
         assert named.good, named.line

@@ -94,7 +94,7 @@ class SkinStatistics:
     def add(self, time: float, data: bytes) -> list[Frame]:
         """Take bytes that were read at a time [s]; return the frames that they complete."""
         self.received += len(data)
-        self.window.add(data, time)
+        self.window.feed(data, time)
         frames = self.decoder.feed(data)
         for frame in frames:
             self.sensors.setdefault((frame.device, frame.sensor), SensorStatistics()).add(time, frame)

@@ -129,7 +129,7 @@ class LineMonitor:
     def feed(self, data: bytes, now: float) -> None:
         """Take the next bytes, which came at a host time [s]."""
         self._size += len(data)
-        self._window.add(data, now)
+        self._window.feed(data, now)
         for frame in self._decoder.feed(data):
             key = frame.device, frame.sensor
             if key not in self._heard and len(self._heard) >= 64:
