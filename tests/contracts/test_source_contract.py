@@ -122,7 +122,7 @@ def test_a_right_source_in_memory_keeps_it(check: Callable[[OpenLineFactory], No
     ],
 )
 def test_each_way_to_break_it_is_noticed(kind: type[_Memory], first: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(source_contract, "_PATIENCE", 0.05)
+    monkeypatch.setattr(source_contract, "_LINE_TIMEOUT", 0.05)
     broken = []
     for check in SOURCE_CHECKS:
         try:
