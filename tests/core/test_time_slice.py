@@ -59,6 +59,6 @@ def test_a_thread_with_a_policy_of_its_own_keeps_it() -> None:
 
 
 def test_on_a_machine_whose_calls_are_not_known_nothing_is_called(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(time_slice, "_CALLS", {})
+    monkeypatch.setattr(time_slice, "_CALL_NUMBERS", {})
     monkeypatch.setattr(time_slice.ctypes, "CDLL", None)
     shorten_time_slice()

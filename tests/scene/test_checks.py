@@ -7,7 +7,7 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
-from coneskin.scene.checks import check_links
+from coneskin.scene.reader import _check_links
 from coneskin.scene.values.scene import ArmScene, LinkScene, MotionScene, PlacedSensor, Scene
 from coneskin.skin.sensor import Sensor
 
@@ -22,7 +22,7 @@ def scene(arm: str | None, link: str, height: float = 0.1, waypoint: tuple[float
 
 def complaints(*args: object, **kwargs: object) -> list[str]:
     problems: list[str] = []
-    check_links(scene(*args, **kwargs), problems)  # type: ignore[arg-type]
+    _check_links(scene(*args, **kwargs), problems)  # type: ignore[arg-type]
     return problems
 
 

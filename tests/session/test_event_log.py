@@ -3,7 +3,6 @@
 import logging
 import os
 import threading
-import time
 from collections.abc import Callable
 
 import pytest
@@ -271,20 +270,23 @@ def test_an_answer_is_known_by_its_number(request_):
 
 SCENE = parse_scene(SERIAL_RETREAT)
 SENSOR = SCENE.sensors[0].sensor
+NOW = 100.0  # s
 WAITS = [f"{SENSOR.name}: no valid frame"]
 
 
 def heard(change: Callable[[bytes], bytes]) -> HeardLine:
-    """Half a second of a skin, until now."""
-    line, end = HeardLine(), time.monotonic()
+    """Half a second of a skin, until ``NOW``."""
+    line = HeardLine()
     packets = list(VirtualSkin(SENSOR, model="ladder", duration=0.5, seed=1).packets())
-    line.feed([Block(BlockKind.SKIN, end - 0.5 + at, change(data)) for at, data in packets])
+    line.feed([Block(BlockKind.SKIN, NOW - 0.5 + at, change(data)) for at, data in packets])
     return line
 
 
 def test_the_refusal_names_the_mistake_in_the_firmware() -> None:
     line = heard(lambda data: data[:-2] + data[-1:] + data[-2:-1])
-    error = activation_error([GuardEvent("waiting", 1.0, {"reasons": WAITS})], lambda why: line.describe(SCENE, why))
+    error = activation_error(
+        [GuardEvent("waiting", 1.0, {"reasons": WAITS})], lambda why: line.describe(SCENE, why, NOW)
+    )
     assert str(error).splitlines() == [
         "the guard did not become active:",
         "  on serial hwgrep://0403:6001, the checksum is another CRC: its low byte goes first: append the CRC with its "
@@ -294,13 +296,17 @@ def test_the_refusal_names_the_mistake_in_the_firmware() -> None:
 
 
 def test_a_silent_line_is_named_too() -> None:
-    assert HeardLine().describe(SCENE, WAITS).startswith("no byte has come from serial hwgrep://0403:6001: check power")
+    assert (
+        HeardLine()
+        .describe(SCENE, WAITS, NOW)
+        .startswith("no byte has come from serial hwgrep://0403:6001: check power")
+    )
 
 
 @pytest.mark.parametrize("reasons", [[], ["the arm is not powered"]])
 def test_reasons_of_the_arm_get_no_words_about_the_skin(reasons: list[str]) -> None:
-    assert heard(lambda _: b"nonsense").describe(SCENE, reasons) == ""
+    assert heard(lambda _: b"nonsense").describe(SCENE, reasons, NOW) == ""
 
 
 def test_a_line_on_which_all_is_right_gets_none_either() -> None:
-    assert heard(lambda data: data).describe(SCENE, WAITS) == ""
+    assert heard(lambda data: data).describe(SCENE, WAITS, NOW) == ""

@@ -34,9 +34,9 @@ __all__ = [
     "wait_writable",
 ]
 
-_LENGTH = struct.Struct("<I")
+_LENGTH_FIELD = struct.Struct("<I")
 _MAX_LENGTH = 1 << 24  # bytes of one message
-_RESERVE = 2  # bounds; the second is for what is left of a shortened message
+_BOUND_FACTOR = 2  # bounds; the second is for what is left of a shortened message
 
 
 class HasDescriptor(Protocol):
@@ -134,11 +134,11 @@ class Channel:
             if self._full:
                 self.dropped += 1
                 message = b"" if self.overflow is None else self.overflow.shorten(message)
-                if not message or len(self._out) + len(message) > _RESERVE * self._limit:
+                if not message or len(self._out) + len(message) > _BOUND_FACTOR * self._limit:
                     return False
             elif self.overflow is not None and (notice := self.overflow.notice()):
-                self._out += _LENGTH.pack(len(notice)) + notice
-        self._out += _LENGTH.pack(len(message)) + message
+                self._out += _LENGTH_FIELD.pack(len(notice)) + notice
+        self._out += _LENGTH_FIELD.pack(len(message)) + message
         return self._flush()
 
     def flush(self) -> bool:
@@ -160,7 +160,7 @@ class Channel:
     def finish(self, seconds: float) -> bool:
         """Hand over all that waits, report what was left out, and return whether it was taken within this time [s]."""
         if self.overflow is not None and (notice := self.overflow.notice()):
-            self._out += _LENGTH.pack(len(notice)) + notice
+            self._out += _LENGTH_FIELD.pack(len(notice)) + notice
         end = time.monotonic() + seconds
         while self.flush() and self._out and (left := end - time.monotonic()) > 0.0:
             wait_writable(self, left)
@@ -180,15 +180,15 @@ class Channel:
         except OSError:
             self.closed = True
         messages, at = [], 0
-        while at + _LENGTH.size <= len(self._in):
-            (length,) = _LENGTH.unpack_from(self._in, at)
+        while at + _LENGTH_FIELD.size <= len(self._in):
+            (length,) = _LENGTH_FIELD.unpack_from(self._in, at)
             if length > _MAX_LENGTH:
                 self.closed = True  # the other side does not speak this protocol
                 break
-            if at + _LENGTH.size + length > len(self._in):
+            if at + _LENGTH_FIELD.size + length > len(self._in):
                 break
-            messages.append(self._in[at + _LENGTH.size : at + _LENGTH.size + length])
-            at += _LENGTH.size + length
+            messages.append(self._in[at + _LENGTH_FIELD.size : at + _LENGTH_FIELD.size + length])
+            at += _LENGTH_FIELD.size + length
         self._in = self._in[at:]
         return messages
 

@@ -23,7 +23,7 @@ from .errors import RobotConnectionError
 
 __all__ = ["Lifeline", "inherit", "spawn"]
 
-_LENGTH = struct.Struct("<I")  # of what a child is told over its standard input
+_LENGTH_FIELD = struct.Struct("<I")  # of what a child is told over its standard input
 
 
 def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
@@ -46,7 +46,7 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
             assert child.stdin is not None
             for end in ends:
                 share = end.share(child.pid)
-                child.stdin.write(_LENGTH.pack(len(share)) + share)
+                child.stdin.write(_LENGTH_FIELD.pack(len(share)) + share)
             child.stdin.close()
         else:
             with contextlib.ExitStack() as stack:
@@ -121,8 +121,8 @@ def inherit(arguments: list[str], parent: int = 0) -> tuple[Lifeline, list[Chann
     if arguments == ["shared"]:
         stream = sys.stdin.buffer
         shares = []
-        while head := stream.read(_LENGTH.size):
-            shares.append(stream.read(_LENGTH.unpack(head)[0]))
+        while head := stream.read(_LENGTH_FIELD.size):
+            shares.append(stream.read(_LENGTH_FIELD.unpack(head)[0]))
         channels = [Channel(socket.fromshare(share)) for share in shares]  # type: ignore[attr-defined,unused-ignore]
         return Lifeline(channels[parent], None), channels
     count, *numbers = map(int, arguments)

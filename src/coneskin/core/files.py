@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 __all__ = ["draft_of", "format_size", "open_file", "read_file", "write_whole"]
 
-_KINDS = {
+_FILE_KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
@@ -24,7 +24,7 @@ _KINDS = {
     stat.S_IFSOCK: "a socket",
 }
 #: a pipe that somebody puts there between the two looks must not hold the opening up
-_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+_OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
 
 
 def read_file(path: Path, limit: int) -> bytes:
@@ -57,7 +57,7 @@ def open_file(path: Path, limit: int) -> BinaryIO:
     """
     try:
         _check(path, os.stat(path), limit)  # opening a device may already have an effect
-        descriptor = os.open(path, _FLAGS)
+        descriptor = os.open(path, _OPEN_FLAGS)
     except ValueError as exc:  # a NUL in the name
         raise OSError(errno.EINVAL, str(exc), str(path)) from exc
     try:
@@ -80,7 +80,7 @@ def format_size(count: int) -> str:
 
 def _check(path: Path, found: os.stat_result, limit: int) -> None:
     if not stat.S_ISREG(found.st_mode):
-        kind = _KINDS.get(stat.S_IFMT(found.st_mode), "something else")
+        kind = _FILE_KINDS.get(stat.S_IFMT(found.st_mode), "something else")
         raise OSError(errno.EINVAL, f"it is {kind}, and only a regular file is read", str(path))
     if found.st_size > limit:
         raise _too_long(path, found.st_size, limit)

@@ -17,19 +17,19 @@ from typing import Any
 
 __all__ = ["Key", "check", "with_meanings"]
 
-_DEGREE = math.pi / 180.0  # rad
-_UNITS: Mapping[str, tuple[float, str]] = {
+_RAD_PER_DEG = math.pi / 180.0  # rad
+_KEY_UNITS: Mapping[str, tuple[float, str]] = {
     "_n_per_mm": (1e3, "N/mm"),
     "_n_per_cm2": (1e4, "N/cm2"),
     "_cm2": (1e-4, "cm2"),
     "_kg": (1.0, "kg"),
     "_mm_s": (1e-3, "mm/s"),
-    "_deg_s2": (_DEGREE, "deg/s2"),
-    "_deg_s": (_DEGREE, "deg/s"),
+    "_deg_s2": (_RAD_PER_DEG, "deg/s2"),
+    "_deg_s": (_RAD_PER_DEG, "deg/s"),
     "_rad_s2": (1.0, "rad/s2"),
     "_rad_s": (1.0, "rad/s"),
     "_mm": (1e-3, "mm"),
-    "_deg": (_DEGREE, "deg"),
+    "_deg": (_RAD_PER_DEG, "deg"),
     "_ppm": (1e-6, "ppm"),
     "_days": (86400.0, "days"),
     "_s_per_m": (1.0, "s/m"),
@@ -45,7 +45,7 @@ _UNITS: Mapping[str, tuple[float, str]] = {
     "_n": (1.0, "N"),
     "_s": (1.0, "s"),
 }
-_MEANING = re.compile(r"^(\w+): (.*(?:\n .*)*)", re.MULTILINE)
+_MEANING_LINE = re.compile(r"^(\w+): (.*(?:\n .*)*)", re.MULTILINE)
 _TYPE_WORDS = {float: "ratio", int: "whole number", str: "text", bool: "true or false", dict: "tables", tuple: "texts"}
 
 
@@ -84,7 +84,7 @@ class Key:
     @property
     def suffix(self) -> str:
         """Unit at the end of the name, with its underscore; empty without a unit."""
-        return next((s for s in _UNITS if self.name.endswith(s)), "") if self.kind in (float, list) else ""
+        return next((s for s in _KEY_UNITS if self.name.endswith(s)), "") if self.kind in (float, list) else ""
 
     @property
     def plain(self) -> str:
@@ -94,7 +94,7 @@ class Key:
     @property
     def unit(self) -> str:
         """Unit or type for people: "mm", "deg, 3 numbers", "whole number", "text", "ratio"."""
-        named = _UNITS.get(self.suffix, (1.0, ""))[1]
+        named = _KEY_UNITS.get(self.suffix, (1.0, ""))[1]
         if self.kind is list:
             numbers = f"{self.length} numbers" if self.length else "numbers"
             return ", ".join([*([named] if named else []), f"1 or {numbers}" if self.one_for_all else numbers])
@@ -128,8 +128,8 @@ class Key:
 
     def in_file_unit(self, value: float) -> float:
         """Convert a value from SI to the unit of the key."""
-        factor = _UNITS.get(self.suffix, (1.0, ""))[0]
-        return value * (1.0 / factor) if factor != _DEGREE else math.degrees(value)  # 1 / 1e-3 is 1000 exactly
+        factor = _KEY_UNITS.get(self.suffix, (1.0, ""))[0]
+        return value * (1.0 / factor) if factor != _RAD_PER_DEG else math.degrees(value)  # 1 / 1e-3 is 1000 exactly
 
 
 def with_meanings(text: str, *keys: Key) -> tuple[Key, ...]:
@@ -142,7 +142,7 @@ def with_meanings(text: str, *keys: Key) -> tuple[Key, ...]:
     Raises:
         ValueError: the text has another name, or a key none.
     """
-    meanings = {name: " ".join(words.split()) for name, words in _MEANING.findall(inspect.cleandoc(text))}
+    meanings = {name: " ".join(words.split()) for name, words in _MEANING_LINE.findall(inspect.cleandoc(text))}
     if extra := meanings.keys() - {key.name for key in keys}:
         raise ValueError(f"there is no key {', '.join(sorted(extra))}")
     found = tuple(replace(key, meaning=meanings.get(key.name, key.meaning)) for key in keys)
@@ -228,7 +228,7 @@ def _convert(key: Key, value: Any, where: str, report: Callable[[str], None]) ->
 
 
 def _number(key: Key, value: Any, where: str, report: Callable[[str], None]) -> float | None:
-    factor, unit = _UNITS.get(key.suffix, (1.0, ""))
+    factor, unit = _KEY_UNITS.get(key.suffix, (1.0, ""))
     if isinstance(value, bool) or not isinstance(value, int | float):
         report(f"{where} must be a number{f' [{unit}]' if unit else ''}, got {_show(value)}")
         return None
@@ -245,7 +245,7 @@ def _number(key: Key, value: Any, where: str, report: Callable[[str], None]) -> 
             hint = f": is that in metres? Then write {1e3 * value:g}"
         report(f"{where} must be {_range(key, unit)}, got {_show(value)}{f' {unit}' if unit else ''}{hint}")
         return None
-    return value * factor if factor != _DEGREE else math.radians(value)
+    return value * factor if factor != _RAD_PER_DEG else math.radians(value)
 
 
 def _show(value: Any) -> str:

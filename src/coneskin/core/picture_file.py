@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["write_picture"]
 
-_SUFFIXES = (".png", ".svg", ".pdf")
+_PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def write_picture(
@@ -33,8 +33,8 @@ def write_picture(
         ConeSkinError: as ``refusal`` makes it: the suffix is another, the file cannot be written, or its content has
             no common scale.
     """
-    if path.suffix.lower() not in _SUFFIXES:
-        raise refusal(f"{what} is a {', '.join(_SUFFIXES)} file, got {path}")
+    if path.suffix.lower() not in _PICTURE_SUFFIXES:
+        raise refusal(f"{what} is a {', '.join(_PICTURE_SUFFIXES)} file, got {path}")
     if not path.parent.is_dir():
         raise refusal(f"{what} cannot be written to {path}: there is no folder {path.parent}; make it first")
     try:

@@ -13,9 +13,9 @@ from typing import Any, TextIO
 
 __all__ = ["painted", "positive_seconds", "printable", "read_json"]
 
-_DIGITS = 100  # a longer whole number is none that anything counts; as int it would overflow where it meets a float
-_SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
-_COLORS = {"red": 31, "green": 32, "yellow": 33, "blue": 34}
+_MAX_DIGITS = 100  # a longer whole number is none that anything counts; as int it would overflow where it meets a float
+_HALF_PAIR = re.compile(rb"\\u[dD][89a-fA-F]")
+_COLOR_CODES = {"red": 31, "green": 32, "yellow": 33, "blue": 34}
 
 
 def read_json(data: bytes) -> Any:
@@ -29,13 +29,13 @@ def read_json(data: bytes) -> Any:
     """
     try:
         value = json.loads(data.decode("utf-8-sig"), parse_int=_whole)
-        return _encodable(value) if _SURROGATE.search(data) else value
+        return _encodable(value) if _HALF_PAIR.search(data) else value
     except RecursionError as error:
         raise ValueError("nested too deep") from error
 
 
 def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits.lstrip("-")) <= _DIGITS else float(digits)
+    return int(digits) if len(digits.lstrip("-")) <= _MAX_DIGITS else float(digits)
 
 
 def _encodable(value: Any) -> Any:
@@ -58,7 +58,7 @@ def painted(text: str, color: str, stream: TextIO) -> str:
     """
     if os.environ.get("NO_COLOR") or not stream.isatty():
         return text
-    return f"\033[{_COLORS[color]}m{text}\033[0m"
+    return f"\033[{_COLOR_CODES[color]}m{text}\033[0m"
 
 
 def printable(text: str) -> str:

@@ -15,12 +15,12 @@ import sys
 
 __all__ = ["shorten_time_slice"]
 
-_SHORTEST = 100_000  # ns that Linux takes
-_OTHER = 0  # policy of ordinary processes
+_MIN_SLICE = 100_000  # ns that Linux takes
+_ORDINARY_POLICY = 0  # policy of ordinary processes
 #: sched_attr: size, policy, flags, nice, priority, runtime, deadline, period; times in ns
-_ATTRIBUTES = struct.Struct("<IIQiIQQQ")
+_SCHED_ATTRIBUTES = struct.Struct("<IIQiIQQQ")
 #: machine -> numbers of the calls sched_getattr and sched_setattr, which Python does not have
-_CALLS = {"x86_64": (315, 314), "aarch64": (275, 274), "riscv64": (275, 274)}
+_CALL_NUMBERS = {"x86_64": (315, 314), "aarch64": (275, 274), "riscv64": (275, 274)}
 
 
 def shorten_time_slice() -> None:
@@ -28,14 +28,14 @@ def shorten_time_slice() -> None:
 
     Call it before anything starts a thread. Where it is not to be had, all is as it was.
     """
-    calls = _CALLS.get(os.uname().machine) if sys.platform == "linux" else None
+    calls = _CALL_NUMBERS.get(os.uname().machine) if sys.platform == "linux" else None
     if calls is None or sys.maxsize < 2**32:  # a process of 32 bits on such a kernel has other numbers
         return
     call = ctypes.CDLL(None).syscall
-    data = ctypes.create_string_buffer(_ATTRIBUTES.size)
-    if call(calls[0], 0, data, _ATTRIBUTES.size, 0) != 0:
+    data = ctypes.create_string_buffer(_SCHED_ATTRIBUTES.size)
+    if call(calls[0], 0, data, _SCHED_ATTRIBUTES.size, 0) != 0:
         return
-    size, policy, _, nice, *_ = _ATTRIBUTES.unpack(data.raw)
-    if policy == _OTHER:
-        data.raw = _ATTRIBUTES.pack(size, policy, 0, nice, 0, _SHORTEST, 0, 0)
+    size, policy, _, nice, *_ = _SCHED_ATTRIBUTES.unpack(data.raw)
+    if policy == _ORDINARY_POLICY:
+        data.raw = _SCHED_ATTRIBUTES.pack(size, policy, 0, nice, 0, _MIN_SLICE, 0, 0)
         call(calls[1], 0, data, 0)

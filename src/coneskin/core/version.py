@@ -11,7 +11,7 @@ __all__ = ["__version__", "code_commit", "recorded_version", "running_version"]
 
 __version__ = "0.1.0"  # the one place: pyproject.toml reads it from here
 
-_SHOWN = 7  # digits of a commit, for people
+_COMMIT_DIGITS = 7  # digits of a commit, for people
 
 
 @cache
@@ -52,4 +52,4 @@ def recorded_version(header: Mapping[str, Any]) -> str:
 
 
 def _words(version: str, commit: str) -> str:
-    return f"{version} ({commit[:_SHOWN]})" if commit else version
+    return f"{version} ({commit[:_COMMIT_DIGITS]})" if commit else version

@@ -9,13 +9,12 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.files import read_file
+from coneskin.core.files import read_file, write_whole
 from coneskin.core.recording.block import is_time
 from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName, GuardEvent
@@ -92,13 +91,9 @@ def write_events(path: Path, events: Iterable[GuardEvent], start: float) -> None
         RecordingError: the file cannot be written.
     """
     lines = ",\n".join(json.dumps(item) for item in event_facts(events, start))
-    draft = path.with_name(path.name + ".draft")
     try:
-        draft.write_text(f'{{"events": [\n{lines}\n]}}\n', encoding="utf-8")
-        draft.replace(path)
+        write_whole(path, f'{{"events": [\n{lines}\n]}}\n')
     except OSError as exc:
-        with suppress(OSError):
-            draft.unlink()
         raise RecordingError(f"cannot write the events {path}: {exc.strerror or exc}") from exc
 
 

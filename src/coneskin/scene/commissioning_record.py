@@ -32,9 +32,9 @@ __all__ = [
     "write_record",
 ]
 
-_CHAIN = 1  # to be raised where the way from a frame to a place on the arm changes, so that old records are void
+_CHAIN_NUMBER = 1  # to be raised where the way from a frame to a place on the arm changes, so that old records are void
 _MAX_BYTES = 1 << 20  # of a record
-_DAY = 86400.0  # s
+_DAY_SECONDS = 86400.0  # s
 _CLOCK_ERROR = 1.0  # days that a record may be ahead of this computer's date
 HOW_TO = "see `coneskin commission`"
 
@@ -102,7 +102,7 @@ def fingerprint(scene: Scene) -> str:
 
     simulated = scene.source is not None and is_simulated(scene.source.kind)
     facts = {
-        "chain": _CHAIN,
+        "chain": _CHAIN_NUMBER,
         "arm": scene.arm.model if scene.arm else None,
         "simulated": simulated,
         "sensors": [[_link_name(link.name), link.frame, _facts(item)] for link in scene.links for item in link.sensors],
@@ -193,7 +193,7 @@ def _check(scene: Scene, now: float) -> Commissioning:
     then = datetime.fromisoformat(record.date)
     then = then if then.tzinfo else then.replace(tzinfo=UTC)
     day = f"{then:%Y-%m-%d}"
-    age = (now - then.timestamp()) / _DAY
+    age = (now - then.timestamp()) / _DAY_SECONDS
     if record.passed is not True or not record.marks or not all(mark.passed is True for mark in record.marks):
         why = f"the commissioning of {day} has failed{f', {record.cause}' if record.cause else ''}: {HOW_TO}"
         return Commissioning(False, why)
@@ -204,8 +204,8 @@ def _check(scene: Scene, now: float) -> Commissioning:
         )
         return Commissioning(False, f"the commissioning of {day} was of another scene, {changed}: {HOW_TO}")
     limit = scene.commissioning_max_age
-    if limit is not None and age * _DAY > limit:
-        allowed = f"{limit / _DAY:g} days are allowed (commissioning.max_age_days)"
+    if limit is not None and age * _DAY_SECONDS > limit:
+        allowed = f"{limit / _DAY_SECONDS:g} days are allowed (commissioning.max_age_days)"
         return Commissioning(False, f"the commissioning of {day} is {age:.1f} days old, {allowed}: {HOW_TO}")
     if limit is not None and age < -_CLOCK_ERROR:
         return Commissioning(False, f"the commissioning is dated {day}, which is still to come: set the date; {HOW_TO}")

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import SceneError
+from coneskin.core.errors import KinematicsError, SceneError
 from coneskin.core.files import read_file
 from coneskin.core.keys import check
 
@@ -19,6 +20,9 @@ from .tables.keys import COMMISSIONING_KEYS, MAX_SIZE, RECORDING_KEYS
 from .tables.sensor_tables import count_sensors, inline_sensor_files, read_links
 from .tables.source_tables import read_sources, read_touch
 from .values import scene as s
+
+if TYPE_CHECKING:
+    from coneskin.robot.arm.model import ArmModel
 
 __all__ = ["TABLES", "load_scene", "parse_scene"]
 
@@ -36,10 +40,11 @@ TABLES = (
     "padding",
     "speed_limit",
 )
+_TUBE_LENGTHS = {"upper_arm": 1, "forearm": 2}  # link name -> index of the DH length that is the tube's
 #: tomllib's time for a dotted key grows with the cube of its parts: a key of 20 kB takes minutes
 _MAX_PARTS = 64
-_DOTTED = re.compile(r"[\w\"'-][ \t]*\.")
-_PIECES = re.compile(r"[=,{\n]")
+_DOTTED_PART = re.compile(r"[\w\"'-][ \t]*\.")
+_PIECE_END = re.compile(r"[=,{\n]")
 
 
 def load_scene(path: Path | str, *, calibrated: bool = True) -> s.Scene:
@@ -89,7 +94,7 @@ def parse_scene(
     """
     if len(text) > MAX_SIZE:
         raise SceneError([f"a scene has at most {MAX_SIZE} characters, got {len(text)}: is it the right file?"], name)
-    if any(len(_DOTTED.findall(piece)) > _MAX_PARTS for piece in _PIECES.split(text)):
+    if any(len(_DOTTED_PART.findall(piece)) > _MAX_PARTS for piece in _PIECE_END.split(text)):
         raise SceneError([f"not TOML: a key must have at most {_MAX_PARTS} parts with dots between them"], name)
     try:
         tables = tomllib.loads(text)
@@ -215,6 +220,46 @@ def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, 
     if "source" in named and isinstance(tables.get("link", []), list) and not count_sensors(tables):
         problems.append("[source] needs a [[link]] with a [[link.sensor]] that its bytes come from")
     if "arm" in named:
-        from .checks import check_links
+        _check_links(scene, problems)
 
-        check_links(scene, problems)
+
+def _check_links(scene: s.Scene, problems: list[str]) -> None:
+    """Add to problems a link that no arm has, a sensor longer than its link, a joint beyond its limit.
+
+    Lengths and limits need a known arm; names are the same for all arms.
+    """
+    from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
+    from coneskin.robot.arm.ur_models import arm_model
+
+    arm = None if scene.arm is None else arm_model(scene.arm.model)
+    names = {index: name for name, index in LINK_INDEX.items()}
+    for link in scene.links:
+        try:
+            name = names[link_index(link.name)]  # "upperarm" and "upper_arm_link" are the same link
+        except KinematicsError:
+            problems.append(f"link {link.name}: an arm has no such link; it has {', '.join(LINK_INDEX)}")
+            continue
+        if arm is not None and name in _TUBE_LENGTHS:
+            _check_length(link, abs(arm.a[_TUBE_LENGTHS[name]]), arm.name, problems)
+    if arm is not None and scene.motion is not None:
+        _check_limits(scene.motion, arm, problems)
+
+
+def _check_limits(motion: s.MotionScene, arm: ArmModel, problems: list[str]) -> None:
+    for number, point in enumerate(motion.waypoints, 1):
+        for joint, (q, low, high) in enumerate(zip(point, arm.joint_lower, arm.joint_upper, strict=False), 1):
+            if not low <= q <= high:
+                problems.append(
+                    f"motion.waypoints_deg[{number}]: joint {joint} of the {arm.name} must be from "
+                    f"{math.degrees(low):g} to {math.degrees(high):g} deg, got {math.degrees(q):g} deg"
+                )
+
+
+def _check_length(link: s.LinkScene, length: float, arm: str, problems: list[str]) -> None:
+    for item in link.sensors:
+        height = item.sensor.frustum.height
+        if height > length:
+            problems.append(
+                f"link {link.name}, {item.sensor.name}: height_mm must be at most {1e3 * length:g} mm, the distance "
+                f"between the joints of the {arm}'s {link.name}, got {1e3 * height:g} mm"
+            )

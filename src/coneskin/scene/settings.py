@@ -34,12 +34,12 @@ __all__ = [
     "resolved_settings",
 ]
 
-_EXAMPLE = (
+_NAME_EXAMPLE = (
     "write reaction.kind=stop, monitoring.settle_ms=100, reaction.rule.0.kind=slow, sensor.0.touch_level=0.08, "
     "detection.touch_level=0.08 for all sensors, or detector.release_frames=5"
 )
 _ALL_SENSORS = "detection"  # keys of every [[link.sensor]]
-_SENSOR = "sensor"  # the sensors of all links in the order of the file
+_ONE_SENSOR = "sensor"  # the sensors of all links in the order of the file
 _BARE_POINT = re.compile(r"(?<![\w.\"'])([+-]?)\.(?=\d)")  # of a number such as .08, which is none in TOML
 #: tables of which a replay uses nothing, and why
 _NO_EFFECT = {
@@ -47,7 +47,7 @@ _NO_EFFECT = {
     "motion": "the arm moved as it was recorded",
     "recording": "nothing is recorded",
 }
-_PART = re.compile(r'"([^"]*)"|([^."]+)')
+_NAME_PART = re.compile(r'"([^"]*)"|([^."]+)')
 
 
 def parse_settings(words: Iterable[str]) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def parse_choices(word: str) -> tuple[str, list[Any]]:
 def _split(word: str) -> tuple[str, str]:
     name, equals, text = word.partition("=")
     if not equals or not name.strip() or not text.strip():
-        raise SceneError([f"a setting is TABLE.KEY=VALUE, got {word!r}; {_EXAMPLE}"], "settings")
+        raise SceneError([f"a setting is TABLE.KEY=VALUE, got {word!r}; {_NAME_EXAMPLE}"], "settings")
     return name.strip(), text.strip()
 
 
@@ -90,7 +90,9 @@ def override_detector(settings: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         SceneError: one of them is unknown, or its value not possible.
     """
-    own = {name.partition(".")[2]: value for name, value in settings.items() if name.partition(".")[0] == _DETECTOR}
+    own = {
+        name.partition(".")[2]: value for name, value in settings.items() if name.partition(".")[0] == _DETECTOR_NAME
+    }
     return _detector_settings(own)
 
 
@@ -116,8 +118,8 @@ def override_settings(text: str, settings: Mapping[str, Any]) -> str:
         raise SceneError([f"not TOML: {exc}"], "settings") from exc
     problems: list[str] = []
     for name, value in settings.items():
-        parts = [quoted or plain for quoted, plain in _PART.findall(name)]
-        if parts[:1] == [_DETECTOR]:
+        parts = [quoted or plain for quoted, plain in _NAME_PART.findall(name)]
+        if parts[:1] == [_DETECTOR_NAME]:
             continue
         try:
             _override(tables, parts, value)
@@ -134,22 +136,22 @@ class _NoPlace(Exception):
 
 def _override(tables: dict[str, Any], parts: list[str], value: Any) -> None:
     if len(parts) < 2:
-        raise _NoPlace(f"a setting is named TABLE.KEY; {_EXAMPLE}")
+        raise _NoPlace(f"a setting is named TABLE.KEY; {_NAME_EXAMPLE}")
     if parts[0] in _NO_EFFECT:
         raise _NoPlace(f"it would have no effect in a replay: {_NO_EFFECT[parts[0]]}; leave it out")
     sensors = sensor_tables(tables)
-    if parts[0] in (_ALL_SENSORS, _SENSOR) and not sensors:
+    if parts[0] in (_ALL_SENSORS, _ONE_SENSOR) and not sensors:
         raise _NoPlace("the scene has no sensor")
     if parts[0] == _ALL_SENSORS:
         for sensor in sensors:
             _put(sensor, parts[1:], value, parts[0])
-    elif parts[0] == _SENSOR:
-        place = _step(sensors, parts[1], _SENSOR)
+    elif parts[0] == _ONE_SENSOR:
+        place = _step(sensors, parts[1], _ONE_SENSOR)
         _put(place, [part for part in parts[2:3] if part != _ALL_SENSORS] + parts[3:], value, ".".join(parts[:2]))
     elif parts[0] in TABLES:
         _put(tables.setdefault(parts[0], {}), parts[1:], value, parts[0])
     else:
-        raise _NoPlace(_unknown("table", parts[0], [*TABLES, _SENSOR, _ALL_SENSORS, _DETECTOR]))
+        raise _NoPlace(_unknown("table", parts[0], [*TABLES, _ONE_SENSOR, _ALL_SENSORS, _DETECTOR_NAME]))
 
 
 def _put(place: Any, parts: list[str], value: Any, where: str) -> None:
@@ -198,8 +200,8 @@ def _unknown(what: str, part: str, known: list[str]) -> str:
     return f"there is no {what} {part}; {said}"
 
 
-_DETECTOR = "detector"  # what their names begin with
-_UNITS = {
+_DETECTOR_NAME = "detector"  # what their names begin with
+_DETECTOR_UNITS = {
     "settle_distance": "_mm",
     "move_distance": "_mm",
     "largest_contact": "_mm",
@@ -216,7 +218,7 @@ def detector_keys() -> tuple[Key, ...]:
     from coneskin.skin.detection.frame.settings import DetectorSettings
 
     own = (item for item in fields(DetectorSettings) if item.name not in _OF_THE_SCENE)
-    return tuple(Key(item.name + _UNITS.get(item.name, ""), type(item.default), None, low=0.0) for item in own)
+    return tuple(Key(item.name + _DETECTOR_UNITS.get(item.name, ""), type(item.default), None, low=0.0) for item in own)
 
 
 def _detector_settings(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -229,7 +231,7 @@ def _detector_settings(values: Mapping[str, Any]) -> dict[str, Any]:
         SceneError: a key is unknown, or a value is not possible.
     """
     problems: list[str] = []
-    checked = check(values, detector_keys(), _DETECTOR, problems) if values else {}
+    checked = check(values, detector_keys(), _DETECTOR_NAME, problems) if values else {}
     found = {name: value for name, value in checked.items() if value is not None}
     if not problems and found:
         problems += _refusals(found)

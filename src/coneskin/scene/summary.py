@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 __all__ = ["missing_parts", "summarize"]
 
 #: arm.controller_heartbeat -> what it means
-_HEARTBEAT = {
+_HEARTBEAT_WORDS = {
     "required": "a program on the controller must depend on the guard's heartbeat (coneskin heartbeat)",
     "optional": "NOT REQUIRED: a program without the lines of coneskin heartbeat goes on if the network is cut",
 }
 
 #: reaction.on_resistance -> what it means
-_ANSWER = {"stop": "stay", "back": "go back the way of the retreat", "comply": "give way to all touches"}
+_RESISTANCE_WORDS = {"stop": "stay", "back": "go back the way of the retreat", "comply": "give way to all touches"}
 #: reaction.on_clamp -> what it means, beside what is the default
-_CLAMP = {
+_CLAMP_WORDS = {
     "stop": "",
     "path": "; where touches hold the arm between them: go back along its path if that leads into none of them",
     "comply": "; where touches hold the arm between them: give way to them",
@@ -46,7 +46,7 @@ def summarize(scene: Scene) -> dict[str, Any]:
         table = "" if scene.arm.table_z is None else f", table at z = {1e3 * scene.arm.table_z:g} mm"
         found["arm"] = f"{scene.arm.model} at {scene.arm.host}, control {scene.arm.control}{table}"
         if scene.arm.control == "external":
-            found["heartbeat"] = _HEARTBEAT[scene.arm.controller_heartbeat]
+            found["heartbeat"] = _HEARTBEAT_WORDS[scene.arm.controller_heartbeat]
     for link in scene.links:
         for item in link.sensors:
             found[f"sensor {item.sensor.name}"] = _sensor(item, link.name, link.frame)
@@ -133,7 +133,9 @@ def _reaction(reaction: Reaction) -> str:
     if reaction.kind == "comply":
         return f"{text}, with full speed at level {reaction.full_level:g}"
     text += "; else back along its path" if reaction.fallback == "path" else ""
-    return f"{text}; where the touch resists: {_ANSWER[reaction.on_resistance]}{_CLAMP[reaction.on_clamp]}"
+    return (
+        f"{text}; where the touch resists: {_RESISTANCE_WORDS[reaction.on_resistance]}{_CLAMP_WORDS[reaction.on_clamp]}"
+    )
 
 
 def _conditions(rule: Rule) -> str:

@@ -311,12 +311,13 @@ class HeardLine:
             self._window = CaptureWindow(block.time)
         self._window.feed(block.payload, block.time)
 
-    def describe(self, scene: Scene, reasons: Sequence[str]) -> str:
+    def describe(self, scene: Scene, reasons: Sequence[str], now: float) -> str:
         """Return what is wrong with the line, where a guard waits for its skin.
 
         Args:
             scene: with the sensors and their source.
             reasons: why the guard waits or refuses; those of a sensor begin with its name.
+            now: host clock [s].
 
         Returns:
             a sentence; empty where the reasons are others, and where frames come as they should.
@@ -327,7 +328,6 @@ class HeardLine:
         from coneskin.skin.diagnosis.capture import Capture
         from coneskin.skin.diagnosis.diagnose import diagnose
 
-        now = time.monotonic()
         capture = Capture((), now, since=now) if self._window is None else self._window.capture(now)
         found = diagnose(capture, [item.sensor for item in scene.sensors], scene.source.settings.get("baud"))
         if found.good:

@@ -279,7 +279,7 @@ class Session:
 
     def _describe_line(self, reasons: Sequence[str]) -> str:
         """Return what is wrong with the skin's line, given why the guard waits or refuses."""
-        return self._log.line.describe(self.scene, reasons)
+        return self._log.line.describe(self.scene, reasons, time.monotonic())
 
     def _send_guard(self, message: bytes) -> None:
         assert self._processes.guard is not None

@@ -16,7 +16,7 @@ START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]  #: j
 GOAL = [math.radians(60.0), *START[1:]]  #: joint positions 100 deg of the base further [rad]
 ESCALATE = 0.025  #: s; default of the scene's monitoring.escalate_ms
 
-_SCENE = """\
+_SCENE_TEXT = """\
 [arm]
 model = "UR5e"
 host = "{host}"
@@ -52,7 +52,7 @@ def forearm_scene(
         limits: lines of [monitoring]; the limits that are not named have their defaults.
     """
     source = f'kind = "serial"\nport = "{port}"' if port else 'kind = "virtual"'
-    text = _SCENE.format(host=host, control=control, source=source, reaction=reaction)
+    text = _SCENE_TEXT.format(host=host, control=control, source=source, reaction=reaction)
     return text + (f"[monitoring]\n{limits}\n" if limits else "")
 
 

@@ -35,9 +35,9 @@ END = 0  #: kind of the last block of a recording that was closed
 COPY = 255  #: kind: a block that stands elsewhere as well: u8 its kind, f64 its time, its payload
 DROPPED = 254  #: kind: JSON: what retention has dropped
 FILE_KINDS = frozenset({END, *range(240, 256)})  #: not for those who read a run
-_HEAD = struct.Struct("<IBd")
-_TAIL = struct.Struct("<I")
-_COPY = struct.Struct("<Bd")
+_BLOCK_HEAD = struct.Struct("<IBd")
+_BLOCK_TAIL = struct.Struct("<I")
+_COPY_HEAD = struct.Struct("<Bd")
 MAX_PAYLOAD = 1 << 24  #: bytes; a longer block is damage, not data
 
 
@@ -62,28 +62,28 @@ def is_time(value: object) -> TypeGuard[float]:
 
 def encode_block(block: Block) -> bytes:
     """Return the bytes of one block."""
-    body = _HEAD.pack(len(block.payload), block.kind, block.time) + block.payload
-    return body + _TAIL.pack(zlib.crc32(body))
+    body = _BLOCK_HEAD.pack(len(block.payload), block.kind, block.time) + block.payload
+    return body + _BLOCK_TAIL.pack(zlib.crc32(body))
 
 
 def decode_blocks(data: bytes) -> Iterator[tuple[int, Block]]:
     """Yield the whole blocks from the start of data, each with the offset behind it, up to the first damaged one."""
     at = 0
-    while at + _HEAD.size + _TAIL.size <= len(data):
-        length, kind, time = _HEAD.unpack_from(data, at)
-        end = at + _HEAD.size + length
-        if length > MAX_PAYLOAD or end + _TAIL.size > len(data):
+    while at + _BLOCK_HEAD.size + _BLOCK_TAIL.size <= len(data):
+        length, kind, time = _BLOCK_HEAD.unpack_from(data, at)
+        end = at + _BLOCK_HEAD.size + length
+        if length > MAX_PAYLOAD or end + _BLOCK_TAIL.size > len(data):
             return
-        if zlib.crc32(data[at:end]) != _TAIL.unpack_from(data, end)[0]:
+        if zlib.crc32(data[at:end]) != _BLOCK_TAIL.unpack_from(data, end)[0]:
             return
-        payload = data[at + _HEAD.size : end]
-        at = end + _TAIL.size
+        payload = data[at + _BLOCK_HEAD.size : end]
+        at = end + _BLOCK_TAIL.size
         yield at, Block(kind, time, payload)
 
 
 def encode_copy(block: Block, time: float) -> Block:
     """Return the copy of a block, to be written at a time [s, host clock]."""
-    return Block(COPY, time, _COPY.pack(block.kind, block.time) + block.payload)
+    return Block(COPY, time, _COPY_HEAD.pack(block.kind, block.time) + block.payload)
 
 
 def decode_copy(copy: Block) -> Block:
@@ -92,9 +92,9 @@ def decode_copy(copy: Block) -> Block:
     Raises:
         RecordingError: it holds none.
     """
-    if len(copy.payload) < _COPY.size:
+    if len(copy.payload) < _COPY_HEAD.size:
         raise RecordingError(f"a copy of {copy.time:.6f} s holds no block")
-    kind, time = _COPY.unpack_from(copy.payload)
+    kind, time = _COPY_HEAD.unpack_from(copy.payload)
     if not is_time(time):
         raise RecordingError(f"a copy of {copy.time:.6f} s holds a block of the time {time} s")
-    return Block(kind, time, copy.payload[_COPY.size :])
+    return Block(kind, time, copy.payload[_COPY_HEAD.size :])

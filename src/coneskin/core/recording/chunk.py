@@ -33,12 +33,12 @@ MAGIC = b"CONESKIN"  #: of a file
 SYNC = b"\xa7CSK"  #: of a chunk
 _FILE_HEAD = struct.Struct("<8sIQI")
 _CHUNK_HEAD = struct.Struct("<4sIQQIIQddB3xII")
-_BLOCK = struct.Struct("<IBd")
+_BLOCK_HEAD = struct.Struct("<IBd")
 FILE_HEAD_SIZE = _FILE_HEAD.size  #: bytes
 CHUNK_HEAD_SIZE = _CHUNK_HEAD.size  #: bytes
 MAX_BODY = 2 * MAX_PAYLOAD  #: bytes of a chunk's blocks before compression; more is damage, not data
 _PLAIN, _ZLIB = 0, 1  # encodings of a body
-_LEVEL = 1  # of zlib: 3.1 times smaller in 2 to 4 ms for a second of an arm and a skin; 6 gains 8 % more
+_ZLIB_LEVEL = 1  # of zlib: 3.1 times smaller in 2 to 4 ms for a second of an arm and a skin; 6 gains 8 % more
 _LAST_BIT = 63  # of ``ChunkHead.kinds``: this kind or one above it
 
 
@@ -114,8 +114,8 @@ def decode_file_head(data: bytes) -> FileHead | None:
 
 def encode_chunk(run: int, sequence: int, blocks: Sequence[Block], span: int = 1) -> bytes:
     """Return the bytes of a chunk of at least one block, compressed where that makes it smaller."""
-    body = b"".join([_BLOCK.pack(len(payload), kind, time) + payload for kind, time, payload in blocks])
-    packed = zlib.compress(body, _LEVEL)
+    body = b"".join([_BLOCK_HEAD.pack(len(payload), kind, time) + payload for kind, time, payload in blocks])
+    packed = zlib.compress(body, _ZLIB_LEVEL)
     encoding, stored = (_ZLIB, packed) if len(packed) < len(body) else (_PLAIN, body)
     times = [block.time for block in blocks]
     fields = (SYNC, len(stored), run, sequence, span, len(blocks), bits({block.kind for block in blocks}))  # type: ignore[arg-type]
@@ -145,7 +145,7 @@ def decode_body(head: ChunkHead, stored: bytes) -> list[Block]:
     """
     body = _unpacked(head, stored)
     at, size, since, until = 0, len(body), head.since, head.until
-    unpack, skip, make = _BLOCK.unpack_from, _BLOCK.size, tuple.__new__
+    unpack, skip, make = _BLOCK_HEAD.unpack_from, _BLOCK_HEAD.size, tuple.__new__
     blocks: list[Block] = []
     try:
         while at < size:
@@ -170,7 +170,7 @@ def decode_payloads(head: ChunkHead, stored: bytes, kind: int) -> list[tuple[flo
     """
     body = _unpacked(head, stored)
     at, size, since, until = 0, len(body), head.since, head.until
-    unpack, skip = _BLOCK.unpack_from, _BLOCK.size
+    unpack, skip = _BLOCK_HEAD.unpack_from, _BLOCK_HEAD.size
     found: list[tuple[float, bytes]] = []
     try:
         while at < size:

@@ -21,7 +21,7 @@ from .scan import Chunk, Damage, Extent, holds_chunk, scan_extents, walk
 __all__ = ["MAX_SIZE", "RecordedBlocks", "Recording", "parts_of", "read_recording"]
 
 MAX_SIZE = 1 << 36  #: bytes of a file: two years of one sensor and an arm; it is never held in memory
-_EVERY = (1 << 64) - 1
+_ALL_KINDS = (1 << 64) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class RecordedBlocks:
                     if block.kind not in hidden:
                         yield block
             return
-        for block in self._raw(since, until, _EVERY if kinds is None else bits(kinds)):
+        for block in self._raw(since, until, _ALL_KINDS if kinds is None else bits(kinds)):
             kind = block.kind
             if kind not in hidden and (kinds is None or kind in kinds) and since <= block.time <= until:
                 yield block
@@ -85,7 +85,7 @@ class RecordedBlocks:
         kinds = frozenset({COPY, DROPPED})
         return (block for block in self._raw(-math.inf, math.inf, bits(kinds)) if block.kind in kinds)
 
-    def chunks(self, since: float = -math.inf, until: float = math.inf, kinds: int = _EVERY) -> Iterator[Chunk]:
+    def chunks(self, since: float = -math.inf, until: float = math.inf, kinds: int = _ALL_KINDS) -> Iterator[Chunk]:
         """Yield the intact chunks with blocks in a time [s, host clock] and of kinds, each once, in order."""
         following = 0
         with ExitStack() as stack:

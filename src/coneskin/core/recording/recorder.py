@@ -27,9 +27,9 @@ if sys.platform != "win32":
 
 FLUSH_PERIOD = 0.05  #: s of blocks in a chunk: what a killed recorder loses; shorter ones are compressed less
 _FLUSH_SIZE = 1 << 17  # bytes of blocks in a chunk
-_STEPS = 8  # of retention with each chunk
-_OVER = object()
-_MODE = 0o600  # what was recorded tells who worked when: for its owner alone, who may chmod it
+_RETENTION_STEPS = 8  # of retention with each chunk
+_RETENTION_END = object()
+_FILE_MODE = 0o600  # what was recorded tells who worked when: for its owner alone, who may chmod it
 
 
 class Recorder:
@@ -133,8 +133,8 @@ class Recorder:
     def _go_on_retaining(self, retain: Callable[[Path], Iterator[None]]) -> None:
         """Make some steps of the retention; a file that cannot be shortened stays as it is."""
         with suppress(RecordingError):
-            for _ in range(_STEPS):
-                if next(self._retaining, _OVER) is _OVER:
+            for _ in range(_RETENTION_STEPS):
+                if next(self._retaining, _RETENTION_END) is _RETENTION_END:
                     if not self._waiting:
                         return
                     self._retaining = retain(self._waiting.pop(0))
@@ -197,7 +197,7 @@ def part_path(path: Path, number: int) -> Path:
 
 
 def _create(name: str, flags: int) -> int:
-    return os.open(name, flags, _MODE)
+    return os.open(name, flags, _FILE_MODE)
 
 
 def _mark_recorded(file: BinaryIO) -> None:

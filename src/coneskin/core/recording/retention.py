@@ -19,8 +19,8 @@ from .scan import Chunk, walk
 
 __all__ = ["prune_file"]
 
-_LONGEST = 1 << 16  # bytes of blocks that are kept in one chunk in the place of several
-_LARGEST_SPAN = 1 << 16  # chunks in whose place one stands
+_MAX_KEPT_SIZE = 1 << 16  # bytes of blocks that are kept in one chunk in the place of several
+_MAX_SPAN = 1 << 16  # chunks in whose place one stands
 
 
 def prune_file(path: Path, windows: Sequence[tuple[float, float]], kept: frozenset[int]) -> Iterator[None]:
@@ -92,7 +92,7 @@ class _Shortened:
     def fits(self, chunk: Chunk) -> bool:
         if not self._span:
             return True
-        full = self._size > _LONGEST or self._span + chunk.head.span > _LARGEST_SPAN
+        full = self._size > _MAX_KEPT_SIZE or self._span + chunk.head.span > _MAX_SPAN
         return chunk.head.sequence == self._first + self._span and not full
 
     def put_in(self, chunk: Chunk, kept: frozenset[int]) -> None:

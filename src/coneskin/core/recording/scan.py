@@ -12,9 +12,9 @@ from .chunk import CHUNK_HEAD_SIZE, FILE_HEAD_SIZE, MAX_BODY, SYNC, ChunkHead, d
 
 __all__ = ["Chunk", "Damage", "Extent", "holds_chunk", "scan_extents", "walk"]
 
-_WINDOW = 1 << 18  # bytes that are searched at once
-_SEARCHED = MAX_BODY + CHUNK_HEAD_SIZE + _WINDOW  # bytes within which one of the first two chunks begins
-_EXTENT = 1 << 22  # bytes of an extent: what a seek has to pass over
+_SEARCH_WINDOW = 1 << 18  # bytes that are searched at once
+_SEARCH_LENGTH = MAX_BODY + CHUNK_HEAD_SIZE + _SEARCH_WINDOW  # bytes within which one of the first two chunks begins
+_EXTENT_SIZE = 1 << 22  # bytes of an extent: what a seek has to pass over
 
 
 class Chunk(NamedTuple):
@@ -73,7 +73,7 @@ class Extent:
         head = chunk.head
         if chunk.offset != self.end or head.sequence != self.following or head.run != self.run:
             return False
-        if chunk.end - self.offset > _EXTENT:
+        if chunk.end - self.offset > _EXTENT_SIZE:
             return False
         self.end, self.following, self.last_kinds = chunk.end, head.following, head.kinds
         self.blocks += head.blocks
@@ -115,19 +115,19 @@ def _find(file: BinaryIO, at: int, size: int) -> int:
     """Return the offset of the next head of a chunk; the size of the file where there is none."""
     while at < size:
         file.seek(at)
-        window = file.read(min(_WINDOW + CHUNK_HEAD_SIZE, size - at))
+        window = file.read(min(_SEARCH_WINDOW + CHUNK_HEAD_SIZE, size - at))
         found = window.find(SYNC)
-        while 0 <= found < _WINDOW:
+        while 0 <= found < _SEARCH_WINDOW:
             if decode_chunk_head(window, found) is not None:
                 return at + found
             found = window.find(SYNC, found + 1)
-        at += _WINDOW
+        at += _SEARCH_WINDOW
     return size
 
 
 def holds_chunk(file: BinaryIO) -> bool:
     """Tell whether a chunk begins at the start of a file, or where the largest body there would have ended."""
-    return _find(file, 0, _SEARCHED) < _SEARCHED
+    return _find(file, 0, _SEARCH_LENGTH) < _SEARCH_LENGTH
 
 
 def scan_extents(

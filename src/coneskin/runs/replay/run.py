@@ -78,10 +78,6 @@ def _describe(old: GuardEvent | None, new: GuardEvent | None, start: float) -> s
     return f"{old.time - start:.4f} s, {old.name}: {said}"
 
 
-if TYPE_CHECKING:
-    pass
-
-
 MOST_DIFFERENCES = 5  #: that a replay describes
 
 
@@ -215,12 +211,8 @@ class Run:
 
     @property
     def commissioning(self) -> Commissioning | None:
-        """What was known of the scene's commissioning; a replay does not look again.
-
-        A recording from before there were records has none, and its arm moved away without.
-        """
-        before = {"valid": True, "note": "recorded before there were commissioning records"}
-        return Commissioning.from_message(self.header.get("commissioning", before))
+        """What was known of the scene's commissioning; a replay does not look again."""
+        return Commissioning.from_message(self.header.get("commissioning"))
 
     @property
     def recorded_by(self) -> str:

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = ["read_arm", "read_bodies", "read_monitoring", "read_motion", "read_padding", "read_reaction"]
 
-_WAYPOINT = (replace(k.MOTION_KEYS[0], name="q_deg"),)
-_CONDITIONS = ("link", "level_above", "speed_above")  # of a rule
+_WAYPOINT_KEYS = (replace(k.MOTION_KEYS[0], name="q_deg"),)
+_RULE_CONDITIONS = ("link", "level_above", "speed_above")  # of a rule
 #: keys that a kind must have, because nothing is known that holds for all
-_NEEDED = {
+_NEEDED_VALUES = {
     "wall": ("direction",),
     "post": ("direction",),
     "mass": ("mass",),
@@ -73,7 +73,7 @@ def read_motion(tables: Mapping[str, Any], problems: list[str]) -> MotionScene |
         for number, row in enumerate(rows, 1):
             where = f"motion.waypoints_deg[{number}]"
             lines: list[str] = []
-            points.append(check({"q_deg": row}, _WAYPOINT, where, lines).get("q", ()))
+            points.append(check({"q_deg": row}, _WAYPOINT_KEYS, where, lines).get("q", ()))
             problems += [line.replace(f"{where}.q_deg", where) for line in lines]
         if len(rows) < 2:
             problems.append(f"motion.waypoints_deg needs at least 2 waypoints, got {len(rows)}")
@@ -110,7 +110,7 @@ def _rule(row: Mapping[str, Any], where: str, default: Reaction, problems: list[
 
     before = len(problems)
     values = _given(check(row, k.RULE_KEYS, where, problems))
-    conditions = {name: values.pop(name) for name in _CONDITIONS if name in values}
+    conditions = {name: values.pop(name) for name in _RULE_CONDITIONS if name in values}
     if not conditions and len(problems) == before:
         problems.append(f"{where} has no condition: give it link, level_above or speed_above_rad_s")
     if "link" in conditions:
@@ -142,7 +142,7 @@ def _body(row: Mapping[str, Any], where: str, problems: list[str]) -> BodyScene 
     values = check(row, k.BODY_KEYS, where, problems)
     kind = values.get("kind", "")
     names = {key.plain: key.name for key in k.BODY_KEYS}
-    for name in _NEEDED.get(kind, ()):
+    for name in _NEEDED_VALUES.get(kind, ()):
         if values[name] is None:
             problems.append(f"{where}: a {kind} needs {names[name]}; there is no value that holds for every {kind}")
     if values["direction"] is not None and not any(values["direction"]):

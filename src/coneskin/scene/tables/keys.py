@@ -126,13 +126,13 @@ TOUCH_KEYS = with_meanings(
 
 # ---- what the arm does; defaults as of ``Reaction``
 
-_KIND = Key(
+_REACTION_KIND = Key(
     "kind",
     str,
     choices=("slow", "comply", "retreat", "stop"),
     meaning="what the arm does when it is touched. `retreat` and `comply` need a commissioning",
 )
-_REACTION = with_meanings(
+_REACTION_SETTINGS = with_meanings(
     """
     deceleration_rad_s2: deceleration of the leading joint while stopping
     distance_mm: distance by which the touched point retreats, or gives way
@@ -172,8 +172,8 @@ _REACTION = with_meanings(
     Key("press_mm", float, None, low=0.1, high=100.0),
 )
 REACTION_KEYS = (
-    _KIND,
-    *_REACTION,
+    _REACTION_KIND,
+    *_REACTION_SETTINGS,
     Key("rule", dict, (), unset="none", meaning="reactions with conditions, each under `[[reaction.rule]]`"),
 )
 RULE_KEYS = with_meanings(
@@ -185,8 +185,8 @@ RULE_KEYS = with_meanings(
     Key("link", str, None, unset="any"),
     Key("level_above", float, None, low=0.0, high=1.0, unset="any"),
     Key("speed_above_rad_s", float, None, low=0.0, high=10.0, unset="any"),
-    replace(_KIND, meaning="as in `[reaction]`"),
-    *(replace(key, unset="as above", meaning="as in `[reaction]`") for key in _REACTION),
+    replace(_REACTION_KIND, meaning="as in `[reaction]`"),
+    *(replace(key, unset="as above", meaning="as in `[reaction]`") for key in _REACTION_SETTINGS),
 )
 
 # ---- limits, recording, motion, commissioning; [monitoring] has the defaults of ``MonitoringLimits``

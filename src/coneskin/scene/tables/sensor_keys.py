@@ -13,16 +13,16 @@ from coneskin.core.keys import Key, with_meanings
 
 __all__ = ["CALIBRATION_KEYS", "CONE_KEYS", "DOUBLE_CONE_KEYS", "FILE_KEYS", "LINK_CONE_KEYS", "SENSOR_KEYS"]
 
-_RADIUS1 = Key("radius1_mm", low=1.0, high=5000.0, meaning="radius at end 1, the arc of electrode B")
-_RADIUS2 = Key("radius2_mm", low=1.0, high=5000.0, meaning="radius at end 2, the arc of electrode A")
-_HEIGHT = Key(
+_RADIUS1_KEY = Key("radius1_mm", low=1.0, high=5000.0, meaning="radius at end 1, the arc of electrode B")
+_RADIUS2_KEY = Key("radius2_mm", low=1.0, high=5000.0, meaning="radius at end 2, the arc of electrode A")
+_HEIGHT_KEY = Key(
     "height_mm",
     low=1.0,
     high=10_000.0,
     or_zero=True,
     meaning="distance between the ends along the axis, 0 for a flat ring",
 )
-_WRAP = Key(
+_WRAP_KEY = Key(
     "wrap_deg",
     default=2.0 * math.pi,
     low=0.0,
@@ -32,22 +32,22 @@ _WRAP = Key(
 )
 
 #: the active cone of a sensor, in a scene and in a sensor file; a sensor cannot reach an apex
-CONE_KEYS = (_RADIUS1, _RADIUS2, _HEIGHT, _WRAP)
+CONE_KEYS = (_RADIUS1_KEY, _RADIUS2_KEY, _HEIGHT_KEY, _WRAP_KEY)
 #: the side of a link, on the command line; a radius of 0 is an apex
 LINK_CONE_KEYS = (
-    replace(_RADIUS1, or_zero=True, meaning="radius at end 1"),
-    replace(_RADIUS2, or_zero=True, meaning="radius at end 2"),
-    _HEIGHT,
-    replace(_WRAP, meaning="angle covered about the axis"),
+    replace(_RADIUS1_KEY, or_zero=True, meaning="radius at end 1"),
+    replace(_RADIUS2_KEY, or_zero=True, meaning="radius at end 2"),
+    _HEIGHT_KEY,
+    replace(_WRAP_KEY, meaning="angle covered about the axis"),
 )
 #: the same, with a second cone on end 2 of the first
 DOUBLE_CONE_KEYS = (
     *LINK_CONE_KEYS[:3],
-    replace(_RADIUS2, name="radius3_mm", or_zero=True, meaning="far radius of a second cone on end 2"),
-    replace(_HEIGHT, name="height2_mm", meaning="height of the second cone"),
+    replace(_RADIUS2_KEY, name="radius3_mm", or_zero=True, meaning="far radius of a second cone on end 2"),
+    replace(_HEIGHT_KEY, name="height2_mm", meaning="height of the second cone"),
     LINK_CONE_KEYS[3],
 )
-_BENDS = with_meanings(
+_BEND_KEYS = with_meanings(
     """
     bend_wrap_deg: of a link that is not round: shares of the wrap from phi = 0 on, each bent evenly. They add up to
         `wrap_deg`. `coneskin design` writes them
@@ -60,7 +60,7 @@ _BENDS = with_meanings(
     Key("bend_turn_deg", list, (), low=-360.0, high=360.0),
     Key("bend_lift_mm", float, 0.0, low=0.0, high=100.0),
 )
-_PLACE = with_meanings(
+_PLACE_KEYS = with_meanings(
     """
     xyz_mm: where the middle of end 1 is, in the link's `frame`
     rpy_deg: roll, pitch, yaw about the fixed axes, as in URDF. z runs from end 1 to end 2, x points at phi = 0
@@ -68,7 +68,7 @@ _PLACE = with_meanings(
     Key("xyz_mm", list, (0.0, 0.0, 0.0), low=-10_000.0, high=10_000.0, length=3),
     Key("rpy_deg", list, (0.0, 0.0, 0.0), low=-360.0, high=360.0, length=3),
 )
-_WIRE = with_meanings(
+_WIRE_KEYS = with_meanings(
     """
     id: number of the sensor on the wire
     device: number of its electronics on the wire
@@ -78,7 +78,7 @@ _WIRE = with_meanings(
     Key("device", int, 0, low=0, high=65535),
     Key("name", str, "", unset="from its numbers"),
 )
-_POLARITY = with_meanings(
+_POLARITY_KEYS = with_meanings(
     """
     radial_positive: which arc electrode is at the supply in the radial phase
     angular_positive: which edge electrode is at the supply in the angular phase
@@ -86,8 +86,8 @@ _POLARITY = with_meanings(
     Key("radial_positive", str, "B", choices=("A", "B")),
     Key("angular_positive", str, "C", choices=("C", "D")),
 )
-_MATCHED = "matches the sheets"
-_ELECTRONICS = with_meanings(
+_MATCHED_WORDS = "matches the sheets"
+_ELECTRONICS_KEYS = with_meanings(
     """
     supply_v: potential of the positive electrode, U0; at most 95 % of `adc_v`
     adc_v: potential of the highest count of the A/D converter
@@ -97,15 +97,15 @@ _ELECTRONICS = with_meanings(
     lead_ohm: wire and switch of each electrode: one number for all, or a list for A, B, C, D
     current_full_scale_ma: drive current of the highest count
     """,
-    Key("supply_v", float, None, low=0.1, high=50.0, unset=_MATCHED),
+    Key("supply_v", float, None, low=0.1, high=50.0, unset=_MATCHED_WORDS),
     Key("adc_v", float, 3.3, low=0.1, high=50.0),
-    Key("adc_bits", int, None, low=8, high=16, unset=_MATCHED),
-    Key("pulldown_ohm", float, None, low=1.0, high=1e9, unset=_MATCHED),
+    Key("adc_bits", int, None, low=8, high=16, unset=_MATCHED_WORDS),
+    Key("pulldown_ohm", float, None, low=1.0, high=1e9, unset=_MATCHED_WORDS),
     Key("input_ohm", float, 10e6, low=1.0, high=1e12),
     Key("lead_ohm", list, (1.0,) * 4, low=0.0, high=1e6, length=4, above=True, one_for_all=True),
-    Key("current_full_scale_ma", float, None, low=1e-3, high=1e4, unset=_MATCHED),
+    Key("current_full_scale_ma", float, None, low=1e-3, high=1e4, unset=_MATCHED_WORDS),
 )
-_SHEETS = with_meanings(
+_SHEET_KEYS = with_meanings(
     """
     upper_sheet_ohm: resistance of the upper conductive layer per square
     lower_sheet_ohm: resistance of the lower conductive layer per square
@@ -113,7 +113,7 @@ _SHEETS = with_meanings(
     Key("upper_sheet_ohm", float, 1000.0, low=1e-3, high=1e9),
     Key("lower_sheet_ohm", float, 1000.0, low=1e-3, high=1e9),
 )
-_THRESHOLDS = with_meanings(
+_THRESHOLD_KEYS = with_meanings(
     """
     touch_level: level from which the sensor is touched
     touch_force_n: the same as a force, in place of `touch_level`. It needs a calibration with known forces, and one
@@ -144,8 +144,8 @@ CALIBRATION_KEYS = with_meanings(
     Key("force_error", float, 0.0, low=0.0, high=0.99),
 )
 SENSOR_KEYS = (
-    *(*CONE_KEYS, *_BENDS, *_PLACE, *_WIRE, *_POLARITY),
-    *(*_ELECTRONICS, *_SHEETS, *_THRESHOLDS, *CALIBRATION_KEYS),
+    *(*CONE_KEYS, *_BEND_KEYS, *_PLACE_KEYS, *_WIRE_KEYS, *_POLARITY_KEYS),
+    *(*_ELECTRONICS_KEYS, *_SHEET_KEYS, *_THRESHOLD_KEYS, *CALIBRATION_KEYS),
 )
 #: that a scene may have beside those of the sensor
 FILE_KEYS = with_meanings(

@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 _NEEDS_CALIBRATION = "touch_force_n"
-_CALIBRATED = ("calibration", *(key.name for key in CALIBRATION_KEYS))
+_CALIBRATION_NAMES = ("calibration", *(key.name for key in CALIBRATION_KEYS))
 
 
 def merge_sensor_file(table: Mapping[str, Any], where: str, folder: Path | None, problems: list[str]) -> dict[str, Any]:
@@ -64,7 +64,7 @@ def merge_sensor_file(table: Mapping[str, Any], where: str, folder: Path | None,
 
 def drop_calibration(table: Mapping[str, Any]) -> dict[str, Any]:
     """Return a sensor's table without its calibration, the keys that stand for one, and those that need one."""
-    return {key: value for key, value in table.items() if key not in (*_CALIBRATED, _NEEDS_CALIBRATION)}
+    return {key: value for key, value in table.items() if key not in (*_CALIBRATION_NAMES, _NEEDS_CALIBRATION)}
 
 
 def apply_calibration(
@@ -83,7 +83,7 @@ def apply_calibration(
     (name,) = check({"calibration": table["calibration"]}, (Key("calibration", str, None),), where, problems).values()
     if folder is None:
         problems.append(f"{where}.calibration: a recording carries the numbers of its calibrations and names no file")
-    elif both := sorted(key for key in _CALIBRATED[1:] if key in table):
+    elif both := sorted(key for key in _CALIBRATION_NAMES[1:] if key in table):
         problems.append(f"{where}: {', '.join(both)} cannot stand beside calibration, which gives them: leave one out")
     elif name is not None:
         built = build_sensor(plain, where, [])  # what is wrong with it is reported when the table itself is read

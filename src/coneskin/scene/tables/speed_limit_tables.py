@@ -177,10 +177,12 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
     problems += [f"arm.speed_limit_from: {line}; {_HOW_TO}" for line in lines[:_MAX_LINES]]
 
 
-_STEEPER = 1.05  # of the lever's growth by which a speed may grow; the search leaves 1 %, rounding another
-_ROUNDED = 2e-5  # m/s that rounding leaves of two speeds
-_WIDEST = math.radians(90.0)  # between two patches around a sheet; beyond, no factor makes up for what lies between
-_SLACK = 1e-7  # m and rad that the rounding of a file leaves
+_MAX_STEEPNESS = 1.05  # of the lever's growth by which a speed may grow; the search leaves 1 %, rounding another
+_ROUNDING_SPEED = 2e-5  # m/s that rounding leaves of two speeds
+_MAX_PATCH_GAP = math.radians(
+    90.0
+)  # between two patches around a sheet; beyond, no factor makes up for what lies between
+_ROUNDING_SLACK = 1e-7  # m and rad that the rounding of a file leaves
 
 
 def limit_digest(table: Mapping[str, Any]) -> str:
@@ -227,7 +229,7 @@ def _bends(levers: tuple[float, ...], curve: tuple[float, ...]) -> list[str]:
         at = f"{1e3 * high:.6g} mm/s after {1e3 * low:.6g} mm/s"
         if high < low:
             return [f"speeds_mm_s must not fall with a longer lever, got {at}"]
-        if low > 0.0 and high > _STEEPER * low * after / before + _ROUNDED:
+        if low > 0.0 and high > _MAX_STEEPNESS * low * after / before + _ROUNDING_SPEED:
             return [
                 f"speeds_mm_s must not grow more than the lever does, from {1e3 * before:.6g} to {1e3 * after:.6g} mm "
                 f"here, got {at}: the straight line between them would be above what is permissible"
@@ -246,13 +248,13 @@ def uncovered(name: str, sheet: Frustum, patches: list[LimitedPatch]) -> list[st
         patches: of that sensor.
     """
     for patch in patches:
-        if patch.u > sheet.slant + _SLACK:
+        if patch.u > sheet.slant + _ROUNDING_SLACK:
             return [f"{name}: u_mm = {1e3 * patch.u:.6g} is off the sheet, which ends at {1e3 * sheet.slant:.6g} mm"]
-        if patch.phi > sheet.wrap + _SLACK:
+        if patch.phi > sheet.wrap + _ROUNDING_SLACK:
             wrap = math.degrees(sheet.wrap)
             return [f"{name}: phi_deg = {math.degrees(patch.phi):.6g} is off the sheet, which ends at {wrap:.6g} deg"]
     for u in (0.0, sheet.slant):
-        around = sorted(patch.phi for patch in patches if abs(patch.u - u) <= _SLACK)
+        around = sorted(patch.phi for patch in patches if abs(patch.u - u) <= _ROUNDING_SLACK)
         if not around:
             return [f"{name}: no patch at its end u_mm = {1e3 * u:.6g}"]
         for start, end in _gaps(around, sheet.wrap):
@@ -263,8 +265,8 @@ def uncovered(name: str, sheet: Frustum, patches: list[LimitedPatch]) -> list[st
 
 def _gaps(around: list[float], wrap: float) -> list[tuple[float, float]]:
     """Return where patches are too far apart, or an edge has none [rad]."""
-    gaps = [(a, b) for a, b in pairwise(around) if b - a > _WIDEST + _SLACK]
+    gaps = [(a, b) for a, b in pairwise(around) if b - a > _MAX_PATCH_GAP + _ROUNDING_SLACK]
     if wrap > 2.0 * math.pi - 1e-9:
         beyond = around[0] + 2.0 * math.pi
-        return gaps + [(around[-1], beyond)] * (beyond - around[-1] > _WIDEST + _SLACK)
-    return gaps + [(a, b) for a, b in ((0.0, around[0]), (around[-1], wrap)) if b - a > _SLACK]
+        return gaps + [(around[-1], beyond)] * (beyond - around[-1] > _MAX_PATCH_GAP + _ROUNDING_SLACK)
+    return gaps + [(a, b) for a, b in ((0.0, around[0]), (around[-1], wrap)) if b - a > _ROUNDING_SLACK]

@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 _MAX_BYTES = 1 << 20  # of a file, about 250 calibrations
-_KINDS = {"float": float, "int": int, "str": str, "bool": bool}  # of a record's fields that are one value each
+_FIELD_KINDS = {"float": float, "int": int, "str": str, "bool": bool}  # of a record's fields that are one value each
 HOW_TO = "see `coneskin calibrate`"
 
 
@@ -162,7 +162,7 @@ def _record(row: dict[str, Any]) -> CalibrationRecord:
     parts: list[CalibrationRecord | TouchResult] = [record, *touches]
     for item in parts:
         for field in fields(item):
-            value, kind = getattr(item, field.name), _KINDS.get(str(field.type))
+            value, kind = getattr(item, field.name), _FIELD_KINDS.get(str(field.type))
             if kind is float:
                 numbers.append(value)
             elif kind is not None and type(value) is not kind:

@@ -351,7 +351,7 @@ class Scene:
         return self.monitoring or MonitoringLimits()
 
 
-_DIGITS = 9  # of a number in a fingerprint; the last bits of a sine may differ between machines
+_FACT_DIGITS = 9  # of a number in a fingerprint; the last bits of a sine may differ between machines
 
 
 def sensor_facts(sensor: Sensor) -> dict[str, Any]:
@@ -368,7 +368,7 @@ def sensor_facts(sensor: Sensor) -> dict[str, Any]:
 def round_facts(value: Any) -> Any:
     """Return facts with each number rounded, so that those of two machines agree."""
     if isinstance(value, float):
-        return round(value, _DIGITS) + 0.0  # no negative zero
+        return round(value, _FACT_DIGITS) + 0.0  # no negative zero
     if isinstance(value, Mapping):
         return {key: round_facts(item) for key, item in value.items()}
     return [round_facts(item) for item in value] if isinstance(value, list | tuple) else value
