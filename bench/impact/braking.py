@@ -16,7 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bench.report import head
+from bench.report import head, show
 
 _PAGE = Path(__file__).parents[2] / "docs" / "do" / "impact.md"
 _SCENE_BLOCK = re.compile(r'```toml title="scene\.toml"\n(.*?)```', re.DOTALL)
@@ -62,13 +62,10 @@ def main() -> None:
     args = parser.parse_args()
     scene = args.scene.read_text(encoding="utf-8") if args.scene else page_scene()
     print(head("mujoco"))
-    print(
-        f"{'rad/s2':>8}"
-        + "".join(f"{f'{name} {unit}':>15}" for name, unit in zip(_COLUMN_FACTORS, _COLUMN_UNITS, strict=True))
-    )
+    rows = []
     for deceleration in args.rad_s2:
         found = strike(scene, deceleration)
-        cells = "".join(
-            f"{factor * found[name]:15.{2 if factor == 1.0 else 1}f}" for name, factor in _COLUMN_FACTORS.items()
-        )
-        print(f"{deceleration:8g}{cells}", flush=True)
+        cells = (f"{factor * found[name]:.{2 if factor == 1.0 else 1}f}" for name, factor in _COLUMN_FACTORS.items())
+        rows.append([f"{deceleration:g}", *cells])
+    columns = [f"{name} {unit}" for name, unit in zip(_COLUMN_FACTORS, _COLUMN_UNITS, strict=True)]
+    show("a stop of each deceleration", ["rad/s2", *columns], rows)

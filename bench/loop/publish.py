@@ -12,7 +12,7 @@ import socket
 import statistics
 from pathlib import Path
 
-from bench.report import head
+from bench.report import head, show
 from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene.reader import parse_scene
 from coneskin.session.event_publisher import EventPublisher
@@ -96,4 +96,5 @@ def main() -> None:
                 f"  {'with' if publish else 'without':>7}: {spent:6.2f} us a frame, {events} events, {came} datagrams"
             )
     without, with_it = statistics.median(found[False]), statistics.median(found[True])
-    print(f"median: {without:.2f} us a frame without, {with_it:.2f} us with: {with_it - without:+.2f} us (at most 20)")
+    row = [f"{without:.2f}", f"{with_it:.2f}", f"{with_it - without:+.2f}"]
+    show("us a frame, median of the rounds; at most 20 more", ["without", "with a publisher", "more"], [row])

@@ -1,6 +1,6 @@
 """Deceleration that an arm's motors can give: by joint, over random positions, bare and with its payload.
 
-    python -m bench deceleration [--positions 2000] [--json]
+    python -m bench deceleration [--positions 2000]
 
 A joint that turns alone can be braked with (torque - what gravity and the payload take) / (what it turns): the torques
 and inertias of coneskin.robot.arm.inertia, the payload as a point at the flange. The worse direction counts: down.
@@ -11,11 +11,10 @@ arm stretched out, highest payload (user manuals UR5/CB3 3.4.5 and UR3/CB3 3.10,
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import random
 
-from bench.report import head, quantile
+from bench.report import head, quantile, show
 from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
 from coneskin.robot.arm.ur_models import arm_model
@@ -76,21 +75,14 @@ def main() -> None:
     """Measure, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--positions", type=int, default=2000, help="random joint positions (%(default)s)")
-    parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    lines = [line for name in PAYLOAD_MASSES for line in measure(name, args.positions)]
-    if args.json:
-        print("\n".join(json.dumps(line) for line in lines))
-        return
     print(head())
-    print(f"{args.positions} random positions; rad/s2, and the share of them in which 10, 20, 40 rad/s2 are possible\n")
-    print(
-        f"{'arm, payload, joint':28}{'stretched':>10}{'UR, cat. 0':>11}{'least':>8}{'p5':>8}{'median':>8}"
-        + f"{'10':>7}{'20':>7}{'40':>7}"
-    )
-    for line in lines:
-        what = f"{line['arm']}, {line['payload_kg']:g} kg, {line['joint']}"
-        measured = f"{line['measured_stretched']:11.1f}" if "measured_stretched" in line else " " * 11
-        cells = "".join(f"{line[key]:8.1f}" for key in ("least", "p5", "median"))
-        shares = "".join(f"{100 * line[f'share_{rate}']:6.0f}%" for rate in (10, 20, 40))  # type: ignore[operator]
-        print(f"{what:28}{line['stretched']:10.1f}{measured}{cells}{shares}")
+    rows = []
+    for line in (line for name in PAYLOAD_MASSES for line in measure(name, args.positions)):
+        measured = f"{line['measured_stretched']:.1f}" if "measured_stretched" in line else "-"
+        what = [f"{line['arm']}, {line['payload_kg']:g} kg, {line['joint']}", f"{line['stretched']:.1f}", measured]
+        cells = [f"{line[key]:.1f}" for key in ("least", "p5", "median")]
+        rows.append([*what, *cells, *(f"{line[f'share_{rate}']:.0%}" for rate in (10, 20, 40))])
+    title = f"rad/s2, and the share of {args.positions} positions in which 10, 20, 40 rad/s2 are possible"
+    columns = ["arm, payload, joint", "stretched", "UR, category 0", "least", "p5", "median", "10", "20", "40"]
+    show(title, columns, rows)

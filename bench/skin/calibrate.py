@@ -12,15 +12,13 @@ outermost 3 %, one frame each.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import random
 import statistics
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 
-from bench.report import head, quantile
+from bench.report import head, quantile, show
 from coneskin.commissioning.calibration.fit import KnownTouch, fit_map
 from coneskin.commissioning.calibration.marks import MARK_COUNTS, calibration_marks
 from coneskin.commissioning.misreadings import Place
@@ -109,22 +107,17 @@ def measure(leads: tuple[float, float], skins: int) -> dict[str, list[float]]:
     return found
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="20 skins of each kind")
-    parser.add_argument("--json", action="store_true", help="print one JSON object for each kind of skin")
-    args = parser.parse_args(arguments)
+    args = parser.parse_args()
     skins = 20 if args.quick else 200
-    if not args.json:
-        print(f"{head()}\n{skins} skins, {PLACE_COUNT} places on each; errors in mm: median / 95 % / largest\n")
-        print(f"| | before | {' | '.join(f'{count} touches' for count in MARK_COUNTS)} |\n|---|---|---|---|---|")
+    print(head())
+    rows = []
     for name, leads in LEAD_RANGES.items():
-        found = measure(leads, skins)
-        rows = {key: [round(quantile(values, share), 3) for share in (0.5, 0.95, 1.0)] for key, values in found.items()}
-        if args.json:
-            print(json.dumps({"skin": name, **rows}), flush=True)
-        else:
-            print(
-                f"| {name} | {' | '.join(' / '.join(f'{v:.2f}' for v in row) for row in rows.values())} |", flush=True
-            )
+        found = measure(leads, skins).values()
+        shares = ((quantile(errors, share) for share in (0.5, 0.95, 1.0)) for errors in found)
+        rows.append([name, *(" / ".join(f"{value:.2f}" for value in values) for values in shares)])
+    title = f"errors in mm: median / 95 % / largest; {skins} skins, {PLACE_COUNT} places on each"
+    show(title, ["", "before", *(f"{count} touches" for count in MARK_COUNTS)], rows)

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 
-from bench.report import head
+from bench.report import head, show
 from coneskin.core.errors import SkinConnectionError, SkinTimeout
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.stream import TouchStream
@@ -107,8 +107,8 @@ def main() -> None:
     missing = sum(detector.timing.missing for detector in stream.detectors)
     print(head())
     print(f"{PORTS * EACH} sensors at {RATE:.0f} Hz on {PORTS} ports for {args.seconds:.0f} s, read in {wall:.1f} s")
-    print(f"frames: {frames} of {sent}; missing by sequence {missing}, skipped bytes {stream.decoder.bytes_skipped}")
-    share, each = 100.0 * used / args.seconds, 1e6 * used / max(frames, 1)
-    print(f"processor time: {used:.1f} s = {share:.1f} % of one core, {each:.1f} us a frame")
+    row = [frames, sent, missing, stream.decoder.bytes_skipped, f"{used / args.seconds:.1%}"]
+    columns = ["frames", "sent", "missing by sequence", "bytes skipped", "share of a core", "us a frame"]
+    show("processor time, and what was lost", columns, [[*row, f"{1e6 * used / max(frames, 1):.1f}"]])
     print(f"reads: {reads}; the child was over 50 ms late {late} times (at worst {worst} s), writes lost {lost}")
     print(f"events: {faults or 'none'}")
