@@ -48,6 +48,14 @@ def scene_table(keys: Sequence[Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def design_tables() -> str:
+    """Return the tables of the keys of design.toml. They are a page of the site alone: the file itself says the same."""
+    from coneskin.design.design_toml import DESIGN_TABLES
+
+    parts = (f"## `[{name}]`\n\n{meaning}\n\n{scene_table(keys)}" for name, (meaning, keys) in DESIGN_TABLES.items())
+    return "\n".join(parts)
+
+
 # events, commands, names
 
 
@@ -201,7 +209,7 @@ PARTS: dict[str, dict[str, Callable[[], str]]] = {
 }
 
 #: what is a page of the site alone, or is printed: name -> what makes it
-SHOWN: dict[str, Callable[[], str]] = {"options": option_tables, "methods": method_table}
+SHOWN: dict[str, Callable[[], str]] = {"options": option_tables, "design": design_tables, "methods": method_table}
 
 
 def page(name: str) -> str:

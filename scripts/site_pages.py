@@ -13,7 +13,7 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parent))
-from reference import method_table, option_tables
+from reference import design_tables, method_table, option_tables
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "coneskin"
@@ -41,6 +41,7 @@ def generated_pages() -> Iterator[tuple[str, str]]:
         for other, name in COPIED.items():
             text = text.replace(f"]({name})", f"]({other})")
         yield page, text
+    yield "look-up/design-options.md", f"# Options of a design\n\n{design_tables()}"
     yield "look-up/options.md", f"# Options of the commands\n\n{option_tables()}"
     yield "look-up/ur-rtde.md", f"# Methods of ur_rtde on `session.arm`\n\n{methods()}"
     for folder in folders(PACKAGE):

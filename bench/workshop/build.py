@@ -25,8 +25,7 @@ from scipy.spatial import KDTree
 
 import coneskin as cs
 from bench.report import head
-from coneskin.design.sheets.seam_strip import blind_angle, cover_seams
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, blind_angle, cover_seams, design_sheets
 from coneskin.design.workshop.jig import Collar, jig_collars, with_sheets
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.layer_stack import parallel_frustum

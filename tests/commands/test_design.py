@@ -10,7 +10,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.commands.design import EXAMPLES
-from coneskin.design import files as design_files
+from coneskin.design import folder as design_folder
 
 from .design_run import design, sensor_of, sets
 
@@ -229,7 +229,7 @@ def test_a_failure_halfway_leaves_nothing(tmp_path, monkeypatch, capsys):
             raise OSError(28, "No space left on device")
         return "drawing"
 
-    monkeypatch.setattr(design_files, "to_dxf", breaks)
+    monkeypatch.setattr(design_folder, "to_dxf", breaks)
     assert design(*CYLINDER, "-o", str(tmp_path / "out")) == 1
     assert "coneskin design: No space left on device" in capsys.readouterr().err
     assert written == [0, 1, 2], "files were there when it failed"
@@ -349,3 +349,37 @@ def test_help_shows_examples_that_run(tmp_path, monkeypatch):
         words[words.index("skin")] = f"skin{i}"
         assert design(*words) == 0
         assert (tmp_path / f"skin{i}" / "report.md").is_file()
+
+
+def test_a_file_of_options_is_written_changed_and_used(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["design", "--write-options", "design.toml"])
+    assert ended.value.code == 0
+    assert "design.toml written: change it, then coneskin design LINK" in capsys.readouterr().err
+    text = (tmp_path / "design.toml").read_text().replace("#kerf_mm = 0", "kerf_mm = 0.4").replace("#tab_mm", "tab_mm")
+    (tmp_path / "design.toml").write_text(text)
+    words = ["-o", "out", "--options", "design.toml", *sets("electrodes.margin_mm=8")]
+    assert design(*CYLINDER, *words) == 0
+    report = (tmp_path / "out" / "report.md").read_text()
+    assert "These files have 0.4 mm in their outlines" in report
+    table = tomllib.loads((tmp_path / "out" / "sensor.toml").read_text())
+    assert table["height_mm"] == pytest.approx(200 - 28)  # margins of 8 mm, electrodes of 6 mm
+
+
+def test_a_file_of_options_is_not_overwritten(tmp_path, capsys):
+    (tmp_path / "design.toml").write_text("mine")
+    with pytest.raises(SystemExit) as ended:
+        main(["design", "--write-options", str(tmp_path / "design.toml")])
+    assert ended.value.code == 2
+    assert "design.toml exists already: choose another name" in capsys.readouterr().err
+    assert (tmp_path / "design.toml").read_text() == "mine"
+
+
+def test_a_mistake_in_a_file_of_options_names_the_file_and_the_key(tmp_path, capsys):
+    path = tmp_path / "design.toml"
+    path.write_text("[drawings]\nkerf_mm = -1\n")
+    assert design(*CYLINDER, "--options", str(path), "-o", str(tmp_path / "out")) == 1
+    error = capsys.readouterr().err
+    assert f"coneskin design: {path}: 1 mistake\n  drawings.kerf_mm must be at least 0 mm, got -1.0 mm" in error
+    assert list(tmp_path.iterdir()) == [path]

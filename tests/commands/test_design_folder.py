@@ -17,9 +17,9 @@ import pytest
 from coneskin import cli
 from coneskin.cli import main
 from coneskin.commands import design as command
-from coneskin.design import files as design_files
+from coneskin.design import folder as design_folder
 from coneskin.design import link_design
-from coneskin.design.link import LinkMesh
+from coneskin.design.link_design import LinkMesh
 from coneskin.geometry.fit.cones import LinkFit
 
 CYLINDER = ["--radius1-mm", "54", "--height-mm", "200"]
@@ -89,7 +89,7 @@ def test_a_signal_ends_the_command_and_leaves_nothing(
         return "drawing"
 
     before = [signal.getsignal(item) for item in (signal.SIGINT, signal.SIGTERM)]
-    monkeypatch.setattr(design_files, "to_dxf", drawing)
+    monkeypatch.setattr(design_folder, "to_dxf", drawing)
     try:
         ended = design(*CYLINDER, "-o", str(tmp_path / "out"))
     except SystemExit as exc:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import coneskin as cs
-from coneskin.design.files import FileOptions
+from coneskin.design.folder import FileOptions
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum

@@ -9,7 +9,7 @@ import pytest
 
 from coneskin.core.errors import GeometryError, SceneError
 from coneskin.design.design_toml import DESIGN_TABLES, read_settings, settings_text
-from coneskin.design.files import FileOptions
+from coneskin.design.folder import FileOptions
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.fit.fit_options import FitOptions

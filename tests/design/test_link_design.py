@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 import coneskin as cs
-from coneskin.design.link import load_link
+from coneskin.design.link_design import load_link
 from coneskin.geometry.mesh import Mesh, make_mesh
 
 

@@ -8,8 +8,7 @@ import pytest
 
 import coneskin as cs
 from coneskin.core.errors import GeometryError
-from coneskin.design.sheets.seam_strip import blind_angle, cover_seams
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, blind_angle, cover_seams, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
 from coneskin.design.workshop.build_guide import guide_lines
 from coneskin.geometry.drawing.surface_shape import SheetSide

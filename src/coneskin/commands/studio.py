@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from coneskin.core.text import positive_seconds
 
 if TYPE_CHECKING:
-    from coneskin.design.link import LinkMesh
+    from coneskin.design.link_design import LinkMesh
     from coneskin.design.studio.workbench import Workbench
 
 __all__ = ["add_arguments", "run"]
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show the studio."""
-    from coneskin.design.link import load_link
+    from coneskin.design.link_design import load_link
     from coneskin.design.studio.studio_page import StudioPage
     from coneskin.design.studio.workbench import Workbench
     from coneskin.view.page_server import PageServer

@@ -28,7 +28,7 @@ from coneskin.scene.tables.keys import MAX_SIZE
 from coneskin.scene.tables.sensor_keys import SENSOR_KEYS
 from coneskin.skin.electronics import GivenElectronics
 
-from .files import FileOptions
+from .folder import FileOptions
 from .sheets.sheet_design import DesignOptions, JigPlan, JigSurface
 
 __all__ = ["DESIGN_TABLES", "DesignSettings", "read_settings", "settings_text"]

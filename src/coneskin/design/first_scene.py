@@ -18,7 +18,7 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.tables.sensor_tables import build_sensor
 from coneskin.skin.firmware.board_circuit import value_text
 
-from .files import DESIGN_FILE
+from .folder import DESIGN_FILE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,29 +1,226 @@
-"""Design of the sheets of a link in one call: from its mesh, or its dimensions, to a folder for the workshop."""
+"""Design of the sheets of a link in one call: from its mesh or its dimensions to a folder for the workshop.
+
+A link is a mesh file, or a link of a URDF.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import GeometryError
+from coneskin.core.errors import GeometryError, MeshError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import require_step_writer
 
-from .files import FileOptions, check_target
-from .folder import write_design
-from .link import LinkMesh, fit_link, fit_mesh
-from .sheets.seam_strip import cover_seams
-from .sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from .folder import FileOptions, check_target, write_design
+from .sheets.sheet_design import DesignOptions, SheetDesign, cover_seams, design_sheets
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
+    from coneskin.geometry.fit.touch_weights import TouchWeights
 
-__all__ = ["LinkDesign", "NothingFits", "design_link"]
+__all__ = [
+    "LinkDesign",
+    "LinkMesh",
+    "NothingFits",
+    "design_link",
+    "find_link_sheets",
+    "fit_link",
+    "fit_mesh",
+    "load_link",
+    "with_seams",
+]
+
+#: words in the name of a file or folder
+_VISUAL_WORDS, _HULL_WORDS = {"visual", "visuals"}, {"collision", "collisions", "hull", "hulls", "convex"}
+_RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkMesh:
+    """The mesh of a link.
+
+    Attributes:
+        name: of the link, for titles.
+        mesh: its surface.
+        frame: frame of its coordinates, in words.
+        notes: notes on the mesh, one sentence each.
+        visual: True where it is called the visual mesh, by a URDF or by its path: no collision body, though convex.
+    """
+
+    name: str
+    mesh: Mesh
+    frame: str
+    notes: tuple[str, ...]
+    visual: bool = False
+
+
+def load_link(
+    link: str,
+    unit: str | None = None,
+    up_axis: str = "ignore",
+    packages: Mapping[str, str | Path] | None = None,
+    arguments: Mapping[str, str] | None = None,
+) -> Iterator[LinkMesh]:
+    """Load the meshes of a LINK.
+
+    Args:
+        link: a mesh file, or FILE.urdf#LINK; a xacro file is expanded.
+        unit: of a mesh file; None to guess.
+        up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
+        packages: folders of the ROS packages in a URDF's package:// paths (``load_urdf_link``).
+        arguments: of a xacro file (``expand_xacro``).
+
+    Yields:
+        the meshes of the link, the best first: the visual mesh of a URDF is closer to the real surface than its
+        collision mesh, which is often a convex hull.
+
+    Raises:
+        MeshError: the file, the link or its mesh cannot be found or read.
+    """
+    from coneskin.geometry.mesh import load_mesh
+
+    path, hash_sign, name = link.partition("#")
+    if not hash_sign and not path.lower().endswith((".urdf", ".xacro")):
+        mesh = load_mesh(path, unit, up_axis)
+        frame = f"the mesh's coordinates in {Path(path).name}"
+        yield LinkMesh(Path(path).stem, mesh, frame, (*_terms(path), *mesh.notes), _called_visual(path))
+        return
+    from coneskin.geometry.urdf import load_urdf_link, urdf_links
+
+    if not name:
+        names = ", ".join(urdf_links(path, packages, arguments))
+        raise MeshError(f"{path}: name a link as {Path(path).name}#LINK; its links are: {names}")
+    errors: list[MeshError] = []
+    for kind in ("visual", "collision"):
+        try:
+            mesh = load_urdf_link(path, name, kind, packages, up_axis, arguments)
+        except MeshError as exc:
+            errors.append(exc)
+            continue
+        said = tuple(str(error) for error in errors)
+        notes = (f"{kind} mesh of the URDF", *said, *_terms(path + name), *mesh.notes)
+        yield LinkMesh(name, mesh, f"the URDF link {name}", notes, kind == "visual")
+    if len(errors) == 2:
+        raise errors[0]
+
+
+def fit_link(
+    link: str,
+    unit: str | None = None,
+    up_axis: str = "ignore",
+    packages: Mapping[str, str | Path] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+    arguments: Mapping[str, str] | None = None,
+    **search: Any,
+) -> tuple[LinkMesh, LinkFit]:
+    """Return the first mesh of a link in which sheets are found, with its fit; else the first mesh.
+
+    Args:
+        link: a mesh file, or FILE.urdf#LINK; a xacro file is expanded.
+        unit: of a mesh file; None to guess.
+        up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
+        packages: folders of the ROS packages in a URDF's package:// paths.
+        progress: called with the name of each step.
+        arguments: of a xacro file.
+        search: fields of ``FitOptions``, and ``round_only``. Without ``seam_direction`` the seams are where the link
+            shields them most (``place_seams``).
+
+    Raises:
+        MeshError: the file, the link or its mesh cannot be found or read.
+        GeometryError: an argument of the search is out of range.
+    """
+    facing = search.get("seam_direction")
+    search = {name: value for name, value in search.items() if name != "seam_direction" or facing}
+    tries: list[tuple[LinkMesh, LinkFit]] = []
+    progress(f"reading {link}")
+    for source in load_link(link, unit, up_axis, packages, arguments):
+        progress(f"{source.name}: {len(source.mesh.faces)} faces")
+        fit = find_link_sheets(source, progress, **search)
+        source = _with_notes(source, fit)
+        if fit.sheets:
+            return (source, fit) if facing else with_seams(source, fit, progress, search.get("weights"))
+        tries.append((source, fit))
+    return tries[0]
+
+
+def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **search: Any) -> tuple[LinkMesh, LinkFit]:
+    """Return a mesh with its fit, named by its source; arguments as in ``fit_link``."""
+    name = Path(mesh.source).stem
+    notes = (*_terms(mesh.source), *mesh.notes)
+    source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", notes, _called_visual(mesh.source))
+    facing = search.get("seam_direction")
+    search = {name: value for name, value in search.items() if name != "seam_direction" or facing}
+    fit = find_link_sheets(source, progress, **search)
+    source = _with_notes(source, fit)
+    return (source, fit) if facing or not fit.sheets else with_seams(source, fit, progress, search.get("weights"))
+
+
+def find_link_sheets(source: LinkMesh, progress: Callable[[str], None], **search: Any) -> LinkFit:
+    """Return the fit of a mesh; a convex one is refused as a collision hull, unless it is called the visual mesh.
+
+    Args:
+        source: the mesh.
+        progress: called with the name of each step.
+        search: fields of ``FitOptions``, and ``round_only``.
+
+    Raises:
+        GeometryError: an argument of the search is out of range.
+    """
+    from coneskin.geometry.fit.bare_areas import hull_note
+    from coneskin.geometry.fit.developable.packing import find_sheets
+    from coneskin.geometry.fit.surface_samples import sample_surface
+    from coneskin.geometry.ray_casting import RayCaster
+
+    asked = bool(search.pop("allow_hull", False))
+    fit = find_sheets(source.mesh, progress=progress, allow_hull=asked or source.visual, **search)
+    if asked or not source.visual or not fit.sheets:
+        return fit
+    note = hull_note(source.mesh, sample_surface(source.mesh, RayCaster(source.mesh)), visual=True)
+    return replace(fit, notes=(*fit.notes, note)) if note else fit
+
+
+def _called_visual(path: str) -> bool:
+    """Tell whether a path calls its mesh the visual one, as ROS descriptions do; the nearest name counts."""
+    for part in reversed(Path(path).parts):
+        words = set(re.split("[^a-z]+", part.lower()))
+        if words & _HULL_WORDS:
+            return False
+        if words & _VISUAL_WORDS:
+            return True
+    return False
+
+
+def _with_notes(source: LinkMesh, fit: LinkFit) -> LinkMesh:
+    """Return a source with what the search noted beside the notes on its mesh."""
+    return replace(source, notes=(*source.notes, *(note for note in fit.notes if note not in source.mesh.notes)))
+
+
+def with_seams(
+    source: LinkMesh, fit: LinkFit, progress: Callable[[str], None], weights: TouchWeights | None = None
+) -> tuple[LinkMesh, LinkFit]:
+    """Return a link with its seams at the places that it shields, and with a note of each reason."""
+    from coneskin.geometry.fit.seam_place import place_seams
+
+    fit, places = place_seams(fit, source.mesh, weights)
+    for place in places:
+        progress(place.reason)
+    return replace(source, notes=(*source.notes, *(place.reason for place in places))), fit
+
+
+def _terms(name: str) -> tuple[str, ...]:
+    if not _RESTRICTED_MODELS.search(name):
+        return ()
+    return (
+        "this looks like a mesh of a UR20 or UR30: Universal Robots' terms for these forbid physical models for "
+        "commercial purposes",
+    )
 
 
 class NothingFits(GeometryError):

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from coneskin.design.sheets.summary import sheet_folder
 from coneskin.design.workshop.build_figures import side_name
 from coneskin.geometry.drawing.nesting import MaterialBed
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.skin.electronics import SENSE_GAIN, shunt_ohms
 
-from .files import sheet_folder
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import design_summary, material_rows, sector_text, small_active_area
 from .workshop.bill_of_materials import bill_of_materials

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.design.link import LinkMesh
+from coneskin.design.link_design import LinkMesh
 from coneskin.design.studio.design_text import electrode_marks
 from coneskin.design.studio.studio_page import first_view, seen_shares
 from coneskin.design.studio.workbench import Handles, Workbench

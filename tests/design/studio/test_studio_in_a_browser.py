@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from coneskin.design.link import LinkMesh
+from coneskin.design.link_design import LinkMesh
 from coneskin.design.studio.studio_page import StudioPage
 from coneskin.design.studio.workbench import Workbench
 from coneskin.view.page_server import PageServer

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import GeometryError
-from coneskin.design.link import LinkMesh
-from coneskin.design.link_design import design_link
+from coneskin.design.link_design import LinkMesh, design_link
 from coneskin.design.sheets.sheet_design import DesignOptions
 from coneskin.design.studio.design_text import design_facts, deviation_bands, flat_drawing, warning_list
 from coneskin.design.studio.studio_page import StudioPage

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import GeometryError
@@ -25,6 +26,7 @@ __all__ = [
     "polar_text",
     "sector_text",
     "sensor_toml",
+    "sheet_folder",
     "small_active_area",
 ]
 
@@ -300,3 +302,8 @@ def _halved(plan: ElectrodePlan) -> ElectrodePlan:
     """Return a plan with margins and electrodes half as wide; holes do not fit there."""
     margin, electrode = max(0.5 * plan.margin, plan.setback), 0.5 * plan.electrode
     return replace(plan, margin=margin, electrode=electrode, lead=min(plan.lead, electrode), hole=0.0)
+
+
+def sheet_folder(designs: tuple[SheetDesign, ...], index: int) -> Path:
+    """Return the folder of a sheet, relative to the output folder; a single sheet has no folder of its own."""
+    return Path() if len(designs) == 1 else Path(f"sheet-{index + 1}")

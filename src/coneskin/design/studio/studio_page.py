@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import ConeSkinError
-from coneskin.design.link import LinkMesh, load_link
+from coneskin.design.link_design import LinkMesh, load_link
 from coneskin.geometry.pose import Vector
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.view.page_server import PageServer

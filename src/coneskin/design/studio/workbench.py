@@ -9,7 +9,7 @@ from pathlib import Path
 
 from coneskin.core.errors import GeometryError
 from coneskin.design.folder import write_design
-from coneskin.design.link import LinkMesh, find_link_sheets, with_seams
+from coneskin.design.link_design import LinkMesh, find_link_sheets, with_seams
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
