@@ -49,7 +49,7 @@ def scene_table(keys: Sequence[Any]) -> str:
 
 
 def design_tables() -> str:
-    """Return the tables of the keys of design.toml. They are a page of the site alone: the file itself says the same."""
+    """Return the tables of the keys of design.toml. They are a page of the site alone, as the file says it."""
     from coneskin.design.design_toml import DESIGN_TABLES
 
     parts = (f"## `[{name}]`\n\n{meaning}\n\n{scene_table(keys)}" for name, (meaning, keys) in DESIGN_TABLES.items())
