@@ -40,7 +40,8 @@ from .ur_models import arm_model
 
 __all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "effective_mass", "joint_torques", "mass_matrix"]
 
-GRAVITY = 9.82  #: of an arm that stands upright [m/s^2]; as a UR controller has it until it is told another
+#: of an arm that stands upright [m/s^2]; as a UR controller has it until it is told another
+GRAVITY = 9.82
 
 Tensor = tuple[Vector, Vector, Vector]
 

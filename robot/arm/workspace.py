@@ -18,22 +18,17 @@ from .model import ArmModel, Joints
 from .ur_models import MODEL_NAMES, arm_model
 
 __all__ = [
-    "MARGIN",
     "REACTION_TIME",
     "ArmSweep",
     "JointLimits",
-    "PartPair",
     "TablePlane",
     "Workspace",
-    "clearance_needed",
-    "close_pairs",
     "reach",
-    "segment_distance",
     "skeleton",
 ]
 
 #: distance kept from a joint's limit [rad]
-MARGIN = 0.02
+_LIMIT_MARGIN = 0.02
 #: time until a command acts: two controller cycles, the network, and one cycle to see it [s]
 REACTION_TIME = 0.01
 
@@ -61,8 +56,8 @@ class JointLimits:
         """Return the limits of an arm whose joints brake with a deceleration [rad/s^2]."""
         lower, upper = model.joint_lower, model.joint_upper
         return cls(
-            lower=_six([limit + MARGIN for limit in lower]),
-            upper=_six([limit - MARGIN for limit in upper]),
+            lower=_six([limit + _LIMIT_MARGIN for limit in lower]),
+            upper=_six([limit - _LIMIT_MARGIN for limit in upper]),
             speed=model.joint_speed,
             braking=braking,
             reach=reach(model),
@@ -136,7 +131,7 @@ _PART_NAMES = ("base", "shoulder", "upper arm", "elbow", "forearm", "wrist 1", "
 _PART_PAIRS = tuple((a, b) for a in (0, 1, 2) for b in (4, 5, 6, 7) if (a, b) != (2, 4) and (a, b) != (2, 5))
 
 
-def clearance_needed(model: ArmModel) -> float:
+def _clearance_needed(model: ArmModel) -> float:
     """Return the distance of two axes below which the arm counts as touching itself [m].
 
     The wrist's joints are about as thick as d5 is long, its fifth joint offset, and no tube of the family is thicker:
@@ -145,8 +140,8 @@ def clearance_needed(model: ArmModel) -> float:
     return model.d[4]
 
 
-class PartPair(NamedTuple):
-    """PartPair of parts that are close to each other.
+class _PartPair(NamedTuple):
+    """_PartPair of parts that are close to each other.
 
     Attributes:
         first: index of the part nearer to the base.
@@ -167,24 +162,23 @@ class PartPair(NamedTuple):
     def distance_in(self, corners: Sequence[Vector]) -> float:
         """Return the distance of the same two parts in another skeleton [m]."""
         a, b = self.first, self.second
-        return segment_distance(corners[a], corners[a + 1], corners[b], corners[b + 1])
+        return _segment_distance(corners[a], corners[a + 1], corners[b], corners[b + 1])
 
 
-def close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[PartPair]:
-    """Return the pairs of parts that are closer than ``clearance_needed``.
+def _close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[_PartPair]:
+    """Return the pairs of parts that are closer than ``_clearance_needed``.
 
     Args:
         model: the arm.
         corners: its skeleton [m].
     """
-    least = clearance_needed(model)
-    pairs = (
-        PartPair(a, b, segment_distance(corners[a], corners[a + 1], corners[b], corners[b + 1])) for a, b in _PART_PAIRS
-    )
+    least = _clearance_needed(model)
+    distances = ((a, b, _segment_distance(*corners[a : a + 2], *corners[b : b + 2])) for a, b in _PART_PAIRS)
+    pairs = (_PartPair(*found) for found in distances)
     return [pair for pair in pairs if pair.distance < least]
 
 
-def segment_distance(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
+def _segment_distance(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
     """Return the least distance between the line segments a b and c d [m]; either may be a point.
 
     The distance is convex along each segment, so the least one is between an end and its foot on the other segment, or
@@ -277,7 +271,7 @@ class Workspace:
         ahead = REACTION_TIME + leading / (2.0 * braking)
         there = skeleton(self.model, [angle + ahead * speed for angle, speed in zip(q, qd, strict=True)])
         low = self.table is not None and self.table.below(there)
-        near = close_pairs(self.model, there) if self.avoid_self else []
+        near = _close_pairs(self.model, there) if self.avoid_self else []
         if not (low or near):  # nearly always; then the present skeleton is not needed
             return ""
         here = skeleton(self.model, q)

@@ -1,12 +1,12 @@
 """Admittance law of a compliant reaction: the arm gives way as firmly as the skin is pushed, without a spring. Pure.
 
     v_wanted = speed * min(1, (level - threshold) / (full_level - threshold))        along -n, of the touched point
-    v       += (v_wanted - v) * (1 - exp(-dt / DAMPING))                             so that it neither jumps nor rings
+    v       += (v_wanted - v) * (1 - exp(-dt / _DAMPING_TIME))                       so that it neither jumps nor rings
 
 Point and normal are taken anew in each cycle, where the touch is then; where that is not known, or where touches push
-against each other, the arm stands. Each
-cycle is one step of a retreat (``retreat.py``) from where the arm is, so its limits are the same. It ends with the
-touch, or when the distance or the time is used up. The arm stands when it begins; it is stopped and latched at the end.
+against each other, the arm stands. Each cycle is one step of a retreat (``retreat.py``) from where the arm is, so its
+limits are the same. It ends with the touch, or when the distance or the time is used up. The arm stands when it begins;
+it is stopped and latched at the end.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from .contact_supervision import opposed
 from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
-__all__ = ["DAMPING", "AdmittanceState", "admittance_step", "begin_admittance", "wanted_speed"]
+__all__ = ["AdmittanceState", "admittance_step", "begin_admittance"]
 
-DAMPING = 0.05  #: s; a person's push rises in 50 ms and more
+_DAMPING_TIME = 0.05  # s; a person's push rises in 50 ms and more
 _MIN_SPEED = 1e-3  # m/s; slower counts as standing
 
 
@@ -62,7 +62,7 @@ def begin_admittance(
     return AdmittanceState(model, reaction, space, ArmSweep.begin(model, state.q), state.time, state.time)
 
 
-def wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> float:
+def _wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> float:
     """Return the speed at which to give way to the firmest of these touches [m/s]."""
     most = 0.0
     for contact in contacts:
@@ -95,8 +95,8 @@ def admittance_step(
         return now, Done(f"the time of {reaction.time_budget} s is over", progress)
     placed = all(contact.location_valid for contact in contacts)  # as a push ends, its place is lost before itself
     against = placed and opposed(now.model, state.q, contacts)
-    wanted = wanted_speed(reaction, contacts) if placed and not against else 0.0
-    share = 1.0 - math.exp(-max(0.0, state.time - now.time) / DAMPING)
+    wanted = _wanted_speed(reaction, contacts) if placed and not against else 0.0
+    share = 1.0 - math.exp(-max(0.0, state.time - now.time) / _DAMPING_TIME)
     speed = now.speed + share * (wanted - now.speed)
     if speed < _MIN_SPEED or not placed or against:
         still = replace(now, time=state.time, speed=speed, progress=progress, plan=None)

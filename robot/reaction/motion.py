@@ -20,10 +20,7 @@ from .retreat import RetreatPlan, plan_retreat, retreat_step
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
 __all__ = [
-    "AdmittanceMotion",
-    "BacktrackMotion",
     "ReactionMotion",
-    "RetreatMotion",
     "plan_answer",
     "plan_reaction_motion",
 ]
@@ -46,7 +43,7 @@ class ReactionMotion(Protocol):
         """Return what to do in this control cycle, with the current touches."""
 
 
-class RetreatMotion:
+class _RetreatMotion:
     """Retreat along the normal of the touch (``retreat.py``)."""
 
     how = ""
@@ -59,7 +56,7 @@ class RetreatMotion:
         return retreat_step(self._plan, state)
 
 
-class BacktrackMotion:
+class _BacktrackMotion:
     """Backtrack along the arm's own recent path (``backtrack.py``)."""
 
     how = "path"
@@ -72,7 +69,7 @@ class BacktrackMotion:
         return backtrack_step(self._plan, state)
 
 
-class AdmittanceMotion:
+class _AdmittanceMotion:
     """Motion with the push (``admittance.py``)."""
 
     how = "push"
@@ -119,7 +116,7 @@ def plan_reaction_motion(
         return why
     plan = plan_retreat(model, at_touch, contacts, reaction, space, ArmSweep.begin(model, state.q))
     if not isinstance(plan, Done):
-        return RetreatMotion(plan)
+        return _RetreatMotion(plan)
     if reaction.fallback != "path":
         return plan.reason
     back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD_REASON
@@ -153,8 +150,8 @@ def plan_answer(
     return _way_back(model, reaction, state, contacts, history, space, since)
 
 
-def _comply(model: ArmModel, reaction: Reaction, state: ArmState, space: Workspace) -> AdmittanceMotion:
-    return AdmittanceMotion(begin_admittance(model, state, reaction, space))
+def _comply(model: ArmModel, reaction: Reaction, state: ArmState, space: Workspace) -> _AdmittanceMotion:
+    return _AdmittanceMotion(begin_admittance(model, state, reaction, space))
 
 
 def _way_back(
@@ -165,14 +162,14 @@ def _way_back(
     history: PathHistory,
     space: Workspace,
     since: float = -math.inf,
-) -> BacktrackMotion | str:
+) -> _BacktrackMotion | str:
     """Return the motion back along the arm's path, or why there is none: it must not press on any touch."""
     if any(not contact.location_valid for contact in contacts):
         return "the place of a touch is not certain, and it might press on it"
     back = plan_backtrack(model, state, history, reaction, replace(space, avoid_self=False), since)
     if isinstance(back, Done):
         return back.reason
-    return _approached_touch(model, state, contacts, back) or BacktrackMotion(back)
+    return _approached_touch(model, state, contacts, back) or _BacktrackMotion(back)
 
 
 def _approached_touch(model: ArmModel, state: ArmState, contacts: Sequence[ContactOnLink], back: BacktrackPlan) -> str:

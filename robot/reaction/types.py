@@ -13,14 +13,14 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import Joints
 
-__all__ = ["CLAMP", "KINDS", "RESISTANCE", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction"]
+__all__ = ["KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction"]
 
 #: what an arm can do when it is touched, gentlest first
 KINDS = ("slow", "comply", "retreat", "stop")
 #: what follows where a motion away is resisted
-RESISTANCE = ("stop", "back", "comply")
+_RESISTANCE_CHOICES = ("stop", "back", "comply")
 #: what follows where touches may hold the arm between them
-CLAMP = ("stop", "path", "comply")
+_CLAMP_CHOICES = ("stop", "path", "comply")
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +114,8 @@ class Reaction:
         for name, choices in (
             ("kind", KINDS),
             ("fallback", ("stop", "path")),
-            ("on_resistance", RESISTANCE),
-            ("on_clamp", CLAMP),
+            ("on_resistance", _RESISTANCE_CHOICES),
+            ("on_clamp", _CLAMP_CHOICES),
         ):
             if (word := getattr(self, name)) not in choices:
                 raise RobotRefused(f"reaction {name} must be one of {', '.join(choices)}, got {word!r}")

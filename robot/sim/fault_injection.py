@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from coneskin.core.errors import RobotRefused
 
-from .machine.controller import Controller, describe
+from .machine.controller import Controller
 
 __all__ = ["FaultInjector", "Services"]
 
@@ -55,7 +55,7 @@ class FaultInjector:
         self.dashboard_silent = False
         self.rtde_silent = False
         self._lines: dict[str, Callable[[], Any]] = {
-            "state": partial(describe, controller),
+            "state": controller.describe,
             "dashboard silent": lambda: self._set("dashboard_silent", True),
             "dashboard normal": lambda: self._set("dashboard_silent", False),
             "rtde silent": lambda: self._set("rtde_silent", True),

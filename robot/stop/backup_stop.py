@@ -21,12 +21,12 @@ from .limits import MonitoringLimits
 from .standstill import WATCH_DURATION, StandstillWatch
 from .stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
-__all__ = ["BLIND_TIMEOUT", "BackupStop", "StandstillHold"]
+__all__ = ["BackupStop", "StandstillHold"]
 
 _STOP_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE)
 _STRONGEST_FIRST = (StopPath.PROTECTIVE, StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER)
 _REOPEN_PERIOD = 0.05  # s between two attempts to open what is missing
-BLIND_TIMEOUT = 2.0  #: s without a state after which a stop is given up, and the reader opened anew
+_BLIND_TIMEOUT = 2.0  # s without a state after which a stop is given up, and the reader opened anew
 _CONNECT_TIMEOUT = 0.5  # s that opening the reader may take
 
 
@@ -99,7 +99,7 @@ class BackupStop:
         budget = limits.stop_budget(speed or 0.0, gentle)
         stop = StopMonitor(now, speed, paths, limits.escalate, budget, limits.standstill, limits.arm_silence)
         look_at = now
-        while stop.standing_at is None and now - max(start, self._fresh) < BLIND_TIMEOUT and not over():
+        while stop.standing_at is None and now - max(start, self._fresh) < _BLIND_TIMEOUT and not over():
             if now >= look_at:
                 self.reconnect(gentle)
                 look_at = self._clock() + _REOPEN_PERIOD
@@ -127,7 +127,7 @@ class BackupStop:
         if self._connections.reopen():  # what was sent over the old ones may be lost
             self._use(StopPath.PROGRAM, deceleration)
         now = self._clock()
-        if now - max(self._fresh, self._opened) < (BLIND_TIMEOUT if self._reader is not None else _CONNECT_TIMEOUT):
+        if now - max(self._fresh, self._opened) < (_BLIND_TIMEOUT if self._reader is not None else _CONNECT_TIMEOUT):
             return
         self._close_reader()
         with suppress(ConeSkinError):  # the next look tries again
@@ -233,7 +233,7 @@ class StandstillHold:
                 return False
             self._stop.repeat()
             self._due = self._clock() + _REPEAT_PERIOD
-            self.failed = self.failed or self._stop.states_missing(BLIND_TIMEOUT)
+            self.failed = self.failed or self._stop.states_missing(_BLIND_TIMEOUT)
             return False
         if moved or not self._watch.under_way:
             self.begin(over=over)

@@ -12,7 +12,7 @@ from coneskin.robot.driver.values import ControllerState
 
 from .stop_monitor import STANDSTILL_SAMPLES
 
-__all__ = ["WATCH_DURATION", "StandstillMonitor", "StandstillWatch"]
+__all__ = ["WATCH_DURATION", "StandstillWatch"]
 
 #: s; programs that start anew after up to 0.3 s, and the time a controller needs to start and to move one
 WATCH_DURATION = 0.7
@@ -24,7 +24,7 @@ _MAX_STARTS = 3  # of programs during one watch, from which on a loop starts the
 _MAX_RESTARTS = 2  # motions of a stopped arm, from which on it is stopped by the strongest path; touched, one is enough
 
 
-class StandstillMonitor:
+class _StandstillMonitor:
     """Monitor of one arm from its standstill on. A person who jogs or pushes the arm is left alone: no program runs.
 
     What programs have moved it is summed, so that one which is started anew again and again gets no farther.
@@ -89,7 +89,7 @@ class StandstillWatch:
 
     def __init__(self, standstill: float) -> None:
         self._standstill = standstill
-        self._monitor: StandstillMonitor | None = None
+        self._monitor: _StandstillMonitor | None = None
         self._until = self._duration = 0.0
         self._ran = True
         self._crept = 0.0
@@ -113,7 +113,7 @@ class StandstillWatch:
 
         A program that starts meanwhile has not moved the arm yet: the duration counts from its start then.
         """
-        self._monitor = StandstillMonitor(self._standstill, self._crept)
+        self._monitor = _StandstillMonitor(self._standstill, self._crept)
         self._until, self._duration, self.confirmed = now + duration, duration, duration <= 0.0
         self._starts = 0
         self._ran = True  # what runs now may be the program of the stop

@@ -31,12 +31,12 @@ from coneskin.robot.driver.registry import load_driver
 from .backup_stop import BackupStop, StandstillHold
 from .limits import MonitoringLimits
 
-__all__ = ["GuardWatchdog", "main"]
+__all__ = ["main"]
 
 _POLL_PERIOD = 0.01  # s between two looks
 
 
-class GuardWatchdog:
+class _GuardWatchdog:
     """Watchdog over one guard.
 
     Args:
@@ -122,7 +122,7 @@ def main(arguments: list[str]) -> int:
             lifeline.hold()
             guard.send(StatusReport("ready").encode())
             stop = BackupStop(driver, connections, limits, settings["deceleration"], reader)
-            GuardWatchdog(guard, session, StandstillHold(stop, limits.standstill)).run()
+            _GuardWatchdog(guard, session, StandstillHold(stop, limits.standstill)).run()
     except ConeSkinError as exc:
         guard.send(StatusReport("error", str(exc)).encode())
         return 1

@@ -39,7 +39,7 @@ from coneskin.robot.driver.values import Waypoint
 
 from .ur_rtde import MIN_ACCELERATION, MOVE_L_DECELERATION, SERVO_DECELERATION, UrArm, stop_time
 
-__all__ = ["DriverProcess", "carry_out", "main", "stop_acceleration"]
+__all__ = ["DriverProcess", "carry_out", "main"]
 
 _ANSWER_TIME = 0.5  # s for the controller to take a tool or a payload, or to answer a question
 _PATH_TIME = 3.0  # s for the controller to start its program again with a path in it
@@ -81,7 +81,7 @@ def carry_out(
     wait = bool(request.get("wait", True))
     match request["do"]:
         case "move_j" | "move_j_ik" | "move_l" | "move_l_fk" as move:
-            acceleration, straight = stop_acceleration(request), move in ("move_l", "move_l_fk")
+            acceleration, straight = _stop_acceleration(request), move in ("move_l", "move_l_fk")
             work(stop_time(MOVE_L_DECELERATION if straight else acceleration))  # it first ends what is under way
             target = request["q"] if move in ("move_j", "move_l_fk") else request["pose"]
             getattr(arm, move)(target, request["speed"], acceleration)
@@ -96,7 +96,7 @@ def carry_out(
             restart(True)
             return _RequestOutcome(True, waits=wait)
         case "speed_j" | "speed_l" as move:
-            duration, acceleration = _duration(request), stop_acceleration(request)
+            duration, acceleration = _duration(request), _stop_acceleration(request)
             work(stop_time(min(acceleration, MOVE_L_DECELERATION)))
             getattr(arm, move)(request["qd" if move == "speed_j" else "twist"], acceleration)
             return _RequestOutcome(True, holds=duration)
@@ -123,7 +123,7 @@ def carry_out(
     return _RequestOutcome()
 
 
-def stop_acceleration(request: dict[str, Any]) -> float:
+def _stop_acceleration(request: dict[str, Any]) -> float:
     """Return an acceleration, or a deceleration, of the leading joint [rad/s2], or of the tool [m/s2].
 
     Raises:
@@ -304,7 +304,7 @@ class DriverProcess:
             elif not self._allowed:
                 self._reply(number, ok=False, stopped=True, why="the guard does not let the arm move")
             elif request["do"] == "stop":
-                self._stop_for_program(stop_acceleration(request))
+                self._stop_for_program(_stop_acceleration(request))
                 self._answer_waiting(ok=False, stopped=False, why="the program itself has stopped the arm")
                 self._reply(number, ok=True)
             else:

@@ -18,7 +18,7 @@ from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 
 from .rtde_connection import RtdeConnection
 
-__all__ = ["ArmPose", "check_model", "flange_distance", "read_pose"]
+__all__ = ["check_model", "read_pose"]
 
 _POSE_NAMES = ("actual_q", "actual_TCP_pose", "tcp_offset")
 #: distance that the flange may be from where the model has it [m]; calibration makes a millimetre or two, another model
@@ -26,7 +26,7 @@ _POSE_NAMES = ("actual_q", "actual_TCP_pose", "tcp_offset")
 _FLANGE_TOLERANCE = 0.01
 
 
-class ArmPose(NamedTuple):
+class _ArmPose(NamedTuple):
     """Pose of an arm as its controller reports it.
 
     Attributes:
@@ -40,7 +40,7 @@ class ArmPose(NamedTuple):
     offset: Joints
 
 
-def read_pose(host: str, timeout: float = 2.0) -> ArmPose | None:
+def read_pose(host: str, timeout: float = 2.0) -> _ArmPose | None:
     """Ask the controller once and return its answer; None from an old one that does not report its TCP's offset.
 
     Raises:
@@ -53,25 +53,25 @@ def read_pose(host: str, timeout: float = 2.0) -> ArmPose | None:
         except RobotRefused:
             return None
         connection.start()
-        return ArmPose(*recipe.unpack(connection.wait_data(timeout)))  # type: ignore[arg-type]
+        return _ArmPose(*recipe.unpack(connection.wait_data(timeout)))  # type: ignore[arg-type]
 
 
-def flange_distance(arm: ArmModel, pose: ArmPose) -> float:
+def _flange_distance(arm: ArmModel, pose: _ArmPose) -> float:
     """Return the distance of the flange of a model from the flange that the controller reports [m]."""
     base_flange = _pose(pose.tcp) @ _pose(pose.offset).inverse()
     return math.dist(forward(arm, pose.q).translation, base_flange.translation)
 
 
-def check_model(arm: ArmModel, pose: ArmPose, host: str) -> None:
+def check_model(arm: ArmModel, pose: _ArmPose, host: str) -> None:
     """Refuse an arm that is not the scene's.
 
     Raises:
         RobotRefused: the flange is not where the model has it; the message names the model that fits, if one does.
     """
-    distance = flange_distance(arm, pose)
+    distance = _flange_distance(arm, pose)
     if distance <= _FLANGE_TOLERANCE:
         return
-    fits = [name for name in MODEL_NAMES if flange_distance(arm_model(name), pose) <= _FLANGE_TOLERANCE]
+    fits = [name for name in MODEL_NAMES if _flange_distance(arm_model(name), pose) <= _FLANGE_TOLERANCE]
     raise RobotRefused(
         f"the arm at {host} is no {arm.name}: its flange is {1e3 * distance:.0f} mm from where a {arm.name} would have "
         f"it; " + (f"it is where a {' or '.join(fits)} has it: correct arm.model" if fits else "no model fits")

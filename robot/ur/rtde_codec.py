@@ -24,7 +24,6 @@ __all__ = [
     "NOT_FOUND",
     "PROTOCOL_VERSION",
     "VARIABLES",
-    "WIRE_TYPES",
     "Packet",
     "PacketKind",
     "Recipe",
@@ -40,7 +39,7 @@ __all__ = [
 ]
 
 #: type on the wire -> (code of the struct module, number of values)
-WIRE_TYPES: Mapping[str, tuple[str, int]] = {
+_WIRE_TYPES: Mapping[str, tuple[str, int]] = {
     "DOUBLE": ("d", 1),
     "INT32": ("i", 1),
     "UINT32": ("I", 1),
@@ -191,7 +190,7 @@ class Recipe:
         self.ident = ident
         layout, spans, start = ">B", [], 1
         for kind in self.types:
-            code, count = WIRE_TYPES[kind]
+            code, count = _WIRE_TYPES[kind]
             layout += f"{count}{code}" if count > 1 else code
             spans.append((start, start + count) if count > 1 else (start, 0))
             start += count

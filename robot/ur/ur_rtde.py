@@ -28,12 +28,9 @@ from coneskin.robot.driver.values import Waypoint
 __all__ = [
     "MIN_ACCELERATION",
     "MOVE_L_DECELERATION",
-    "QUESTIONS",
     "SERVO_DECELERATION",
-    "ControlProgram",
     "Mode",
     "UrArm",
-    "rtde_errors",
     "stop_time",
 ]
 
@@ -42,7 +39,7 @@ _REGISTER_DELAY = 0.02  # s, ten control cycles, until a register that was writt
 
 
 @contextmanager
-def rtde_errors(doing: str) -> Iterator[None]:
+def _rtde_errors(doing: str) -> Iterator[None]:
     """Convert the wheel's errors: it raises bare RuntimeError for everything.
 
     Raises:
@@ -55,7 +52,7 @@ def rtde_errors(doing: str) -> Iterator[None]:
         raise RobotConnectionError(f"{doing}: {why}") from exc
 
 
-class ControlProgram:
+class _ControlProgram:
     """Program by which RTDEControlInterface moves the arm; open it in a ``with``.
 
     Args:
@@ -77,13 +74,13 @@ class ControlProgram:
         self.wheel: Any = None
         self._watchdog_hz = watchdog_hz
 
-    def __enter__(self) -> ControlProgram:
+    def __enter__(self) -> _ControlProgram:
         try:
             import rtde_control  # type: ignore[import-not-found,unused-ignore]
         except ImportError as exc:
             raise MissingExtra("ur-rtde", "moving a UR arm (wheels exist for Python 3.11 and 3.12)") from exc
         self.wheel = rtde_control
-        with rtde_errors(f"connecting ur_rtde to {self.host}"):
+        with _rtde_errors(f"connecting ur_rtde to {self.host}"):
             self.control = rtde_control.RTDEControlInterface(self.host)
             if not self.set_watchdog():
                 raise RobotRefused(f"the controller {self.host} did not accept a watchdog of {self._watchdog_hz:g} Hz")
@@ -92,7 +89,7 @@ class ControlProgram:
     def __exit__(self, *_: object) -> None:
         if self.control is not None:
             control, self.control = self.control, None
-            with rtde_errors(f"disconnecting from {self.host}"):
+            with _rtde_errors(f"disconnecting from {self.host}"):
                 control.stopScript()
                 control.disconnect()
 
@@ -107,7 +104,7 @@ class ControlProgram:
 
     def kick(self) -> None:
         """Kick the controller's watchdog: this process is alive."""
-        with rtde_errors("kicking the controller's watchdog"):
+        with _rtde_errors("kicking the controller's watchdog"):
             if self.runs:
                 self.control.kickWatchdog()
 
@@ -145,7 +142,7 @@ _NO_TOOL = [0.0, 0.0, 1e-12, 0.0, 0.0, 0.0]  # m and rad; the wheel sends a pack
 _MAX_STOP_TIME = 3.0  # s; ur_rtde waiting longer for a stop counts as a hang, however gentle the stop is
 
 #: questions to the controller that move nothing, by the wheel's names
-QUESTIONS = (
+_QUESTION_WORDS = (
     *("getForwardKinematics", "getInverseKinematics", "getInverseKinematicsHasSolution", "poseTrans"),
     *("isPoseWithinSafetyLimits", "isJointsWithinSafetyLimits", "getTCPOffset", "getStepTime", "getJointTorques"),
     *("getTargetWaypoint", "getActualJointPositionsHistory", "getActualToolFlangePose", "getTargetJointAccelerations"),
@@ -182,7 +179,7 @@ class UrArm:
     def __init__(self, host: str, watchdog_hz: float) -> None:
         self.host = host
         self.mode = Mode.IDLE
-        self._program = ControlProgram(host, watchdog_hz)
+        self._program = _ControlProgram(host, watchdog_hz)
 
     def __enter__(self) -> UrArm:
         self._program.__enter__()
@@ -201,7 +198,7 @@ class UrArm:
         Raises:
             RobotRefused: the controller does not start it.
         """
-        with rtde_errors("starting the control program again"):
+        with _rtde_errors("starting the control program again"):
             if not self._program.runs:
                 self.mode = Mode.IDLE
                 self._program.restart()
@@ -256,7 +253,7 @@ class UrArm:
             position = entry.PositionJoints if point.joints else entry.PositionTcpPose
             values = [*point.target, point.speed, point.acceleration, point.blend]
             path.addEntry(entry(kind, position, values))
-        with rtde_errors("movePath"):
+        with _rtde_errors("movePath"):
             self._started(self._program.control.movePath(path, True), "movePath", Mode.MOVE)
             if not self._program.set_watchdog():
                 self.stop(MOVE_L_DECELERATION)
@@ -325,7 +322,7 @@ class UrArm:
         """Return the number of the way point to which a move goes, from 0; None where no move runs."""
         if self.mode is not Mode.MOVE:
             return None
-        with rtde_errors("asking for progress"):
+        with _rtde_errors("asking for progress"):
             status = self._program.control.getAsyncOperationProgressEx()
             if status.isAsyncOperationRunning():
                 return int(status.progress())
@@ -336,16 +333,17 @@ class UrArm:
         """Return the answer of the controller to a question that moves nothing; nothing may move meanwhile.
 
         Args:
-            name: of the wheel's method, one of ``QUESTIONS``.
+            name: of the wheel's method, one of ``_QUESTION_WORDS``.
             values: its arguments.
 
         Raises:
             RobotRefused: the arm is being moved, or this is no such question.
         """
-        if name not in QUESTIONS:
-            raise RobotRefused(f"{name} is not a question that the arm's driver answers; known: {', '.join(QUESTIONS)}")
+        if name not in _QUESTION_WORDS:
+            known = ", ".join(_QUESTION_WORDS)
+            raise RobotRefused(f"{name} is not a question that the arm's driver answers; known: {known}")
         self._stand_for(name)
-        with rtde_errors(name):
+        with _rtde_errors(name):
             if name == "getForwardKinematics" and values:
                 tool = list(values[1]) if len(values) > 1 else self._program.control.getTCPOffset()  # type: ignore[call-overload]
                 values = (values[0], tool if any(tool) else _NO_TOOL)
@@ -364,12 +362,12 @@ class UrArm:
         """
         mode, self.mode = self.mode, Mode.IDLE
         if not at_once and mode is not Mode.IDLE:
-            with rtde_errors("stopping"):
+            with _rtde_errors("stopping"):
                 self._program.set_watchdog(stop_time(deceleration))
                 self._stop(mode, deceleration)
                 self._program.set_watchdog()
             return
-        with rtde_errors("stopping"):
+        with _rtde_errors("stopping"):
             self._stop(mode, deceleration)
 
     def _stop(self, mode: Mode, deceleration: float) -> None:
@@ -396,7 +394,7 @@ class UrArm:
     def _set(self, name: str, *values: object) -> None:
         """Call a setter of the wheel."""
         self._stand_for(name)
-        with rtde_errors(name):
+        with _rtde_errors(name):
             accepted = getattr(self._program.control, name)(*values)
         if not accepted:
             raise RobotRefused(f"the controller {self.host} did not take {name}{values}")

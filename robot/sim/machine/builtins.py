@@ -21,7 +21,7 @@ from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
 from coneskin.robot.sim.motion.path import Path
-from coneskin.robot.sim.urscript.value_functions import MathFunctions, StringFunctions
+from coneskin.robot.sim.urscript.value_functions import ValueFunctions
 from coneskin.robot.sim.urscript.values import (
     Array,
     PoseValue,
@@ -33,7 +33,7 @@ from coneskin.robot.sim.urscript.values import (
 )
 
 from .force_functions import ForceFunctions
-from .io_functions import InstallationFunctions, IoFunctions, index_of
+from .io_functions import IoFunctions, index_of
 from .moves import MoveFunctions, Wait
 from .socket_functions import SocketFunctions
 from .states import PopupNotice, TextNotice
@@ -46,11 +46,9 @@ _NOT_SIMULATED = (math.nan,) * 6  # value of what is not simulated, for six join
 class Builtins(
     MoveFunctions,
     IoFunctions,
-    InstallationFunctions,
     SocketFunctions,
     ForceFunctions,
-    StringFunctions,
-    MathFunctions,
+    ValueFunctions,
 ):
     """All URScript functions, bound to one program of one controller."""
 

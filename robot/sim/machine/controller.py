@@ -25,13 +25,10 @@ from .program import Program, SecondaryPrograms
 from .safety_system import SafetySystem
 from .states import MOVING, Notice, Options, ProgramFailed, ProgramNotice, RobotMode, Runtime, SafetyMode
 
-__all__ = ["POWER_COMMANDS", "Controller", "describe", "power", "write_event"]
+__all__ = ["POWER_COMMANDS", "Controller"]
 
-
-def write_event(file: IO[str], cycle: int, timestamp: float, event: str, facts: dict[str, Any]) -> None:
-    """Write one line: cycle, controller's time [s], this machine's monotonic clock [s], event and its facts."""
-    line = {"cycle": cycle, "time": round(timestamp, 3), "monotonic": time.monotonic(), "event": event}
-    file.write(json.dumps(line | facts, default=_plain) + "\n")
+#: commands that change the power of the arm
+POWER_COMMANDS = ("power on", "power off", "brake release", "restart safety")
 
 
 def _plain(value: object) -> object:
@@ -302,51 +299,49 @@ class Controller:
     def log(self, event: str, **facts: Any) -> None:
         """Write one JSON line: cycle, controller time, this machine's monotonic clock, event and its facts."""
         if self._log is not None:
-            write_event(self._log, self.cycle, self.timestamp, event, facts)
+            now, here = round(self.timestamp, 3), time.monotonic()
+            line = {"cycle": self.cycle, "time": now, "monotonic": here, "event": event}
+            self._log.write(json.dumps(line | facts, default=_plain) + "\n")
 
     @property
     def currents(self) -> list[float]:
         """Current that each motor takes beyond the model of the arm [A]: what the plant measures, and a fault line."""
         return [a + b for a, b in zip(self.resistance, self.arm.measured.current, strict=True)]
 
+    def describe(self) -> dict[str, Any]:
+        """Return the state: positions and speeds as they are measured [rad], [rad/s], and the words of its modes."""
+        arm = self.arm
+        return {
+            "cycle": self.cycle,
+            "q": list(arm.measured.q),
+            "qd": list(arm.measured.qd),
+            "turning": arm.turning,
+            "plant_lost": self.plant_lost,
+            "tcp": list(values_of(arm.tcp_pose(arm.measured.q))),
+            "program": self.program.name if self.program is not None else "",
+            "runtime": self.runtime.name,
+            "robot_mode": self.robot_mode.name,
+            "safety": self.safety.name,
+            "slider": self.slider,
+            "resistance": list(self.resistance),
+            "digital_outputs": self.digital_outputs,
+        }
 
-def describe(controller: Controller) -> dict[str, Any]:
-    """Return the state: positions and speeds as they are measured [rad], [rad/s], and the words of its modes."""
-    arm = controller.arm
-    return {
-        "cycle": controller.cycle,
-        "q": list(arm.measured.q),
-        "qd": list(arm.measured.qd),
-        "turning": arm.turning,
-        "plant_lost": controller.plant_lost,
-        "tcp": list(values_of(arm.tcp_pose(arm.measured.q))),
-        "program": controller.program.name if controller.program is not None else "",
-        "runtime": controller.runtime.name,
-        "robot_mode": controller.robot_mode.name,
-        "safety": controller.safety.name,
-        "slider": controller.slider,
-        "resistance": list(controller.resistance),
-        "digital_outputs": controller.digital_outputs,
-    }
+    # power
 
-
-#: commands that change the power of the arm
-POWER_COMMANDS = ("power on", "power off", "brake release", "restart safety")
-
-
-def power(controller: Controller, command: str) -> str:
-    """Carry out one of `POWER_COMMANDS`; return what the dashboard answers."""
-    if command == "power off":
-        controller.stop_program("power off")
-        controller.robot_mode = RobotMode.POWER_OFF
-        return "Powering off"
-    if command == "restart safety":
-        if controller.safety_system.restart():
-            controller.robot_mode = RobotMode.POWER_OFF
-        return "Restarting safety"
-    if controller.safety in MOVING:
-        if command == "brake release":
-            controller.robot_mode = RobotMode.RUNNING
-        elif controller.robot_mode is RobotMode.POWER_OFF:
-            controller.robot_mode = RobotMode.IDLE
-    return "Brake releasing" if command == "brake release" else "Powering on"
+    def switch_power(self, command: str) -> str:
+        """Carry out one of `POWER_COMMANDS`; return what the dashboard answers. A real arm takes seconds for it."""
+        if command == "power off":
+            self.stop_program("power off")
+            self.robot_mode = RobotMode.POWER_OFF
+            return "Powering off"
+        if command == "restart safety":
+            if self.safety_system.restart():
+                self.robot_mode = RobotMode.POWER_OFF
+            return "Restarting safety"
+        if self.safety in MOVING:
+            if command == "brake release":
+                self.robot_mode = RobotMode.RUNNING
+            elif self.robot_mode is RobotMode.POWER_OFF:
+                self.robot_mode = RobotMode.IDLE
+        return "Brake releasing" if command == "brake release" else "Powering on"

@@ -17,7 +17,7 @@ from coneskin.robot.ur.rtde_codec import VARIABLES
 from .inputs_outputs import CURRENT, VOLTAGE
 from .script_host import ScriptHost
 
-__all__ = ["InstallationFunctions", "IoFunctions", "index_of"]
+__all__ = ["IoFunctions", "index_of"]
 
 STANDARD, CONFIGURABLE, TOOL = 0, 8, 16  #: first bit of each kind of digital terminal
 _REGISTERS, _BITS = 48, 128
@@ -207,16 +207,6 @@ class IoFunctions:
         terminals = self._host.terminals
         terminals.flags = terminals.flags | bit if b else terminals.flags & ~bit
 
-
-_BAUD_RATES = (9600, 19200, 38400, 57600, 115_200, 1_000_000, 2_000_000, 5_000_000)
-_INPUT_ACTIONS = ("default", "freedrive")
-
-
-class InstallationFunctions:
-    """URScript functions of a robot's installation."""
-
-    _host: ScriptHost
-
     # connector of the tool
 
     def set_tool_output_mode(self, mode: int) -> None:
@@ -269,6 +259,10 @@ class InstallationFunctions:
     def set_safety_mode_transition_hardness(self, type: Any) -> None:
         """Choose how the arm goes from one safety mode to another: 0 softly, 1 hard."""
         _one_of(type, (0, 1), "the hardness of a transition")
+
+
+_BAUD_RATES = (9600, 19200, 38400, 57600, 115_200, 1_000_000, 2_000_000, 5_000_000)
+_INPUT_ACTIONS = ("default", "freedrive")
 
 
 def _one_of(value: Any, allowed: Container[Any], name: str) -> Any:

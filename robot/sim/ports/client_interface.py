@@ -21,7 +21,7 @@ import zlib
 from collections.abc import Callable, Iterable
 
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.sim.machine.controller import Controller, power
+from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import (
     MOVING,
     ErrorNotice,
@@ -281,9 +281,9 @@ class Publisher:
 
 #: line of a client -> what the controller does
 _COMMAND_LINES: dict[str, Callable[[Controller], object]] = {
-    "power on": lambda c: power(c, "power on"),
-    "power off": lambda c: power(c, "power off"),
-    "set robotmode run": lambda c: power(c, "brake release"),
+    "power on": lambda c: c.switch_power("power on"),
+    "power off": lambda c: c.switch_power("power off"),
+    "set robotmode run": lambda c: c.switch_power("brake release"),
     "set unlock protective stop": lambda c: c.unlock(early=True),  # only the dashboard makes one wait
     "stop program": lambda c: c.stop_program("stop program"),
     "pause program": lambda c: c.pause_program(),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from coneskin.robot.sim.machine.controller import POWER_COMMANDS, power
+from coneskin.robot.sim.machine.controller import POWER_COMMANDS
 from coneskin.robot.sim.machine.states import Runtime, Version
 from coneskin.robot.sim.urscript.values import ScriptError
 
@@ -94,7 +94,7 @@ class Dashboard:
             "version": lambda _: self._version,
         }
         for name in POWER_COMMANDS:
-            self._commands[name] = lambda _, command=name: power(self._c, command)  # type: ignore[misc]
+            self._commands[name] = lambda _, command=name: self._c.switch_power(command)  # type: ignore[misc]
 
     @property
     def commands(self) -> list[str]:
@@ -198,7 +198,7 @@ class Dashboard:
         return "Disconnected"
 
     def _shut_down(self, _: str) -> str:
-        power(self._c, "power off")
+        self._c.switch_power("power off")
         return "Shutting down"
 
 

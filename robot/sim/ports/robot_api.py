@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from urllib.parse import unquote
 
-from coneskin.robot.sim.machine.controller import power
 from coneskin.robot.sim.machine.states import SafetyMode
 from coneskin.robot.sim.urscript.values import ScriptError
 
@@ -261,7 +260,7 @@ class RobotApi:
         if action not in _POWER_ACTIONS:
             known = ", ".join((*_POWER_ACTIONS, "UNLOCK_PROTECTIVE_STOP"))
             return _refuse(400, f"action must be one of {known}, got {action!r}")
-        power(self._c, _POWER_ACTIONS[action])
+        self._c.switch_power(_POWER_ACTIONS[action])
         return Answer(200, {"message": action})
 
     def _load(self, request: Request, key: str) -> Answer:

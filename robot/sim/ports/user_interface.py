@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
 
-from coneskin.robot.sim.machine.controller import Controller, describe
+from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 from coneskin.robot.sim.urscript.values import ScriptError
 
@@ -205,7 +205,7 @@ class UserInterface:
     def report(self, kind: str) -> int:
         """Keep the present state as a flight report; return its number."""
         self._count += 1
-        facts = {"id": self._count, "type": kind or "system", "state": describe(self.controller)}
+        facts = {"id": self._count, "type": kind or "system", "state": self.controller.describe()}
         self.reports.append(json.dumps(facts))
         return self._count
 

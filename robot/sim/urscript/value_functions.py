@@ -28,11 +28,11 @@ from .values import (
     values_of,
 )
 
-__all__ = ["MathFunctions", "StringFunctions", "text_of"]
+__all__ = ["ValueFunctions", "text_of"]
 
 
-class MathFunctions:
-    """URScript functions of poses, lists and numbers."""
+class ValueFunctions:
+    """URScript functions of poses, lists, numbers and texts; places in a text are counted from 0."""
 
     _random = random.Random(0)
 
@@ -151,44 +151,6 @@ class MathFunctions:
         """Convert radians to degrees."""
         return math.degrees(radians)
 
-
-for _name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "floor", "ceil", "pow"):
-    setattr(MathFunctions, _name, staticmethod(getattr(math, _name)))
-
-
-_MAX_TEXT = 1023  # characters that str_cat and to_str make
-_NUMBER_TEXT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-
-
-def text_of(value: Any) -> str:
-    """Return a value as str_cat and to_str write it: numbers with up to six decimals, lists and poses in brackets.
-
-    Raises:
-        ScriptError: it is no text, number, truth value, list or pose, or makes too long a text.
-    """
-    text = _text_of(value)
-    if len(text) > _MAX_TEXT:
-        raise ScriptError(f"a text made of values has at most {_MAX_TEXT} characters, got {len(text)}")
-    return text
-
-
-def _text_of(value: Any) -> str:
-    if isinstance(value, str | bool):
-        return str(value)
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            return str(value)
-        return f"{value:.6f}".rstrip("0").removesuffix(".")
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, list):
-        return f"{'p' * isinstance(value, PoseValue)}[{', '.join(map(_text_of, value))}]"
-    raise ScriptError(f"a value of kind {type(value).__name__} is no text")
-
-
-class StringFunctions:
-    """URScript functions of texts; places in a text are counted from 0."""
-
     def str_at(self, src: Any, index: int) -> str:
         """Return the character at a place."""
         text = _text(src)
@@ -232,6 +194,40 @@ class StringFunctions:
     def to_str(self, val: Any) -> str:
         """Return a value as text."""
         return text_of(val)
+
+
+for _name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "floor", "ceil", "pow"):
+    setattr(ValueFunctions, _name, staticmethod(getattr(math, _name)))
+
+
+_MAX_TEXT = 1023  # characters that str_cat and to_str make
+_NUMBER_TEXT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+def text_of(value: Any) -> str:
+    """Return a value as str_cat and to_str write it: numbers with up to six decimals, lists and poses in brackets.
+
+    Raises:
+        ScriptError: it is no text, number, truth value, list or pose, or makes too long a text.
+    """
+    text = _text_of(value)
+    if len(text) > _MAX_TEXT:
+        raise ScriptError(f"a text made of values has at most {_MAX_TEXT} characters, got {len(text)}")
+    return text
+
+
+def _text_of(value: Any) -> str:
+    if isinstance(value, str | bool):
+        return str(value)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            return str(value)
+        return f"{value:.6f}".rstrip("0").removesuffix(".")
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, list):
+        return f"{'p' * isinstance(value, PoseValue)}[{', '.join(map(_text_of, value))}]"
+    raise ScriptError(f"a value of kind {type(value).__name__} is no text")
 
 
 def _text(value: Any) -> str:

@@ -10,7 +10,7 @@ from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import link_poses
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.arm.workspace import MARGIN, REACTION_TIME, JointLimits, reach
+from coneskin.robot.arm.workspace import _LIMIT_MARGIN, REACTION_TIME, JointLimits, reach
 
 from ..arms import FAR_UR10, arms, joints
 
@@ -44,8 +44,8 @@ def test_a_joint_that_turns_without_end_is_never_blocked() -> None:
 
 def test_the_margin_is_kept_on_both_sides() -> None:
     limits = JointLimits.of(arm_model("UR5e"), 4.0)
-    assert limits.upper[2] == pytest.approx(math.pi - MARGIN)
-    assert limits.lower[2] == pytest.approx(-math.pi + MARGIN)
+    assert limits.upper[2] == pytest.approx(math.pi - _LIMIT_MARGIN)
+    assert limits.lower[2] == pytest.approx(-math.pi + _LIMIT_MARGIN)
 
 
 @given(arms(), joints())

@@ -12,12 +12,12 @@ from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import (
     _PART_NAMES,
     JointLimits,
-    PartPair,
     TablePlane,
     Workspace,
-    clearance_needed,
-    close_pairs,
-    segment_distance,
+    _clearance_needed,
+    _close_pairs,
+    _PartPair,
+    _segment_distance,
     skeleton,
 )
 from coneskin.robot.reaction.retreat import plan_retreat, retreat_step
@@ -52,17 +52,17 @@ def test_a_distance_of_segments_is_that_of_coal(a, b, c, d):
     result = coal.DistanceResult()
     found = coal.distance(one, here, two, there, coal.DistanceRequest(), result) + 2.0 * radius
     assume(found > 2.5 * radius)  # where capsules meet it gives the depth instead
-    assert segment_distance(a, b, c, d) == pytest.approx(found, abs=2e-6)  # coal stops at 1e-6
+    assert _segment_distance(a, b, c, d) == pytest.approx(found, abs=2e-6)  # coal stops at 1e-6
 
 
 @given(points, points, points, points, st.floats(0, 1), st.floats(0, 1))
 @settings(max_examples=200)
 def test_it_is_the_least_and_symmetric(a, b, c, d, s, t):
-    least = segment_distance(a, b, c, d)
+    least = _segment_distance(a, b, c, d)
     on_one = [x + s * (y - x) for x, y in zip(a, b, strict=True)]
     on_two = [x + t * (y - x) for x, y in zip(c, d, strict=True)]
     assert least <= math.dist(on_one, on_two) + 1e-12
-    assert least == pytest.approx(segment_distance(d, c, a, b), abs=1e-12)
+    assert least == pytest.approx(_segment_distance(d, c, a, b), abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -75,23 +75,23 @@ def test_it_is_the_least_and_symmetric(a, b, c, d, s, t):
     ],
 )
 def test_distances_that_a_person_can_see(segments, distance):
-    assert segment_distance(*segments) == pytest.approx(distance, abs=1e-15)
+    assert _segment_distance(*segments) == pytest.approx(distance, abs=1e-15)
 
 
 def test_the_thickness_covers_the_tubes_that_were_measured():
     # radii of the meshes: 42.6 mm on the UR5e's upper arm, 54.0 mm on the UR10's
-    assert clearance_needed(arm_model("UR5e")) / 2 > 0.0426
-    assert clearance_needed(arm_model("UR10")) / 2 > 0.0540
+    assert _clearance_needed(arm_model("UR5e")) / 2 > 0.0426
+    assert _clearance_needed(arm_model("UR10")) / 2 > 0.0540
 
 
 def test_an_arm_as_people_use_it_does_not_touch_itself():
     for name in ("UR3e", "UR5e", "UR10e", "UR16e", "UR20", "UR30"):
-        assert close_pairs(arm_model(name), skeleton(arm_model(name), Q)) == []
+        assert _close_pairs(arm_model(name), skeleton(arm_model(name), Q)) == []
 
 
 def test_a_wrist_at_the_base_is_named():
-    (pair, *_) = close_pairs(ARM, skeleton(ARM, folded()))
-    assert isinstance(pair, PartPair)
+    (pair, *_) = _close_pairs(ARM, skeleton(ARM, folded()))
+    assert isinstance(pair, _PartPair)
     assert _PART_NAMES[pair.second].startswith(("wrist", "forearm"))
     assert f"within {1e3 * pair.distance:.0f} mm of the {_PART_NAMES[pair.first]}" in pair.why
 
@@ -116,9 +116,9 @@ def test_a_retreat_that_would_fold_the_arm_into_itself_ends_before():
         plan = plan_retreat(ARM, ArmState(0.0, q), [towards_base(q)], reaction, space)
         assert not isinstance(plan, Done)
         end, why = follow(plan, q)
-        near = min((pair.distance for pair in close_pairs(ARM, skeleton(ARM, end))), default=math.inf)
+        near = min((pair.distance for pair in _close_pairs(ARM, skeleton(ARM, end))), default=math.inf)
         if space is None:
-            assert near < 0.8 * clearance_needed(ARM)  # it would have gone there
+            assert near < 0.8 * _clearance_needed(ARM)  # it would have gone there
         else:
             assert "axis to axis" in why
             assert near == math.inf
@@ -136,11 +136,11 @@ def test_no_retreat_brings_two_parts_closer_than_they_may_be(turned, tilted):
         ARM, ArmState(0.0, q), [contact], Reaction(kind="retreat", distance=0.5, time_budget=20.0), SPACE
     )
     assume(not isinstance(plan, Done))
-    before = {(pair.first, pair.second): pair.distance for pair in close_pairs(ARM, skeleton(ARM, q))}
+    before = {(pair.first, pair.second): pair.distance for pair in _close_pairs(ARM, skeleton(ARM, q))}
     end, _ = follow(plan, q)
-    for pair in close_pairs(ARM, skeleton(ARM, end)):
+    for pair in _close_pairs(ARM, skeleton(ARM, end)):
         # a part that was too close may stay so; half a setpoint at 0.5 m/s is 1 mm
-        assert pair.distance > min(clearance_needed(ARM), before.get((pair.first, pair.second), math.inf)) - 1.5e-3
+        assert pair.distance > min(_clearance_needed(ARM), before.get((pair.first, pair.second), math.inf)) - 1.5e-3
 
 
 def follow(plan, q, period=0.004):

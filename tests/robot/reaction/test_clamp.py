@@ -12,7 +12,7 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import Workspace
 from coneskin.robot.reaction.backtrack import PathHistory
-from coneskin.robot.reaction.motion import AdmittanceMotion, BacktrackMotion, plan_reaction_motion
+from coneskin.robot.reaction.motion import _AdmittanceMotion, _BacktrackMotion, plan_reaction_motion
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 ARM = arm_model("UR5e")
@@ -67,7 +67,7 @@ def test_by_default_it_stays():
 
 def test_the_way_back_opens_an_elbow_that_has_closed():
     motion = planned(elbow_clamp(), "path")
-    assert isinstance(motion, BacktrackMotion)
+    assert isinstance(motion, _BacktrackMotion)
     step = motion.update(ArmState(0.1, Q, ZERO_VELOCITY), ())
     assert step.qd[2] < 0.0
     assert step.qd[:2] == pytest.approx((0.0, 0.0))
@@ -85,7 +85,7 @@ def test_it_does_not_go_back_into_what_came_from_behind():
 
 
 def test_it_complies_where_the_scene_says_so():
-    assert isinstance(planned(elbow_clamp(), "comply"), AdmittanceMotion)
+    assert isinstance(planned(elbow_clamp(), "comply"), _AdmittanceMotion)
 
 
 def test_an_unknown_word_is_refused():
@@ -110,7 +110,7 @@ def test_the_way_out_of_a_clamp_leads_into_no_touch(qd, touches):
             ContactOnLink(link, (0.2, 0.0, 0.08), tuple(v / length for v in normal), 0.6, True, 0.1, number)
         )
     motion = planned(contacts, "path", qd)
-    assume(isinstance(motion, BacktrackMotion))
+    assume(isinstance(motion, _BacktrackMotion))
     step = motion.update(ArmState(0.1, Q, ZERO_VELOCITY), ())
     assume(not isinstance(step, Done))
     for contact in contacts:

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.arm.workspace import MARGIN, TablePlane, Workspace, skeleton
-from coneskin.robot.reaction.admittance import DAMPING, admittance_step, begin_admittance, wanted_speed
+from coneskin.robot.arm.workspace import _LIMIT_MARGIN, TablePlane, Workspace, skeleton
+from coneskin.robot.reaction.admittance import _DAMPING_TIME, _wanted_speed, admittance_step, begin_admittance
 from coneskin.robot.reaction.backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
-from coneskin.robot.reaction.motion import RetreatMotion
+from coneskin.robot.reaction.motion import _RetreatMotion
 from coneskin.robot.reaction.retreat import plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
@@ -70,7 +70,7 @@ def test_the_speed_rises_with_the_level_and_never_above_what_is_set(level, thres
     reaction = Reaction(kind="comply", speed=0.2, full_level=full)
 
     def at(value):
-        return wanted_speed(reaction, [ContactOnLink(3, (0, 0, 0), (0, 0, 1), value, True, threshold)])
+        return _wanted_speed(reaction, [ContactOnLink(3, (0, 0, 0), (0, 0, 1), value, True, threshold)])
 
     assert 0.0 <= at(level) <= 0.2
     assert at(threshold) == 0.0
@@ -99,10 +99,10 @@ def test_half_a_push_is_half_the_speed_and_it_comes_up_as_the_damping_says():
     states, _ = follow(comply(lambda _: 0.35), longest=0.4)  # (0.35 - 0.1) / (0.6 - 0.1)
     speeds = [moved(FOREARM, a.q, b.q) / CYCLE for a, b in pairwise(states)]
     assert speeds[-1] == pytest.approx(0.05, rel=0.01)
-    at = round(DAMPING / CYCLE)
+    at = round(_DAMPING_TIME / CYCLE)
     assert speeds[at] == pytest.approx(0.05 * (1 - math.exp(-1)), rel=0.1)  # the arm's ramp is a cycle or two late
     assert max(speeds) < 0.0505
-    assert all(b - a < 0.05 * CYCLE / DAMPING * 1.5 for a, b in pairwise(speeds))
+    assert all(b - a < 0.05 * CYCLE / _DAMPING_TIME * 1.5 for a, b in pairwise(speeds))
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=20, max_size=20))
@@ -211,7 +211,7 @@ def test_a_trail_forgets():
 
 
 def test_a_joint_at_its_limit_ends_the_way_back():
-    top = ARM.joint_upper[2] - MARGIN
+    top = ARM.joint_upper[2] - _LIMIT_MARGIN
     way = [(*Q[:2], top + 0.015 - 0.001 * k, *Q[3:]) for k in range(100)]  # it came from beyond the margin
     plan = plan_backtrack(ARM, ArmState(1.0, way[-1]), trail_of(way), Reaction(kind="retreat", distance=0.3))
     _, over = follow(lambda state: backtrack_step(plan, state), way[-1], 1.0)
@@ -230,7 +230,7 @@ def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
     space = Workspace(ARM, TablePlane(height), avoid_self=False)
     plan = plan_retreat(ARM, ArmState(0.0, q), [contact], Reaction(kind="retreat", distance=0.2), space)
     assume(not isinstance(plan, Done))
-    states, over = follow(lambda state: RetreatMotion(plan).update(state, ()), q)
+    states, over = follow(lambda state: _RetreatMotion(plan).update(state, ()), q)
     assert isinstance(over, Done)
     before = skeleton(ARM, q)
     last = states[-1]

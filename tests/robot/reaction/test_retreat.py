@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
-from coneskin.robot.arm.workspace import MARGIN
+from coneskin.robot.arm.workspace import _LIMIT_MARGIN
 from coneskin.robot.reaction.retreat import DISTANCE_TOLERANCE, RetreatPlan, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from tests.support.pinocchio_arm import pin_jacobian
@@ -31,7 +31,8 @@ def states(draw: st.DrawFn) -> tuple[ArmModel, Joints, Joints, list[ContactOnLin
     angles = []
     for lower, upper in zip(arm.joint_lower, arm.joint_upper, strict=True):
         low, up = max(lower, -7.0), min(upper, 7.0)
-        edges = [low, low + MARGIN, low + 0.05, 0.0, math.pi / 2, -math.pi / 2, up - 0.05, up - MARGIN, up]
+        edges = [low, low + _LIMIT_MARGIN, low + 0.05, 0.0, math.pi / 2]
+        edges += [-math.pi / 2, up - 0.05, up - _LIMIT_MARGIN, up]
         angles.append(draw(st.one_of(st.floats(low, up), st.sampled_from(edges))))
     speeds = [draw(st.floats(-most, most)) for most in arm.joint_speed]
     contacts = [
@@ -69,7 +70,7 @@ def test_a_step_keeps_all_limits_and_never_moves_towards_an_obstacle(
     assert step.acceleration == reaction.acceleration
     for i, v in enumerate(step.qd):  # braking after the reaction time ends within the margin
         room = arm.joint_upper[i] - q[i] if v > 0 else q[i] - arm.joint_lower[i]
-        assert v == 0.0 or abs(v) * 0.01 + v * v / (2 * reaction.acceleration) <= room - MARGIN + 1e-12
+        assert v == 0.0 or abs(v) * 0.01 + v * v / (2 * reaction.acceleration) <= room - _LIMIT_MARGIN + 1e-12
     away = []
     for contact in contacts:
         rows = pin_jacobian(arm, list(q), contact.link, contact.point)[:3]
@@ -157,7 +158,7 @@ def test_a_joint_before_its_limit_is_locked_and_the_others_do_it() -> None:
     assert isinstance(free, JointVelocity)
     assert free.qd[2] > 0.01
     assert free.clipped_by == ("arm speed",)
-    near, far = MARGIN + 1e-4, 1.0
+    near, far = _LIMIT_MARGIN + 1e-4, 1.0
     behind = planned(elbow_limited(Q[2] - near, Q[2] + far), Q, [FOREARM])
     assert isinstance(behind, RetreatPlan)
     assert retreat_step(behind, ArmState(0.0, Q)) == free  # a limit at its back does not matter
@@ -172,7 +173,7 @@ def test_a_joint_before_its_limit_is_locked_and_the_others_do_it() -> None:
 
 def test_a_joint_that_still_runs_at_its_limit_when_touched_does_not_forbid_the_plan() -> None:
     """The arm stops before it retreats; what counts is whether it could retreat from there."""
-    edge = elbow_limited(Q[2] - 1.0, Q[2] + MARGIN + 0.03)  # 30 mrad: enough for 0.05 rad/s, not for 2 rad/s
+    edge = elbow_limited(Q[2] - 1.0, Q[2] + _LIMIT_MARGIN + 0.03)  # 30 mrad: enough for 0.05 rad/s, not for 2 rad/s
     plan = planned(edge, Q, [FOREARM], qd=(0.0, 0.0, 2.0, 0.0, 0.0, 0.0))
     assert isinstance(plan, RetreatPlan)
     running = retreat_step(plan, ArmState(0.1, Q, (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)))
@@ -188,8 +189,8 @@ def test_with_the_joint_that_it_needs_at_its_limit_it_stands() -> None:
     assert isinstance(planned(UR10E, Q, [tip]), RetreatPlan)
     fixed = replace(
         UR10E,
-        joint_lower=six([angle - MARGIN for angle in Q]),
-        joint_upper=six([angle + MARGIN for angle in Q]),
+        joint_lower=six([angle - _LIMIT_MARGIN for angle in Q]),
+        joint_upper=six([angle + _LIMIT_MARGIN for angle in Q]),
     )
     plan = planned(fixed, Q, [tip])
     assert isinstance(plan, Done)
@@ -211,6 +212,6 @@ def test_a_retreat_into_a_joint_limit_stays_within_it() -> None:
         if isinstance(plan, Done):
             continue
         result = follow(arm, plan, six(q))
-        assert result.beyond < -0.5 * MARGIN  # of the margin of 20 mrad the two late cycles take some
+        assert result.beyond < -0.5 * _LIMIT_MARGIN  # of the margin of 20 mrad the two late cycles take some
         locked += any("limit" in reason for reason in result.clipped)
     assert locked > 3  # else nothing was tried

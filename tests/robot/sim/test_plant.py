@@ -10,7 +10,7 @@ import pytest
 
 from coneskin.core.channel import Channel, pair
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.sim.machine.controller import Controller, describe
+from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import START_Q, Options, RobotMode, SafetyMode
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
@@ -67,8 +67,8 @@ def test_what_is_measured_is_the_plant_and_what_is_the_target_is_not(moving) -> 
     assert outputs.getter("actual_TCP_speed")() != outputs.getter("target_TCP_speed")()
     packet = struct.unpack_from(">6d", _encode_realtime(controller), 4 + 8 * 31)  # q actual: the 32nd double
     assert packet == ELSEWHERE.q
-    assert describe(controller)["q"] == list(ELSEWHERE.q)
-    assert describe(controller)["turning"]
+    assert controller.describe()["q"] == list(ELSEWHERE.q)
+    assert controller.describe()["turning"]
 
 
 def test_without_its_plant_the_arm_has_no_power_and_nothing_says_that_it_stands(moving) -> None:  # type: ignore[no-untyped-def]
@@ -80,9 +80,9 @@ def test_without_its_plant_the_arm_has_no_power_and_nothing_says_that_it_stands(
     assert controller.robot_mode is RobotMode.POWER_OFF
     assert controller.program is None
     assert plant.closed == 1  # it is not asked again
-    assert describe(controller)["plant_lost"] == "it fell off"
-    assert describe(controller)["qd"] == list(ELSEWHERE.qd)  # the last that was measured: no standstill is made up
-    assert describe(controller)["turning"]
+    assert controller.describe()["plant_lost"] == "it fell off"
+    assert controller.describe()["qd"] == list(ELSEWHERE.qd)  # the last that was measured: no standstill is made up
+    assert controller.describe()["turning"]
     events = [json.loads(line)["event"] for line in log.getvalue().splitlines()]
     assert "plant_lost" in events
     assert "standstill" not in events

@@ -10,7 +10,7 @@ from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.process import SimulatedController, free_host
-from coneskin.robot.ur.model_check import ArmPose, check_model, flange_distance, read_pose
+from coneskin.robot.ur.model_check import _ArmPose, _flange_distance, check_model, read_pose
 
 Q = (0.3, -1.2, 1.1, -1.4, -1.5, 0.4)
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -29,17 +29,17 @@ def rotation_vector(rotation):
 def pose_of(name, q=Q, tool=(0.0, 0.0, 0.0)):
     """Return what a controller of this model reports with a tool straight off the flange [m]."""
     flange = forward(arm_model(name), q)
-    return ArmPose(q, (*flange.apply(tool), *rotation_vector(flange.rotation)), (*tool, 0.0, 0.0, 0.0))
+    return _ArmPose(q, (*flange.apply(tool), *rotation_vector(flange.rotation)), (*tool, 0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("name", MODEL_NAMES)
 def test_a_model_is_itself_and_no_other(name):
     pose = pose_of(name, tool=(0.01, -0.02, 0.15))
-    assert flange_distance(arm_model(name), pose) < 1e-12  # a chain of rotations of numbers around 1
+    assert _flange_distance(arm_model(name), pose) < 1e-12  # a chain of rotations of numbers around 1
     check_model(arm_model(name), pose, "host")
     for other in MODEL_NAMES:
         if other != name and {other.upper(), name.upper()} not in SAME:
-            if flange_distance(arm_model(other), pose) <= 0.01:
+            if _flange_distance(arm_model(other), pose) <= 0.01:
                 continue  # the two cannot be distinguished at this pose, and then points are as close
             with pytest.raises(RobotRefused, match=rf"is no {arm_model(other).name}: .*correct arm.model"):
                 check_model(arm_model(other), pose, "host")
@@ -61,7 +61,7 @@ def test_where_no_controller_answers_the_message_says_what_to_check(listens):
 
 def test_an_unknown_arm_fits_no_model():
     with pytest.raises(RobotRefused, match="no model fits"):
-        check_model(arm_model("UR5e"), ArmPose(Q, (3.0, 0.0, 0.0, 0.0, 0.0, 0.0), NONE), "host")
+        check_model(arm_model("UR5e"), _ArmPose(Q, (3.0, 0.0, 0.0, 0.0, 0.0, 0.0), NONE), "host")
 
 
 def test_the_simulated_controller_is_asked():

@@ -4,7 +4,7 @@ import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.values import Waypoint
-from coneskin.robot.ur.ur_rtde import Mode, rtde_errors
+from coneskin.robot.ur.ur_rtde import Mode, _rtde_errors
 
 from .fake_wheel import arm, stops
 
@@ -57,7 +57,7 @@ def test_what_the_wheel_refuses_is_an_error():
     with pytest.raises(RobotRefused, match="did not take moveJ: its program is not running"):
         a.move_j([0.0] * 6, 1.0, 1.0)
     assert a.mode is Mode.IDLE
-    with pytest.raises(RobotConnectionError, match="stopping: broken"), rtde_errors("stopping"):
+    with pytest.raises(RobotConnectionError, match="stopping: broken"), _rtde_errors("stopping"):
         raise RuntimeError("broken")
 
 
