@@ -59,7 +59,7 @@ class Guarded:
     """Guard's loop, with a stamp between its stages.
 
     Attributes:
-        wake, detect, decide, send, react, idle, whole: times [s], as the table names them.
+        wake, decide, send, react, idle, whole: times [s], as the table names them.
         answered: touches in which a stop was sent because of the touch.
         missed: touches of an active guard without a stop.
         inactive: touches that came while the guard was not active, by the reason for that.
@@ -67,7 +67,6 @@ class Guarded:
     """
 
     wake: list[float] = field(default_factory=list)
-    detect: list[float] = field(default_factory=list)
     decide: list[float] = field(default_factory=list)
     send: list[float] = field(default_factory=list)
     react: list[float] = field(default_factory=list)
@@ -120,8 +119,7 @@ class Guarded:
         if not stamp.sent:
             self.idle.append(stamp.done - stamp.read)
         elif stamp.why == "touch":
-            self.detect.append(stamp.events - stamp.read)
-            self.decide.append(stamp.decided - stamp.events)
+            self.decide.append(stamp.decided - stamp.read)
             self.send.append(stamp.sent - stamp.decided)
             self.react.append(stamp.sent - stamp.read)
             self.whole.append(stamp.sent - at)
@@ -152,7 +150,7 @@ def make_core(stamps: Stamps) -> Any:
     cone = PlacedFrustum(SENSOR.frustum)
     placed = GuardedSensor(SENSOR.name, "forearm", 3, lambda u, phi: (cone.point(u, phi), cone.normal(phi)))
     arm = ArmSupervisor(arm_model("UR5e"), UR_DRIVER, Reaction(kind="stop"), limits, (StopPath.DRIVER,))
-    return stamps.wrap_core(GuardCore(stamps.wrap_stream(TouchStream([SENSOR], settings)), [placed], limits, arm))
+    return stamps.wrap_core(GuardCore(TouchStream([SENSOR], settings), [placed], limits, arm))
 
 
 def drain(sock: socket.socket) -> None:

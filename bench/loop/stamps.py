@@ -11,7 +11,6 @@ from coneskin.core.channel import Channel
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import GuardEvent
-from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sources.serial_port import SerialPort
 from coneskin.skin.wire import FrameDecoder
 
@@ -27,7 +26,6 @@ class Stamp:
         read: when [s].
         phase: of the guard then.
         reason: why the guard was last stopped or kept from becoming active, where it is not active.
-        events: when its events were there [s].
         decided: when a stop was decided [s]; 0 without one.
         sent: when it was sent [s].
         why: of that stop.
@@ -38,7 +36,6 @@ class Stamp:
     read: float
     phase: Phase
     reason: str
-    events: float = 0.0
     decided: float = 0.0
     sent: float = 0.0
     why: str = ""
@@ -60,10 +57,6 @@ class Stamps:
     reason: str = "it has not been active yet"
     _decoder: FrameDecoder = field(default_factory=FrameDecoder)
 
-    def wrap_stream(self, stream: TouchStream) -> Any:
-        """Return the stream; it stamps when its events are there."""
-        return Wrapped(stream, "feed", lambda *_: self._stamp_events())
-
     def wrap_core(self, core: GuardCore) -> Any:
         """Return the core; it stamps when it is done, and notes why the guard stops."""
         self.core = core
@@ -84,10 +77,6 @@ class Stamps:
         assert self.core is not None
         frames = self._decoder.feed(data)
         self.all.append(Stamp(tuple(frame.sequence for frame in frames), now, self.core.phase, self.reason))
-
-    def _stamp_events(self) -> None:
-        if self.all and not self.all[-1].events:
-            self.all[-1].events = CLOCK()
 
     def _stamp_done(self, out: Any) -> None:
         if self.all and not self.all[-1].done:
