@@ -13,49 +13,54 @@ from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 from .signals.contact import Contact
 from .signals.journal import EventName, Outputs, emit
 
-__all__ = [
-    "ArmStop",
-]
+__all__ = ["ArmStop"]
 
 
-class _StopEscalation:
-    """Stops of one arm: the first path is used for every stop, the others where it does not work.
+class ArmStop:
+    """Newest stop of one arm, from its cause to the latched arm.
+
+    The first path is used for every stop, the others where it does not work.
 
     Args:
         limits: of the monitoring.
         paths: the stop paths that there are, in the order of their use.
 
     Attributes:
+        number: counted from 1; a motion away and its end belong to the stop before.
+        why: its cause, and what came of it.
         paths: those that are left.
-        first_was_enough: True where the newest stop came to a standstill by the first path alone.
         used: paths of the newest stop.
+        first_was_enough: True where the newest stop came to a standstill by the first path alone.
+        watch: of the arm that stands.
     """
 
     def __init__(self, limits: MonitoringLimits, paths: tuple[StopPath, ...]) -> None:
+        self.number = 0
+        self.why = ""
         self.paths = paths
-        self.first_was_enough = False
         self.used: tuple[StopPath, ...] = ()
+        self.first_was_enough = False
+        self.watch = StandstillWatch(limits.standstill)
         self._limits = limits
         self._first = paths[0]
+        self._others_move = StopPath.DRIVER not in paths
         self._order = paths  # of the stop under way
-        self._stop: StopMonitor | None = None
+        self._monitor: StopMonitor | None = None
         self._protective_at = 0.0  # when it was last used
 
     @property
     def under_way(self) -> bool:
         """True from a stop until the arm is measured standing."""
-        return self._stop is not None
+        return self._monitor is not None
 
-    def send(self, command: StopProgram | EndReaction, strongest_first: bool, out: Outputs) -> None:
-        """Send a stop by its first path.
+    def again(self, what: str) -> str:
+        """Return why an arm is stopped, once there is another reason: the first, which is the cause, and the newest."""
+        return f"{self.why.partition('; then ')[0]}; then {what}"
 
-        Args:
-            command: for the driver process; another path has its deceleration.
-            strongest_first: begin with the protective stop.
-            out: takes the command.
-        """
+    def send(self, command: StopProgram | EndReaction, out: Outputs) -> None:
+        """Send a stop by its first path; another path than the driver process has the command's deceleration."""
         paths = self.paths
-        if strongest_first and StopPath.PROTECTIVE in paths:
+        if self.watch.insists and StopPath.PROTECTIVE in paths:
             paths = (StopPath.PROTECTIVE, *(path for path in paths if path is not StopPath.PROTECTIVE))
         for first in paths[:1]:
             out.append(command if first is StopPath.DRIVER else UseStopPath(first, command.deceleration))
@@ -73,15 +78,22 @@ class _StopEscalation:
         if self._order[:1] == (StopPath.PROTECTIVE,):
             self._protective_at = now
         budget = limits.stop_budget(speed or 0.0, deceleration)
-        self._stop = StopMonitor(
+        self._monitor = StopMonitor(
             now, speed, self._order, limits.escalate, budget, limits.standstill, limits.arm_silence
         )
+        self.watch.end()
+
+    def report(self, now: float, why: str, contact: Contact | None, out: Outputs) -> None:
+        """Report a stop that was sent at a host time [s]: its cause, and the contact for which it was, if any."""
+        self.why = why
+        named = {} if contact is None else {"contact": contact.summary()}
+        emit(out, EventName.STOPPING, now, why=why, stop=self.number, **named)
 
     def lose(self, paths: frozenset[StopPath], now: float, for_good: bool) -> None:
         """Drop stop paths that are lost, or that this stop must not count on, and use the next one at once."""
         self.paths = tuple(path for path in self.paths if path not in paths or not for_good)
-        if self._stop is not None:
-            self._stop.forget(paths, now)
+        if self._monitor is not None:
+            self._monitor.forget(paths, now)
 
     def escalate(self, now: float, deceleration: float, state: ControllerState | None, out: Outputs) -> None:
         """Use the next path where one is due.
@@ -92,7 +104,7 @@ class _StopEscalation:
             state: the newest, for the report; None before the first.
             out: takes commands and events.
         """
-        stop = self._stop
+        stop = self._monitor
         if stop is None:
             return
         rounds, used = stop.rounds, len(stop.used)
@@ -107,33 +119,9 @@ class _StopEscalation:
             speed = None if state is None else state.speed
             emit(out, EventName.STOP_FAILED, now, rounds=stop.rounds, speed=speed)
 
-    def insist(self, state: ControllerState, deceleration: float, out: Outputs) -> None:
-        """Repeat a protective stop that the controller's safety system does not show, though the arm stands.
-
-        Args:
-            state: as measured.
-            deceleration: of the stop [rad/s2].
-            out: takes the command.
-        """
-        if not self.unconfirmed(state) or StopPath.PROTECTIVE not in self.paths:
-            return
-        if state.time - self._protective_at >= PROTECTIVE_PATIENCE * self._limits.escalate:
-            self._protective_at = state.time
-            out.append(UseStopPath(StopPath.PROTECTIVE, deceleration))
-
-    def unconfirmed(self, state: ControllerState) -> bool:
-        """Tell whether the newest stop took a protective stop that the controller does not show."""
-        return StopPath.PROTECTIVE in self.used and not state.stopped_by_safety
-
-    def sample(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
-        """Take a measured state, and return whether the arm stands: then the stop is over.
-
-        Args:
-            state: as measured.
-            measured_at: host time of the measurement [s].
-            out: takes events.
-        """
-        stop = self._stop
+    def stands(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
+        """Take a state, measured at a host time [s]; return whether the arm stands, which begins the watch."""
+        stop = self._monitor
         if stop is None:
             return False
         before = stop.slowed_at
@@ -144,81 +132,32 @@ class _StopEscalation:
             return False
         emit(out, EventName.STANDSTILL, state.time, speed=state.speed, paths=[path.value for path in stop.used])
         self.first_was_enough = stop.used == [self._first]
-        self._stop = None
-        return True
-
-
-class ArmStop:
-    """Newest stop of one arm, from its cause to the latched arm.
-
-    Args:
-        limits: of the monitoring.
-        paths: the stop paths that there are, in the order of their use.
-
-    Attributes:
-        number: counted from 1; a motion away and its end belong to the stop before.
-        why: its cause, and what came of it.
-        escalation: one stop path after the other, until the arm stands.
-        watch: of the arm that stands.
-    """
-
-    def __init__(self, limits: MonitoringLimits, paths: tuple[StopPath, ...]) -> None:
-        self.number = 0
-        self.why = ""
-        self.escalation = _StopEscalation(limits, paths)
-        self.watch = StandstillWatch(limits.standstill)
-        self._others_move = StopPath.DRIVER not in paths
-
-    def again(self, what: str) -> str:
-        """Return why an arm is stopped, once there is another reason: the first, which is the cause, and the newest."""
-        return f"{self.why.partition('; then ')[0]}; then {what}"
-
-    def send(self, command: StopProgram | EndReaction, out: Outputs) -> None:
-        """Send a stop; nothing is looked at before."""
-        self.escalation.send(command, self.watch.insists, out)
-
-    def begin(self, now: float, speed: float | None, deceleration: float) -> None:
-        """Begin to monitor the stop that was sent; arguments as of ``_StopEscalation.begin``."""
-        self.escalation.begin(now, speed, deceleration)
-        self.watch.end()
-
-    def report(self, now: float, why: str, contact: Contact | None, out: Outputs) -> None:
-        """Report a stop that was sent.
-
-        Args:
-            now: host time [s].
-            why: its cause.
-            contact: for which it was sent, or None.
-            out: takes the event.
-        """
-        self.why = why
-        named = {} if contact is None else {"contact": contact.summary()}
-        emit(out, EventName.STOPPING, now, why=why, stop=self.number, **named)
-
-    def stands(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
-        """Take a measured state of a stop under way; return whether the arm stands, which begins the watch.
-
-        Args:
-            state: as measured.
-            measured_at: host time of the measurement [s].
-            out: takes events.
-        """
-        if not self.escalation.sample(state, measured_at, out):
-            return False
+        self._monitor = None
         self.watch.begin(state.time, math.inf)
         return True
+
+    def insist(self, state: ControllerState, deceleration: float, out: Outputs) -> None:
+        """Repeat a protective stop that the controller's safety system does not show, though the arm stands."""
+        if not self._unconfirmed(state) or StopPath.PROTECTIVE not in self.paths:
+            return
+        if state.time - self._protective_at >= PROTECTIVE_PATIENCE * self._limits.escalate:
+            self._protective_at = state.time
+            out.append(UseStopPath(StopPath.PROTECTIVE, deceleration))
 
     def stay(self, why: str, state: ControllerState) -> None:
         """Let the arm stand: at once where no other program can start, else to the end of a watch."""
         self.why = why
-        watched = self._others_move or self.escalation.unconfirmed(state)
-        self.watch.begin(state.time, WATCH_DURATION if watched else 0.0)
+        self.watch.begin(state.time, WATCH_DURATION if self._others_move or self._unconfirmed(state) else 0.0)
 
     def latched(self, state: ControllerState, out: Outputs) -> bool:
         """Tell whether the arm has kept standing for long enough to be called latched, and report that it is."""
         if not (self.watch.confirmed or state.stopped_by_safety):
             return False
-        if self.escalation.unconfirmed(state):
+        if self._unconfirmed(state):
             self.why += "; the controller does not show the protective stop"
         emit(out, EventName.LATCHED, state.time, why=self.why, stop=self.number)
         return True
+
+    def _unconfirmed(self, state: ControllerState) -> bool:
+        """Tell whether the newest stop took a protective stop that the controller does not show."""
+        return StopPath.PROTECTIVE in self.used and not state.stopped_by_safety

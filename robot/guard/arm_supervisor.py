@@ -115,7 +115,7 @@ class ArmSupervisor:
     def needs(self) -> ControllerNeeds:
         """What it needs of the controller."""
         heartbeat = None if self.heartbeat is None else self.heartbeat.required
-        by_slider = StopPath.SLIDER in self._stop.escalation.paths
+        by_slider = StopPath.SLIDER in self._stop.paths
         setpoints = self._rules.move and not self.internal_control
         return ControllerNeeds(self._needs_slider, by_slider, setpoints, heartbeat)
 
@@ -245,14 +245,14 @@ class ArmSupervisor:
 
     def lose(self, paths: frozenset[StopPath], now: float, for_good: bool = True) -> None:
         """Drop stop paths that are lost, or that this stop must not count on, and use the next one at once."""
-        self._stop.escalation.lose(paths, now, for_good)
+        self._stop.lose(paths, now, for_good)
 
     def sample(self, state: ControllerState, out: Outputs) -> None:
         """Take a measured state."""
         self.state = state
         stop, measured_at = self._stop, self.state_age.feed(state)
         self._away.feed(measured_at, state)
-        if stop.escalation.under_way:
+        if stop.under_way:
             self._brake(state, measured_at, out)
         elif self._away.under_way:
             self._move(state, out)
@@ -266,15 +266,15 @@ class ArmSupervisor:
         elif stop.watch.under_way and self._away.undecided:
             self._decide(state, out)
         elif stop.watch.under_way and self.phase is not Phase.LATCHED:
-            stop.escalation.insist(state, self._reaction.deceleration, out)
+            stop.insist(state, self._reaction.deceleration, out)
             self._latch(state, out)
 
     def poll(self, now: float, out: Outputs) -> None:
         """Decide what only the passing of time shows."""
         stop = self._stop
-        if stop.escalation.under_way:
-            stop.escalation.escalate(now, self._reaction.deceleration, self.state, out)
-            self.speed_reduction.note_stop(stop.escalation.used)
+        if stop.under_way:
+            stop.escalate(now, self._reaction.deceleration, self.state, out)
+            self.speed_reduction.note_stop(stop.used)
         elif self.phase is Phase.SLOWED:
             if why := self.speed_reduction.poll(now, bool(self._touches.contacts)):
                 approach = self.speed_reduction.approach
@@ -291,7 +291,7 @@ class ArmSupervisor:
 
         That is as long as its states show the same of power, safety system and program.
         """
-        at_work = self._stop.escalation.under_way or self._away.under_way or self._stop.watch.under_way
+        at_work = self._stop.under_way or self._away.under_way or self._stop.watch.under_way
         heard = self.heartbeat is None or self.heartbeat.silent
         if self.phase is not Phase.ACTIVE or at_work or not heard or self._speed_limit is not None:
             return -math.inf
@@ -315,7 +315,7 @@ class ArmSupervisor:
             self._sent = False
         else:
             self._stop.send(command, out)
-        self.speed_reduction.note_stop(self._stop.escalation.used)
+        self.speed_reduction.note_stop(self._stop.used)
         self._away.end(out)
         state = self.state
         speed = None if state is None or self.state_age.silent(now) else state.speed
@@ -330,7 +330,7 @@ class ArmSupervisor:
 
     def _decide(self, state: ControllerState, out: Outputs) -> None:
         """Decide what the standing arm does; the place of a touch may need a while to become certain."""
-        stopping, enough = self.phase is Phase.STOPPING, self._stop.escalation.first_was_enough
+        stopping, enough = self.phase is Phase.STOPPING, self._stop.first_was_enough
         if stale := self.state_age.stale(state.time):
             self._away.bar(stale)
         decision = self._away.decide(state, self._reaction, stopping, enough, self._touches, out)

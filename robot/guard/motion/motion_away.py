@@ -17,12 +17,12 @@ from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reactio
 if TYPE_CHECKING:  # a reaction that only stops loads it not
     from .reaction_motion import MotionStream, ReactionPlanner
 
-__all__ = ["MotionAway", "MotionDecision"]
+__all__ = ["MotionAway"]
 
 _PLACE_TIME = 0.3  # s that a standing arm waits for the place of a touch; at 12 bits it takes 10 to 60 frames
 
 
-class MotionDecision(NamedTuple):
+class _Decision(NamedTuple):
     """Decision about an arm that stands.
 
     Attributes:
@@ -107,7 +107,7 @@ class MotionAway:
         first_was_enough: bool,
         touches: TouchRecord,
         out: Outputs,
-    ) -> MotionDecision:
+    ) -> _Decision:
         """Decide whether a standing arm moves away, and begin that; the place of a touch may need a while.
 
         Args:
@@ -127,14 +127,14 @@ class MotionAway:
         wanted = wanted and reaction.kind not in ("stop", "slow")
         bar = self._barred or ("" if first_was_enough else f"{self._mover} did not stop the arm")
         if wanted and not bar and not touches.all_placed and state.time < self._decide_by:
-            return MotionDecision(reaction, waits=True)
+            return _Decision(reaction, waits=True)
         self._resisted, self._decide_by = None, -math.inf
         if not wanted:
-            return MotionDecision(reaction)
+            return _Decision(reaction)
         if bar:
-            return MotionDecision(reaction, refusal=f"no retreat: {bar}")
+            return _Decision(reaction, refusal=f"no retreat: {bar}")
         refusal = self._begin(state, reaction, touches, resisted, out)
-        return MotionDecision(reaction, begun=not refusal, refusal=refusal)
+        return _Decision(reaction, begun=not refusal, refusal=refusal)
 
     def _begin(
         self,

@@ -117,33 +117,12 @@ class EventName(StrEnum):
     SKIN_LINE = "skin_line", "The guard waits for a skin, and its bytes are wrong. `what` says how."
 
 
-INPUTS = frozenset(
-    {
-        BlockKind.SKIN,
-        BlockKind.ARM,
-        BlockKind.TICK,
-        BlockKind.DRIVER,
-        BlockKind.RESET,
-        BlockKind.LOST,
-        BlockKind.SLIDER,
-        BlockKind.PROGRAM,
-        BlockKind.ABSENT,
-        BlockKind.ECHO,
-        BlockKind.SUSPENDED,
-        BlockKind.REOPENED,
-    }
-)
-
-
+INPUTS = frozenset(kind for kind in BlockKind if kind < BlockKind.EVENT or kind >= BlockKind.ECHO)
 #: events about the guard, not from it, which a replay does not make
 SESSION_EVENTS = frozenset(
     {
-        EventName.GUARD_EXITED,
-        EventName.GUARD_UNRESPONSIVE,
-        EventName.GUARD_RESPONSIVE,
-        EventName.FALLBACK_STOP,
-        EventName.RECORDING_GAP,
-        EventName.SKIN_LINE,
+        *(EventName.GUARD_EXITED, EventName.GUARD_UNRESPONSIVE, EventName.GUARD_RESPONSIVE),
+        *(EventName.FALLBACK_STOP, EventName.RECORDING_GAP, EventName.SKIN_LINE),
     }
 )
 

@@ -156,9 +156,6 @@ class MatrixNoise(NamedTuple):
     x_around: float
     y_along: float
     y_around: float
-    reciprocity: float  #: [S^2]
-    sum_rule: float  #: [S^2]
-    split: float
 
 
 class FrameNoise:
@@ -171,7 +168,7 @@ class FrameNoise:
     def __init__(self, sensor: Sensor) -> None:
         parts = sensor.electronics
         self._unit = parts.current_full_scale / parts.adc_volts
-        self._pulldown, self._input = 1.0 / parts.pulldown_ohms, 1.0 / parts.input_ohms
+        self._input = 1.0 / parts.input_ohms
         lead_a, lead_b, lead_c, lead_d = parts.lead_ohms
         self._radial_leads, self._angular_leads = lead_a + lead_b, lead_c + lead_d
         self._b_positive, self._c_positive = sensor.b_positive, sensor.c_positive
@@ -210,24 +207,16 @@ class FrameNoise:
         weight1, weight2 = weight1 / (weight1 + weight2), weight2 / (weight1 + weight2)
         i11, i22, m11, m22 = i1 * i1, i2 * i2, mix1 * mix1, mix2 * mix2
         both1, both2 = around * noise * (2.0 * y - 1.0), along * noise * (2.0 * x - 1.0)
-        yy = m22 * guides1 + i22 * guides2 + noise * (y_1 * y_1 + y_2 * y_2)
-        rr = m22 * split1 + i22 * current + noise * (r_1 * r_1 + r_2 * r_2)
-        total = (frame.touch_c + frame.touch_d) * scale
-        share = around / self._pulldown  # of the touch phase's difference between the guides, seen by the lower sheet
-        apart = (frame.touch_c - frame.touch_d) * scale / self._pulldown
         return MatrixNoise(
             i11 * guides1 + m11 * guides2 + noise * (x_1 * x_1 + x_2 * x_2),
             i1 * mix2 * guides1 + mix1 * i2 * guides2 + noise * (x_1 * y_1 + x_2 * y_2),
-            yy,
+            m22 * guides1 + i22 * guides2 + noise * (y_1 * y_1 + y_2 * y_2),
             i11 * current + m11 * split2 + noise * (a_1 * a_1 + a_2 * a_2),
             weight1 * weight1 * (i11 * split1 + m11 * current) + weight2 * weight2 * (m22 * current + i22 * split2),
-            rr,
+            m22 * split1 + i22 * current + noise * (r_1 * r_1 + r_2 * r_2),
             noise * (a_1 * r_1 + a_2 * r_2),
             m11 * both2 + noise * (x_1 * a_1 + x_2 * a_2),
             i1 * mix2 * both1 + noise * (x_1 * r_1 + x_2 * r_2),
             i2 * mix1 * both2 + noise * (y_1 * a_1 + y_2 * a_2),
             m22 * both1 + noise * (y_1 * r_1 + y_2 * r_2),
-            i11 * split1 + m11 * current + m22 * current + i22 * split2,
-            current + 2.0 * self._pulldown * self._pulldown * noise,
-            4.0 * noise * ((1.0 - y + share) ** 2 + (y + share) ** 2) + 4.0 * (total * total * yy + apart * apart * rr),
         )

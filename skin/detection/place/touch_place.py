@@ -55,12 +55,7 @@ class _MatrixMean:
         self.frames, self.values = 1, matrix[:6]
 
     def feed(self, matrix: ContactMatrix, noise: MatrixNoise) -> tuple[float, float, float]:
-        """Take a matrix into the mean, or begin a new mean with it where the touch has moved; return its G, X, Y.
-
-        Args:
-            matrix: of the next frame.
-            noise: of one frame.
-        """
+        """Take a matrix into the mean, or begin a new mean with it where the touch has moved; return its G, X, Y."""
         frames = self.frames
         g, x, y, along, cross, around = self.values
         new = matrix[:6]
@@ -120,13 +115,7 @@ class _TouchVelocity:
         self._track = None
 
     def feed(self, matrix: ContactMatrix, noise: MatrixNoise | None, period: float) -> tuple[float, float]:
-        """Return the velocity along the side and around [m/s]; zeros where noise explains what moved.
-
-        Args:
-            matrix: of the next frame of the touch.
-            noise: of one frame; None: not known yet.
-            period: time from frame to frame [s].
-        """
+        """Return the velocity along the side and around [m/s]; zeros where noise explains what moved."""
         track = self._track
         if track is None or noise is None or not period > 0.0:
             self._track = matrix.x, matrix.y, 0.0, 0.0

@@ -3,7 +3,7 @@
 import random
 
 from coneskin.core.errors import SkinConnectionError
-from coneskin.skin.detection.detector import Detector
+from coneskin.skin.detection.detector import Detector, TouchAlarm
 from coneskin.skin.detection.events import SkinEvent, SkinFault
 from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.settings import DetectorSettings
@@ -24,6 +24,7 @@ class DetectorBench:
 
     def __init__(self, settings: DetectorSettings | None = None) -> None:
         self.detector = Detector(SENSOR, settings)
+        self.alarm: TouchAlarm | None = None
         self.count = 0
         self._rng = random.Random(3)
 
@@ -34,7 +35,9 @@ class DetectorBench:
         for _ in range(times):
             counts = {n: max(0, round(exact[n] + self._rng.gauss(0.0, 0.7))) for n in COUNTS}
             stamp = {"sequence": self.count & 0xFFFF, "clock_us": self.count * 1000 & 0xFFFFFFFF}
-            events += self.detector.feed(frame._replace(**{**counts, **stamp, **changes}), self.count * 1e-3)
+            events += self.detector.feed(
+                frame._replace(**{**counts, **stamp, **changes}), self.count * 1e-3, self.alarm
+            )
             self.count += 1
         return events
 

@@ -12,6 +12,7 @@ from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, Tou
 from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.untouched import CURRENT_BLOCK
+from coneskin.skin.detection.place.touch_place import TouchPlace
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
@@ -19,6 +20,8 @@ from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
+from coneskin.skin.wire import Status, encode
+from tests.skin.bench_top import measured
 from tests.skin.detection.detector_bench import FIRM, SENSOR, DetectorBench, faults_of, play
 
 
@@ -273,3 +276,48 @@ def test_a_touch_that_begins_or_ends_between_two_phases_is_a_touch(seed):
     for time, data in VirtualSkin(sensor, [touch], seed=seed, duration=0.25).packets():
         events += stream.feed(data, time)
     assert [type(event) for event in events if not isinstance(event, TouchMoved)] == [TouchBegan, TouchEnded]
+
+
+def test_the_alarm_sounds_before_the_place_is_worked_out(monkeypatch):
+    bench, order, begin = DetectorBench(), [], TouchPlace.begin
+    bench.feed(times=100)
+    monkeypatch.setattr(TouchPlace, "begin", lambda *inputs: order.append("place") or begin(*inputs))
+    bench.alarm = lambda name, level: order.append((name, level))
+    (began,) = bench.feed(FIRM)
+    assert order == [(SENSOR.name, began.level), "place"]
+    bench.feed(FIRM)
+    assert len(order) == 2  # once for each touch
+
+
+def test_no_alarm_sounds_before_a_touch_is_confirmed():
+    bench, heard = DetectorBench(DetectorSettings(confirm_frames=2)), []
+    bench.alarm = lambda *inputs: heard.append(inputs)
+    bench.feed(times=100)
+    assert bench.feed(FIRM) == []
+    assert heard == []
+    assert len(bench.feed(FIRM)) == len(heard) == 1
+
+
+def test_what_has_happened_before_the_touch_decides_first():
+    """A fault stops the arm for good, a touch may let it move away: so an alarm must not come before the fault."""
+    bench, heard = DetectorBench(), []
+    bench.alarm = lambda *inputs: heard.append(inputs)
+    bench.feed(times=100)
+    fault, began = bench.feed(FIRM, status=int(Status.RESTARTED))
+    assert isinstance(fault, SkinFault)
+    assert isinstance(began, TouchBegan)
+    assert heard == []
+
+
+@pytest.mark.parametrize("status", [0, int(Status.RESTARTED)])
+def test_a_fault_in_a_frame_before_it_decides_first_as_well(status):
+    stream, heard = TouchStream([SENSOR]), []
+    quiet, touch = (measured(SENSOR, contacts)._replace(status=0) for contacts in ((), FIRM))
+    frames = [encode(quiet._replace(sequence=k, clock_us=1000 * k)) for k in range(100)]
+    frames.append(encode(quiet._replace(sequence=100, clock_us=100_000, status=status)))
+    frames.append(encode(touch._replace(sequence=101, clock_us=101_000)))
+    for number in range(100):
+        stream.feed(frames[number], 1e-3 * number, lambda *inputs: heard.append(inputs))
+    events = stream.feed(frames[100] + frames[101], 0.101, lambda *inputs: heard.append(inputs))
+    assert isinstance(events[-1], TouchBegan)
+    assert len(heard) == (0 if status else 1)
