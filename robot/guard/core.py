@@ -1,8 +1,8 @@
 """Core of the guard: bytes, states and time go in, commands and events come out.
 
 One machine without input or output of its own, so that a replay of a recording is the same run again, bit by bit. It
-becomes active once nothing has stood against it for a while; a touch or a fault then makes the arm react and latch
-(``arm_supervisor``). Without an arm it reports touches and faults.
+becomes active once nothing has stood against it for a while. From then on a touch or a fault makes the arm react and
+latch (``arm_supervisor``). Without an arm it reports touches and faults.
 
 A touch stops the arm before anything else is known of it: the place of the touch, its covariance and every event are
 worked out after the command is out.

@@ -1,7 +1,7 @@
 """Live loop of the guard: one thread in a process of its own that joins source, core and arm.
 
-Order of work after each wake: read the skin, decide, send the command; only then report to the recorder. Whatever
-stalls beside it (disk, terminal, driver) is on the other side of a channel that never makes it wait.
+Order of work after each wake: read the skin, decide, send the command. Only then it reports to the recorder. Whatever
+may stall (disk, terminal, driver) is on the other side of a channel that never makes it wait.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Quiet inputs of a guard, many at once: for replays, which they make many times faster. The live guard has no part.
 
 Most of a run is an arm that moves and a skin that nobody touches. An input is *calm* where, on its own, it makes
-nothing happen; so long as the guard is active and nothing is due, calm inputs change only what is learned. The classes
-that learn it work that out without the rest, in the same operations on the same numbers: the guard is afterwards what
-it would be had it taken them one by one, bit by bit. All other inputs it takes one by one.
+nothing happen. While the guard is active and nothing is due, calm inputs change only what is learned. The classes that
+learn it do so without the rest, in the same operations on the same numbers. Afterwards the guard is bit by bit what it
+would be if it had been fed one by one. All other inputs are fed one by one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Events of the skin: frozen values that carry both clocks, compare by value and can be written to a file."""
+"""Events of the skin: frozen values that carry both clocks, compare by value and can be written to a file.
+
+A touch begins with one event and ends with another. Between them one is due where the level or the place has changed
+by a step since the last, where the place became certain or ceased to be, and once where a line was found.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,8 @@ from .frame.reading import TouchReading
 from .frame.settings import DetectorSettings
 
 __all__ = ["ReportedTouch", "SkinEvent", "SkinFault", "TouchBegan", "TouchEnded", "TouchEvent", "TouchMoved"]
+
+_FULL_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +102,6 @@ class SkinFault(SkinEvent):
         """One clear line for people."""
         line = f"{self.sensor}: {self.fault.value}" if self.sensor else self.fault.value
         return f"{line} ({self.detail})" if self.detail else line
-
-
-_FULL_TURN = 2.0 * math.pi
 
 
 class ReportedTouch:

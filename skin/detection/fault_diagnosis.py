@@ -2,8 +2,8 @@
 
 The first frame that contradicts itself stops the arm, under the first name that fits. Then each thing that may be
 broken (`wiring_hypothesis`) is fitted to one frame at rest, with the contact free, a step or two in a frame, so that no
-frame waits for it. The fault gets another name only where one hypothesis explains the frame by far better than those of
-all other names do; the names of what the readings cannot tell apart stand for all of it.
+frame waits for it. The fault gets another name only where one hypothesis explains the frame far better than those of
+all other names do. One name stands for all that the readings cannot tell apart.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Frames of one sensor in which nothing shows, many at once: for replays. They change only what a detector learns.
 
-A frame is *plain* where, whatever came before, it is neither a fault nor a touch; ``reading.read`` says the same, and
-is asked of every 32nd. What a detector learns from plain frames is worked out here without it, with the same numbers.
+A frame is *plain* where, whatever came before, it is neither a fault nor a touch. ``reading.read`` must say the same,
+and is asked about every 32nd. What a detector learns from plain frames is worked out here with the same numbers.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Whatever joins two sheets, their network is linear and reciprocal. So the radial and the angular phase must tell the
 same P_xy, and the guides of the touch phase must differ as both say (`contact_matrix`). Neither depends on the
-contacts, on the leads or on the sheets, and hardly on a contact's motion between the phases; both do on the gains of
-the inputs. The drive current's sum rule, the third that is left over, is `reading`'s.
+contacts, on the leads or on the sheets, and hardly on a contact's motion between the phases. Both depend on the gains
+of the inputs. The drive current's sum rule, the third that is left over, is `reading`'s.
 
 The deviations are over limits that noise passes once in 1e10 frames. One frame is not a fault: a contact that comes or
 goes between the phases passes them too.

@@ -1,6 +1,6 @@
 """Hypothesis on what is broken between the electronics and the sheets: which readings it predicts at a contact.
 
-Each sheet is a resistor with the contact's tap on it, between its two electrodes; the contact joins the taps. Each
+Each sheet is a resistor with the contact's tap on it, between its two electrodes. The contact joins the taps. Each
 electrode has a feed, by the phase and by what is broken: a conductance to a potential. Leaving the electrodes out one
 by one is exact, joined ones included, and leaves two equations, for the two taps.
 """

@@ -1,7 +1,7 @@
 """Reaction motion: it plans the motion away from a touch and streams its setpoints. Pure.
 
-In every second control cycle a new target goes out, to the driver process; or, for an arm that another program moves,
-to a program of ours in the controller. Built only where a reaction of the scene may move the arm.
+In every second control cycle a new target goes out to the driver process. For an arm that another program moves, it
+goes to a setpoint program in the controller. Built only where a reaction of the scene may move the arm.
 """
 
 from __future__ import annotations

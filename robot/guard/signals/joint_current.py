@@ -1,8 +1,8 @@
 """Joint-current monitor: it notices that a force resists a motion of ours, on the skin or beside it. Pure.
 
 What the motors take beyond what the controller expects of the motion is friction, load and whatever pushes on the arm.
-Friction and load change little while an arm moves away slowly; so the least deviation since the motion began is what
-later ones are compared with, as the level of a touch is. The push of the touch itself fades while the arm moves away.
+Friction and load change little while an arm moves away slowly. So each deviation is compared with the least one since
+the motion began. The push of the touch itself fades while the arm moves away.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """Limit of the speed with which the surfaces of an arm may move towards what they could strike. Pure.
 
-One look says how far down the speed slider must go, because the lever of a patch (``permissible_speeds``) stays where
-the slider scales a motion. A motion is looked at where it will be when the slider can have an effect: further on, and
-faster where it still speeds up, but not faster than its program was seen to go at that slider. Down the slider goes at
-once; up again only after motion that would have allowed it, never beyond where a person has put it, and after twice as
-much motion each time that it had to go down again. So it comes to rest where a program repeats itself. Where it has no
-effect the arm is stopped.
+One sample says how far down the speed slider must go: the slider scales a motion and leaves the lever of a patch
+(``permissible_speeds``) as it is. A motion is judged where it will be when the slider can have an effect. That is
+further on, and faster where it still speeds up, but not faster than its program was seen to go at that slider.
+
+The slider goes down at once. It goes up again only after motion that would have allowed it, and never beyond where a
+person has put it. Each time that it has to go down again, twice as much motion is needed. So it comes to rest where a
+program repeats itself. Where it has no effect the arm is stopped.
 """
 
 from __future__ import annotations

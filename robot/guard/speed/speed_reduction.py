@@ -2,9 +2,9 @@
 
 The slider slows whatever moves the arm, except a stream of servo setpoints. So its value alone is not trusted: the
 measured speed of the touched surface has to fall, or to be low anyway, within the budget of a stop, and to stay so.
-What moves into the touch is stopped, at once where it is fast (``contact_approach``); so is an arm whose motors show
-that something holds it while its setpoints go on (``joint_current``). What a person does with the slider meanwhile
-has priority: it is not put back over it.
+What moves into the touch is stopped, at once where it is fast (``contact_supervision``). So is an arm whose motors
+show that something holds it while its setpoints go on (``joint_current``). A person who moves the slider meanwhile has
+priority: the guard does not put it back.
 """
 
 from __future__ import annotations

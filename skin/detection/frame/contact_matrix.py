@@ -7,7 +7,7 @@ polarisability P. In each phase, with Ic the current from the upper to the lower
     h0 + X hx + Y hy = Ic / G,        K (hx, hy) = (I_A - X Ic, -I_C - Y Ic)
 
 The radial and the angular phase are two such sets, so one 2 x 2 inverse gives X, Y and all of K, exactly, whatever the
-leads and the inputs load; G comes from the touch phase. Three equations are left over. They tell whether the frame can
+leads and the inputs load. G comes from the touch phase. Three equations are left over. They tell whether the frame can
 come from two sheets with contacts between them at all.
 
 The converter's noise in ten counts becomes that of the matrix by differentiating the same equations where they hold:

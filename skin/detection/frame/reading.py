@@ -1,8 +1,8 @@
 """Reading of one frame: how firmly the sensor is touched, where, and whether the frame can be believed.
 
 An untouched sensor and a broken one must never look the same. Each of A, B, C, D is driven in one phase and read in
-another, so the two drive currents prove all four wires in every frame, touched or not; in the touch phase the drive
-current must be what flows through the two pull-downs (Kirchhoff), which proves both inputs whenever there is a touch.
+another, so the two drive currents prove all four wires in every frame, touched or not. In the touch phase the drive
+current must be what flows through the two pull-downs (Kirchhoff). That proves both inputs whenever there is a touch.
 """
 
 from __future__ import annotations

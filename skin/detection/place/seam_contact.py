@@ -7,7 +7,7 @@ centre lies anywhere between them, on the other side of the link too. With the c
 
 Gamma the coupling that the two straight edges have through the upper sheet. For two contacts at the edges this is
 exact. Each term on the right is positive: the sum over G is the mean distance of all contacts from the seam, and where
-it is small, no strong contact is far from there. That excludes two hands which are not both at the seam; two that are
+it is small, no strong contact is far from there. That excludes two hands which are not both at the seam. Two that are
 both within the dangerous angle of it have nearly one normal, and are one press as far as a motion goes.
 """
 

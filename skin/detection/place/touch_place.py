@@ -2,9 +2,8 @@
 
 The frame that begins a touch gives its electrical centre alone: nothing that stops an arm waits for more. The estimate
 with its covariance comes with the next frame, and is made anew only now and then. While the touch rests, the contact
-matrices of its frames are averaged, so that the noise of the place falls with the root of their number; where it moves,
-they begin anew. The learned untouched currents are the same in all frames, and what they are worth does not average
-away.
+matrices of its frames are averaged, so that the noise of the place falls with the root of their number. Where it moves,
+the mean starts over. The learned untouched currents are the same in all frames, so their error does not average away.
 """
 
 from __future__ import annotations
