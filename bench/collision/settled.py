@@ -14,7 +14,7 @@ import argparse
 import math
 from pathlib import Path
 
-from bench.report import head
+from bench.report import head, show
 from coneskin.core.recording.block import Block
 from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
 from coneskin.impact.simulation.impact_outcome import CLAMP_TIME
@@ -46,9 +46,8 @@ def main() -> None:
     parser.add_argument("--most-n", type=float, default=5.0)
     parser.add_argument("--until", type=float, default=1.5, help="after the first contact [s] (%(default)s)")
     args = parser.parse_args()
-    print(
-        f"{head()}\n{'seed':>5} {'body':7}{'way':9}{'stop N':>8}{'way N':>8}   later:{'stop N':>8}{'way N':>8}  torque"
-    )
+    print(head())
+    table = []
     still, count = 0, 0
     for seed, rows in sorted(rows_of(args.kept).items()):
         stop = rows.get("stop")
@@ -56,6 +55,8 @@ def main() -> None:
         for way in [way for way in ways if stop and rows[way].clamp - stop.clamp > args.most_n]:
             (before, rest, _), (clamp, force, share) = settle(seed, "stop", args.until), settle(seed, way, args.until)
             count, still = count + 1, still + (force - rest > args.most_n)
-            words = f"{before:8.0f}{clamp:8.0f}         {rest:8.0f}{force:8.0f}{share:8.2f}"
-            print(f"{seed:5} {rows[way].kind:7}{way:9}{words}", flush=True)
+            forces = (f"{newtons:.0f}" for newtons in (before, clamp, rest, force))
+            table.append([seed, rows[way].kind, way, *forces, f"{share:.2f}"])
+    columns = ["seed", "body", "way", "stop N", "way N", "later: stop N", "way N", "torque"]
+    show(f"clamp {CLAMP_TIME:g} s and force {args.until:g} s after the contact", columns, table)
     print(f"{count} clamps were worse by more than {args.most_n:g} N, {still} still are after {args.until:g} s")

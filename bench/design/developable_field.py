@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from bench.report import head
+from bench.report import head, show
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.fit.cones import fit_cones, sample_link
 from coneskin.geometry.fit.developable.packing import with_developables
@@ -137,23 +137,19 @@ def main() -> None:
         cones = fit_cones(link, options, lambda _: None)
         places[name] = with_developables(link, cones, options).sheets[0].placed
     height = PAPER_STACK.offset(4)
-    print(
-        "\n| link | grid | places on the sector, off at worst [mm] | on the exact pattern [mm] |\n" + "|---" * 4 + "|"
-    )
+    rows = []
     for name, place in places.items():
         for fine in GRIDS:
             off = [1e3 * field_error(place, height, fine, exact) for exact in (False, True)]
-            print(f"| {name} | {fine} | {off[0]:.1e} | {off[1]:.4f} |", flush=True)
-    print(
-        "\n| link | layer | height [mm] | cut as a sector: arc at the ends off [mm] | places off, worst [mm] | "
-        "rms [mm] | cut exactly: places decoded without a table off, worst [mm] |\n" + "|---" * 7 + "|"
-    )
+            rows.append([name, fine, f"{off[0]:.1e}", f"{off[1]:.4f}"])
+    columns = ["link", "grid", "places on the sector, off at worst [mm]", "on the exact pattern [mm]"]
+    show("places off, by the grid", columns, rows)
+    rows = []
     for name, place in places.items():
         for layer, index in LAYERS.items():
             height = PAPER_STACK.offset(index)
             worst, rms = shape_error(place, height)
-            print(
-                f"| {name} | {layer} | {1e3 * height:.2f} | {1e3 * place.mismatch(height):.3f} | {1e3 * worst:.3f} | "
-                f"{1e3 * rms:.3f} | {1e3 * field_error(place, height, 2, True):.3f} |",
-                flush=True,
-            )
+            lengths = place.mismatch(height), worst, rms, field_error(place, height, 2, True)
+            rows.append([name, layer, f"{1e3 * height:.2f}", *(f"{1e3 * length:.3f}" for length in lengths)])
+    columns = ["link", "layer", "height [mm]", "cut as a sector: arc at the ends off [mm]", "places off, worst [mm]"]
+    show("what each way to cut costs", [*columns, "rms [mm]", "cut exactly: places off, worst [mm]"], rows)

@@ -36,7 +36,7 @@ from .kinds_peer import CONTROLLER_KINDS, DRIVER_KINDS, NETWORK_KINDS, SKIN_KIND
 from .kinds_process import PROCESS_KINDS, PROGRAM_KINDS
 from .kinds_reaction import CONTACT_KINDS, REACTION_KINDS
 from .setup import CLOCK, Outcome
-from .table import show, show_head, summary
+from .table import show_kinds, summary
 from .trial import EXTERNAL_CONTROL
 from .verdict import run_trial
 
@@ -98,8 +98,6 @@ def main() -> int:
         return 0
     if not pairs:
         parser.error("no kind has such a name; --list names them")
-    if not args.json:
-        show_head(args.parallel, args.slack_ms)
     slack, began = 1e-3 * args.slack_ms, CLOCK()
     outcomes = read_trials(args.keep) if args.keep and args.keep.exists() else {}
     new = 0
@@ -107,13 +105,13 @@ def main() -> int:
         new = run_all(pairs, args, slack, outcomes)
     except KeyboardInterrupt:
         print("\ninterrupted: this is what was tried", file=sys.stderr)
-    failed = count = 0
-    for kind, control in pairs:
-        if tried := outcomes.get((kind.name, control)):
-            line = summary(kind, control, list(tried.values()), slack)
-            failed, count = failed + line["failed"], count + line["count"]
-            print(json.dumps(line)) if args.json else show(line)
-    if not args.json:
+    tried = ((kind, control, outcomes.get((kind.name, control))) for kind, control in pairs)
+    lines = [summary(kind, control, list(each.values()), slack) for kind, control, each in tried if each]
+    failed, count = sum(line["failed"] for line in lines), sum(line["count"] for line in lines)
+    if args.json:
+        print("\n".join(map(json.dumps, lines)))
+    else:
+        show_kinds(lines, args.parallel, args.slack_ms)
         print(f"\n{len(pairs)} kinds, {count} trials, {new} of them now in {CLOCK() - began:.0f} s; {failed} failed")
     return 1 if failed else 0
 

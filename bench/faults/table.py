@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bench.report import head, quantile
+from bench.report import head, quantile, show
 
 from .kind import FaultKind
 from .setup import Outcome
@@ -32,24 +32,23 @@ def summary(kind: FaultKind, control: str, outcomes: list[Outcome], slack: float
     }
 
 
-def show(line: dict[str, Any]) -> None:
-    """Print one line of the table, and what failed."""
+def show_kinds(lines: list[dict[str, Any]], parallel: int, slack_ms: float) -> None:
+    """Show a row for each kind, and print what failed."""
 
-    def cell(key: str, digits: int = 3) -> str:
-        return f"{line[key]:8.{digits}f}" if line[key] is not None else f"{'-':>8}"
+    def cell(line: dict[str, Any], key: str, digits: int = 3) -> str:
+        return f"{line[key]:.{digits}f}" if line[key] is not None else "-"
 
-    name = f"{line['kind']} [{line['control']}]"
-    times = "".join(cell(key) for key in ("median", "worst", "budget"))
-    print(f"{name:58}{line['count']:6}{times}{cell('pushed_in_mm', 1)}{cell('held_up')}{line['failed']:8}")
-    if line["repeated"]:
-        print(f"    repeated {line['repeated']} failed trials: the machine held up the virtual skin, or the campaign")
-    for failure in line["failures"][:5]:
-        print(f"    FAILED: {failure}")
-
-
-def show_head(parallel: int, slack_ms: float) -> None:
-    """Print machine, commit and the names of the columns."""
     print(f"{head()}\n{parallel} at a time; budgets with {slack_ms:g} ms for this machine")
-    print("pushed: mm that the surface went towards a touch beyond what a bare stop does, the worst\n")
-    columns = "".join(f"{name:>8}" for name in ("median", "worst", "budget", "pushed", "held up", "failed"))
-    print(f"{'s from the fault to standstill':58}{'count':>6}{columns}")
+    rows = []
+    for line in lines:
+        times = [cell(line, key) for key in ("median", "worst", "budget")]
+        pushed = [cell(line, "pushed_in_mm", 1), cell(line, "held_up")]
+        rows.append([f"{line['kind']} [{line['control']}]", line["count"], *times, *pushed, line["failed"]])
+    columns = ["kind", "count", "median", "worst", "budget", "pushed", "held up", "failed"]
+    show("s from the fault to standstill; pushed: mm towards a touch beyond a bare stop, the worst", columns, rows)
+    for line in lines:
+        if line["repeated"]:
+            words = "failed trials: the machine held up the virtual skin, or the campaign"
+            print(f"{line['kind']}: repeated {line['repeated']} {words}")
+        for failure in line["failures"][:5]:
+            print(f"{line['kind']}: FAILED: {failure}")

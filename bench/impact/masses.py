@@ -13,7 +13,7 @@ import random
 
 import numpy as np
 
-from bench.report import head
+from bench.report import head, show
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.scene.reader import parse_scene
 from coneskin.testing.scenes import forearm_scene
@@ -39,9 +39,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.parse_args()
     print(head("numpy"))
-    print(
-        f"{'48 patches of the forearm':28} heavier than sampled: median  95 %   worst   lighter: worst   above its step"
-    )
+    rows = []
     for name, motion in MOTIONS.items():
         scene = parse_scene(forearm_scene() + MOTION_TABLE.format(motion=motion))
         patches, sample = patches_of(scene), motion_positions(scene)
@@ -55,6 +53,7 @@ def main() -> None:
         median, high = np.percentile(heavier, [50.0, 95.0])
         taken = np.array([min(m for m in MASS_GRID if m >= mass) for mass in found.max(axis=0)])
         above = int(np.sum(dense.max(axis=0) > taken))
-        print(
-            f"{name:28} {median:30.1%} {high:6.1%} {heavier.max():7.1%} {lighter.max():15.1%} {above:8} of {len(taken)}"
-        )
+        shares = (f"{share:.1%}" for share in (median, high, heavier.max(), lighter.max()))
+        rows.append([name, *shares, f"{above} of {len(taken)}"])
+    columns = ["motion", "heavier than sampled: median", "95 %", "worst", "lighter: worst", "above its step"]
+    show("sampled positions against others; patches of the forearm", columns, rows)
