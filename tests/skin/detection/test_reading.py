@@ -285,7 +285,7 @@ def test_a_lead_of_too_much_resistance_shows_in_the_driven_potentials(polarity):
         counts = measured(worn, PLACES[:1])
         sheets = ResistorLadder().admittance(worn, PLACES[:1])
         own = measure(worn, (sheets, sheets, sheets))[12:]
-        frame = counts._replace(driven=DrivenPotentials._make(map(sensor.electronics.count_volts, own)))
+        frame = counts._replace(length=52, driven=DrivenPotentials._make(map(sensor.electronics.count_volts, own)))
         assert read(sensor, frame).fault is (Fault.LEAD if electrode else None)
         assert read(worn, frame).fault is None  # it was told
 
@@ -293,7 +293,7 @@ def test_a_lead_of_too_much_resistance_shows_in_the_driven_potentials(polarity):
 def test_a_supply_that_is_read_too_high_shows_in_the_driven_potentials():
     sheets = ResistorLadder().admittance(SENSOR, PLACES[:1])
     own = DrivenPotentials._make(map(SENSOR.electronics.count_volts, measure(SENSOR, (sheets, sheets, sheets))[12:]))
-    good = measured(SENSOR, PLACES[:1])._replace(version=2, driven=own)
+    good = measured(SENSOR, PLACES[:1])._replace(length=52, driven=own)
     assert read(SENSOR, good).fault is None
     for name in ("touch_supply", "radial_supply", "angular_supply"):
         off = good._replace(**{name: round(1.06 * getattr(good, name))})
