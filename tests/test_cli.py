@@ -1,6 +1,7 @@
 """The command line: examples in every help, exit codes, JSON, and no traceback for a user's mistake."""
 
 import argparse
+import contextlib
 import importlib
 import importlib.util
 import io
@@ -69,10 +70,8 @@ def test_every_help_shows_an_example_and_exit_codes(
         examples = re.findall(rf"^  coneskin {name} (.*)$", parser.epilog or "", re.MULTILINE)
         assert examples, name
         for example in examples:
-            try:
+            with contextlib.suppress(SystemExit):  # it writes a file, and ends; a usage would be on stderr
                 parser.parse_args(shlex.split(re.split(r" {2,}", example)[0]))  # the rest says what it does
-            except SystemExit as exc:
-                assert exc.code == 0, example  # it writes a file, and ends
     assert "usage:" not in capsys.readouterr().err
 
 

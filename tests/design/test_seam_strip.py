@@ -99,4 +99,4 @@ def test_a_scene_takes_both_sensors_without_suspicion(tmp_path: Path) -> None:
     text = f'[[link]]\nname = "forearm"\n{files}[source]\nkind = "virtual"\n'
     scene = parse_scene(text, "scene.toml", tmp_path)
     assert [item.sensor.sensor_id for item in scene.links[0].sensors] == [0, 1]
-    assert [line for line in suspicions(scene) if "lie over one another" in line] == []
+    assert [one for one in suspicions(scene) if "lie over one another" in one.value] == []

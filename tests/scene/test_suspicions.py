@@ -26,7 +26,7 @@ TOUCHED = PLAIN.replace('kind = "serial"', 'kind = "virtual"').replace(
 
 
 def doubts(text: str) -> list[str]:
-    return suspicions(parse_scene(text))
+    return [finding.line for finding in suspicions(parse_scene(text))]
 
 
 @pytest.mark.parametrize("text", re.findall(r"```toml.*?\n(.*?)```", DOCUMENT.read_text("utf-8"), re.DOTALL))

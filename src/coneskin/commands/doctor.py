@@ -90,7 +90,7 @@ def _check(scene: Scene, as_json: bool) -> int:
     from coneskin.scene.suspicions import suspicions
 
     scene = with_commissioning(scene, time.time())
-    found, missing, doubts = summarize(scene), missing_parts(scene), suspicions(scene)
+    found, missing, doubts = summarize(scene), missing_parts(scene), [one.line for one in suspicions(scene)]
     if as_json:
         lacks = {"cannot_be_guarded_yet": missing} if missing else {}
         print(json.dumps({**found, **lacks, **({"warnings": doubts} if doubts else {})}))

@@ -85,8 +85,8 @@ def run(args: argparse.Namespace) -> int:
     arm = f"a {scene.arm.model} at {scene.arm.host}" if scene.arm else "no arm"
     count = len(scene.sensors)
     print(f"{args.output}: {count} sensor{'s' if count != 1 else ''} on the {scene.links[0].name}, {arm}")
-    for line in suspicions(scene):
-        print(f"warning: {line}", file=sys.stderr)
+    for finding in suspicions(scene):
+        print(f"warning: {finding.line}", file=sys.stderr)
     if address and not args.arm:
         print(f"no arm was named, so it is a {address.model}: --arm MODEL names another of UR's, --skin-only is none")
     print_hint(f"next: coneskin doctor {shlex.quote(str(args.output))}{' --simulated' if args.simulated else ''}")

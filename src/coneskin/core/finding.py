@@ -34,6 +34,11 @@ class Finding:
         return asdict(self)
 
     @property
+    def line(self) -> str:
+        """What was found, and what to do, without item and verdict."""
+        return f"{self.value}: {self.remedy}" if self.remedy else self.value
+
+    @property
     def text(self) -> str:
         """Return it for people, in one line or two."""
         line = f"{self.verdict:>9}  {self.item}: {self.value}"

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import TYPE_CHECKING
 
+from coneskin.core.finding import Finding
+
 from .required_packages import missing_packages
 
 if TYPE_CHECKING:
@@ -37,15 +39,13 @@ _BUILT_IN = 921600  # baud
 _SCHEMES = ("socket", "rfc2217", "loop", "hwgrep", "spy", "alt", "cp2110")  # of pyserial
 
 
-def suspicions(scene: Scene) -> list[str]:
-    """Return what is hardly meant in a scene, a line each."""
-    return [*_units(scene), *_placing(scene), *_line(scene), *_packages(scene)]
-
-
-def _packages(scene: Scene) -> Iterator[str]:
-    missing = missing_packages(scene)
-    if missing:
-        yield f"{len(missing)} packages that it needs are not installed: pip install {' '.join(missing)}"
+def suspicions(scene: Scene) -> list[Finding]:
+    """Return what is hardly meant in a scene, all of it warnings: of the item "scene", and of "packages"."""
+    found = [Finding("scene", "warning", line) for line in (*_units(scene), *_placing(scene), *_line(scene))]
+    if missing := missing_packages(scene):
+        value, remedy = f"{len(missing)} packages that it needs are not installed", f"pip install {' '.join(missing)}"
+        found.append(Finding("packages", "warning", value, "", remedy))
+    return found
 
 
 # ---- units

@@ -85,7 +85,7 @@ class Doctor:
     def examine(self) -> None:
         """Examine everything that the scene names."""
         self._note(*_packages(self.scene))
-        self._note(*(Finding("scene", "warning", line) for line in suspicions(self.scene) if "pip install" not in line))
+        self._note(*(one for one in suspicions(self.scene) if one.item != "packages"))
         self._examine_source()
         if self.scene.arm is None:
             self._note(Finding("arm", "not tried", "the scene has no [arm]"))
