@@ -1,6 +1,9 @@
+"""Forward kinematics and frames of links and meshes, against the published URDF and other libraries."""
+
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,12 +11,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.core.errors import KinematicsError
-from coneskin.robot.arm.kinematics import flange_jacobian, forward, link_pose, link_poses, point_jacobian
+from coneskin.robot.arm.kinematics import (
+    LINK_INDEX,
+    dh_link,
+    dh_mesh,
+    flange_jacobian,
+    forward,
+    link_index,
+    link_mesh,
+    link_pose,
+    link_poses,
+    point_jacobian,
+)
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from tests.robot.arms import FAR_UR10, NEAR_UR10, NOMINAL, arms, joints, points
+from tests.support.paths import SHARED_DATA
 from tests.support.pinocchio_arm import pin_jacobian, pin_place, pin_rotation
-
-from ..arms import FAR_UR10, NOMINAL, arms, joints, points
 
 pytest.importorskip("pinocchio", reason="the independent kinematics are pinocchio's (PyPI: pin)")
 
@@ -146,3 +160,162 @@ def test_a_link_that_is_not_there_is_refused(link: int) -> None:
 def test_joint_positions_that_cannot_be_are_refused(q: tuple[float, ...]) -> None:
     with pytest.raises(KinematicsError, match=r"q must be 6 finite joint positions"):
         forward(arm_model("UR5e"), q)
+
+
+DATA = SHARED_DATA / "ur"
+
+# Joint origins and mesh offsets as Universal_Robots_ROS2_Description publishes them, with its rounded right angles:
+# shoulder z; forearm x; wrist_1 x, z; wrist_2 y; wrist_3 y; then mesh z of upper_arm, forearm and the three wrists
+PUBLISHED = {
+    "UR3": (0.1519, -0.24365, -0.21325, 0.11235, -0.08535, 0.0819, 0.1198, 0.0275, -0.085, -0.083, -0.082),
+    "UR5": (0.089159, -0.425, -0.39225, 0.10915, -0.09465, 0.0823, 0.13585, 0.0165, -0.093, -0.095, -0.0818),
+    "UR10": (0.1273, -0.612, -0.5723, 0.163941, -0.1157, 0.0922, 0.220941, 0.049042, -0.1149, -0.1158, -0.0922),
+    "UR3e": (0.15185, -0.24355, -0.2132, 0.13105, -0.08535, 0.0921, 0.12, 0.027, -0.104, -0.08535, -0.0921),
+    "UR5e": (0.1625, -0.425, -0.3922, 0.1333, -0.0997, 0.0996, 0.138, 0.007, -0.127, -0.0997, -0.0989),
+    "UR10e": (0.1807, -0.6127, -0.57155, 0.17415, -0.11985, 0.11655, 0.1762, 0.0393, -0.135, -0.12, -0.1168),
+    "UR16e": (0.1807, -0.4784, -0.36, 0.17415, -0.11985, 0.11655, 0.1762, 0.0393, -0.135, -0.12, -0.1168),
+    "UR20": (0.2363, -0.862, -0.7287, 0.201, -0.1593, 0.1543, 0.26, 0.043, -0.0775, -0.0749, -0.07),
+    "UR30": (0.2363, -0.637, -0.5037, 0.201, -0.1593, 0.1543, 0.26, 0.043, -0.0775, -0.0749, -0.07),
+}
+
+
+def urdf(name: str) -> str:
+    """The chain of ur_macro.xacro, meshes as further links at their <origin>."""
+    d1, a2, a3, d4, d5, d6, *offsets = PUBLISHED[name]
+    pi, quarter = 3.141592653589793, 1.570796327
+    aside = {"UR3": -0.002, "UR10": 0.001, "UR5e": -0.0005, "UR10e": -0.0005, "UR16e": -0.0005}.get(name, 0.0)
+    chain = [
+        ("base", "fixed", (0, 0, 0), (0, 0, pi), (0, 0, 0), (0, 0, pi)),
+        ("shoulder", "revolute", (0, 0, d1), (0, 0, 0), (0, 0, 0), (0, 0, pi)),
+        ("upper_arm", "revolute", (0, 0, 0), (quarter, 0, 0), (0, 0, offsets[0]), (pi / 2, 0, -pi / 2)),
+        ("forearm", "revolute", (a2, 0, 0), (0, 0, 0), (0, 0, offsets[1]), (pi / 2, 0, -pi / 2)),
+        ("wrist_1", "revolute", (a3, 0, d4), (0, 0, 0), (0, 0, offsets[2]), (pi / 2, 0, 0)),
+        ("wrist_2", "revolute", (0, d5, 0), (quarter, 0, 0), (0, 0, offsets[3]), (0, 0, 0)),
+        ("wrist_3", "revolute", (0, d6, 0), (1.570796326589793, pi, pi), (0, aside, offsets[4]), (pi / 2, 0, 0)),
+    ]
+    text, parent = ['<robot name="ur"><link name="base_link"/>'], "base_link"
+    for link, kind, xyz, rpy, mesh_xyz, mesh_rpy in chain:
+        text.append(f'<link name="{link}"/><link name="{link}_mesh"/>')
+        for child, type_, above, place, turn in (
+            (link, kind, parent, xyz, rpy),
+            (f"{link}_mesh", "fixed", link, mesh_xyz, mesh_rpy),
+        ):
+            text.append(
+                f'<joint name="{child}_joint" type="{type_}"><parent link="{above}"/><child link="{child}"/>'
+                f'<origin xyz="{place[0]} {place[1]} {place[2]}" rpy="{turn[0]} {turn[1]} {turn[2]}"/>'
+                '<axis xyz="0 0 1"/><limit lower="-7" upper="7" effort="1" velocity="1"/></joint>'
+            )
+        parent = link
+    return "".join(text) + "</robot>"
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_links_and_meshes_are_where_the_urdf_has_them(name: str) -> None:
+    pin: Any = pytest.importorskip("pinocchio", reason="the URDF is read by pinocchio (PyPI: pin)")
+    arm, chain = arm_model(name), pin.buildModelFromXML(urdf(name))
+    data = chain.createData()
+    half_turn = np.diag([-1.0, -1.0, 1.0])  # base_link against the controller's base
+    source = np.random.default_rng(3)
+    for _ in range(20):
+        q = source.uniform(-2 * np.pi, 2 * np.pi, 6)
+        pin.framesForwardKinematics(chain, data, q)
+        for link, index in LINK_INDEX.items():
+            base_dh = link_pose(arm, list(q), index)
+            for frame, pose in ((link, base_dh @ dh_link(arm, link)), (f"{link}_mesh", base_dh @ dh_mesh(arm, link))):
+                wanted = data.oMf[chain.getFrameId(frame)]
+                # the published right angles are off by 2e-10 rad, six times over an arm of 2 m
+                np.testing.assert_allclose(pose.translation, half_turn @ wanted.translation, rtol=0, atol=3e-9)
+                np.testing.assert_allclose(pose.rotation, half_turn @ wanted.rotation, rtol=0, atol=3e-9)
+
+
+@pytest.mark.parametrize("arm", NOMINAL, ids=lambda arm: arm.name)
+def test_every_arm_has_its_meshes_near_its_links(arm: ArmModel) -> None:
+    for link in LINK_INDEX:
+        x, y, z = link_mesh(arm, link).translation
+        assert abs(x) == 0.0
+        assert abs(y) <= 0.002
+        assert abs(z) < 0.3
+
+
+@pytest.mark.parametrize("arm", [NEAR_UR10, FAR_UR10], ids=["near", "far"])
+def test_a_calibrated_arm_has_its_links_where_the_arm_is(arm: ArmModel) -> None:
+    """Frames 2 and 3 of the far table are 440 m away, the links stay within millimetres and milliradians."""
+    nominal = arm_model("UR10")
+    source = np.random.default_rng(4)
+    for _ in range(50):
+        q = [float(x) for x in source.uniform(-np.pi, np.pi, 6)]
+        for link, index in LINK_INDEX.items():
+            real = link_pose(arm, q, index) @ dh_link(arm, link)
+            ideal = link_pose(nominal, q, index) @ dh_link(nominal, link)
+            # joint offsets of up to 0.08 rad (wrist 1) over 1.3 m of arm; a wrong frame is off by metres or radians
+            assert math.dist(real.translation, ideal.translation) < 0.12
+            np.testing.assert_allclose(real.rotation, ideal.rotation, rtol=0, atol=0.12)
+
+
+@pytest.mark.parametrize("arm", [*NOMINAL, NEAR_UR10, FAR_UR10], ids=[*MODEL_NAMES, "near", "far"])
+@pytest.mark.parametrize(("link", "after"), [("upper_arm", "forearm"), ("forearm", "wrist_1")])
+def test_the_next_axis_crosses_a_tube_on_its_own_x_axis(arm: ArmModel, link: str, after: str) -> None:
+    """The law that defines upper arm and forearm: the next axis crosses their plane z = 0 at (-length, 0, 0)."""
+    index = LINK_INDEX[link]
+    lengths = set()
+    for turn in (0.0, 0.7, -2.0):
+        q = [0.3, -0.4, 0.5, -0.6, 0.7, -0.8]
+        q[index] = turn  # joint of the next link: its axis stays where it is
+        base_link = link_pose(arm, q, index) @ dh_link(arm, link)
+        axis = link_pose(arm, q, index)  # z of this DH frame is the next joint's axis
+        direction = base_link.inverse().rotate(axis.rotate((0.0, 0.0, 1.0)))
+        start = base_link.inverse().apply(axis.translation)
+        x, y, z = (s - start[2] / direction[2] * d for s, d in zip(start, direction, strict=True))
+        # 440 m along an axis that is 1 mrad off: rounding of 1e-13 m, and of 1e-16 rad over them
+        assert (y, z) == pytest.approx((0.0, 0.0), abs=1e-12)
+        lengths.add(round(x, 9))
+        nominal = arm_model(arm.name)
+        assert x == pytest.approx(nominal.a[index - 1], abs=0.003)  # what the factory corrects: 3 mm at the most
+    assert len(lengths) == 1
+    if link == "upper_arm":  # and there the forearm begins
+        base_after = link_pose(arm, q, index + 1) @ dh_link(arm, after)
+        assert (base_link.inverse() @ base_after).translation == pytest.approx((x, 0.0, 0.0), abs=1e-12)
+
+
+def test_a_sensor_on_the_upper_arm_mesh_of_a_ur10_is_carried_with_its_tube() -> None:
+    path = DATA / "ur10" / "collision" / "upperarm.stl"
+    if not path.exists():
+        pytest.skip(f"no mesh at {path}: shared data beside the repository")
+    trimesh: Any = pytest.importorskip("trimesh", reason="reads the mesh")
+    mesh = trimesh.load(path)
+    arm = arm_model("UR10")
+    pose = dh_mesh(arm, "upper_arm")
+    a, b = (np.asarray(mesh.vertices)[mesh.edges_unique[:, k]] for k in (0, 1))
+    cut = (a[:, 2] - 0.3) * (b[:, 2] - 0.3) < 0.0  # edges that cross the plane z = 0.3 m, half way along the tube
+    a, b = a[cut], b[cut]
+    ring = a + (b - a) * ((0.3 - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+    assert len(ring) > 20
+    off = np.array([pose.apply((p[0], p[1], p[2])) for p in ring])
+    # in the DH frame the tube runs along x, from the shoulder at 0.612 m to the elbow at 0; in the mesh its axis is
+    # 45 mm aside of the joints' origin, at y = -0.045
+    radius = np.hypot(off[:, 1], off[:, 2] - (0.220941 - 0.045))
+    assert radius == pytest.approx(0.054, abs=1e-4)  # ../shared/data/README.md: a clean tube of 54.000 mm
+    assert off[:, 0].min() > 0.0
+    assert off[:, 0].max() < 0.612
+    # both ends of the mesh are joint housings about the axes of joints 2 and 3
+    assert pose.apply((0.0, 0.0, 0.0))[:2] == pytest.approx((0.612, 0.0), abs=1e-12)
+    assert pose.apply((0.0, 0.0, 0.612))[:2] == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["upper_arm", "upperarm", "Upper-Arm", "upper_arm_link", "UPPERARM"])
+def test_a_link_may_be_written_as_people_write_it(name: str) -> None:
+    assert link_index(name) == 2
+
+
+@pytest.mark.parametrize("name", ["", "elbow", "wrist", "link_2"])
+def test_an_unknown_link_is_refused_with_the_names_there_are(name: str) -> None:
+    with pytest.raises(KinematicsError, match=r"link must be one of base, shoulder, upper_arm.*wrist_3, got"):
+        dh_link(arm_model("UR5e"), name)
+
+
+def test_an_arm_without_meshes_is_refused() -> None:
+    arm = arm_model("UR5e")
+    other = ArmModel("Own", arm.a, arm.d, arm.alpha, arm.joint_lower, arm.joint_upper, arm.joint_speed)
+    with pytest.raises(KinematicsError, match=r"meshes are known for UR3, .*got the arm 'Own'"):
+        link_mesh(other, "forearm")
+    assert dh_link(other, "forearm") == dh_link(arm, "forearm")
