@@ -18,10 +18,10 @@ from coneskin.core.files import read_file
 from .mesh import Mesh, load_mesh, make_mesh, refuse_entities
 from .pose import Pose, Vector
 
-__all__ = ["expand_xacro", "load_urdf_link", "urdf_links"]
+__all__ = ["load_urdf_link", "urdf_links"]
 
 
-def expand_xacro(
+def _expand_xacro(
     path: str | Path,
     arguments: Mapping[str, str] | None = None,
     packages: Mapping[str, str | Path] | None = None,
@@ -70,7 +70,7 @@ def urdf_links(
     """Return the names of the links of a URDF that have a mesh, visual or collision.
 
     Args:
-        path: a URDF, or a xacro file (``expand_xacro``).
+        path: a URDF, or a xacro file.
         packages: folders of the ROS packages that a xacro file names.
         arguments: of a xacro file.
 
@@ -93,7 +93,7 @@ def load_urdf_link(
     """Read the meshes of a link, scaled and placed as the URDF says, as one mesh.
 
     Args:
-        path: the URDF, or a xacro file, which is expanded (``expand_xacro``).
+        path: the URDF, or a xacro file, which is expanded.
         link: name of the link.
         geometry: "visual" or "collision". Collision bodies are often convex hulls that have lost the tube.
         packages: folders of the ROS packages in package:// paths; others are searched for at and beside the folders
@@ -154,7 +154,7 @@ def _robot(
         refuse_entities(data, path)
         root = ElementTree.fromstring(data)
         if root.tag == "robot" and any("xacro" in str(item.tag) for item in root.iter()):
-            root = ElementTree.fromstring(expand_xacro(path, arguments, packages))
+            root = ElementTree.fromstring(_expand_xacro(path, arguments, packages))
     except MeshError:  # a ValueError as well
         raise
     except OSError as error:

@@ -32,9 +32,7 @@ __all__ = [
     "CutPart",
     "CutSheet",
     "FaceUp",
-    "SheetFace",
     "Stroke",
-    "StrokeKind",
     "cut_sheets",
     "make_test_piece",
     "nest_sheets",
@@ -73,8 +71,8 @@ def _layout_above(layout: SheetLayout, place: PlacedFrustum, height: float) -> S
     )
 
 
-StrokeKind = Literal["cut", "hole", "score", "fold"]
-SheetFace = Literal["outside", "inside"]
+_StrokeKind = Literal["cut", "hole", "score", "fold"]
+_SheetFace = Literal["outside", "inside"]
 FaceUp = Literal["work", "outside", "inside"]
 #: colour of each kind of line (red, green, blue), none of them white; a cutter selects speed and power by it
 LINE_COLOURS: dict[str, tuple[int, int, int]] = {
@@ -97,7 +95,7 @@ class Stroke:
         outline: its course on the flat pattern.
     """
 
-    kind: StrokeKind
+    kind: _StrokeKind
     outline: Outline
 
 
@@ -143,7 +141,7 @@ class CutSheet:
     number: int
     name: str
     material: str
-    face: SheetFace
+    face: _SheetFace
     surface: Frustum
     parts: tuple[CutPart, ...]
 
@@ -219,7 +217,7 @@ def cut_sheets(
     place = place or PlacedFrustum(layout.sheet)
     flat = layout
 
-    def sheet(number: int, name: str, index: int, face: SheetFace, foil: bool = False) -> CutSheet:
+    def sheet(number: int, name: str, index: int, face: _SheetFace, foil: bool = False) -> CutSheet:
         face = face if face_up == "work" else face_up
         surface = snap_to_cylinder(stack.surface(place, index), snap)
         layout = _layout_above(flat, place, stack.offset(index))
@@ -289,7 +287,7 @@ def _marks(layout: SheetLayout, surface: Frustum, index: int, crosses: CoverMark
     return tuple(Stroke("score", draw_shape(surface, mark, closed=False)) for mark in marks)
 
 
-def _foil(layout: SheetLayout, surface: Frustum, which: str, face: SheetFace, title: str) -> CutPart:
+def _foil(layout: SheetLayout, surface: Frustum, which: str, face: _SheetFace, title: str) -> CutPart:
     strokes = [Stroke("cut", draw_shape(surface, layout.foils[which]))]
     if which in layout.folds:
         strokes.insert(0, Stroke("fold", draw_shape(surface, layout.folds[which], closed=False)))
@@ -324,7 +322,7 @@ def make_test_piece(material: str) -> CutSheet:
     return CutSheet(0, "test piece", material, "outside", flat, (CutPart("test piece", strokes, labels),))
 
 
-def _square(kind: StrokeKind, half: float) -> Stroke:
+def _square(kind: _StrokeKind, half: float) -> Stroke:
     corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
     sides = [PathSegment(a, b) for a, b in itertools.pairwise([*corners, corners[0]])]
     return Stroke(kind, Outline.from_segments(sides, True))

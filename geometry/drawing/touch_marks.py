@@ -14,7 +14,7 @@ from .layer_stack import LayerStack
 from .part_labels import PartLabel
 from .surface_shape import ShapeCorner, SurfaceShape, drawing_point
 
-__all__ = ["CoverMarks", "TouchMark", "mark_parts", "marks_on_link", "touch_marks"]
+__all__ = ["CoverMarks", "mark_parts", "marks_on_link", "touch_marks"]
 
 _FIRST_SHARE, _LAST_SHARE = 0.1, 0.9  # of the slant and of the wrap; beyond, a touch is cut off by the rim
 _MARKS_PER_SIDE = 3  # marks along and around
@@ -26,7 +26,7 @@ _ARM_LENGTH = 2e-3  # m; half of a line of the cross
 _NUMBER_HEIGHT = 2e-3  # m; height of a mark's number
 
 
-class TouchMark(NamedTuple):
+class _TouchMark(NamedTuple):
     """A mark, by its place between the inner edges of the electrodes; a sensor's places are measured from there."""
 
     number: int
@@ -46,14 +46,14 @@ def mark_parts(side: int) -> Iterator[tuple[float, float]]:
             yield along, around
 
 
-def touch_marks(active: Frustum) -> tuple[TouchMark, ...]:
+def touch_marks(active: Frustum) -> tuple[_TouchMark, ...]:
     """Return the marks that are drawn on the cover of a sheet.
 
     Args:
         active: cone between the inner edges of the electrodes, on the upper conductive layer.
     """
     return tuple(
-        TouchMark(number, along * active.slant, around * active.wrap)
+        _TouchMark(number, along * active.slant, around * active.wrap)
         for number, (along, around) in enumerate(mark_parts(_MARKS_PER_SIDE), 1)
     )
 

@@ -22,7 +22,7 @@ from .cones import LinkFit
 from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights, exposure_weights
 
-__all__ = ["ChosenSeam", "place_seams"]
+__all__ = ["place_seams"]
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _SEAM_MARGIN = math.radians(15.0)  # rad on both sides of a seam that its electr
 _MIN_SHIELDED_SHARE = 0.005  # of the half-space; a smaller difference between the sides is the error of the rays
 
 
-class ChosenSeam(NamedTuple):
+class _ChosenSeam(NamedTuple):
     """Where the seam about one axis was put."""
 
     axis: int  #: number of the axis
@@ -45,7 +45,7 @@ class ChosenSeam(NamedTuple):
 
 def place_seams(
     fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None
-) -> tuple[LinkFit, tuple[ChosenSeam, ...]]:
+) -> tuple[LinkFit, tuple[_ChosenSeam, ...]]:
     """Turn the full wraps of a fit until their seams lie where the link shields them most.
 
     Sheets about one axis are turned together, so that their cables run side by side. Partial wraps stay: they have no
@@ -58,7 +58,7 @@ def place_seams(
     """
     rays = RayCaster(mesh)
     sheets = list(fit.sheets)
-    places: list[ChosenSeam] = []
+    places: list[_ChosenSeam] = []
     for axis in dict.fromkeys(sheet.axis for sheet in sheets):
         full = [i for i, sheet in enumerate(sheets) if sheet.axis == axis and sheet.frustum.wrap == math.tau]
         if not full:
@@ -88,7 +88,7 @@ def place_seams(
         numbers = [str(i + 1) for i in full]
         names = f"{', '.join(numbers[:-1])} and {numbers[-1]}" if len(numbers) > 1 else numbers[0]
         places.append(
-            ChosenSeam(
+            _ChosenSeam(
                 axis,
                 direction,
                 shielded,

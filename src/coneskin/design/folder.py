@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 from coneskin.design.sheets.summary import sheet_folder
 
-__all__ = ["DESIGN_FILE", "FileOptions", "check_target", "new_folder", "write_design", "write_sheets"]
+__all__ = ["DESIGN_FILE", "FileOptions", "check_target", "write_design"]
 
 #: summary of a design; only a folder with this file may be replaced
 DESIGN_FILE = "design.json"
@@ -98,7 +98,7 @@ def check_target(target: Path, replace: bool = False) -> None:
 
 
 @contextmanager
-def new_folder(target: Path, replace: bool = False) -> Iterator[Path]:
+def _new_folder(target: Path, replace: bool = False) -> Iterator[Path]:
     """Open a temporary folder that becomes the target if the block succeeds, and is removed if it fails.
 
     Args:
@@ -161,7 +161,7 @@ def _own_files(target: Path) -> list[Path]:
     )
 
 
-def write_sheets(
+def _write_sheets(
     folder: Path,
     designs: tuple[SheetDesign, ...],
     data: dict[str, Any],
@@ -291,7 +291,7 @@ def write_design(
         {"file": f"nested/{bed.slug}", "material": bed.material, "waste": round(bed.waste, 4)} for bed in beds
     ]
     data["larger_than_bed"] = list(larger)
-    with new_folder(Path(folder), replace) as draft:
+    with _new_folder(Path(folder), replace) as draft:
         drawn: list[tuple[str, str]] = []
         if pictures:
             from .pictures import draw_pictures
@@ -309,7 +309,7 @@ def write_design(
             if options.step:
                 progress(f"{design.name}: writing the wrapped layers")
                 written.append(_write_wrapped(draft, sheet_folder(sheets, index), design))
-        write_sheets(draft, sheets, data, options, progress, beds, written)
+        _write_sheets(draft, sheets, data, options, progress, beds, written)
         progress(f"{sum(1 for path in draft.rglob('*') if path.is_file())} files in {folder}")
     return data
 

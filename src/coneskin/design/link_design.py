@@ -32,7 +32,6 @@ __all__ = [
     "design_link",
     "find_link_sheets",
     "fit_link",
-    "fit_mesh",
     "load_link",
     "with_seams",
 ]
@@ -75,7 +74,7 @@ def load_link(
         unit: of a mesh file; None to guess.
         up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
         packages: folders of the ROS packages in a URDF's package:// paths (``load_urdf_link``).
-        arguments: of a xacro file (``expand_xacro``).
+        arguments: of a xacro file.
 
     Yields:
         the meshes of the link, the best first: the visual mesh of a URDF is closer to the real surface than its
@@ -150,7 +149,7 @@ def fit_link(
     return tries[0]
 
 
-def fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **search: Any) -> tuple[LinkMesh, LinkFit]:
+def _fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **search: Any) -> tuple[LinkMesh, LinkFit]:
     """Return a mesh with its fit, named by its source; arguments as in ``fit_link``."""
     name = Path(mesh.source).stem
     notes = (*_terms(mesh.source), *mesh.notes)
@@ -285,7 +284,7 @@ def design_link(
         unit: of a mesh file, a key of ``UNITS``; None to guess.
         up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
         packages: folders of the ROS packages that a URDF names.
-        arguments: of a xacro file (``expand_xacro``).
+        arguments: of a xacro file.
         files: options of the drawings.
         pictures: True to draw pictures too, which needs the extra ``pictures``.
         replace: True to allow an earlier design in the folder; files that are not of that design stay.
@@ -331,7 +330,7 @@ def design_link(
         source, fit = fit_link(str(link), unit, up_axis, packages, say, arguments, **search)
         places, origin = fit, str(link)
     elif isinstance(link, Mesh):
-        source, fit = fit_mesh(link, say, **search)
+        source, fit = _fit_mesh(link, say, **search)
         places = fit
     else:
         places = link
