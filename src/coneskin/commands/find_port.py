@@ -91,7 +91,7 @@ def find_port(
                 "and see whether `dmesg` names the device"
             )
         sleep(_POLL_PERIOD)
-        if words := search.look(look()):
+        if words := search.update(look()):
             say(words if search.found else f"{words}: {search.request}")
     return search.found
 

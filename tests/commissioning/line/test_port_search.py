@@ -20,7 +20,7 @@ def found(*lists: list[PortFacts]) -> tuple[PortFacts | None, list[str]]:
     search = PortSearch(lists[0])
     said = [search.request]
     for present in lists[1:]:
-        said += [words, search.request] if (words := search.look(present)) else []
+        said += [words, search.request] if (words := search.update(present)) else []
     return search.found, said
 
 

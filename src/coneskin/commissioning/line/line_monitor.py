@@ -95,7 +95,7 @@ class _Heard:
         self.newest = self.before = frame
         self.frames = self.missing = 0
 
-    def take(self, frame: Frame) -> None:
+    def feed(self, frame: Frame) -> None:
         self.before, self.newest = self.newest, frame
         self.frames += 1
         step = (frame.sequence - self.before.sequence) & 0xFFFF
@@ -134,7 +134,7 @@ class LineMonitor:
             key = frame.device, frame.sensor
             if key not in self._heard and len(self._heard) >= 64:
                 continue
-            self._heard.setdefault(key, _Heard(frame)).take(frame)
+            self._heard.setdefault(key, _Heard(frame)).feed(frame)
         if self._stream is not None:
             self._stream.feed(data, now)
 

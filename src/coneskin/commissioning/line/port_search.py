@@ -35,7 +35,7 @@ class PortSearch:
             return "plug it in again"
         return "unplug the device" if self._present else "plug the device in"
 
-    def look(self, present: Sequence[PortFacts]) -> str:
+    def update(self, present: Sequence[PortFacts]) -> str:
         """Compare the ports that are there now with those before.
 
         Returns:
