@@ -42,9 +42,8 @@ GROUPS = {
 def scene_table(keys: Sequence[Any]) -> str:
     """Return the table of the keys of one table of a scene."""
     lines = ["| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
-    for key in keys:
-        row = (f"`{key.name}`", key.unit, key.bounds, key.default_words, key.meaning)
-        lines.append(f"| {' | '.join(row)} |")
+    for (*rest, meaning), alike in _rows(keys).items():
+        lines.append(f"| {', '.join(f'`{name}`' for name in alike)} | {' | '.join(rest)} | {meaning} |")
     return "\n".join(lines) + "\n"
 
 
@@ -56,6 +55,17 @@ def design_tables() -> str:
     return "\n".join(parts)
 
 
+def _rows(keys: Sequence[Any]) -> dict[tuple[str, ...], list[str]]:
+    """Return the cells of each row with the keys that it is for: those that another table explains stand in one."""
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for key in keys:
+        cells = (key.unit, key.bounds, key.default_words, key.meaning)
+        if re.fullmatch(r"as in `\[\w+\]`", key.meaning) and key.default_words == "as above":
+            cells = ("", "", key.default_words, key.meaning)
+        rows.setdefault(cells, []).append(key.name)
+    return rows
+
+
 # events, commands, names
 
 
@@ -63,8 +73,8 @@ def event_table() -> str:
     """Return the table of the names of events."""
     from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName
 
-    lines = ["| event | means | in a replay |", "|---|---|---|"]
-    lines += [f"| `{name}` | {name.meaning} | {'no' if name in SESSION_EVENTS else 'yes'} |" for name in EventName]
+    lines = ["| event | means |", "|---|---|"]
+    lines += [f"| `{name}`{' *' if name in SESSION_EVENTS else ''} | {name.meaning} |" for name in EventName]
     return "\n".join(lines) + "\n"
 
 
