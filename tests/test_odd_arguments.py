@@ -33,7 +33,9 @@ def _arguments(name: str, random: Random) -> list[str]:
 
 @settings(max_examples=150)
 @given(seed=st.integers(0, 2**32))
-@pytest.mark.parametrize("name", ["unroll", "replay", "guard", "sim-skin"])
+@pytest.mark.parametrize(
+    "name", ["unroll", *(pytest.param(command, marks=pytest.mark.long) for command in ("replay", "guard", "sim-skin"))]
+)
 def test_odd_arguments_never_give_a_traceback(tmp_path_factory: pytest.TempPathFactory, name: str, seed: int) -> None:
     words = _arguments(name, Random(seed))
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as said:

@@ -110,6 +110,7 @@ def test_an_interrupt_while_a_command_is_imported_has_no_traceback(
     assert capsys.readouterr().err == "coneskin: interrupted\n"
 
 
+@pytest.mark.long
 def test_a_mesh_whose_name_is_no_text_is_designed(tmp_path: Path) -> None:
     """With LC_ALL=C, or from another computer, the bytes of a name may be no UTF-8."""
     mesh = tmp_path / os.fsdecode(b"\xe4rm.stl")
@@ -138,6 +139,7 @@ def test_a_package_of_a_urdf_is_named(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "--package takes NAME=DIR" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_what_a_sheet_spans_is_said_beside_its_deviation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A groove of 9 mm, 1.16 mm deep, is no deviation of at most 1 mm."""
     groove = [(0.0, 0.05), (0.1, 0.05), (0.1001, 0.04884), (0.1089, 0.04884), (0.109, 0.05), (0.2, 0.05)]

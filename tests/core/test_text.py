@@ -17,6 +17,7 @@ ANY_TEXT = st.text(st.characters())  # half pairs of UTF-16 among them
 VALUES = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(), st.lists)
 
 
+@pytest.mark.long
 @given(VALUES)
 def test_what_json_writes_is_read_as_it_was(value: Any) -> None:
     assert read_json(json.dumps(value).encode()) == value

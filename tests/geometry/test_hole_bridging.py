@@ -1,6 +1,7 @@
 """Holes and grooves bridged: the closing of a height grid, against its definition."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -38,6 +39,7 @@ def test_bridging_is_a_closing(height: Floats, around: bool) -> None:
     np.testing.assert_array_equal(bridge_holes(height, 1.0, 1.0, 2.0, around), by_definition(height, 3, 3, around))
 
 
+@pytest.mark.long
 @settings(max_examples=10)
 @given(arrays(float, (6, 8), elements=st.floats(0.0, 1.0, width=16)))
 def test_a_bridge_of_kilometres_spans_everything_at_the_cost_of_the_grid(height: Floats) -> None:

@@ -126,6 +126,7 @@ def test_the_settings_stand_in_the_projects_file_as_well(project: Project) -> No
     assert "there is no folder" in project.pytest("--coneskin-runs", "nowhere", code=4)
 
 
+@pytest.mark.long
 def test_where_it_is_not_used_nothing_is_loaded_and_recordings_are_no_tests(project: Project) -> None:
     (project.runs / "collision.rec").write_bytes(COLLISION.read_bytes())
     (project.folder / "test_mine.py").write_text(

@@ -17,6 +17,7 @@ from .scene_mutations import mutate
 from .scenes import FULL, SERIAL_RETREAT, SKIN_ONLY
 
 
+@pytest.mark.long
 @settings(max_examples=200)
 @given(seed=st.integers(0, 2**32))
 def test_no_mutated_scene_gives_a_traceback(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:

@@ -127,7 +127,7 @@ def dark_columns(row):
     return [0.5 * (run[0] + run[-1] + 1) for run in runs if len(run)]
 
 
-@pytest.mark.parametrize("page", ["A4", "A3", "Letter"])
+@pytest.mark.parametrize("page", ["A4", *(pytest.param(page, marks=pytest.mark.long) for page in ("A3", "Letter"))])
 def test_scale_bar_of_a_rendered_page_measures_100_mm(page, tmp_path):
     dpi = 600
     data = to_pdf(cut_sheets(lay_out_sheet(SHEETS["widening"]), PAPER_STACK)[:1], page)

@@ -26,6 +26,7 @@ def test_a_sheet_too_few_is_told_and_what_it_would_cover() -> None:
     assert not any("sheet more" in area.reason for area in two.bare_areas)
 
 
+@pytest.mark.long
 def test_the_ends_of_a_tube_are_flat() -> None:
     fit = find_cones(placed(frustum(0.05, 0.05, 0.2)))
     assert shares(fit) == {"flat": pytest.approx(0.1 / 0.5, abs=0.02)}  # 2 r^2 of 2 r h + 2 r^2

@@ -75,9 +75,9 @@ def surface_misses(sheet: FittedSheet, body_radius: dict[str, float] | None = No
     ("spoil", "tilt", "shift", "miss"),
     [
         (lambda b: b, 1e-4, 1e-3, 1e-5),
-        (flipped, 1e-4, 1e-3, 1e-5),
-        (lambda b: flipped(b, 0.5), 1e-4, 1e-3, 1e-5),
-        (exploded, 1e-4, 1e-3, 1e-5),
+        pytest.param(flipped, 1e-4, 1e-3, 1e-5, marks=pytest.mark.long),
+        pytest.param(lambda b: flipped(b, 0.5), 1e-4, 1e-3, 1e-5, marks=pytest.mark.long),
+        pytest.param(exploded, 1e-4, 1e-3, 1e-5, marks=pytest.mark.long),
         # 0.2 mm of noise over 3000 corners and a lever of 0.1 m: some 0.01 degrees, some 0.02 mm
         (lambda b: noisy(b, 2e-4), 0.03, 0.06, 2e-4),
     ],
@@ -152,6 +152,7 @@ def test_a_tube_needs_one_sheet_however_many_are_allowed() -> None:
     assert len(find_cones(placed(frustum(0.05, 0.05, 0.3)), max_sheets=6).sheets) == 1
 
 
+@pytest.mark.long
 def test_bolt_holes_are_bridged_and_said() -> None:
     (sheet,) = find_cones(placed(holed())).sheets
     assert sheet.frustum.radius1 == pytest.approx(0.05, abs=2e-6)
@@ -183,6 +184,7 @@ def test_a_wrap_asked_for_is_kept() -> None:
     assert len(full.sheets) == 2
 
 
+@pytest.mark.long
 def test_the_seam_looks_where_it_is_asked_to() -> None:
     body = placed(frustum(0.05, 0.04, 0.3))
     for seam in ((1.0, 0.0, 0.0), (0.0, -1.0, 0.3)):
@@ -231,12 +233,14 @@ def test_a_convex_visual_mesh_is_taken_where_that_is_allowed() -> None:
     assert [sheet.frustum.radius1 for sheet in sheets] == pytest.approx([0.03, 0.03], abs=2e-4)
 
 
+@pytest.mark.long
 def test_a_link_shorter_than_a_sheet_is_told_so() -> None:
     fit = find_cones(placed(frustum(0.005, 0.005, 0.018)))
     assert fit.reason == "the link is 18.0 mm long, but a sheet needs at least 25 mm"
     assert len(find_cones(placed(frustum(0.005, 0.005, 0.018)), min_length=0.01).sheets) == 1
 
 
+@pytest.mark.long
 def test_a_narrow_wrap_asked_for_on_a_convex_body_is_given() -> None:
     (sheet,) = find_cones(placed(frustum(0.05, 0.05, 0.3)), wrap=1.0, max_wires=4).sheets
     assert sheet.frustum.wrap == pytest.approx(1.0, abs=0.05)
@@ -285,6 +289,7 @@ def clashes(one: FittedSheet, two: FittedSheet, thickness: float) -> int:
     return int((inside & (around > 0.0) & (around < two.frustum.wrap)).sum())
 
 
+@pytest.mark.long
 def test_two_crossing_tubes_get_sheets_about_both_axes_that_keep_clear() -> None:
     fit = find_cones(placed(shoulder()))
     one, two = fit.sheets
@@ -305,6 +310,7 @@ def test_the_thickness_of_the_sheets_keeps_them_apart_in_a_corner() -> None:
     assert clashes(flat[0], flat[1], 0.0062) > 0
 
 
+@pytest.mark.long
 def test_two_partial_wraps_share_a_tube() -> None:
     """Sheets of 150 degrees on two sides of one tube: neither lies on the other."""
     one, two = find_cones(placed(frustum(0.05, 0.05, 0.2)), wrap=math.radians(150.0)).sheets
@@ -363,6 +369,7 @@ def test_wires_are_four_for_each_sheet() -> None:
     assert len(find_cones(placed(shoulder()), max_wires=8).sheets) == 2
 
 
+@pytest.mark.long
 def test_a_shallow_dent_counts_as_a_deviation_and_a_deep_one_as_a_hole() -> None:
     """A dent less deep than the tolerance is no hole: the sheet stands off from it, and says by how much."""
     (shallow,) = find_cones(placed(holed(depth=8e-4)), max_sheets=1).sheets

@@ -71,6 +71,7 @@ def test_a_side_that_curves_is_said_to_curve() -> None:
     assert told == "round, but it curves away from a straight side"
 
 
+@pytest.mark.long
 def test_a_third_part_is_bare_because_two_sheets_were_allowed() -> None:
     body = make_mesh(*revolve([(0.0, 0.03), (0.1, 0.05), (0.2, 0.03), (0.3, 0.05)], segments=96))
     fit = find_cones(body, max_sheets=2)

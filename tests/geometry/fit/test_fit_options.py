@@ -15,6 +15,7 @@ from coneskin.geometry.fit.fit_options import FitOptions
 from ..synthetic import frustum, placed
 
 
+@pytest.mark.long
 def test_names_change_what_the_options_say() -> None:
     mesh = placed(frustum(0.05, 0.05, 0.2))
     asked = FitOptions(tolerance=0.0007, max_sheets=1, wrap=3.0)

@@ -72,6 +72,7 @@ def test_a_bare_tube_keeps_its_seam() -> None:
     assert "shields no side more than another" in place.reason
 
 
+@pytest.mark.long
 def test_the_seams_of_several_sheets_are_named_one_by_one() -> None:
     """Two sheets about one axis are turned together; a partial wrap beside them has no seam and is not named."""
     mesh = tube_with_wing(0.7)

@@ -136,6 +136,7 @@ def test_a_partial_wrap_turns_to_the_touched_side() -> None:
         assert float(middle @ out) > math.cos(math.radians(5.0))
 
 
+@pytest.mark.long
 def test_equal_weights_change_nothing() -> None:
     mesh = placed(shoulder())
     plain = find_cones(mesh, max_sheets=1)

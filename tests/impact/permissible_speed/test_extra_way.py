@@ -101,6 +101,7 @@ def test_the_lag_is_what_six_joints_on_their_servos_overshoot_by_beyond_one() ->
             assert TURN**2 * found >= (lag + float(lever @ direction)) * (1.0 - 1e-4)
 
 
+@pytest.mark.long
 def test_a_delay_makes_up_for_the_lag_also_of_a_short_braking() -> None:
     """What six joints overshoot by is at most what one does, and the way of the delay; but for what they swing."""
     worst = -math.inf

@@ -74,6 +74,7 @@ def test_the_jacobian_is_the_derivative_of_the_place(
         np.testing.assert_allclose(rows[:, i], slope, rtol=0, atol=2e-9)
 
 
+@pytest.mark.long
 @given(arms(), joints(), LINKS, points(), points())
 def test_links_are_rigid(
     arm: ArmModel, q: tuple[float, ...], link: int, a: tuple[float, float, float], b: tuple[float, float, float]

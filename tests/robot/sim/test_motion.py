@@ -83,6 +83,7 @@ def _motions(arm: SimulatedArm) -> dict[str, Callable[[], Motion]]:
     }
 
 
+@pytest.mark.long
 @LAW
 @given(st.integers(0, 10_000))
 @example(114)  # asks the shoulder for 367 N m

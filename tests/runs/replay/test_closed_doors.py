@@ -74,6 +74,7 @@ def _replay_mutated(bases: list[list[Block]], path: Path, seed: int) -> None:
     assert not said.getvalue() or said.getvalue().startswith("coneskin replay: ")
 
 
+@pytest.mark.long
 @pytest.mark.promise("P66")
 def test_nothing_that_a_header_names_is_opened(tmp_path: Path) -> None:
     record(tmp_path / "run.rec", SKIN_ONLY)

@@ -70,7 +70,7 @@ def test_between_sheets_of_1_to_1e6_multipoles_of_a_high_order_agree() -> None:
     assert np.abs(difference).max() < 1e-13
 
 
-@pytest.mark.parametrize("ka", [1e-4, 0.3, 5.0, 20.0, math.inf])
+@pytest.mark.parametrize("ka", [1e-4, 0.3, 5.0, pytest.param(20.0, marks=pytest.mark.long), math.inf])
 def test_where_multipoles_converge_both_agree(ka: float) -> None:
     radius = 0.02
     one = Discs(*(np.array([[v]]) for v in (0.04, 0.8, radius, (ka / radius) ** 2 / 3.0)))
