@@ -78,7 +78,7 @@ def _engine(push: Push, braked: float) -> tuple[float, float, float]:
         after, _ = push.turned((step + 1) * _CYCLE, braked)
         target[push.joint] = push.q[push.joint] + before
         qd[push.joint] = (after - before) / _CYCLE
-        plant.advance(target, qd, _CYCLE)
+        plant.update(target, qd, _CYCLE)
     return plant.peak, plant.impulse, plant.deepest
 
 

@@ -174,7 +174,7 @@ class CollisionRig:
         since = 0.0 if self._steps % 2 else STEP  # after the arm's last control cycle
         q = [x + since * v for x, v in zip(self.arm.q, self.arm.qd, strict=True)]
         for item in self.pressing:
-            item.advance(link_pose(self._model, q, item.link), self.now - self.began, STEP)
+            item.update(link_pose(self._model, q, item.link), self.now - self.began, STEP)
             body = item.body
             presses[body] = Press(body.sensor, body.u, body.phi, item.force, body.radius)
         self._device.press(presses, STEP)

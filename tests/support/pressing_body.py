@@ -81,7 +81,7 @@ class Pressing:
     _met: float = 0.0  # place of the surface along it when the two touched [m]
     _here: bool = False
 
-    def advance(self, base_link: Pose, time: float, step: float) -> None:
+    def update(self, base_link: Pose, time: float, step: float) -> None:
         """Let time pass with the link in this pose.
 
         Args:

@@ -149,7 +149,7 @@ def meet(
     for step in range(round(0.4 / CYCLE)):
         change = -math.copysign(min(braking * CYCLE, abs(rate)), turn) if step * CYCLE >= course.braked else 0.0
         qd[joint] = rate + 0.5 * change
-        plant.advance(target, qd, CYCLE)
+        plant.update(target, qd, CYCLE)
         target[joint] += qd[joint] * CYCLE
         rate += change
     return course, extra, plant

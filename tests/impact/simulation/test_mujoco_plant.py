@@ -72,7 +72,7 @@ def test_energy_is_kept_where_nothing_damps_and_accounted_for_where_something_do
     ):
         arm = plant(body, padding, step=2e-5)
         before = arm.energy
-        arm.advance(Q, QD, 0.12)
+        arm.update(Q, QD, 0.12)
         # the integration is of the first order: its error falls with the step, 0.3 % at five times this one
         assert arm.energy + arm.lost == pytest.approx(before, rel=1e-3)
         assert arm.impulse > 0.1
@@ -80,7 +80,7 @@ def test_energy_is_kept_where_nothing_damps_and_accounted_for_where_something_do
 
 def test_a_free_mass_gets_the_momentum_that_the_contact_has_given() -> None:
     arm = plant(ahead())
-    arm.advance(Q, QD, 0.12)
+    arm.update(Q, QD, 0.12)
     _, velocity = arm.part_state(0)
     assert not arm.contacts
     # the normal turns with the link while the two touch, so the forces' sum is a little more than the vector's
@@ -91,7 +91,7 @@ def test_angular_momentum_about_the_base_axis_is_kept_while_no_servo_turns_that_
     arm = plant(ahead(), held=(False, True, True, True, True, True))
     rotor = arm_inertia(MODEL).rotor[0]  # it turns with the joint, about the same axis
     before = arm.momentum()[5] + rotor * arm.qd[0]
-    arm.advance(Q, (0.0,) * 6, 0.12)
+    arm.update(Q, (0.0,) * 6, 0.12)
     assert arm.impulse > 0.5
     assert arm.momentum()[5] + rotor * arm.qd[0] == pytest.approx(before, rel=1e-4)
 
@@ -103,7 +103,7 @@ def test_a_short_blow_is_that_of_two_masses_and_a_spring() -> None:
     arm = plant(body, Padding(thickness=0.02, stiffness=60e3, loss=0.0))
     heavy = effective_mass(MODEL, arm_inertia(MODEL), Q, LINK, link_pose(MODEL, Q, LINK).inverse().apply(point), normal)
     reduced = heavy * 0.3 / (heavy + 0.3)
-    arm.advance(Q, QD, 0.05)
+    arm.update(Q, QD, 0.05)
     assert arm.impulse == pytest.approx(2.0 * speed * reduced, rel=0.02)  # the arm swings on for 8 ms
     assert arm.peak == pytest.approx(speed * math.sqrt(60e3 * reduced), rel=0.02)
 
@@ -111,7 +111,7 @@ def test_a_short_blow_is_that_of_two_masses_and_a_spring() -> None:
 def test_a_stiff_arm_presses_a_hand_as_far_as_springs_in_series_let_it() -> None:
     body, padding = ahead("hand", gap=-0.004, stiffness=5e3, damping=1.0), Padding(thickness=0.02, stiffness=20e3)
     arm = MujocoPlant(MODEL, [SHEET], [body], padding, Q)
-    arm.advance(Q, (0.0,) * 6, 0.4)
+    arm.update(Q, (0.0,) * 6, 0.4)
     (contact,) = arm.contacts
     # 4 mm over 5 and 20 N/mm and the arm's own servos, which are 30 times as stiff
     assert contact.force == pytest.approx(0.004 / (1 / 5e3 + 1 / 20e3), rel=0.04)
@@ -126,9 +126,9 @@ def test_a_person_pushes_with_the_force_wanted_after_the_delay(kind: str) -> Non
     body = ahead(kind, gap=-0.001, stiffness=5e3, damping=1.0, force=30.0, delay=0.1)
     body = BodyScene(kind, body.place, (x, y, z), mass=0.6, stiffness=5e3, damping=1.0, force=30.0, delay=0.1)
     arm = MujocoPlant(MODEL, [SHEET], [body], Padding(), Q)
-    arm.advance(Q, (0.0,) * 6, 0.09)
+    arm.update(Q, (0.0,) * 6, 0.09)
     assert arm.force < 5.0
-    arm.advance(Q, (0.0,) * 6, 0.9)
+    arm.update(Q, (0.0,) * 6, 0.9)
     assert [contact.force for contact in arm.contacts] == pytest.approx([30.0] * len(arm.parts), rel=0.02)
 
 
@@ -142,7 +142,7 @@ def test_what_does_not_give_way_is_pressed_as_deep_as_the_arm_went(kind: str) ->
     cx, cy, cz = across.tolist()
     body = BodyScene(kind, ball.place, (nx, ny, nz) if kind == "wall" else (cx, cy, cz), radius=0.04)
     arm = MujocoPlant(MODEL, [SHEET], [body], Padding(), Q)
-    arm.advance(Q, (0.0,) * 6, 0.2)
+    arm.update(Q, (0.0,) * 6, 0.2)
     (contact,) = arm.contacts
     assert contact.depth == pytest.approx(0.002, abs=1.5e-4)  # the servos yield a little
     assert contact.force == pytest.approx(Padding().elastic(contact.depth), rel=1e-3)

@@ -104,8 +104,8 @@ def test_what_has_never_been_heard_is_a_blocker():
 @BOTH
 def test_it_is_active_only_after_the_acknowledgement(external):
     rig = GuardRig(external=external)
-    take = rig.companions.take
-    rig.companions.take = lambda output: None  # it beats, and does not answer
+    take = rig.companions.feed
+    rig.companions.feed = lambda output: None  # it beats, and does not answer
     rig.run(1.0)
     assert Release(1) in rig.outputs
     assert rig.core.phase is Phase.STARTING
@@ -114,12 +114,12 @@ def test_it_is_active_only_after_the_acknowledgement(external):
     assert rig.core.phase is Phase.STARTING
     rig.feed(BlockKind.DRIVER, StatusReport("released", "1").encode())
     assert rig.core.phase is Phase.ACTIVE
-    rig.companions.take = take
+    rig.companions.feed = take
 
 
 def test_a_release_that_nobody_acknowledges_is_taken_back_and_its_late_answer_counts_for_nothing():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
-    rig.companions.take = lambda output: None
+    rig.companions.feed = lambda output: None
     rig.reset()
     rig.run(0.2)
     assert rig.outputs.count(Release(2)) == 1

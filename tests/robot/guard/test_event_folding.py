@@ -42,7 +42,7 @@ def test_states_that_are_no_numbers_are_one_fault_and_counts():
     """500 events a second before, and a list of faults that grew with each."""
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction("stop"), speed=1.0).run(1.5)
     assert rig.core.phase is Phase.LATCHED
-    step = rig.arm.step
+    step = rig.arm.poll
 
     def nonsense():
         payload = bytearray(step())
@@ -50,7 +50,7 @@ def test_states_that_are_no_numbers_are_one_fault_and_counts():
         payload[17:25] = struct.pack(">d", rig.now)  # another text each time
         return bytes(payload)
 
-    rig.arm.step = nonsense
+    rig.arm.poll = nonsense
     before = len(rig.events)
     rig.run(4.0)
     faults = [e for e in rig.events[before:] if e.name == "fault" and "cannot be read" in e.details["what"]]

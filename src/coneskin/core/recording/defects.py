@@ -163,7 +163,7 @@ def find_defects(
         if hole is None and not closed and (at_end or _number(damage, run) >= covered):
             hole = tail
         if hole is not None:
-            hole.take(path, damage)
+            hole.feed(path, damage)
         else:
             size = damage.end - damage.offset
             defects.append(Defect(DefectKind.STRAY, offset=damage.offset, size=size, note=path.name))
@@ -193,7 +193,7 @@ class _Hole:
         self.size = self.blocks = self.known = self.kinds = 0
         self.path: Path | None = None
 
-    def take(self, path: Path, damage: Damage) -> None:
+    def feed(self, path: Path, damage: Damage) -> None:
         if self.offset is None:
             self.offset, self.path = damage.offset, path
         self.size += damage.end - damage.offset

@@ -239,7 +239,7 @@ class CollisionRun:
         if moving:
             since = CYCLE if first else _STEP_TIME
             start = [q - since * v for q, v in zip(self.arm.q, self.arm.qd, strict=True)]
-            self.plant.advance(start, self.arm.qd, _STEP_TIME)
+            self.plant.update(start, self.arm.qd, _STEP_TIME)
             self._measure()
         if self._core is not None:
             self._guard(first)

@@ -51,7 +51,7 @@ class _HeldPart:
         """True where a person moves the rest."""
         return self.body.kind in ("person", "grip")
 
-    def advance(self, since: float, force: float, away: Vector | None, step: float) -> bool:
+    def update(self, since: float, force: float, away: Vector | None, step: float) -> bool:
         """Let a person move the rest; return whether it has moved.
 
         Args:
@@ -264,7 +264,7 @@ class MujocoPlant:
 
     # time
 
-    def advance(self, q: Sequence[float], qd: Sequence[float], duration: float) -> None:
+    def update(self, q: Sequence[float], qd: Sequence[float], duration: float) -> None:
         """Let time pass while the controller's targets move evenly.
 
         Args:
@@ -324,7 +324,7 @@ class MujocoPlant:
             since = -1.0 if began is None else self.time - began
             by = felt.get(number)
             away = None if by is None else tuple(by.normal.tolist())
-            if part.advance(since, by.force if by else 0.0, away, self._step):
+            if part.update(since, by.force if by else 0.0, away, self._step):
                 self._m.qpos_spring[at : at + 3] = part.rest
 
     def _find(self, near: float = 0.0) -> list[Touch]:

@@ -37,7 +37,7 @@ class LiveMujocoPlant(MujocoPlant):
     """
 
     def update(self, q: Sequence[float], qd: Sequence[float], duration: float) -> None:
-        """Let time pass while the controller's targets move evenly; see `MujocoPlant.advance`."""
+        """Let time pass while the controller's targets move evenly; see `MujocoPlant.update`."""
         m, d, step, padding = self._m, self._d, self._step, self._padding
         step1, step2 = self._mj.mj_step1, self._mj.mj_step2
         no_contacts = int(self._mj.mjtDisableBit.mjDSBL_CONTACT)
@@ -137,7 +137,7 @@ class ScenePlant:
     def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
         """Let one control cycle pass; see the protocol."""
         start = [at - CYCLE * speed for at, speed in zip(q, qd, strict=True)]
-        self.physics.advance(start, qd, CYCLE)
+        self.physics.update(start, qd, CYCLE)
         if self.physics.diverged:
             raise PlantLost("the physics engine has diverged: the bodies are too light for their stiffness, perhaps")
         return PlantState(self.physics.q, self.physics.qd, currents_of(self.physics))

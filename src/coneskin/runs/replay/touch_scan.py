@@ -67,7 +67,7 @@ def scan_touches(run: Run) -> list[_ScannedTouch]:
         batch = find_frames(stream)
         arrived = times[np.searchsorted(ends + len(rest), batch.ends, side="left")]
         for state in states:
-            state.take(batch, arrived)
+            state.feed(batch, arrived)
         # what is behind the last frame may be the beginning of the next
         rest = stream[max(int(batch.ends[-1]) if len(batch.ends) else 0, len(stream) - _LONGEST_FRAME) :]
     found = [touch for state in states for touch in state.touches()]
@@ -113,7 +113,7 @@ class _SensorState:
         self._peak = 0.0
         self._touches: list[_ScannedTouch] = []
 
-    def take(self, batch: FrameBatch, times: NDArray[np.float64]) -> None:
+    def feed(self, batch: FrameBatch, times: NDArray[np.float64]) -> None:
         import numpy as np
 
         sensor, bounds, limits = self._sensor, self._sensor.bounds, self._sensor.thresholds

@@ -109,8 +109,8 @@ def test_a_external_arm_is_stopped_by_script_and_follows():
 
 def test_a_program_that_does_not_start_is_not_waited_for():
     rig = GuardRig(touch(0.5, 0.7), external=True, speed=1.0)
-    take = rig.arm.take
-    rig.arm.take = lambda command: None if isinstance(command, SetpointProgram) else take(command)
+    take = rig.arm.feed
+    rig.arm.feed = lambda command: None if isinstance(command, SetpointProgram) else take(command)
     rig.run(0.5)
     rig.arm.runtime_state = 1
     rig.run(2.0)
@@ -125,8 +125,8 @@ def test_an_arm_that_something_else_moves_is_not_left_to_it(external):
     """A person starts a program while the arm moves away: it replaces ours."""
     rig = GuardRig(touch(0.5, 0.7), external=external, speed=1.0).run(0.75)
     assert rig.core.phase is Phase.RETREATING
-    take, ignored = rig.arm.take, (SetJointVelocity, JointVelocitySetpoint)
-    rig.arm.take = lambda command: None if isinstance(command, ignored) else take(command)
+    take, ignored = rig.arm.feed, (SetJointVelocity, JointVelocitySetpoint)
+    rig.arm.feed = lambda command: None if isinstance(command, ignored) else take(command)
     rig.arm.go([-0.5, 0.2, 0.0, 0.0, 0.0, 0.0], 4.0)
     rig.run(0.7)
     assert "does not move as commanded" in rig.event("retreated").details["why"]
@@ -164,8 +164,8 @@ def test_a_fault_ends_a_external_retreat():
 def test_something_faster_than_it_was_told_is_not_waited_for(acceleration):
     reaction = Reaction(kind="retreat", acceleration=acceleration, time_budget=30.0)
     rig = GuardRig(touch(0.5, 0.7), reaction=reaction, external=True, speed=1.0).run(0.75)
-    take = rig.arm.take
-    rig.arm.take = lambda command: None if isinstance(command, JointVelocitySetpoint) else take(command)
+    take = rig.arm.feed
+    rig.arm.feed = lambda command: None if isinstance(command, JointVelocitySetpoint) else take(command)
     rig.arm.go([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 20.0)
     rig.run(0.12)
     assert "does not move as commanded" in rig.event("retreated").details["why"]
