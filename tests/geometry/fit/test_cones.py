@@ -214,7 +214,7 @@ def test_a_box_is_refused_and_the_nearest_thing_shown() -> None:
     fit = find_cones(placed(box(0.1, 0.12, 0.3)))
     assert fit.sheets == ()
     assert "100 % of the surface lies on the convex hull" in fit.reason
-    assert "allow_hull (--allow-hull) if this is the visual mesh" in fit.reason
+    assert "allow_hull (--set search.allow_hull=true) if this is the visual mesh" in fit.reason
     assert fit.nearest is not None
     assert fit.nearest.max_deviation > 0.005
     assert [bare.reason for bare in fit.bare] == [fit.reason]
