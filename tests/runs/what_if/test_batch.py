@@ -98,14 +98,14 @@ from pathlib import Path
 import distributed
 
 from coneskin.core.errors import RecordingError
-from coneskin.runs.what_if import dask_cluster
+from coneskin.runs.what_if import batch
 from coneskin.runs.what_if.batch import judge_runs
 
 if __name__ == "__main__":
     paths, variants = [Path(word) for word in sys.argv[2:]], json.loads(sys.argv[1])
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         rows = judge_runs(paths, variants, scheduler=cluster.scheduler_address)
-        dask_cluster._CONNECT_TIMEOUT = 0.5
+        batch._CONNECT_TIMEOUT = 0.5
         try:
             judge_runs(paths, variants, scheduler="tcp://127.0.0.1:1")
         except RecordingError as exc:
