@@ -92,7 +92,9 @@ def test_a_convex_mesh_is_taken_for_the_link_where_it_is_called_visual(source: s
     hull = ConvexHull(np.concatenate(rings))
     body = make_mesh(hull.points, hull.simplices, source)
     if not taken:
-        with pytest.raises(cs.GeometryError, match=r"use the visual mesh of the link, or allow_hull \(--set search.allow_hull=true\)"):
+        with pytest.raises(
+            cs.GeometryError, match=r"use the visual mesh of the link, or allow_hull \(--set search.allow_hull=true\)"
+        ):
             cs.design_link(body)
         return
     design = cs.design_link(body)
