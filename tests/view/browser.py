@@ -101,6 +101,8 @@ def pixels(page: Any, at: tuple[int, int], around: int = 5) -> np.ndarray:
     """The page's pixels about a place, as red, green and blue."""
     from PIL import Image
 
+    # viser 1.1.1 lays a note about drawing without a GPU over the picture, which these computers all get
+    page.add_style_tag(content="[class*=Notifications-root] { display: none !important }")
     picture = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
     return picture[at[1] - around : at[1] + around + 1, at[0] - around : at[0] + around + 1].reshape(-1, 3)
 
