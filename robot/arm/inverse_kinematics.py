@@ -28,7 +28,9 @@ __all__ = ["nearest", "solutions"]
 #: share of the reach by which a pose may be beyond it and still count as on the border; rounding of the pose itself
 _BORDER_SHARE = 1e-9
 #: sine of q5 below which the axes of joints 4 and 6 are parallel, and the pose determines only the sum of their angles
-_WRIST_SINGULAR = 1e-9
+_WRIST_SINGULAR = 1e-8
+#: rounding of a pose's rotation; over the sine of q5 it is what that leaves unknown of joint 6 [rad]
+_ROTATION_ROUNDING = 2e-15
 
 
 def solutions(model: ArmModel, flange: Pose, q6_if_free: float = 0.0) -> list[Joints]:
@@ -62,6 +64,9 @@ def solutions(model: ArmModel, flange: Pose, q6_if_free: float = 0.0) -> list[Jo
         c1, s1 = math.cos(q1), math.sin(q1)
         nx, ny, nz = r00 * s1 - r10 * c1, r01 * s1 - r11 * c1, r02 * s1 - r12 * c1
         sine = math.hypot(nx, ny)
+        # near the wrist's singularity o4 is as uncertain as joint 6 is, at a distance of d5
+        blur = sine if sine <= _WRIST_SINGULAR else _ROTATION_ROUNDING / sine
+        border = _BORDER_SHARE + blur * abs(d5) * (abs(a2) + abs(a3)) / abs(a2 * a3)
         for wrist in (1.0, -1.0):
             q5 = math.atan2(wrist * sine, nz)
             q6 = math.atan2(-wrist * ny, wrist * nx) if sine > _WRIST_SINGULAR else q6_if_free
@@ -76,7 +81,7 @@ def solutions(model: ArmModel, flange: Pose, q6_if_free: float = 0.0) -> list[Jo
             x = o4x * c1 + o4y * s1
             y = o5z + d5 * (r20 * s6 + r21 * c6) - d1
             c3 = (x * x + y * y - a2 * a2 - a3 * a3) / (2.0 * a2 * a3)
-            if abs(c3) > 1.0 + _BORDER_SHARE:
+            if abs(c3) > 1.0 + border:
                 continue
             bend = math.acos(max(-1.0, min(1.0, c3)))
             for elbow in (1.0, -1.0):
