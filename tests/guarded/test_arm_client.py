@@ -52,8 +52,17 @@ def session(guarded, controller):
         with socket.create_connection((controller.host, 30002), 5.0) as screen:
             screen.sendall(b"set unlock protective stop\n")
             until(lambda: controller.state()["safety"] == "NORMAL")
-    let_move(guarded)
+    until(lambda: may_move(guarded))
     return guarded
+
+
+def may_move(session):
+    """Let the arm move, and say whether it may: a guard hears of an unlocked controller a moment later."""
+    try:
+        let_move(session)
+    except RobotRefused:
+        return False
+    return True
 
 
 def let_move(session):
