@@ -18,8 +18,6 @@ def scene_text(host, changes=None, control="internal"):
     in virtual time (test_guard_core).
     """
     text = forearm_scene(host, control, reaction='kind = "retreat"\ndistance_mm = 30', limits=_PATIENT)
-    # a retreat ends where its frames are 50 ms old, whatever the limits say: so few frames, and ones that cost little
-    text = text.replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 300\nmodel = "ladder"')
     for old, new in (changes or {}).items():
         assert old in text, old
         text = text.replace(old, new)

@@ -215,9 +215,7 @@ def test_a_controller_that_is_not_there_is_one_clear_line():
 
 @pytest.mark.long
 def test_a_port_that_is_not_there_is_one_clear_line(controller):
-    scene = scene_for(
-        controller, {'kind = "virtual"\nrate_hz = 300\nmodel = "ladder"': 'kind = "serial"\nport = "/dev/ttyNOWHERE"'}
-    )
+    scene = scene_for(controller, {'kind = "virtual"': 'kind = "serial"\nport = "/dev/ttyNOWHERE"'})
     with pytest.raises(SkinConnectionError, match="/dev/ttyNOWHERE"):
         guard(scene, start_timeout=10.0).__enter__()
 
