@@ -29,7 +29,7 @@ import numpy as np
 
 from bench.report import head
 from coneskin.skin.field.fourport import Readings, angular_phase, radial_phase
-from coneskin.skin.field.patch import solve_patch
+from tests.support.field.contact_patch import solve_patch
 from tests.support.field.port_solution import PortSolution, port_solution
 from tests.support.field.problems import Problem
 from tests.support.field.reference import Reference, load_references, provenance

@@ -91,7 +91,7 @@ def check_discs(sheet: SectorSheet, u: Floats, phi: Floats, radius: Floats, cond
         raise FieldError(
             f"a disc must lie inside the sheet: at u={u.flat[n]:.6g} m, phi={phi.flat[n]:.6g} rad the nearest edge is"
             f" {room.flat[n]:.6g} m away, the radius is {radius.flat[n]:.6g} m;"
-            " for a contact cut by an edge use solve_patch"
+            " make it smaller; of a contact that an edge cuts, give the disc about the middle of the part on the sheet"
         )
     for i in range(u.shape[1]):
         for j in range(i):

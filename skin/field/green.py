@@ -130,14 +130,6 @@ def _square(z: Complex) -> Floats:
     return z.real * z.real + z.imag * z.imag
 
 
-def _blurred(squared: Floats, blur: Floats | None) -> Floats:
-    """Return a squared distance that tends to the size of the cells where it vanishes."""
-    if blur is None:
-        return squared
-    size = np.sqrt(blur[:, :, None] * blur[:, None, :])
-    return squared + size / (1.0 + (squared / (4.0 * size)) ** 2)
-
-
 def kernel(
     strip: Strip,
     first: StripPoints,
@@ -146,7 +138,6 @@ def kernel(
     resistance_b: float,
     singular: Floats | None = None,
     diagonal: Floats | None = None,
-    blur: Floats | None = None,
     taken: Floats | None = None,
 ) -> Floats:
     """Compute Ra G_a + Rb G_b between every pair of points, without its linear part, shape (n, N, N').
@@ -159,8 +150,6 @@ def kernel(
         resistance_b: of the other sheet.
         singular: |z - z'|^2/a^2 of the pairs, divided out of A1, shape (N, N'); nowhere zero.
         diagonal: A1 of each point with itself, after that division, shape (n, N).
-        blur: squared size of the cell around each point, where points stand for cells that may touch their own images,
-            shape (n, N).
         taken: divided out of A2/A3, shape (n, N, N').
     """
     equal = resistance_a == resistance_b
@@ -177,7 +166,7 @@ def kernel(
     if diagonal is not None:
         index = np.arange(diagonal.shape[1])
         direct[:, index, index] = diagonal
-    corner = _blurred(_square(n1 + n2 - n1 * n2), blur)
+    corner = _square(n1 + n2 - n1 * n2)
     if terms:
         direct *= _square(np.asarray(_theta(q * (f1 * x2 + x1 * f2), q2, terms)))
         corner *= _square(np.asarray(_theta(f1 * f2 + q2 * (x1 * x2), q2, terms)))
@@ -186,8 +175,8 @@ def kernel(
     if equal:
         return out
     x2c, f2c, n2c = x2.conj(), f2.conj(), n2.conj()
-    end = _blurred(_square(n1 + n2c - n1 * n2c), blur)
-    edge = _blurred(_square(first.folded[:, :, None] - second.folded.conj()[:, None, :]), blur)
+    end = _square(n1 + n2c - n1 * n2c)
+    edge = _square(first.folded[:, :, None] - second.folded.conj()[:, None, :])
     if terms:
         end *= _square(np.asarray(_theta(f1 * f2c + q2 * (x1 * x2c), q2, terms)))
         edge *= _square(np.asarray(_theta(q * (f1 * x2c + x1 * f2c), q2, terms)))

@@ -175,18 +175,6 @@ class SectorSheet:
             out[..., 2:] = np.where(np.abs(angle) < 0.5 * math.pi, straight, math.inf)
         return out
 
-    def offsets(self, local: NDArray[np.complex128], u: float) -> NDArray[np.complex128]:
-        """Return the rectangle's offsets x + i y of flat offsets (e_u, e_phi) from a point at slant distance u [m]."""
-        stretch = float(self.stretch(u))
-        if self.curvature == 0.0:
-            return local / stretch
-        bent = local * (self.curvature / stretch)
-        # numpy's complex log1p loses digits near zero; the two real functions do not.
-        out = np.empty_like(local)
-        np.multiply(0.5 * np.log1p(2.0 * bent.real + bent.real**2 + bent.imag**2), 1.0 / self.curvature, out=out.real)
-        np.multiply(np.arctan2(bent.imag, 1.0 + bent.real), 1.0 / self.curvature, out=out.imag)
-        return out
-
     def flat(self, u: ArrayLike, phi: ArrayLike, at: tuple[float, float]) -> NDArray[np.complex128]:
         """Return flat coordinates along (e_u, e_phi) of the point `at`, measured from it [m], complex."""
         x, _ = self.along(u)

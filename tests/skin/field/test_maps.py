@@ -12,6 +12,7 @@ from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.maps import FieldMap
 from coneskin.skin.field.model import FieldModel
+from tests.support.field.contact_patch import rectangle_offsets
 
 from ..field_cases import PAPER, SHEETS
 
@@ -33,7 +34,7 @@ def test_boundary_conditions_and_the_contacts_law(name: str, g: float) -> None:
 
     def places(rho: float, count: int = 64) -> tuple[np.ndarray, np.ndarray]:
         ring = rho * one.radius * np.exp(2j * math.pi * np.arange(count) / count)
-        w = sheet.offsets(ring, one.u)
+        w = rectangle_offsets(sheet, ring, one.u)
         return sheet.locate(float(sheet.along(one.u)[0]) + w.real, float(sheet.across(one.phi)[0]) + w.imag)
 
     for inner, outer in (((1 - 1e-9), (1 + 1e-9)),):  # continuous over the rim

@@ -21,6 +21,7 @@ from coneskin.skin.field.fourport import radial_phase
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.multipole import solve_discs
 from coneskin.skin.field.sheet import SectorSheet
+from tests.support.field.contact_patch import rectangle_offsets
 from tests.support.sweep import sweep
 
 from ..field_cases import PAPER, SHEETS
@@ -90,7 +91,7 @@ def test_from_disc_to_disc(name: str) -> None:
     few, _, _ = circle(2, 6)
     w = [
         complex(float(sheet.along(u[0, k])[0]), float(sheet.across(phi[0, k])[0]))
-        + sheet.offsets(discs.radius[0, k] * few, float(u[0, k]))
+        + rectangle_offsets(sheet, discs.radius[0, k] * few, float(u[0, k]))
         for k in (0, 1)
     ]
     places = [sheet.locate(v.real, v.imag) for v in w]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coneskin.skin.field import patch as field_shape
 from coneskin.skin.field.fourport import Coupling, angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel
-from coneskin.skin.field.patch import ContactPatch, solve_patch
 from coneskin.skin.field.sheet import SectorSheet
 
+from . import contact_patch as field_shape
+from .contact_patch import ContactPatch, solve_patch
 from .port_solution import PortSolution
 from .problems import Array, CircularPatch, Problem
 

@@ -1,4 +1,4 @@
-"""Patches: against the exact disc, their own refinement, and exact centroids where the contact is weak."""
+"""The second method that judges the disc solver: against the exact disc, its refinement, and centroids of the weak."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.core.errors import FieldError
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel
-from coneskin.skin.field.patch import ContactPatch, clip, disc, ellipse, rectangle, solve_patch
+from tests.support.field.contact_patch import ContactPatch, disc, ellipse, rectangle, solve_patch
 from tests.support.sweep import sweep
 
 from ..field_cases import PAPER, SHEETS
@@ -91,28 +90,3 @@ def test_reciprocity_charge_and_profile() -> None:
     weak = solve_patch(model, ContactPatch(0.05, 0.7, disc(a), lambda p, q: hertz(p, q) * 1e-12), 32, 12)
     # the mean of the Hertz profile is 2/3; cells at their centroids leave 1 %
     assert weak.conductance[0] == pytest.approx(2 / 3 * g * 1e-12 * math.pi * a * a, rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda m: solve_patch(m, ContactPatch(0.5, 0.7, disc(0.01))), "lies off the sheet"),
-        (
-            lambda m: solve_patch(m, ContactPatch(0.05, 0.7, disc(0.01), -1.0)),
-            "conductance of a patch must be 0 or more",
-        ),
-        (
-            lambda m: solve_patch(m, ContactPatch(0.05, 0.7, disc(0.01), math.nan)),
-            "conductance of a patch must be 0 or more",
-        ),
-        (lambda m: solve_patch(m, ContactPatch(math.nan, 0.7, disc(0.01))), "middle of a contact must be finite"),
-        (lambda m: solve_patch(m, ContactPatch(-0.2, 0.7, disc(0.3))), "must not lie beyond the apex"),
-        (lambda m: solve_patch(m, ContactPatch(0.05, 0.7, disc(0.01)), 7), "even number of directions"),
-        (lambda m: disc(0.0), "radius of an outline must be positive"),
-        (lambda m: ellipse(0.1, -1.0), "half-axis of an outline must be positive"),
-        (lambda m: clip(PAPER, 0.05, 0.7, lambda t: t - 1.0, 16), "an outline must be positive"),
-    ],
-)
-def test_bad_patches_are_refused(make, message) -> None:
-    with pytest.raises(FieldError, match=message):
-        make(FieldModel(PAPER, 1.0, 1.0))
