@@ -33,8 +33,7 @@ from .push_in_cases import ALL_CASES, RandomCollision, case_of, draw
 REACTIONS = {
     "stop": Reaction("stop"),
     "retreat": Reaction("retreat"),
-    "path": Reaction("retreat", fallback="path"),
-    "way out of a clamp": Reaction("retreat", on_clamp="path"),
+    "back": Reaction("retreat", on_resistance="back"),
     "comply": Reaction("comply"),
     "slow": Reaction("slow"),
 }

@@ -5,7 +5,6 @@ The three are used in the same way: ``step`` returns in each control cycle how t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
@@ -21,13 +20,9 @@ from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
 __all__ = [
     "ReactionMotion",
-    "plan_answer",
     "plan_reaction_motion",
+    "plan_way_back",
 ]
-
-
-_MIN_APPROACH_SPEED = 0.02  # rad/s; a slower arm has not run into anything
-_STOOD_REASON = "the arm stood when it was touched"
 
 
 class ReactionMotion(Protocol):
@@ -89,7 +84,6 @@ def plan_reaction_motion(
     at_touch: ArmState,
     state: ArmState,
     contacts: Sequence[ContactOnLink],
-    history: PathHistory,
     space: Workspace,
 ) -> ReactionMotion | str:
     """Return the motion that a reaction wants, or why there is none.
@@ -100,30 +94,17 @@ def plan_reaction_motion(
         at_touch: the arm when the touch was seen.
         state: the arm now, standing.
         contacts: the touches, as they were last seen.
-        history: where the arm has been.
-        space: the room that the arm has; on the way back, which it has just come, its own links do not count.
+        space: the room that the arm has.
     """
     if reaction.kind == "comply":
-        return _comply(model, reaction, state, space)
-    moved = max(map(abs, at_touch.qd)) >= _MIN_APPROACH_SPEED
+        return _AdmittanceMotion(begin_admittance(model, state, reaction, space))
     if clamped(contacts):
-        why = "touches on opposite sides, or on two links, may hold the arm between them"
-        if reaction.on_clamp == "comply":
-            return _comply(model, reaction, state, space)
-        if reaction.on_clamp == "path":
-            back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD_REASON
-            return f"{why}; no way back: {back}" if isinstance(back, str) else back
-        return why
+        return "touches on opposite sides, or on two links, may hold the arm between them"
     plan = plan_retreat(model, at_touch, contacts, reaction, space, ArmSweep.begin(model, state.q))
-    if not isinstance(plan, Done):
-        return _RetreatMotion(plan)
-    if reaction.fallback != "path":
-        return plan.reason
-    back = _way_back(model, reaction, state, contacts, history, space) if moved else _STOOD_REASON
-    return f"{plan.reason}; no way back: {back}" if isinstance(back, str) else back
+    return plan.reason if isinstance(plan, Done) else _RetreatMotion(plan)
 
 
-def plan_answer(
+def plan_way_back(
     model: ArmModel,
     reaction: Reaction,
     state: ArmState,
@@ -132,38 +113,21 @@ def plan_answer(
     space: Workspace,
     since: float,
 ) -> ReactionMotion | str:
-    """Return the motion that follows where one away was resisted, or why there is none.
+    """Return the motion back the way of a retreat that was resisted, or why there is none.
+
+    It must not press on any touch.
 
     Args:
         model: the arm.
-        reaction: its ``on_resistance`` is "back" or "comply".
+        reaction: the settings.
         state: the arm now, standing.
         contacts: the touches there are now.
         history: where the arm has been.
-        space: the room that the arm has.
-        since: when the motion away began [s]; the way back ends there.
+        space: the room that the arm has. Its own links do not count, because it has just come this way.
+        since: when the motion away began [s]. The way back ends there.
     """
     if not contacts:
         return "nothing touches any more"
-    if reaction.on_resistance == "comply":
-        return _comply(model, reaction, state, space)
-    return _way_back(model, reaction, state, contacts, history, space, since)
-
-
-def _comply(model: ArmModel, reaction: Reaction, state: ArmState, space: Workspace) -> _AdmittanceMotion:
-    return _AdmittanceMotion(begin_admittance(model, state, reaction, space))
-
-
-def _way_back(
-    model: ArmModel,
-    reaction: Reaction,
-    state: ArmState,
-    contacts: Sequence[ContactOnLink],
-    history: PathHistory,
-    space: Workspace,
-    since: float = -math.inf,
-) -> _BacktrackMotion | str:
-    """Return the motion back along the arm's path, or why there is none: it must not press on any touch."""
     if any(not contact.location_valid for contact in contacts):
         return "the place of a touch is not certain, and it might press on it"
     back = plan_backtrack(model, state, history, reaction, replace(space, avoid_self=False), since)

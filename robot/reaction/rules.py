@@ -104,4 +104,4 @@ class RuleSet:
 
 
 def _still(reaction: Reaction) -> Reaction:
-    return replace(reaction, kind="stop", fallback="stop") if reaction.kind in _MOVING_KINDS else reaction
+    return replace(reaction, kind="stop") if reaction.kind in _MOVING_KINDS else reaction

@@ -18,9 +18,7 @@ __all__ = ["KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "React
 #: what an arm can do when it is touched, gentlest first
 KINDS = ("slow", "comply", "retreat", "stop")
 #: what follows where a motion away is resisted
-_RESISTANCE_CHOICES = ("stop", "back", "comply")
-#: what follows where touches may hold the arm between them
-_CLAMP_CHOICES = ("stop", "path", "comply")
+_RESISTANCE_CHOICES = ("stop", "back")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +75,8 @@ class Reaction:
         time_budget: after which the retreat ends wherever it is; a touch that slows for longer stops the arm [s].
         arm_speed: that no point of the bare arm exceeds while retreating [m/s]; a bound by the reach of each joint.
         arm_distance: that no point of the bare arm goes from where the motion began [m].
-        fallback: where no retreat along the normal is possible, "stop" stays there and "path" goes back the way that
-            the arm came.
-        on_resistance: where the touch does not become lighter, or another one comes, "stop" stays there, "back" goes
-            back the way of the retreat, not beyond where it began, and "comply" gives way to all touches.
-        on_clamp: where touches, each with a certain place, may hold the arm between them, "stop" stays there, "path"
-            goes back the way that the arm came if that leads into none of them, and "comply" gives way to all of
-            them, to none where they push against each other.
+        on_resistance: where the touch does not become lighter, or another one comes, "stop" stays there, and "back"
+            goes back the way of the retreat, not beyond where it began, if that leads into no touch.
         full_level: level at which comply gives way with its full speed.
         slow_to: the controller's speed slider while slow, 0..1.
         slow_speed: of the touched surface, below which an arm counts as slow whatever it was before [m/s].
@@ -102,21 +95,14 @@ class Reaction:
     time_budget: float = 2.0
     arm_speed: float = 0.25
     arm_distance: float = 0.1
-    fallback: str = "stop"
     on_resistance: str = "stop"
-    on_clamp: str = "stop"
     full_level: float = 0.6
     slow_to: float = 0.2
     slow_speed: float = 0.05
     press: float = 0.0005
 
     def __post_init__(self) -> None:
-        for name, choices in (
-            ("kind", KINDS),
-            ("fallback", ("stop", "path")),
-            ("on_resistance", _RESISTANCE_CHOICES),
-            ("on_clamp", _CLAMP_CHOICES),
-        ):
+        for name, choices in (("kind", KINDS), ("on_resistance", _RESISTANCE_CHOICES)):
             if (word := getattr(self, name)) not in choices:
                 raise RobotRefused(f"reaction {name} must be one of {', '.join(choices)}, got {word!r}")
         # 40 rad/s^2 is the most that the UR driver lets through; 1.5 m/s the fastest tool of that family

@@ -185,7 +185,7 @@ def test_the_check_lists_it(tmp_path: Path) -> None:
     assert summarize(with_commissioning(scene, 0.0))["commissioning"].startswith("passed on ")
 
 
-RULE = '[[reaction.rule]]\nlevel_above = 0.2\nkind = "comply"\nfallback = "path"\n'
+RULE = '[[reaction.rule]]\nlevel_above = 0.2\nkind = "comply"\n'
 STOP_WITH_RULE = VIRTUAL_RETREAT.replace('kind = "retreat"', 'kind = "stop"') + RULE
 
 

@@ -147,7 +147,7 @@ class MotionAway:
         assert self._planner is not None
         here = ArmState(state.time, state.q, state.qd)
         if resisted:
-            what, stream = "answer", self._planner.answer(reaction, here, touches.contacts, resisted.began, out)
+            what, stream = "way back", self._planner.go_back(reaction, here, touches.contacts, resisted.began, out)
         else:
             at_touch = self._at_touch or here
             what, stream = "retreat", self._planner.begin(reaction, at_touch, here, touches.placed, out)

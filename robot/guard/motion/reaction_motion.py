@@ -17,7 +17,7 @@ from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
 from coneskin.robot.guard.signals.journal import EventName, Outputs, describe_way, emit
 from coneskin.robot.reaction.backtrack import PathHistory
 from coneskin.robot.reaction.contact_supervision import ContactSupervision
-from coneskin.robot.reaction.motion import ReactionMotion, plan_answer, plan_reaction_motion
+from coneskin.robot.reaction.motion import ReactionMotion, plan_reaction_motion, plan_way_back
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
@@ -124,25 +124,25 @@ class ReactionPlanner:
             contacts: the touches, as they were last seen.
             out: takes commands and events.
         """
-        motion = plan_reaction_motion(self._model, reaction, at_touch, here, contacts, self._history, self._workspace)
+        motion = plan_reaction_motion(self._model, reaction, at_touch, here, contacts, self._workspace)
         if isinstance(motion, str):
             return motion
-        answered = reaction.on_resistance == "comply" or (reaction.on_resistance == "back" and not motion.how)
-        return self._stream(motion, reaction, here, contacts, answered and motion.how != "push", out)
+        answered = reaction.kind == "retreat" and reaction.on_resistance == "back"
+        return self._stream(motion, reaction, here, contacts, answered, out)
 
-    def answer(
+    def go_back(
         self, reaction: Reaction, here: ArmState, contacts: Sequence[ContactOnLink], since: float, out: Outputs
     ) -> MotionStream | str:
-        """Begin the motion that follows where one away was resisted, or return why that cannot be.
+        """Begin to go back the way of a retreat that was resisted, or return why that cannot be.
 
         Args:
-            reaction: its ``on_resistance`` is "back" or "comply".
+            reaction: the settings.
             here: the arm now, standing.
             contacts: the touches there are now.
             since: when the motion away began [s].
             out: takes commands and events.
         """
-        motion = plan_answer(self._model, reaction, here, contacts, self._history, self._workspace, since)
+        motion = plan_way_back(self._model, reaction, here, contacts, self._history, self._workspace, since)
         if isinstance(motion, str):
             return motion
         return self._stream(motion, reaction, here, contacts, False, out)

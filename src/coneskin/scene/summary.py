@@ -24,13 +24,7 @@ _HEARTBEAT_WORDS = {
 }
 
 #: reaction.on_resistance -> what it means
-_RESISTANCE_WORDS = {"stop": "stay", "back": "go back the way of the retreat", "comply": "give way to all touches"}
-#: reaction.on_clamp -> what it means, beside what is the default
-_CLAMP_WORDS = {
-    "stop": "",
-    "path": "; where touches hold the arm between them: go back along its path if that leads into none of them",
-    "comply": "; where touches hold the arm between them: give way to them",
-}
+_RESISTANCE_WORDS = {"stop": "stay", "back": "go back the way of the retreat"}
 
 
 def missing_parts(scene: Scene) -> list[str]:
@@ -132,10 +126,7 @@ def _reaction(reaction: Reaction) -> str:
     )
     if reaction.kind == "comply":
         return f"{text}, with full speed at level {reaction.full_level:g}"
-    text += "; else back along its path" if reaction.fallback == "path" else ""
-    return (
-        f"{text}; where the touch resists: {_RESISTANCE_WORDS[reaction.on_resistance]}{_CLAMP_WORDS[reaction.on_clamp]}"
-    )
+    return f"{text}; where the touch resists: {_RESISTANCE_WORDS[reaction.on_resistance]}"
 
 
 def _conditions(rule: Rule) -> str:

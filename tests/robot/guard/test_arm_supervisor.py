@@ -73,7 +73,7 @@ def test_the_wall_clock_is_no_part_of_it(monkeypatch):
             {"reaction": comply()},
             {"reaction": SLOW},
             {"external": True},
-            {"reaction": Reaction(kind="retreat", fallback="path")},
+            {"reaction": Reaction(kind="retreat", on_resistance="back")},
         ]
     ),
 )

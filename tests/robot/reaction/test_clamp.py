@@ -1,4 +1,4 @@
-"""Touches that may hold the arm between them: it stays, unless the scene asks for a way that presses on none."""
+"""Touches that may hold the arm between them: it only stops. A way back from a resisted retreat presses on none."""
 
 import math
 
@@ -12,22 +12,22 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import Workspace
 from coneskin.robot.reaction.backtrack import PathHistory
-from coneskin.robot.reaction.motion import _AdmittanceMotion, _BacktrackMotion, plan_reaction_motion
+from coneskin.robot.reaction.motion import _BacktrackMotion, plan_reaction_motion, plan_way_back
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 ARM = arm_model("UR5e")
 Q = (0.2, -1.4, 1.5, -1.6, -1.5, 0.3)
 CYCLE = 0.002
+REACTION = Reaction("retreat", distance=0.03, on_resistance="back")
 
 
-def planned(contacts, on_clamp, qd=(0.0, 0.0, 0.5, 0.0, 0.0, 0.0), at=Q):
-    """What an arm does that was touched as it came with these joint speeds."""
+def way_back(contacts, qd=(0.0, 0.0, 0.5, 0.0, 0.0, 0.0)):
+    """Plan the way back of an arm whose retreat, with these joint speeds, was resisted by touches."""
     history = PathHistory()
     for k in range(200, -1, -1):
-        history.update(-k * CYCLE, tuple(q - k * CYCLE * v for q, v in zip(at, qd, strict=True)))
-    reaction = Reaction("retreat", distance=0.03, on_clamp=on_clamp)
-    touch, here = ArmState(0.0, at, qd), ArmState(0.1, at)
-    return plan_reaction_motion(ARM, reaction, touch, here, contacts, history, Workspace(ARM, None))
+        history.update(-k * CYCLE, tuple(q - k * CYCLE * v for q, v in zip(Q, qd, strict=True)))
+    here = ArmState(0.1, Q)
+    return plan_way_back(ARM, REACTION, here, contacts, history, Workspace(ARM, None), -math.inf)
 
 
 def facing(link, point, towards, q=Q, valid=True, number=1):
@@ -60,47 +60,47 @@ def elbow_clamp(valid=True):
     ]
 
 
-def test_by_default_it_stays():
-    assert Reaction("retreat").on_clamp == "stop"
-    assert "may hold the arm between them" in planned(elbow_clamp(), "stop")
+@pytest.mark.promise("P36")
+def test_from_a_clamp_it_does_not_retreat():
+    touched, here = ArmState(0.0, Q, (0.0, 0.0, 0.5, 0.0, 0.0, 0.0)), ArmState(0.1, Q)
+    why = plan_reaction_motion(ARM, REACTION, touched, here, elbow_clamp(), Workspace(ARM, None))
+    assert why == "touches on opposite sides, or on two links, may hold the arm between them"
 
 
 def test_the_way_back_opens_an_elbow_that_has_closed():
-    motion = planned(elbow_clamp(), "path")
+    motion = way_back(elbow_clamp())
     assert isinstance(motion, _BacktrackMotion)
     step = motion.update(ArmState(0.1, Q, ZERO_VELOCITY), ())
     assert step.qd[2] < 0.0
     assert step.qd[:2] == pytest.approx((0.0, 0.0))
 
 
+@pytest.mark.promise("P37")
 def test_both_places_must_be_certain_and_the_arm_must_have_come_somewhere():
-    assert "not certain" in planned(elbow_clamp(valid=False), "path")
-    assert "stood when it was touched" in planned(elbow_clamp(), "path", ZERO_VELOCITY)
+    assert "not certain" in way_back(elbow_clamp(valid=False))
+    assert way_back(elbow_clamp(), ZERO_VELOCITY) == "the arm has not come from anywhere"
+    assert way_back(()) == "nothing touches any more"
 
 
 def test_it_does_not_go_back_into_what_came_from_behind():
     first, _ = elbow_clamp()
     behind = facing(3, (0.2, 0.0, 0.05), [-v for v in moving(3, (0.2, 0.0, 0.05), (0, 0, 1, 0, 0, 0))], number=2)
-    assert "leads towards the touch" in planned([first, behind], "path")
-
-
-def test_it_complies_where_the_scene_says_so():
-    assert isinstance(planned(elbow_clamp(), "comply"), _AdmittanceMotion)
+    assert "leads towards the touch" in way_back([first, behind])
 
 
 def test_an_unknown_word_is_refused():
-    with pytest.raises(RobotRefused, match="on_clamp must be one of stop, path, comply, got 'open'"):
-        Reaction("retreat", on_clamp="open")
+    with pytest.raises(RobotRefused, match="on_resistance must be one of stop, back, got 'comply'"):
+        Reaction("retreat", on_resistance="comply")
 
 
 speeds = st.tuples(*[st.floats(-0.8, 0.8)] * 3, *[st.just(0.0)] * 3)
 normals = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.3)
 
 
-@pytest.mark.promise("P36")
+@pytest.mark.promise("P37")
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 @given(speeds, st.lists(st.tuples(st.sampled_from((2, 3)), normals), min_size=2, max_size=2))
-def test_the_way_out_of_a_clamp_leads_into_no_touch(qd, touches):
+def test_the_way_back_leads_into_no_touch(qd, touches):
     """The law: whatever way it came, no touched point starts along its own normal."""
     assume(max(map(abs, qd)) > 0.1)
     contacts = []
@@ -109,7 +109,7 @@ def test_the_way_out_of_a_clamp_leads_into_no_touch(qd, touches):
         contacts.append(
             ContactOnLink(link, (0.2, 0.0, 0.08), tuple(v / length for v in normal), 0.6, True, 0.1, number)
         )
-    motion = planned(contacts, "path", qd)
+    motion = way_back(contacts, qd)
     assume(isinstance(motion, _BacktrackMotion))
     step = motion.update(ArmState(0.1, Q, ZERO_VELOCITY), ())
     assume(not isinstance(step, Done))

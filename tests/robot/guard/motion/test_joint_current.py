@@ -62,7 +62,7 @@ def resisted(how, joint=1, current=3.0):
 
 
 @pytest.mark.promise("P32")
-@pytest.mark.parametrize("how", ["stop", "back", "comply"])
+@pytest.mark.parametrize("how", ["stop", "back"])
 def test_a_retreat_that_a_force_resists_beside_the_skin_ends_at_once(how):
     rig, way = resisted(how)
     assert rig.event("retreated").details["why"] == "joint 2 takes 3.0 A more than expected: something resists it"

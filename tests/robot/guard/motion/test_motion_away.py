@@ -1,4 +1,4 @@
-"""Motion away from a touch under guard: giving way, waiting for the place, another's motion, back along the path."""
+"""Motion away from a touch under guard: giving way, waiting for the place, another's motion, a table, a clamp."""
 
 import math
 
@@ -10,7 +10,7 @@ from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram,
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
-from tests.support.guard_rig import MODEL, GuardRig, felt, touch
+from tests.support.guard_rig import GuardRig, felt, touch
 
 from ..reactions import comply
 
@@ -176,34 +176,29 @@ def clamped(**settings):
     return GuardRig(touch(0.5), opposite, sensors=2, speed=1.0, **settings)
 
 
-@pytest.mark.promise("P37")
-def test_back_along_the_path_only_where_the_scene_asks_and_nothing_is_pressed():
-    assert "retreating" not in clamped().run(1.5).names
-    pressed = clamped(reaction=Reaction(kind="retreat", fallback="path")).run(1.5)  # one of the two is in the way
-    assert "touches on opposite sides" in pressed.event("latched").details["why"]
+@pytest.mark.promise("P36")
+def test_from_touches_on_opposite_sides_it_only_stops():
+    rig = clamped().run(0.9)
+    assert "retreating" not in rig.names
+    assert "touches on opposite sides" in rig.event("latched").details["why"]
 
 
-def test_back_along_the_path_where_the_place_is_not_known():
-    """The retreat is refused by the table, which stands higher than the arm; the way back is level."""
-    table = TablePlane(2.0)
+def test_a_table_in_the_way_is_named_and_the_arm_stays():
+    table = TablePlane(2.0)  # higher than the arm
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="retreat", distance=0.08), table=table, speed=1.0).run(1.5)
     assert "the table at 2000 mm is in the way" in rig.event("latched").details["why"]
-    back = GuardRig(
-        touch(0.5, 0.7), reaction=Reaction(kind="retreat", distance=0.08, fallback="path"), table=table, speed=1.0
-    ).run(0.49)
-    was = list(back.arm.q)
-    back.run(2.0)
-    event = back.event("retreated").details
-    assert back.event("retreating").details == {"how": "path"}
-    assert event["complete"] is True
-    assert back.arm.q[1:] == pytest.approx(was[1:], abs=1e-6)  # only joint 1 had moved
-    # brakes from 1 rad/s at 10 rad/s2: 0.05 rad; 80 mm at the arm's reach, which bounds the way of every point
-    from coneskin.robot.arm.workspace import reach
-
-    assert was[0] + 0.05 + 0.012 - back.arm.q[0] == pytest.approx(0.079 / reach(MODEL)[0], abs=0.01)
 
 
 @pytest.mark.promise("P37")
-def test_an_arm_that_stood_does_not_go_back():
-    rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="retreat", fallback="path"), table=TablePlane(2.0)).run(1.5)
-    assert "the arm stood when it was touched" in rig.event("latched").details["why"]
+@pytest.mark.parametrize("answer", ["stop", "back"])
+def test_from_a_second_hand_behind_it_goes_back_only_where_the_scene_asks(answer):
+    """The first hand is gone by then: the way back leads into no touch."""
+    hands = touch(0.5, 0.65), touch(0.7, 1.5, sensor="two", phi=1.57 + math.pi)
+    reaction = Reaction("retreat", distance=0.08, arm_distance=0.3, on_resistance=answer)
+    rig = GuardRig(*hands, reaction=reaction, sensors=2, speed=1.0, follows=True).run(0.9)
+    ways = [event.details.get("how", "away") for event in rig.events if event.name == "retreating"]
+    assert ways == (["away", "path"] if answer == "back" else ["away"])
+    assert rig.core.phase is Phase.LATCHED
+    assert rig.names.count("stopping") == 2
+    if answer == "back":
+        assert 0.005 < rig.event("retreated").details["progress"] < 0.03  # no farther than the retreat had come
