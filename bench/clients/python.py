@@ -26,6 +26,39 @@ with socket.create_connection(({host!r}, 29999), 5.0) as sock:
         assert reply in file.readline()
 """
 
+#: URScript of the client's rtde_control_loop.urp, which PolyScope would write beside it
+_CONTROL_LOOP = """
+def rtde_control_loop():
+  global setp = p[0, 0, 0, 0, 0, 0]
+  rtde_set_watchdog("input_int_register_0", 1, "PAUSE")
+  write_output_integer_register(0, 1)
+  thread watch_setp():
+    while True:
+      global tmp = p[0, 0, 0, 0, 0, 0]
+      i = 0
+      while i < 6:
+        tmp[i] = read_input_float_register(i)
+        i = i + 1
+      end
+      global setp = tmp
+      sync()
+    end
+  end
+  run watch_setp()
+  while True:
+    if read_input_integer_register(0) == 1 and setp != p[0, 0, 0, 0, 0, 0]:
+      movel(setp, a=1.2, v=0.08)
+      write_output_integer_register(0, 0)
+      while read_input_integer_register(0) == 1:
+        sync()
+      end
+      write_output_integer_register(0, 1)
+    end
+    sync()
+  end
+end
+"""
+
 
 def _run(label: str, test: str, command: Sequence[str], folder: Path, timeout: float = TEST_TIMEOUT) -> Trial:
     begin = time.monotonic()
@@ -58,6 +91,7 @@ def rtde_client(source: Path) -> Iterator[Trial]:
         programs = folder / "programs"
         programs.mkdir()
         shutil.copy(examples / "rtde_control_loop.urp", programs)
+        (programs / "rtde_control_loop.script").write_text(_CONTROL_LOOP)
         with controller(programs=programs) as simulated:
             loop = examples / "example_control_loop.py"
             text = loop.read_text().replace('"localhost"', repr(simulated.host))

@@ -26,8 +26,6 @@ TEST_PROGRAMS: tuple[tuple[str, tuple[str, ...], dict[str, Any]], ...] = (
     ("rtde_tests", (), {}),
     ("dashboard_client_g5_tests", (), {"remote_control": False}),
     ("dashboard_client_g5_tests", (), {"remote_control": False, "version": "3.15"}),
-    ("dashboard_client_x_tests", (), {"remote_control": False, "version": "10.12", "robot_api_port": 80}),
-    ("dashboard_client_x_tests", (), {"remote_control": False, "version": "10.11", "robot_api_port": 80}),
     ("ur_driver_deprecated_constructor_test", (), {}),
     *(
         (name, ("--headless", headless), {})
@@ -68,6 +66,10 @@ OWN_SERVER_WORDS = (
     "destroy_client_after_server_stops_sending",
     "RTDEClientTest.test_initialization",
 )
+
+
+#: URScript of the library's wait_program.urp, which PolyScope would write beside it
+_WAIT_PROGRAM = "def wait_program():\n  while True:\n    sleep(0.01)\n    sync()\n  end\nend\n"
 
 
 class Trial(NamedTuple):
@@ -151,6 +153,7 @@ def robot(source: Path, options: dict[str, Any]) -> Iterator[str]:
         for path in (source / "tests" / "resources" / "dockerursim" / "programs" / generation).iterdir():
             if path.is_file():
                 (Path(folder) / path.name).write_bytes(path.read_bytes())
+        (Path(folder) / "wait_program.script").write_text(_WAIT_PROGRAM)
         with controller(programs=Path(folder), **options) as simulated:
             yield simulated.host
 

@@ -44,12 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--model", default=DEFAULT_MODEL, help=f"arm: {', '.join(MODEL_NAMES)} (%(default)s)")
     add("--version", default="5.25", metavar="MAJOR.MINOR", help="PolyScope version to report (%(default)s)")
     add(
-        "--quirks",
-        choices=("real", "fixed"),
-        default="real",
-        help="run the control program of ur_rtde as it is, or with corrections (%(default)s)",
-    )
-    add(
         "--start-q-deg",
         type=float,
         nargs=6,
@@ -77,12 +71,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="pause",
         help="effect of a protective stop on the running program (%(default)s)",
     )
-    add(
-        "--wrong-size",
-        choices=("truncate", "drop"),
-        default="truncate",
-        help="treatment of data packets longer than their recipe (%(default)s)",
-    )
     add("--program", type=Path, metavar="FILE", help="URScript program that the dashboard command play starts")
     add("--programs", type=Path, metavar="FOLDER", help="programs and installations that the dashboard can load")
     add(
@@ -92,13 +80,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where a loaded program with the node External Control asks for its script (%(default)s)",
     )
     add("--local-control", action="store_true", help="say that the robot is not under remote control")
-    add(
-        "--robot-api-port",
-        type=int,
-        default=0,
-        metavar="PORT",
-        help="serve the robot API of PolyScope X too, which its clients ask at port 80 (off)",
-    )
     add("--plant-descriptor", type=int, help=argparse.SUPPRESS)  # of a line to a plant, inherited: `RemotePlant`
     add("--log", type=Path, metavar="FILE", help="write a JSON line for each command and event")
     add(
@@ -129,8 +110,6 @@ def _serve(args: argparse.Namespace) -> int:
         model=args.model,
         version=_version(args.version),
         start_q=_start_q(args.model, args.start_q_deg),
-        quirks=args.quirks,
-        wrong_size=args.wrong_size,
         start_delay=args.start_delay_ms / 1000.0,
         unlock_after=args.unlock_after_s,
         after_protective_stop=args.protective_stop,
@@ -138,7 +117,6 @@ def _serve(args: argparse.Namespace) -> int:
         programs=_folder(args.programs) if args.programs else None,
         external_control=_address(args.external_control),
         remote_control=not args.local_control,
-        robot_api_port=args.robot_api_port,
     )
     parent = os.getppid()
     log = None
@@ -167,7 +145,7 @@ def _announce(args: argparse.Namespace, controller: Controller, server: Server) 
         "host": args.host,
         "model": controller.arm.model.name,
         "version": args.version,
-        "ports": PORTS | ({"robot API": api_port} if (api_port := controller.options.robot_api_port) else {}),
+        "ports": PORTS,
         "fault_address": server.fault_address,
         "pid": os.getpid(),
     }

@@ -28,47 +28,6 @@ from .urscript.values import ScriptError
 
 __all__ = ["SIMULATOR_MEMORY", "Compiler", "bounded_memory"]
 
-#: definition in which stopL and stopJ do what their names say, and end the speed and servo threads first
-_EXEC_STOP = """
-def exec_stopl_stopj(command, message):
-  deceleration = read_input_float_reg(0)
-  background = read_input_integer_reg(1)
-  enter_critical
-  if stop_thrd != 0:
-    kill stop_thrd
-    global stop_thrd = 0
-    signal_async_operation_finished()
-  end
-  kill speed_thrd
-  kill servo_thrd
-  kill servoc_thrd
-  global speed_thrd = 0
-  global servo_thrd = 0
-  global servoc_thrd = 0
-  global is_speeding = 0
-  global is_servoing = 0
-  exit_critical
-  stop_async_move()
-  global stop_dec = deceleration
-  if command == 33:
-    global stop_type = 1
-  else:
-    global stop_type = 0
-  end
-  if background == 1:
-    global stop_thrd = run stop_thread()
-  elif stop_type == 1:
-    stopl(deceleration)
-  else:
-    stopj(deceleration)
-  end
-end
-"""
-
-#: name of a function of the uploaded program -> corrected definition
-_QUIRK_FIXES = {"exec_stopl_stopj": _EXEC_STOP}
-
-
 SIMULATOR_MEMORY = 512 * 2**20  #: bytes that the simulated controller may take beyond what it has at its start
 _TRANSLATOR_MEMORY = 1024 * 2**20  # bytes for the translation of a program, likewise
 _STATUS_FILE = Path("/proc/self/statm")
@@ -113,8 +72,7 @@ class Compiler:
     A program that another has overtaken before its turn came is not translated: it would never run.
     """
 
-    def __init__(self, quirks: str) -> None:
-        self._fix_quirks = quirks == "fixed"
+    def __init__(self) -> None:
         self._known: dict[str, Translation] = {}
         self._todo: SimpleQueue[tuple[int, str, bool] | None] = SimpleQueue()
         self._done: SimpleQueue[Result] = SimpleQueue()
@@ -155,7 +113,7 @@ class Compiler:
             self._done.put((number, self._known[text]))
         elif len(text) <= _IN_PLACE_LENGTH:
             try:
-                self._done.put((number, _translate(text, self._fix_quirks)))
+                self._done.put((number, _translate(text)))
             except ScriptError as exc:
                 self._done.put((number, exc))
         else:
@@ -168,7 +126,7 @@ class Compiler:
             ScriptError: it cannot be translated.
         """
         if text not in self._known and len(text) <= _IN_PLACE_LENGTH:
-            _translate(text, self._fix_quirks)
+            _translate(text)
 
     def results(self) -> list[Result]:
         """Return what has been translated since the last call; once in each control cycle."""
@@ -187,7 +145,7 @@ class Compiler:
                 if not secondary and number < self._newest:
                     continue
                 try:
-                    made = _ask(worker, text, self._fix_quirks)
+                    made = _ask(worker, text)
                 except (OSError, struct.error, EOFError, pickle.UnpicklingError) as exc:  # it has died of this program
                     why = f"the translation has failed, or took more than {_TRANSLATION_TIME:g} s: {type(exc).__name__}"
                     self._done.put((number, ScriptError(why)))
@@ -214,13 +172,13 @@ def _end(worker: subprocess.Popen[bytes]) -> None:
         worker.communicate()
 
 
-def _ask(worker: subprocess.Popen[bytes], text: str, fix_quirks: bool) -> Translation | ScriptError:
+def _ask(worker: subprocess.Popen[bytes], text: str) -> Translation | ScriptError:
     assert worker.stdin is not None
     assert worker.stdout is not None
     deadline = threading.Timer(_TRANSLATION_TIME, worker.kill)  # the read below then ends
     deadline.start()
     try:
-        _send(worker.stdin, pickle.dumps((text, fix_quirks)))
+        _send(worker.stdin, pickle.dumps(text))
         (length,) = _LENGTH_PREFIX.unpack(worker.stdout.read(_LENGTH_PREFIX.size))
         name, secondary, code, problem = pickle.loads(worker.stdout.read(length))
     finally:
@@ -240,9 +198,9 @@ def serve() -> None:
 def _serve(source: IO[bytes], target: IO[bytes]) -> None:
     answer: tuple[str, bool, bytes, dict[str, object]]
     while len(head := source.read(_LENGTH_PREFIX.size)) == _LENGTH_PREFIX.size:
-        text, fix_quirks = pickle.loads(source.read(_LENGTH_PREFIX.unpack(head)[0]))
+        text = pickle.loads(source.read(_LENGTH_PREFIX.unpack(head)[0]))
         try:
-            made = _translate(text, fix_quirks)
+            made = _translate(text)
             answer = (made.name, made.secondary, marshal.dumps(made.code), {})
         except ScriptError as exc:
             problem = {"message": str(exc), "title": exc.title, "line": exc.line, "column": exc.column}
@@ -250,8 +208,8 @@ def _serve(source: IO[bytes], target: IO[bytes]) -> None:
         _send(target, pickle.dumps(answer))
 
 
-def _translate(text: str, fix_quirks: bool) -> Translation:
-    return translate(text, Builtins.names(), Builtins.blocking(), _QUIRK_FIXES if fix_quirks else None)
+def _translate(text: str) -> Translation:
+    return translate(text, Builtins.names(), Builtins.blocking())
 
 
 def _send(pipe: IO[bytes], data: bytes) -> None:

@@ -64,7 +64,6 @@ class SimulatedController:
         start_q: joint positions at the start [rad]; clear of every singular position if not given.
         log: file for a JSON line for each command and event.
         version: PolyScope version to report.
-        quirks: "real" runs the program of ur_rtde as it is, "fixed" with the corrections of docs/look-up/sim-ur.md.
         start_delay: from a program's last byte to its first cycle [s].
         unlock_after: time before a protective stop can be unlocked [s].
         protective_stop: "pause" or "stop", the effect of a protective stop on the running program.
@@ -72,7 +71,6 @@ class SimulatedController:
         programs: folder of the programs and installations that the dashboard can load.
         external_control: HOST:PORT at which such a program asks for the script of its External Control node.
         remote_control: whether the robot says that it is under remote control.
-        robot_api_port: on which the robot API of PolyScope X is served; 0 where it is not.
         plant: line to what its targets move, closed here on entry (``motion/remote_plant.py``); without one the arm
             follows them exactly. POSIX only.
         ready_within: time allowed until it listens [s].
@@ -90,7 +88,6 @@ class SimulatedController:
         *,
         log: Path | None = None,
         version: str = "5.25",
-        quirks: str = "real",
         start_delay: float = 0.010,
         unlock_after: float = 5.0,
         protective_stop: str = "pause",
@@ -98,7 +95,6 @@ class SimulatedController:
         programs: Path | None = None,
         external_control: str = "127.0.0.1:50002",
         remote_control: bool = True,
-        robot_api_port: int = 0,
         plant: socket.socket | None = None,
         ready_within: float = 15.0,
     ) -> None:
@@ -109,10 +105,9 @@ class SimulatedController:
         self._plant = plant
         self._process: subprocess.Popen[str] | None = None
         self._arguments = [
-            *("--host", host, "--model", model, "--version", version, "--quirks", quirks),
+            *("--host", host, "--model", model, "--version", version),
             *("--start-delay-ms", repr(start_delay * 1000.0), "--unlock-after-s", repr(unlock_after)),
             *("--protective-stop", protective_stop, "--external-control", external_control),
-            *("--robot-api-port", str(robot_api_port)),
         ]
         if start_q is not None:
             self._arguments += ["--start-q-deg", *(repr(math.degrees(q)) for q in start_q)]

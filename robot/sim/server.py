@@ -23,7 +23,6 @@ from .motion.arm import CYCLE
 from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client, LineReader
 from .ports.client_interface import Publisher, ScriptPort
 from .ports.dashboard import WELCOME, Dashboard
-from .ports.robot_api import RequestReader, RobotApi
 from .ports.rtde import RtdeOutputs, RtdeSession
 from .ports.user_interface import UserInterface
 from .urscript.translator import Translation
@@ -37,7 +36,7 @@ class _PortServices:
     """Services of one controller.
 
     Args:
-        interface: its PolyScope, behind dashboard and robot API.
+        interface: its PolyScope, behind the dashboard.
         faults: takes the lines of its port, and silences the dashboard.
         publisher: makes what a new client gets first.
     """
@@ -46,7 +45,6 @@ class _PortServices:
         self._interface, self._faults, self._publisher = interface, faults, publisher
         self._controller = interface.controller
         self._outputs = RtdeOutputs(self._controller)
-        self._api = RobotApi(interface)
 
     def client(self, name: str, sock: socket.socket) -> Client:
         """Return a new client of a service."""
@@ -56,8 +54,6 @@ class _PortServices:
         if name == "dashboard":
             dashboard = Dashboard(self._interface)
             return Client(sock, LineReader(self._unless_silent(dashboard.answer)), left=lambda: dashboard.left)
-        if name == "robot API":
-            return Client(sock, RequestReader(self._api.answer))
         if name == "faults":
             return Client(sock, LineReader(self._faults.answer))
         port = ScriptPort(self._controller, self._interface.run, messages=name == "primary")
@@ -79,7 +75,6 @@ class _PortServices:
 
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
 PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
-_OPTIONAL_PORTS = ("robot API", "faults")  # services with a port of one's own choice
 _MAX_LATENESS = 0.05  # s; later cycles are skipped, not made up for: the process was frozen
 _LOOPBACK_PREFIX = "127."  # of every address that no other computer can reach
 _ACCEPT_BACKLOG = 16  # connections that wait to be accepted
@@ -117,8 +112,8 @@ class Server:
         self._publisher = Publisher(controller)
         self._selector = selectors.SelectSelector()
         self._listeners: dict[str, socket.socket] = {}
-        self._clients: dict[str, list[Client]] = {name: [] for name in (*PORTS, *_OPTIONAL_PORTS)}
-        self._compiler = Compiler(controller.options.quirks)
+        self._clients: dict[str, list[Client]] = {name: [] for name in (*PORTS, "faults")}
+        self._compiler = Compiler()
         self._interface = UserInterface(controller, self._program, self._compiler.check)
         self._services = _PortServices(self._interface, self.faults, self._publisher)
         self._cut: set[str] = set()  # services that the network does not reach
@@ -134,8 +129,6 @@ class Server:
             for name, port in PORTS.items():
                 address = self._listen(name, self.host, port)
             self.local = is_loopback(address[0])
-            if api_port := self.controller.options.robot_api_port:
-                self._listen("robot API", self.host, api_port)
             self.controller.beyond = not self.local
             if self._with_faults:
                 self.fault_address = self._listen("faults", self.host if self.local else "127.0.0.1", 0)

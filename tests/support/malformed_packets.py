@@ -15,7 +15,6 @@ _NAMES = tuple(VARIABLES)
 _COMMANDS = ("load", "play", "pause", "popup", "addToLog", "programState", "get variable", "saveLog", "setUserRole")
 _PIECES = "def f(): / end / if / while True: / thread t(): / sec s(): / movej( / p[1,2 / 9^9^9 / $ 1 / sync()"
 _WORDS = (*'ab19.,()[]=:+-*/^%<>"\\\0', *_PIECES.split(" / "), "\n", "\n")
-_PATHS = ("robotstate/v1/robotmode", "program/v1/load", "programs/v1/x", "../../etc/passwd", "%00", "x" * 300)
 
 
 def _noise(dice: random.Random, most: int) -> bytes:
@@ -50,23 +49,12 @@ def _script(dice: random.Random) -> bytes:
     return " ".join(dice.choices(_WORDS, k=dice.randrange(12))).encode() + b"\n"
 
 
-def _robot_api(dice: random.Random) -> bytes:
-    if dice.random() < 0.3:
-        return _noise(dice, 60) + b"\r\n\r\n"
-    method = dice.choice(("GET", "PUT", "POST", "DELETE", "get", ""))
-    head = f"{method} /universal-robots/robot-api/{dice.choice(_PATHS)} HTTP/1.{dice.randrange(3)}\r\n"
-    length = dice.choice(("", "Content-Length: 5\r\n", "Content-Length: -1\r\n", "Content-Length: 99999999999\r\n"))
-    kind = dice.choice(("", "Transfer-Encoding: chunked\r\n", "Content-Type: multipart/form-data; boundary=\r\n"))
-    return (head + length + kind + "\r\n").encode() + dice.choice((b"", b"{}", b'{"action"', _noise(dice, 5)))
-
-
 _KINDS_OF: dict[str, Callable[[random.Random], bytes]] = {
     "RTDE": _rtde,
     "dashboard": _dashboard,
     "primary": _script,
     "secondary": _script,
     "realtime": _script,
-    "robot API": _robot_api,
 }
 
 #: names of the services

@@ -68,7 +68,7 @@ class Controller:
         self.arm.kinematic = plant is None
         self.plant_lost = ""
         self.cycle = 0
-        self.inputs = ClientInputs(self.arm, options.quirks == "fixed", self.log)
+        self.inputs = ClientInputs(self.log)
         self.output_ints = [0] * 48
         self.output_doubles = [0.0] * 48
         self.digital_outputs = 0

@@ -9,15 +9,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
-from coneskin.robot.sim.urscript.values import values_of
+from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.ur.rtde_codec import VARIABLES, Value
 
 __all__ = ["CURRENT", "INPUTS", "VOLTAGE", "ClientInputs", "InputWatchdog", "Terminals", "digital_outputs"]
 
 #: registers in which ur_rtde writes the number of a command, with register offset 0 and 24
 _COMMAND_REGISTERS = ("input_int_register_0", "input_int_register_24")
-_GET_FORWARD_KINEMATICS = 44  #: number of that command of ur_rtde
 
 
 #: variables that clients may write, by the RTDE guide's table of inputs
@@ -56,8 +54,6 @@ class ClientInputs:
     """Inputs of one controller. They keep their values after the client that wrote them has gone.
 
     Args:
-        arm: gives its active tool.
-        fixed: True where ur_rtde's forward kinematics use the active tool (``Options.quirks``).
         log: takes an event and its facts.
 
     Attributes:
@@ -66,14 +62,12 @@ class ClientInputs:
         external_forces: whether a client's external_force_torque counts as the measured one.
     """
 
-    def __init__(self, arm: SimulatedArm, fixed: bool, log: Callable[..., None]) -> None:
+    def __init__(self, log: Callable[..., None]) -> None:
         self.owners: dict[str, object] = {}
         self.watchdogs: dict[str, InputWatchdog] = {}
         self._values: dict[str, Value] = dict.fromkeys(INPUTS, 0)
         self._values["external_force_torque"] = (0.0,) * 6
         self.external_forces = False
-        self._arm = arm
-        self._fixed = fixed
         self._log = log
         self._fresh = False  # a command register was written, and no program has read it
 
@@ -96,14 +90,6 @@ class ClientInputs:
                 self._fresh = True
                 if command:
                     self._log("received", command=command, values=list(values.values())[1:])
-                if command == _GET_FORWARD_KINEMATICS and self._fixed:
-                    self._fix_forward_kinematics(values)
-
-    def _fix_forward_kinematics(self, names: Mapping[str, Value]) -> None:
-        """Use the active tool where the packet has none, instead of what an earlier command left behind."""
-        if "input_double_register_6" not in names:
-            for i, value in enumerate(values_of(self._arm.tcp), 6):
-                self._values[f"input_double_register_{i}"] = value
 
     def read_command(self, address: int) -> int:
         """Read an integer input register as a program does; log when it takes a command."""

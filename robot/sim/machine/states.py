@@ -122,8 +122,6 @@ class Options:
         model: name of the arm.
         version: of PolyScope, major and minor.
         start_q: joint positions at the start [rad].
-        quirks: "real": the program of ur_rtde runs as it is; "fixed": with the corrections of docs/look-up/sim-ur.md.
-        wrong_size: treatment of a data packet longer than its recipe; that of the real controller is not known.
         start_delay: from a program's last byte to its first cycle [s].
         unlock_after: time that must pass before a protective stop can be unlocked [s].
         after_protective_stop: effect of a protective stop on the program: paused (e-Series) or ended.
@@ -131,14 +129,11 @@ class Options:
         programs: folder of the programs and installations that the dashboard can load.
         external_control: host and port from which a program takes the script of its External Control node.
         remote_control: whether the robot says that it is under remote control; it takes commands in any case.
-        robot_api_port: on which the robot API of PolyScope X is served; 0 where it is not.
     """
 
     model: str = DEFAULT_MODEL
     version: Version = (5, 25)
     start_q: Sequence[float] = START_Q
-    quirks: Literal["real", "fixed"] = "real"
-    wrong_size: Literal["truncate", "drop"] = "truncate"
     start_delay: float = 0.010
     unlock_after: float = 5.0
     after_protective_stop: Literal["pause", "stop"] = "pause"
@@ -146,7 +141,6 @@ class Options:
     programs: Path | None = None
     external_control: tuple[str, int] = ("127.0.0.1", 50002)
     remote_control: bool = True
-    robot_api_port: int = 0
 
 
 class Report(IntEnum):

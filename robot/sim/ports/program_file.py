@@ -1,8 +1,8 @@
 """Programs that the dashboard can load: the folder that stands for the disk, and program files as URScript.
 
-A ``.urp`` file is XML, packed with gzip or not, in which each node of the program tree is an element; see
-`program_tree`. PolyScope writes the URScript of a program beside it, in a ``.script`` file of the same name: where that
-exists it is run instead, whatever the nodes. A ``.urpx`` file of PolyScope X is JSON that has the URScript in it.
+A ``.urp`` file is XML, packed with gzip or not. PolyScope writes the URScript of a program beside it, in a ``.script``
+file of the same name, and that is what runs. Without one, only a program whose single node is External Control is
+loaded. A ``.urpx`` file of PolyScope X is JSON that has the URScript in it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import json
 import re
 import xml.etree.ElementTree as ET
 import zlib
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,10 +18,12 @@ from coneskin.core.files import read_file
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 from coneskin.robot.sim.urscript.values import ScriptError
 
-from .program_tree import EXTERNAL_CONTROL, program_lines
+__all__ = ["EXTERNAL_CONTROL", "ProgramFile", "ProgramFolder"]
 
-__all__ = ["ProgramFile", "ProgramFolder", "program_information"]
-
+#: line that stands for the script of an External Control node until ``play`` has asked for it
+EXTERNAL_CONTROL = "# script of the node External Control"
+_EXTERNAL_CONTROL_CLASS = "com.fzi.externalcontrol.ExternalControlNode"
+_WITHOUT_EFFECT = ("Comment", "Folder", "InitVariablesNode")
 _GZIP_WINDOW = 31  # window bits for zlib: the largest, in gzip's format
 
 
@@ -60,7 +61,7 @@ def _read_program(name: str, data: bytes) -> str:
         data: its content.
 
     Raises:
-        ScriptError: it is none of them, or has a node that is not simulated.
+        ScriptError: it is none of them, or a ``.urp`` of other nodes than External Control.
     """
     function = re.sub(r"\W", "_", name.rpartition(".")[0]) or "program"
     if name.endswith(".urpx"):
@@ -70,36 +71,27 @@ def _read_program(name: str, data: bytes) -> str:
         lines = (line.strip() for line in text.splitlines())
         first = next((line for line in lines if line and not line.startswith("#")), "")
         return text if first.startswith("def ") else f"def {function}():\n{text}\nend\n"
-    if data[:2] == b"\x1f\x8b":
-        try:
+    try:
+        if data[:2] == b"\x1f\x8b":
             data = zlib.decompressobj(_GZIP_WINDOW).decompress(data, MAX_LENGTH)
-        except zlib.error as exc:
-            raise ScriptError(f"{name} is not a program: {exc}") from exc
-    if b"<!DOCTYPE" in data:
-        raise ScriptError(f"{name} is not a program: it declares a document type")
-    try:
+        if b"<!DOCTYPE" in data:
+            raise ScriptError(f"{name} is not a program: it declares a document type")
         root = ET.fromstring(data)
-    except ET.ParseError as exc:
+    except (zlib.error, ET.ParseError) as exc:
         raise ScriptError(f"{name} is not a program: {exc}") from exc
-    try:
-        return "\n".join([*program_lines(root, function), ""])
-    except (ScriptError, RecursionError) as exc:
-        raise ScriptError(f"{name}: {exc}") from exc
-
-
-def program_information(data: bytes) -> dict[str, object]:
-    """Return what a ``.urpx`` file says of its program: name, description, dates.
-
-    Raises:
-        ValueError: it is not such a file.
-    """
-    try:
-        found = json.loads(data)["program"]["programInformation"]
-        if isinstance(found["name"], str) and found["name"]:
-            return dict(found)
-    except (KeyError, TypeError, RecursionError) as exc:
-        raise ValueError(f"no program of PolyScope X: {exc}") from exc
-    raise ValueError("no program of PolyScope X: it has no name")
+    main = root.find("./children/MainProgram")
+    if main is None:
+        raise ScriptError(f"{name} has no main program")
+    nodes = [node for node in root.iterfind(".//children/*") if node is not main and node.tag not in _WITHOUT_EFFECT]
+    if [node.get("strategyClass") for node in nodes] != [_EXTERNAL_CONTROL_CLASS]:
+        kinds = dict.fromkeys(node.get("strategyProgramNodeType") or node.tag for node in nodes)
+        raise ScriptError(
+            f"{name} has the nodes {', '.join(kinds) or 'of an empty program'}, and only a single External Control is "
+            "simulated; save its .script file beside the program"
+        )
+    once = main.get("runOnlyOnce") == "true"
+    body = [EXTERNAL_CONTROL] if once else ["while True:", EXTERNAL_CONTROL, "sync()", "end"]
+    return "\n".join([f"def {function}():", *body, "end", ""])
 
 
 def _script_of(name: str, data: bytes) -> str:
@@ -180,11 +172,6 @@ class ProgramFolder:
             return self.locate(name).is_file()
         except FileNotFoundError:
             return False
-
-    def names(self, *suffixes: str) -> Iterable[str]:
-        """Return the paths, relative to the folder, of all files that end in one of these ways."""
-        found = sorted(self.root.rglob("*")) if self.root is not None else []
-        return [path.relative_to(self.root).as_posix() for path in found if path.suffix in suffixes]  # type: ignore[arg-type]
 
     def save(self, name: str, data: bytes) -> Path:
         """Write a file into the folder, and return its path.

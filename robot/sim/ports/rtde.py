@@ -299,7 +299,7 @@ class RtdeSession:
         recipe = self._inputs[number - 1]
         if len(payload) != recipe.size:
             self._c.log("bad_packet", reason=f"recipe {number} has {recipe.size} bytes, got {len(payload)}")
-            if len(payload) < recipe.size or self._c.options.wrong_size == "drop":
+            if len(payload) < recipe.size:
                 return
             payload = payload[: recipe.size]
         self._c.write_inputs(dict(zip(recipe.names, recipe.unpack(payload), strict=True)))

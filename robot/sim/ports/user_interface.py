@@ -1,4 +1,4 @@
-"""State of PolyScope, which dashboard and robot API share: the loaded program, modes, log messages, reports.
+"""State of PolyScope behind the dashboard: the loaded program, modes, log messages, reports.
 
 The script of an External Control node is asked for at ``play``, from the program that has it, without holding a cycle
 up. That program listens on a TCP port and answers the line ``request_program`` with URScript. Nothing marks its end, so
@@ -21,8 +21,7 @@ from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 from coneskin.robot.sim.urscript.values import ScriptError
 
-from .program_file import ProgramFile, ProgramFolder
-from .program_tree import EXTERNAL_CONTROL
+from .program_file import EXTERNAL_CONTROL, ProgramFile, ProgramFolder
 
 __all__ = ["SERIAL_NUMBER", "UserInterface"]
 

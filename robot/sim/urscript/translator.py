@@ -16,7 +16,7 @@ Source: Universal Robots, "The URScript Programming Language", chapters 1-2 (lan
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Set
+from collections.abc import Set
 from dataclasses import dataclass
 from types import CodeType
 
@@ -95,44 +95,31 @@ def complete_programs(text: str) -> tuple[list[str], str]:
     return programs, text[start:]
 
 
-def translate(
-    text: str, builtins: Set[str], blocking: Set[str], replace: Mapping[str, str] | None = None
-) -> Translation:
+def translate(text: str, builtins: Set[str], blocking: Set[str]) -> Translation:
     """Turn one program into a Python module.
 
     Args:
         text: from ``def name():`` or ``sec name():`` to ``end``, or a single line.
         builtins: names of the controller's functions.
         blocking: those of them that take time, and are therefore generators.
-        replace: name of a function -> URScript definition to use instead of the program's own.
 
     Raises:
         ScriptError: the text is not URScript as this module describes it; the message gives the line.
     """
     if len(text) > MAX_LENGTH:
         raise ScriptError(f"a program has at most {MAX_LENGTH} characters, got {len(text)}")
+    lines = numbered_lines(text)
+    if not lines or not re.match(r"(def|sec)\b", lines[0][1]):
+        lines = [(0, "def unnamed():"), *lines, (0, "end")]
     try:
-        return _translate(text, builtins, blocking, replace or {})
+        parser = Parser(lines)
+        program = parser.program()
+        source = _Writer(program, parser, builtins, blocking, text).module()
+        return Translation(program.name, program.kind == "sec", compile(source, f"<{program.name}>", "exec"))
     except ScriptError:
         raise
     except Exception as exc:  # of Python's own compiler, whose limits are not ours: too deep, too many, misplaced
         raise ScriptError(f"the program cannot be translated: {type(exc).__name__}: {exc}") from exc
-
-
-def _translate(text: str, builtins: Set[str], blocking: Set[str], replace: Mapping[str, str]) -> Translation:
-    lines = numbered_lines(text)
-    if not lines or not re.match(r"(def|sec)\b", lines[0][1]):
-        lines = [(0, "def unnamed():"), *lines, (0, "end")]
-    parser = Parser(lines)
-    program = parser.program()
-    for name, definition in replace.items():
-        if name in parser.functions:
-            other = Parser(numbered_lines(definition))
-            other.program()
-            parser.functions |= other.functions
-            parser.globals |= other.globals
-    source = _Writer(program, parser, builtins, blocking, text).module()
-    return Translation(program.name, program.kind == "sec", compile(source, f"<{program.name}>", "exec"))
 
 
 class _Writer:

@@ -20,7 +20,7 @@ LONG = "def long():\n" + "  sync()\n" * (_IN_PLACE_LENGTH // 8) + "end\n"
 
 @pytest.fixture
 def translator() -> Iterator[Compiler]:
-    with Compiler("real") as made:
+    with Compiler() as made:
         yield made
 
 

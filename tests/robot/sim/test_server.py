@@ -237,21 +237,6 @@ def test_the_dashboard_ends_a_connection_that_has_said_quit() -> None:
         assert server._clients["dashboard"] == []
 
 
-def test_the_robot_api_is_served_where_it_is_asked_for() -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    options = Options(version=(10, 12), robot_api_port=port)
-    with Server(Controller(options), free_host()) as server, socket.socket() as client:
-        client.connect((server.host, port))
-        server._poll(1.0)
-        client.sendall(b"GET /universal-robots/robot-api/robotstate/v1/robotmode HTTP/1.1\r\nHost: a\r\n\r\n")
-        server._poll(1.0)
-        assert client.recv(65536).endswith(b'{"mode": "RUNNING"}')
-    with Server(Controller(Options()), free_host()) as server, pytest.raises(ConnectionRefusedError):
-        socket.create_connection((server.host, port), 1.0)
-
-
 def test_ten_clients_of_each_service_are_greeted_and_looked_after() -> None:
     with Server(Controller(Options()), free_host()) as server, contextlib.ExitStack() as stack:
         for name, port in PORTS.items():

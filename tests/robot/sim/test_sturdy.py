@@ -59,12 +59,7 @@ class Reader:
 
 @pytest.fixture(scope="module")
 def started() -> Iterator[Server]:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    options = Options(version=(10, 12), robot_api_port=port, start_delay=0.002)
-    with Server(Controller(options), free_host()) as made:
-        made.ports = {**PORTS, "robot API": port}  # type: ignore[attr-defined]
+    with Server(Controller(Options(start_delay=0.002)), free_host()) as made:
         yield made
 
 
@@ -87,7 +82,7 @@ def turn(server: Server, cycles: int = 1) -> None:
 
 
 def connect(server: Server, name: str) -> socket.socket:
-    made = socket.create_connection((server.host, server.ports[name]), 5.0)  # type: ignore[attr-defined]
+    made = socket.create_connection((server.host, PORTS[name]), 5.0)
     made.setblocking(False)
     return made
 
@@ -121,9 +116,9 @@ def test_of_three_thousand_programs_in_one_go_the_last_runs_and_no_cycle_waits(
     translated: list[str] = []
     translate = compiler._translate
 
-    def counted(text: str, fix: bool) -> Translation:
+    def counted(text: str) -> Translation:
         translated.append(text)
-        return translate(text, fix)
+        return translate(text)
 
     monkeypatch.setattr(compiler, "_translate", counted)
     with connect(server, "secondary") as client:
@@ -144,9 +139,9 @@ def test_of_three_thousand_programs_in_one_go_the_last_runs_and_no_cycle_waits(
 def test_secondary_programs_share_the_time_of_many_cycles(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
 
-    def translate(text: str, fix: bool) -> Translation:
+    def translate(text: str) -> Translation:
         clock[0] += 0.0003
-        return make(text, fix)
+        return make(text)
 
     make = compiler._translate
     monkeypatch.setattr(compiler, "_translate", translate)
@@ -360,7 +355,7 @@ def test_malformed_packets_change_nothing_for_another_client(server: Server, rea
 @pytest.mark.parametrize("service", SERVICES)
 def test_many_malformed_packets_change_nothing_for_another_client(server: Server, reader: Reader, service: str) -> None:
     """A hundred thousand, in batches; what is left of a batch goes with a connection that is ended."""
-    flood(server, reader, service, 100_000, 17, batch=3_000 if service == "robot API" else 30_000)
+    flood(server, reader, service, 100_000, 17, batch=30_000)
     server.controller.stop_program("test")
     server.controller.unlock(early=True)
     with connect(server, "secondary") as client:

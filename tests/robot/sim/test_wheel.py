@@ -295,19 +295,6 @@ def test_forward_kinematics_without_a_tool_uses_stale_registers(simulated: Simul
     assert math.dist(got[:3], forward(ARM, asked).translation) > 0.9  # moveJ's speed of 1.0 was taken for 1 m
 
 
-@pytest.mark.long
-def test_the_corrected_program_has_none_of_these(tmp_path: Path) -> None:
-    asked = [0.4, -1.1, 1.2, -1.5, -1.2, 0.3]
-    log = tmp_path / "log.jsonl"
-    with SimulatedController("ur10e", free_host(), HOME, quirks="fixed", log=log) as corrected:
-        got = wheel.run("stop_in_speed_mode", corrected.host)
-        assert got == {"running": True, "stands": True, "moves": True}
-        wheel.run("stop_types", corrected.host)
-        assert stop_cycles(corrected, "StopJoints")[-2:] == [250, 250]
-        here = wheel.run("stale_forward_kinematics", corrected.host, asked)["fk"]
-        assert here == pytest.approx(list(values_of(forward(ARM, asked))), abs=ROUNDING)
-
-
 # versions and faults
 
 

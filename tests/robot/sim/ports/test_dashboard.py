@@ -15,8 +15,9 @@ from tests.support.paths import ROOT
 @pytest.fixture
 def console(tmp_path: Path) -> Console:
     (tmp_path / "cell").mkdir()
-    (tmp_path / "wait.urp").write_bytes(packed(WAIT))
-    (tmp_path / "cell" / "wait.urp").write_bytes(packed(WAIT))
+    for folder in (tmp_path, tmp_path / "cell"):
+        (folder / "wait.urp").write_bytes(packed(WAIT))
+        (folder / "wait.script").write_text("def wait():\n  while True:\n    sleep(0.01)\n  end\nend\n")
     (tmp_path / "grip.urp").write_bytes(packed('<Force type="Simple"/>'))
     (tmp_path / "default.installation").write_bytes(b"")
     return Console(tmp_path)
@@ -81,7 +82,7 @@ def test_without_a_folder_nothing_is_found() -> None:
     assert Console().say("saveLog") == "Failed to save log"
 
 
-def test_a_program_with_a_node_that_is_not_simulated_is_not_loaded(console: Console) -> None:
+def test_a_program_of_nodes_without_its_script_is_not_loaded(console: Console) -> None:
     console.say("load wait.urp")
     assert console.say("load grip.urp") == "Error while loading program: grip.urp"
     assert console.say("get loaded program") == "Loaded program: /programs/wait.urp"

@@ -284,13 +284,3 @@ def test_a_variable_called_p_is_not_a_pose() -> None:
       end
       write_output_integer_register(0, first(p[4, 0, 0, 0, 0, 0]))"""
     assert ints(program(body))[0] == 5
-
-
-def test_a_definition_can_be_replaced() -> None:
-    text = program("def f():\n  return 1\nend\nwrite_output_integer_register(0, f())")
-    mended = translate(text, Builtins.names(), Builtins.blocking(), {"f": "def f():\n  return 2\nend", "g": "broken"})
-    controller = Controller(Options(start_delay=0.0))
-    controller.load(mended)
-    for _ in range(3):
-        controller.update()
-    assert controller.output_ints[0] == 2
