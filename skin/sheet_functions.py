@@ -9,8 +9,13 @@ and its inverse is t = s f E(f L)/E(L) with E(x) = expm1(x)/x. Written so, the c
 never appears, and no two nearly equal radii are subtracted (eq. 20 as printed has lost every digit at L = 1e-15).
 
 The Robin function is what a point of contact feels of the sheet's edges (docs/understand/field.md): its value changes
-the spreading resistance, its gradient displaces the electrical centre of an extended contact. `skin/field/area_error`
-has the gradient for arrays, from the same series.
+the spreading resistance, its gradient displaces the electrical centre of an extended contact. It is the value at z' = z
+of Ru G_u + Rl G_l without its logarithm. In the strip of `field/green`, with w = s + ip and q = exp(-Sigma),
+
+    gamma = (1/2 pi) [ (Ra+Rb) ln|theta(2w)| - (Ra-Rb) ln|theta(2s)/theta(2ip)| ] - Rb s^2/(pi Sigma) + const
+    theta(z) = 2 sinh(z/2) prod (1 - q^2n e^z)(1 - q^2n e^-z)
+
+In the flat sheet the stretch adds (Ru+Rl)/(2 pi) ln(r/r1).
 """
 
 from __future__ import annotations

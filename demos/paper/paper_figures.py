@@ -25,7 +25,6 @@ from paper_pictures import (
 from paper_tables import FIGURES, TableRow, error_map, influence_of_area, largest_errors, paper_model, rows
 
 from coneskin.core.errors import ConeSkinError, FieldError
-from coneskin.skin.field.area_error import area_error
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.maps import FieldMap
 from coneskin.skin.field.model import FieldModel
@@ -192,10 +191,8 @@ def _draw(model: FieldModel, folder: Path, points: int, quiet: bool) -> list[Pat
         print(f"{count} contacts solved and drawn in {time.perf_counter() - started:.2f} s", file=sys.stderr)
     radii = np.linspace(0.5, 20.0, 40)
     r_error, theta_error = influence_of_area(model, radii, 150.0, 45.0)
-    u, phi = model.sheet.from_polar(0.15, math.radians(45.0))
-    law = area_error(model, np.full(40, float(u)), np.full(40, float(phi)), radii * 1e-3)
     label = ("contact radius [mm]", "error of r [mm]")
-    curves = [("exact", r_error, "-"), ("law: -a^2/(2r)", law[0] * 1e3, "--")]
+    curves = [("exact", r_error, "-"), ("law: -a^2/(2r)", -(radii**2) / (2.0 * 150.0), "--")]
     draw_curves(at("fig11c"), radii, [curves], label, "influence of the contact area at (150 mm, 45 deg)")
     _, off_theta = influence_of_area(model, radii, 150.0, 30.0)
     middle = [

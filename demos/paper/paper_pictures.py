@@ -12,7 +12,7 @@ from paper_experiment import POINT_CONTACT, Experiment, Sensitivity, lead_errors
 from paper_tables import TABLE_2_RADIUS_MM, decode_errors
 
 from coneskin.core.arrays import Floats
-from coneskin.skin.field.area_error import ErrorMap
+from coneskin.skin.field.maps import ErrorMap
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.pictures import make_figure, paint_error
 from coneskin.skin.field.sheet import SectorSheet

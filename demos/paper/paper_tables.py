@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coneskin.core.arrays import Floats
-from coneskin.skin.field import area_error
-from coneskin.skin.field.area_error import ErrorMap
+from coneskin.skin.field import maps
+from coneskin.skin.field.maps import ErrorMap
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 
@@ -76,7 +76,7 @@ def decode_errors(
     model: FieldModel, r: Floats, theta: Floats, radius: float, conductance: float = math.inf
 ) -> tuple[Floats, Floats]:
     """Decoded minus true (r [m], theta [rad])."""
-    return area_error.decode_errors(model, *model.sheet.from_polar(r, theta), radius, conductance)
+    return maps.decode_errors(model, *model.sheet.from_polar(r, theta), radius, conductance)
 
 
 def error_map(

@@ -33,15 +33,9 @@ __all__ = [
     "PHASE",
     "Circles",
     "circle",
-    "edge_images",
     "green_block",
-    "image_coefficients",
-    "image_distance",
     "make_circles",
     "offsets_of",
-    "other_disc",
-    "pair_coefficients",
-    "pair_distance",
     "pair_points",
     "places_of",
 ]
@@ -66,7 +60,7 @@ class _EdgeImage:
     delta: Floats
 
 
-def edge_images(sheet: SectorSheet, discs: Discs, place: int) -> list[_EdgeImage]:
+def _edge_images(sheet: SectorSheet, discs: Discs, place: int) -> list[_EdgeImage]:
     """Find the near edges of the discs at one place of every scene; edges that no disc is near are left out."""
     u, phi, a = discs.u[:, place], discs.phi[:, place], discs.radius[:, place]
     kappa = sheet.curvature
@@ -94,7 +88,7 @@ def edge_images(sheet: SectorSheet, discs: Discs, place: int) -> list[_EdgeImage
     return out
 
 
-def image_distance(image: _EdgeImage, zeta: Complex) -> Floats:
+def _image_distance(image: _EdgeImage, zeta: Complex) -> Floats:
     """Return the squared distance from each point to the image of each, to a constant, shape (n, N, N)."""
     alpha = image.alpha[:, None]
     one, two = alpha * zeta, (alpha * zeta).conj()
@@ -114,8 +108,8 @@ def _binomials(order: int) -> Floats:
     return out
 
 
-def image_coefficients(image: _EdgeImage, order: int) -> Floats:
-    """Return the Fourier coefficients of ln of `image_distance`, shape (n, 2M+1, 2M+1), as of the Green function."""
+def _image_coefficients(image: _EdgeImage, order: int) -> Floats:
+    """Return the Fourier coefficients of ln of `_image_distance`, shape (n, 2M+1, 2M+1), as of the Green function."""
     m = np.arange(1, order + 1)
     size = np.abs(image.alpha)
     divisor = np.where(size > 0.0, size, 1.0)
@@ -150,7 +144,7 @@ def _pairs(order: int) -> Floats:
     return out
 
 
-def other_disc(sheet: SectorSheet, discs: Discs, i: int, j: int) -> tuple[Complex, Complex]:
+def _other_disc(sheet: SectorSheet, discs: Discs, i: int, j: int) -> tuple[Complex, Complex]:
     """Return alpha, beta of |z_i - z_j| = const |1 + alpha zeta + beta zeta'|, circle i to circle j, shape (n,)."""
     kappa = sheet.curvature
     turn = kappa * sheet.arc * (discs.phi[:, j] - discs.phi[:, i]) / sheet.wrap
@@ -165,14 +159,14 @@ def other_disc(sheet: SectorSheet, discs: Discs, i: int, j: int) -> tuple[Comple
     return np.asarray(alpha, dtype=np.complex128), np.asarray(beta, dtype=np.complex128)
 
 
-def pair_distance(alpha: Complex, beta: Complex, zeta: Complex) -> Floats:
+def _pair_distance(alpha: Complex, beta: Complex, zeta: Complex) -> Floats:
     """Return |1 + alpha zeta + beta zeta'|^2, shape (n, N, N)."""
     z = (1.0 + alpha[:, None] * zeta)[:, :, None] + (beta[:, None] * zeta)[:, None, :]
     return np.asarray(z.real * z.real + z.imag * z.imag)
 
 
-def pair_coefficients(alpha: Complex, beta: Complex, order: int) -> Floats:
-    """Return the Fourier coefficients of ln of `pair_distance`, shape (n, 2M+1, 2M+1)."""
+def _pair_coefficients(alpha: Complex, beta: Complex, order: int) -> Floats:
+    """Return the Fourier coefficients of ln of `_pair_distance`, shape (n, 2M+1, 2M+1)."""
     m = np.arange(1, order + 1)
     out = np.zeros((alpha.size, 2 * order + 1, 2 * order + 1))
     first, second = np.abs(alpha)[:, None] ** m, np.abs(beta)[:, None] ** m
@@ -261,7 +255,7 @@ def make_circles(
     fy[:, :, 2::2] = series / sheet.breadth
     k = strip.scale
     places = range(discs.u.shape[1]) if with_images else ()
-    images = tuple(tuple(edge_images(sheet, discs, place)) for place in places)
+    images = tuple(tuple(_edge_images(sheet, discs, place)) for place in places)
     return Circles(sheet, discs, order, offset * k, slope * k, *places_of(sheet, strip, discs), fx, fy, images)
 
 
@@ -355,8 +349,8 @@ def green_block(
         values = kernel(strip, first, second, resistance_a, resistance_b, squared, slope * slope, taken=taken)
     else:
         zeta, _, _ = circle(circles.order, circles.offset.shape[2])
-        alpha, beta = other_disc(circles.sheet, circles.discs, i, j)
-        values = kernel(strip, first, second, resistance_a, resistance_b, pair_distance(alpha, beta, zeta))
+        alpha, beta = _other_disc(circles.sheet, circles.discs, i, j)
+        values = kernel(strip, first, second, resistance_a, resistance_b, _pair_distance(alpha, beta, zeta))
     b = resistance_b / math.pi
     values += ((b * weight_i)[:, None] * first.s)[:, :, None] + ((b * weight_j)[:, None] * second.s)[:, None, :]
     values -= (b / strip.sigma) * (first.s[:, :, None] * second.s[:, None, :])
@@ -367,7 +361,7 @@ def green_block(
     block[:, 0, 0] += b * centre
     if i != j:
         both = resistance_a + resistance_b
-        block -= both / (4.0 * math.pi) * pair_coefficients(alpha, beta, circles.order)
+        block -= both / (4.0 * math.pi) * _pair_coefficients(alpha, beta, circles.order)
     elif put_back is not None:
         block -= (resistance_a - resistance_b) / (4.0 * math.pi) * put_back
     return block, aliased
@@ -394,7 +388,7 @@ def _near_images(strip: Strip, circles: Circles, i: int) -> tuple[Floats | None,
     for image in circles.images[i]:
         # A2 holds the images in the ends of the strip, A3 those in its long edges.
         at_end = image.arc == strip.along_x
-        distance, logarithm = image_distance(image, zeta), image_coefficients(image, circles.order)
+        distance, logarithm = _image_distance(image, zeta), _image_coefficients(image, circles.order)
         if not at_end:
             distance, logarithm = 1.0 / distance, -logarithm
         taken = distance if taken is None else taken * distance

@@ -1,4 +1,4 @@
-"""Maps of potential and current density on the two sheets, for pictures and for checks.
+"""Maps of potential and current density on the two sheets, and of the error of the decoded place.
 
 Each sheet's potential is the straight one between its electrodes plus what the multipoles of the contacts add.
 Outside a disc their logarithmic part is a sum over moments, inside it follows the difference d = sum c_m I_m(k
@@ -14,19 +14,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import special
 
 from coneskin.core.arrays import Complex, Floats
 from coneskin.core.errors import FieldError
 
 from .circles import Circles, circle, make_circles
 from .disc import Disc, Discs, bessel_ratios, check_discs
-from .fourport import DrivePhase
+from .fourport import DrivePhase, angular_phase, radial_phase
 from .green import Strip, direct_features, kernel, mirrored
 from .model import FieldModel
 from .multipole import resolution, solve_to_tolerance
 
-__all__ = ["FieldMap"]
+__all__ = ["ErrorMap", "FieldMap", "decode_errors"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,6 +169,8 @@ class FieldMap:
 
     def _logarithm(self, disc: Disc, moments: Floats, flat: Complex) -> Floats:
         """Integrate -(1/2 pi) ln(|z - z'|/a) j at flat offsets in units of the radius."""
+        from scipy import special
+
         rho, angle = np.abs(flat), np.angle(flat)
         rs = self.model.upper_resistance + self.model.lower_resistance
         ka = disc.radius * math.sqrt(rs * disc.conductance)
@@ -190,3 +191,50 @@ class FieldMap:
             shape = special.ive(m, z) / special.ive(m, ka) * np.exp(z - ka)
             out = out - np.where(inside, rim * wave * (shape - np.where(inside, rho, 1.0) ** m), 0.0)
         return np.asarray(out)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ErrorMap:
+    """Errors of the decoded place over a grid of round contacts; NaN where the disc would not fit.
+
+    Attributes:
+        u: slant distances of the contacts [m], shape (n,).
+        phi: azimuths of the contacts [rad], shape (m,).
+        u_error: decoded minus true slant distance [m], shape (n, m).
+        phi_error: decoded minus true azimuth [rad], shape (n, m).
+    """
+
+    u: Floats
+    phi: Floats
+    u_error: Floats
+    phi_error: Floats
+
+    @classmethod
+    def of(cls, model: FieldModel, radius: float, u: Floats, phi: Floats, conductance: float = math.inf) -> ErrorMap:
+        """Compute the errors over a grid of discs of a radius [m]; conductance per area [S/m^2]."""
+        at_u, at_phi = (values.ravel() for values in np.meshgrid(u, phi, indexing="ij"))
+        fits = model.sheet.edge_distances(at_u, at_phi).min(axis=1) >= radius * (1.0 - 1e-13)
+        out = np.full((2, at_u.size), math.nan)
+        if fits.any():
+            out[:, fits] = decode_errors(model, at_u[fits], at_phi[fits], radius, conductance)
+        return cls(u, phi, *out.reshape(2, u.size, phi.size))
+
+
+def decode_errors(
+    model: FieldModel, u: Floats, phi: Floats, radius: ArrayLike, conductance: ArrayLike = math.inf
+) -> tuple[Floats, Floats]:
+    """Return decoded minus true (u [m], phi [rad]) by the paper's equations 20 and 24 from each guide pair's mean.
+
+    Args:
+        model: the sensor.
+        u: slant distance of the centres from end 1 [m].
+        phi: azimuth of the centres [rad].
+        radius: of the discs [m].
+        conductance: per area [S/m^2]; inf is a perfect bond.
+    """
+    sheet = model.sheet
+    coupling = model.contacts(u, phi, radius, conductance)
+    radial = model.read(coupling, radial_phase()).terminals[:, 2:].mean(axis=1)
+    angular = model.read(coupling, angular_phase()).terminals[:, :2].mean(axis=1)
+    seen_u, seen_phi = sheet.locate((1.0 - radial) * sheet.length, angular * sheet.breadth)
+    return seen_u - u, seen_phi - phi

@@ -2,7 +2,7 @@
 
 Outside, a disc acts like a layer of charge (L_k - L_0) d / (Ru + Rl) on its rim, with L_k the map from the potential
 on the rim to its normal derivative where lap d = k^2 d inside. Inside, d is the potential of a layer mu of
-K_0(k r) / 2 pi. Both Green functions' logarithms are integrated by `log_weights`. What L_k and L_0 have in
+K_0(k r) / 2 pi. Both Green functions' logarithms are integrated by `_log_weights`. What L_k and L_0 have in
 common is taken out by hand, so that a weak contact keeps its digits. Beside an edge or another disc, which lie along
 the rim and are no point as the apex is, the multipoles' exact images do better.
 
@@ -29,14 +29,14 @@ from .fourport import Coupling
 from .green import Strip, kernel
 from .sheet import SectorSheet
 
-__all__ = ["RimPoints", "log_weights", "near_apex", "solve_rims"]
+__all__ = ["near_apex", "solve_rims"]
 
 _SCALE_FACTOR = 4.0  # from one scale to the next
 _MIN_SCALE = 1e-9  # scale, in radii; nearer than that a rim counts as touching
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RimPoints:
+class _RimPoints:
     """N points on each rim of one scene of k discs; lengths in the rectangle in units of (shorter side)/pi.
 
     Attributes:
@@ -62,7 +62,7 @@ class RimPoints:
     p_far: Floats
 
     @classmethod
-    def of(cls, sheet: SectorSheet, strip: Strip, discs: Discs, density: int) -> RimPoints:
+    def of(cls, sheet: SectorSheet, strip: Strip, discs: Discs, density: int) -> _RimPoints:
         """Make them for one scene, `density` (even) for each scale."""
         k = discs.u.shape[1]
         maps = [_maps(sheet, discs, i) for i in range(k)]
@@ -124,7 +124,7 @@ def _crowd(t: Floats, maps: Sequence[tuple[float, float]]) -> tuple[Floats, Floa
     return theta, 1.0 / forward(theta)[1]
 
 
-def log_weights(n: int) -> Floats:
+def _log_weights(n: int) -> Floats:
     """Return the weights of f at n points t' (even) in the integral of ln(4 sin^2((t - t')/2)) f(t') dt', shape (n, n).
 
     Kress, Linear integral equations, section 12.3: exact for trigonometric polynomials below n/2.
@@ -203,11 +203,11 @@ def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density
     k = discs.u.shape[1]
     decay = np.where(np.isfinite(discs.conductance), np.sqrt(discs.conductance * rs) * discs.radius, 0.0)[0]
     density *= math.ceil(max(1.0, float(decay.max()) / 3.0))
-    points = RimPoints.of(sheet, strip, discs, density)
+    points = _RimPoints.of(sheet, strip, discs, density)
     n = points.t.size
     if n * k > _MAX_POINTS:
         return None
-    weights = log_weights(n)
+    weights = _log_weights(n)
     matrix, charges, wanted = np.empty((k, n, k, n)), [], np.empty((k, n, 3))
     x, y = sheet.along(discs.u)[0][0] / sheet.length, sheet.across(discs.phi)[0][0] / sheet.breadth
     offset = points.offset[0] / strip.scale
@@ -232,7 +232,7 @@ def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density
     return np.asarray(0.5 * (w + w.T)) if np.isfinite(w).all() else None
 
 
-def _green(strip: Strip, points: RimPoints, i: int, j: int, a: float, b: float, weights: Floats) -> Floats:
+def _green(strip: Strip, points: _RimPoints, i: int, j: int, a: float, b: float, weights: Floats) -> Floats:
     """Return Ra G_a + Rb G_b from the charge of each point of disc j to each point of disc i, shape (N, N)."""
     n = points.t.size
     first, second, weight_i, weight_j, centre = pair_points(strip, points, i, j, a == b)
@@ -259,7 +259,7 @@ def _lag(t: Floats) -> Floats:
     return lag
 
 
-def _inside(points: RimPoints, i: int, a: float, k: float, weights: Floats) -> tuple[Floats, Floats]:
+def _inside(points: _RimPoints, i: int, a: float, k: float, weights: Floats) -> tuple[Floats, Floats]:
     """Return d on the rim and the charge of each point times Ru + Rl, for each unit of the unknown layer.
 
     Args:
@@ -267,7 +267,7 @@ def _inside(points: RimPoints, i: int, a: float, k: float, weights: Floats) -> t
         i: the disc.
         a: its radius [m].
         k: of lap d = k^2 d inside [1/m]; inf is a perfect bond, where d = 0 and the charge itself is the unknown.
-        weights: of `log_weights`.
+        weights: of `_log_weights`.
     """
     n = points.t.size
     if math.isinf(k):

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
 from coneskin.core.errors import ConeSkinError
 
-__all__ = ["Openable", "Source", "SourceReopening", "open_again"]
+__all__ = ["Openable", "Source", "SourceReopening"]
 
 
 class Openable(Protocol):
@@ -73,28 +74,8 @@ _ATTEMPT_PERIOD = 0.5  # s between two attempts
 _MAX_ATTEMPTS = 1200  # ten minutes; after them somebody has to look at it anyway
 
 
-def open_again(source: Source, wait: Callable[[float], bool], attempts: int = _MAX_ATTEMPTS) -> bool:
-    """Close a source and open it, again and again; tell whether it is open.
-
-    Args:
-        source: it is gone; nobody else may use it meanwhile.
-        wait: lets so many seconds pass; True if the waiting shall stop.
-        attempts: after which it is left closed.
-    """
-    source.close()
-    for _ in range(attempts):
-        if wait(_ATTEMPT_PERIOD):
-            return False
-        try:
-            source.open()
-        except ConeSkinError:  # not there yet; that it is gone has been reported
-            continue
-        return True
-    return False
-
-
 class SourceReopening:
-    """Thread that opens a source again. It begins at once.
+    """Thread that closes a source and opens it again, every half second for ten minutes. It begins at once.
 
     Args:
         source: it is gone; nobody else may use it before ``done``.
@@ -123,4 +104,11 @@ class SourceReopening:
         self._thread.join(timeout)
 
     def _run(self) -> None:
-        self.opened = open_again(self._source, lambda time: self._stopped.is_set() or self._wait(time))
+        self._source.close()
+        for _ in range(_MAX_ATTEMPTS):
+            if self._stopped.is_set() or self._wait(_ATTEMPT_PERIOD):
+                return
+            with suppress(ConeSkinError):  # not there yet; that it is gone has been reported
+                self._source.open()
+                self.opened = True
+                return

@@ -16,12 +16,12 @@ from coneskin.skin.wire import FrameDecoder
 
 from .source import Source
 
-__all__ = ["FrameBoundary", "SourceGroup"]
+__all__ = ["SourceGroup"]
 
 _TURN_TIME = 0.001  # s for each source in turn, where there is nothing to wait on for all of them
 
 
-class FrameBoundary:
+class _FrameBoundary:
     """A stream of bytes that is handed on in whole frames; what is no frame goes with the next one.
 
     Attributes:
@@ -71,7 +71,7 @@ class SourceGroup(Source):
             )
         self.name = " + ".join(names)
         self._sources = tuple(sources)
-        self._cuts = {source.name: FrameBoundary() for source in sources}
+        self._cuts = {source.name: _FrameBoundary() for source in sources}
         self._opened = False
         self._poll: Any = None
         self._by_descriptor: dict[int, Source] = {}
@@ -92,7 +92,7 @@ class SourceGroup(Source):
             self.close()
             raise
         self._opened = True
-        self._cuts = {source.name: FrameBoundary() for source in self._sources}
+        self._cuts = {source.name: _FrameBoundary() for source in self._sources}
         descriptors = [source.fileno() for source in self._sources]
         if hasattr(select, "epoll") and None not in descriptors:
             self._poll = select.epoll()

@@ -26,7 +26,7 @@ from .scripted_touch import ScriptedTouch
 from .skin import MODELS, VirtualSkin
 from .typed_script import FAULT_NAMES, TOUCH_SHAPES, parse_fault, parse_press, read_script
 
-__all__ = ["EXAMPLE", "HELP", "add_arguments", "play_skin", "run"]
+__all__ = ["EXAMPLE", "HELP", "add_arguments", "run"]
 
 HELP = "run a virtual skin that sends the very bytes of a real one"
 EXAMPLE = """\
@@ -146,10 +146,10 @@ def run(args: argparse.Namespace) -> int:
         duration=args.duration_s,
         frame_length=args.frame_length,
     )
-    return play_skin(skin, output=args.output, link=args.link, at_once=args.now, as_json=args.json)
+    return _play_skin(skin, output=args.output, link=args.link, at_once=args.now, as_json=args.json)
 
 
-def play_skin(
+def _play_skin(
     skin: VirtualSkin,
     *,
     output: str | None = None,

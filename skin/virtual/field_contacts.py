@@ -1,6 +1,6 @@
 """Exact field as contact model of the virtual skin: any script of touches, in a tenth of a millisecond a frame.
 
-The touches stay where they are while their force changes, so ``FixedDiscs`` works out what depends on the places when
+The touches stay where they are while their force changes, so ``_FixedDiscs`` works out what depends on the places when
 a touch begins (0.5 to 5 ms), and each moment after is one small system. Around a fixed middle everything outside a disc
 is harmonic, so its m-th Fourier coefficient goes with radius^m, exactly. The coupling K of `multipole` for any radii up
 to the largest is therefore one matrix, scaled; only the discs' own answer D changes with force.
@@ -31,11 +31,11 @@ from coneskin.skin.sensor import Sensor
 from .circuit import LayerContact, Matrix
 from .ladder import ResistorLadder
 
-__all__ = ["FieldContacts", "FixedDiscs"]
+__all__ = ["FieldContacts"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FixedDiscs:
+class _FixedDiscs:
     """The places of k contacts on a sheet, and all that does not depend on how firmly they are pressed.
 
     Attributes:
@@ -55,7 +55,7 @@ class FixedDiscs:
     error: float
 
     @classmethod
-    def of(cls, model: FieldModel, u: ArrayLike, phi: ArrayLike, largest: ArrayLike) -> FixedDiscs:
+    def of(cls, model: FieldModel, u: ArrayLike, phi: ArrayLike, largest: ArrayLike) -> _FixedDiscs:
         """Prepare the places.
 
         Args:
@@ -222,7 +222,7 @@ class _Spot(NamedTuple):
 class _Setting(NamedTuple):
     """Contacts at their places, ready for any force."""
 
-    places: FixedDiscs
+    places: _FixedDiscs
     spots: tuple[_Spot, ...]
     reaches: tuple[float, ...]  #: what the spots' radii are at the contacts' firmest, before any is made smaller
 
@@ -233,7 +233,7 @@ class _Setting(NamedTuple):
         spots = _merged(sheet, [_clipped(sheet, sensor, *one, n) for n, one in enumerate(key)])
         limits = _limits(sheet, spots)
         u, phi = [spot.u for spot in spots], [spot.phi for spot in spots]
-        return cls(FixedDiscs.of(model, u, phi, limits), tuple(spots), tuple(spot.reach for spot in spots))
+        return cls(_FixedDiscs.of(model, u, phi, limits), tuple(spots), tuple(spot.reach for spot in spots))
 
     def admittances(self, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
         radius = np.empty((len(scenes), len(self.spots)))

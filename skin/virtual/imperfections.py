@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 from coneskin.core.errors import SensorError
 
-__all__ = ["ContactLaw", "Foam", "Imperfections", "RoundContact"]
+__all__ = ["ContactLaw", "Foam", "Imperfections"]
 
 
-class RoundContact(NamedTuple):
+class _RoundContact(NamedTuple):
     """A round contact between the layers.
 
     Attributes:
@@ -135,7 +135,7 @@ class ContactLaw:
             if not (math.isfinite(value) and value >= 0.0):
                 raise SensorError(f"{name} must be finite and not negative, got {value!r}")
 
-    def touch(self, force: float, radius: float = 0.0) -> RoundContact:
+    def touch(self, force: float, radius: float = 0.0) -> _RoundContact:
         """Return the contact under a seated force.
 
         Args:
@@ -144,11 +144,11 @@ class ContactLaw:
         """
         beyond = force - self.threshold_force
         if not beyond > 0.0:
-            return RoundContact(0.0, 0.0)
+            return _RoundContact(0.0, 0.0)
         if radius == 0.0:
             radius = self.radius_at_newton * math.cbrt(beyond)
         pressure = beyond * (self.radius_at_newton / radius) ** 2  # over that at 1 N
-        return RoundContact(radius, self.conductance_at_newton * pressure**self.pressure_exponent)
+        return _RoundContact(radius, self.conductance_at_newton * pressure**self.pressure_exponent)
 
 
 @dataclass(frozen=True, slots=True)

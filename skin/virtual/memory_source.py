@@ -1,7 +1,8 @@
-"""Virtual skin without any port: bytes in memory, on a clock that the caller may own."""
+"""Virtual skin without any port: bytes in memory, in real time or as fast as can be."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 
 from coneskin.core.errors import SkinConnectionError, SkinTimeout
@@ -9,59 +10,37 @@ from coneskin.skin.sources.source import Source
 
 from .skin import VirtualSkin
 
-__all__ = ["ManualClock", "MemorySource"]
-
-
-class ManualClock:
-    """A clock that moves only when ``sleep`` is called.
-
-    Args:
-        now: where it starts [s].
-    """
-
-    def __init__(self, now: float = 0.0) -> None:
-        self._now = now
-
-    def __call__(self) -> float:
-        """Return the time [s]."""
-        return self._now
-
-    def sleep(self, duration: float) -> None:
-        """Let time pass [s]."""
-        self._now += max(0.0, duration)
+__all__ = ["MemorySource"]
 
 
 class MemorySource(Source):
     """Source of a virtual skin's bytes.
 
-    By default time is simulated and a day passes as fast as it can be computed. With ``clock=time.monotonic`` and
-    ``sleep=time.sleep`` the bytes come when they are due.
+    By default time is simulated and a day passes as fast as it can be computed.
 
     Args:
         skin: the virtual skin.
-        clock: the time [s].
-        sleep: lets time pass [s]; must be given with a clock.
-        name: what to call it.
+        real_time: the bytes come when they are due.
+
+    Attributes:
+        clock: returns the time [s], simulated from 0 on or monotonic.
+        sleep: lets time pass [s].
     """
 
-    def __init__(
-        self,
-        skin: VirtualSkin,
-        clock: Callable[[], float] | None = None,
-        sleep: Callable[[float], None] | None = None,
-        name: str = "virtual skin",
-    ) -> None:
-        if (clock is None) != (sleep is None):
-            raise TypeError("MemorySource needs clock and sleep together, or neither")
-        manual = ManualClock()
-        self.clock: Callable[[], float] = clock or manual
-        self._sleep = sleep or manual.sleep
+    name = "virtual skin"
+
+    def __init__(self, skin: VirtualSkin, real_time: bool = False) -> None:
+        self._now = 0.0
+        self.clock: Callable[[], float] = time.monotonic if real_time else lambda: self._now
+        self.sleep: Callable[[float], None] = time.sleep if real_time else self._advance
         self._skin = skin
-        self.name = name
         self._packets: Iterator[tuple[float, bytes]] | None = None
         self._next: tuple[float, bytes] | None = None
         self._gone: SkinConnectionError | None = None
         self._start = 0.0
+
+    def _advance(self, duration: float) -> None:
+        self._now += duration
 
     def open(self) -> None:
         """Start the device, anew each time."""
@@ -88,7 +67,7 @@ class MemorySource(Source):
             if due > now and (parts or due > deadline):
                 break
             if due > now:
-                self._sleep(due - now)
+                self.sleep(due - now)
                 if self.clock() < due:  # woken early
                     continue
             self._next = None
@@ -98,7 +77,7 @@ class MemorySource(Source):
                 break
         if parts:
             return b"".join(parts)
-        self._sleep(deadline - self.clock())
+        self.sleep(max(0.0, deadline - self.clock()))
         raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
 
     def _peek(self) -> tuple[float, bytes]:
@@ -109,8 +88,8 @@ class MemorySource(Source):
             if self._gone is not None:
                 raise self._gone
             try:
-                time, data = next(self._packets)
-                self._next = (self._start + time, data)
+                due, data = next(self._packets)
+                self._next = (self._start + due, data)
             except StopIteration:
                 self._gone = SkinConnectionError(f"{self.name} is gone: its time of {self._skin.duration:g} s is over")
                 self._next = (self.clock(), b"")

@@ -15,7 +15,7 @@ from .circuit import WiringFaults
 from .fault_injection import FaultInjection
 from .scripted_touch import ScriptedTouch, fingers, grip, palm_over_seam
 
-__all__ = ["FAULT_NAMES", "TOUCH_SHAPES", "parse_fault", "parse_press", "parse_touch", "read_script"]
+__all__ = ["FAULT_NAMES", "TOUCH_SHAPES", "parse_fault", "parse_press", "read_script"]
 
 _MAX_SCRIPT = 1 << 20  # bytes of a script
 _PALM_RADIUS = 0.03  # m; radius of its face
@@ -68,13 +68,13 @@ def parse_press(text: str) -> tuple[str, ScriptedTouch]:
 def _parse_shape(text: str) -> tuple[str, ScriptedTouch]:
     shape, separator, rest = text.partition(":")
     if separator and shape in TOUCH_SHAPES:
-        return shape, parse_touch(rest)
+        return shape, _parse_touch(rest)
     if shape[:1].isalpha():
         raise SensorError(f"the shape of a touch must be one of {', '.join(TOUCH_SHAPES)}, got {shape!r}")
-    return "finger", parse_touch(text)
+    return "finger", _parse_touch(text)
 
 
-def parse_touch(text: str) -> ScriptedTouch:
+def _parse_touch(text: str) -> ScriptedTouch:
     """Read START_S:END_S:U_MM:PHI_DEG[:FORCE_N], U_MM and PHI_DEG each as one number or as FROM..TO.
 
     Raises:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.commissioning.acceptance.marks import MIN_MARKS, MIN_POWER, azimuth_margin, plan_marks, slant_places
+from coneskin.commissioning.acceptance.marks import MIN_MARKS, MIN_POWER, _azimuth_margin, _slant_places, plan_marks
 from coneskin.commissioning.misreadings import (
     RIGHT,
     WRONG,
@@ -45,11 +45,11 @@ sensors = st.builds(
 
 def offered(sensor: Sensor, first: float = 0.0) -> list[Mark]:
     """Places at every 15 deg from an angle on [deg], as far from the edges as marks are."""
-    margin = azimuth_margin(sensor)
+    margin = _azimuth_margin(sensor)
     angles = [math.radians(first + 15.0 * k) for k in range(24)]
     return [
         Mark(u, phi, "")
-        for u in slant_places(sensor)
+        for u in _slant_places(sensor)
         for phi in angles
         if margin <= phi <= sensor.frustum.wrap - margin
     ]

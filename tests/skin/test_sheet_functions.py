@@ -7,10 +7,10 @@ import mpmath as mp
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.field.area_error import Robin
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sheet_functions import LogScale, RobinFunction
+from tests.support.field.area_law import Robin
 
 SHAPES = ("cylinder", "nearly a cylinder", "cone", "nearly an apex")
 

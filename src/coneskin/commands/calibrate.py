@@ -88,7 +88,7 @@ def _check_names(scene: Scene, built: Scene) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calibrate the skin of a scene, or list its marks."""
     from coneskin.commissioning.calibration.calibrate import Calibrator
-    from coneskin.commissioning.skin_watch import check_touchable
+    from coneskin.commissioning.skin_watch import TouchSession, check_touchable
     from coneskin.core.errors import SceneError
     from coneskin.scene.reader import load_scene
     from coneskin.scene.tables.sensor_tables import sensor_files
@@ -104,13 +104,9 @@ def run(args: argparse.Namespace) -> int:
     check_touchable(scene, simulated)  # before the terminal is read
     live = LiveReading(args.json)
     person = None if args.simulated or args.list else Person()
+    refuses = person.refuses if person else lambda: False
     calibrator = Calibrator(
-        scene,
-        live.notice,
-        live.reading,
-        person.refuses if person else lambda: False,
-        simulated,
-        built,
+        TouchSession(scene, live.notice, live.reading, refuses, simulated, built),
         args.marks,
         1e-3 * args.mark_error_mm,
         args.forces,

@@ -60,20 +60,16 @@ def _posture(text: str) -> tuple[float, ...]:
 def run(args: argparse.Namespace) -> int:
     """Commission the skin of a scene, or list its marks."""
     from coneskin.commissioning.acceptance.commission import Commissioner
+    from coneskin.commissioning.skin_watch import TouchSession
     from coneskin.scene.commissioning_record import write_record
     from coneskin.scene.reader import load_scene
 
     scene = load_scene(args.scene)
     show = _Show(args.json)
     person = None if args.simulated or args.list else Person()
-    commissioner = Commissioner(
-        scene,
-        show.notice,
-        show.reading,
-        person.refuses if person else lambda: False,
-        q=args.posture_deg,
-        simulated=args.simulated,
-    )
+    refuses = person.refuses if person else lambda: False
+    session = TouchSession(scene, show.notice, show.reading, refuses, args.simulated)
+    commissioner = Commissioner(session, args.posture_deg)
 
     def begin(procedure: Procedure, q: Sequence[float] | None) -> None:
         if args.picture:

@@ -392,10 +392,12 @@ def _commission(scene: Scene, say: Callable[[str], None]) -> None:
         RobotRefused: the skin has not passed.
     """
     from coneskin.commissioning.acceptance.commission import Commissioner
+    from coneskin.commissioning.skin_watch import TouchSession
     from coneskin.scene.commissioning_record import write_record
 
     say("commissioning of the skin, by virtual touches (a real one: a person, with `coneskin commission`)")
-    record = Commissioner(scene, lambda notice: say(f"  {notice.kind}: {notice.text}"), simulated=True).run("the demo")
+    session = TouchSession(scene, lambda notice: say(f"  {notice.kind}: {notice.text}"), simulated=True)
+    record = Commissioner(session).run("the demo")
     write_record(scene, record)
     if not record.passed:
         raise RobotRefused(f"the virtual skin has not passed its commissioning: {record.cause}")

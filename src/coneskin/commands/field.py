@@ -14,7 +14,7 @@ from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 from .arguments.dimensions import add_key_options, given_keys
 
 if TYPE_CHECKING:
-    from coneskin.skin.field.area_error import ErrorMap
+    from coneskin.skin.field.maps import ErrorMap
     from coneskin.skin.field.model import FieldModel
 
 __all__ = ["add_arguments", "run"]
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from coneskin.geometry.frustum import Frustum
-    from coneskin.skin.field.area_error import ErrorMap
+    from coneskin.skin.field.maps import ErrorMap
     from coneskin.skin.field.model import FieldModel
     from coneskin.skin.field.sheet import SectorSheet
     from coneskin.skin.sensor import sheet_resistances

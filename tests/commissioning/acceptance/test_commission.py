@@ -7,6 +7,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.commissioning.acceptance.commission import Commissioner, commission_virtual_skin
+from coneskin.commissioning.skin_watch import TouchSession
 from coneskin.core.errors import SkinConnectionError
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.values.scene import Scene
@@ -52,7 +53,7 @@ def test_a_right_skin_passes_and_the_record_is_valid(tmp_path: Path, capsys: Out
     ],
 )
 def test_exchanged_wires_fail_and_are_named(keys: str, cause: str) -> None:
-    record = Commissioner(parse_scene(TEXT), simulated=True, wired_as=wired(keys)).run()
+    record = Commissioner(TouchSession(parse_scene(TEXT), simulated=True, wired_as=wired(keys))).run()
     assert not record.passed
     assert f"it reads as if {cause}" in record.cause
     assert not all(mark.passed for mark in record.marks)
@@ -72,7 +73,7 @@ def test_simulated_touches_are_refused_for_a_real_skin(tmp_path: Path, capsys: O
     assert main(["commission", str(path), "--simulated"]) == 1
     assert "only a person can touch it" in capsys.readouterr().err
     with pytest.raises(SkinConnectionError, match="nobody can touch it: use --simulated"):
-        Commissioner(load_scene(saved(tmp_path)))
+        TouchSession(load_scene(saved(tmp_path)))
     assert [item.name for item in tmp_path.iterdir()] == ["scene.toml"]
 
 

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from coneskin.commissioning.calibration.forces import ForceSequence, KnownPress, SensorPresses, fit_forces
+from coneskin.commissioning.calibration.forces import ForceSequence, SensorPresses, _KnownPress, fit_forces
 from coneskin.commissioning.calibration.marks import calibration_marks
 from coneskin.commissioning.touching import Touching
 from coneskin.core.errors import SceneError, SensorError, SkinError
@@ -25,8 +25,8 @@ def level(force: float, gain: float = 1.0) -> float:
     return strength / (1.0 + strength)
 
 
-def presses(gains: tuple[float, ...] = (1.0, 1.0, 1.0)) -> list[KnownPress]:
-    return [KnownPress(force, place, level(force, gain)) for place, gain in enumerate(gains) for force in FORCES]
+def presses(gains: tuple[float, ...] = (1.0, 1.0, 1.0)) -> list[_KnownPress]:
+    return [_KnownPress(force, place, level(force, gain)) for place, gain in enumerate(gains) for force in FORCES]
 
 
 @pytest.mark.parametrize("force", [1.0, 1.4, 3.0, 7.0, 10.0])
@@ -49,7 +49,7 @@ def test_what_differs_from_place_to_place_is_the_error() -> None:
 
 
 def test_forces_that_the_level_does_not_tell_are_refused() -> None:
-    flat = [KnownPress(20.0, place, level(10.0, gain) + 0.001) for place, gain in enumerate((0.9, 1.0, 1.1))]
+    flat = [_KnownPress(20.0, place, level(10.0, gain) + 0.001) for place, gain in enumerate((0.9, 1.0, 1.1))]
     with pytest.raises(SkinError, match="leave out the forces from 20 N on"):
         fit_forces(presses((0.9, 1.0, 1.1)) + flat)
 

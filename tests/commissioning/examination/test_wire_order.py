@@ -6,7 +6,7 @@ from functools import cache
 
 import pytest
 
-from coneskin.commissioning.examination.wires import WIRINGS, TouchReadings, Wiring, identify, touch_places
+from coneskin.commissioning.examination.wires import WIRINGS, TouchReadings, Wiring, _identify, touch_places
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
@@ -60,7 +60,7 @@ def test_there_are_24_orders_and_the_right_one_is_first() -> None:
 
 @pytest.mark.parametrize("wires", ["ABCD", "BADC", "DBCA"])
 def test_an_order_is_named(wires: str) -> None:
-    assert identify(SENSORS[0], readings(0, Wiring(wires, False))).wiring == Wiring(wires, False)
+    assert _identify(SENSORS[0], readings(0, Wiring(wires, False))).wiring == Wiring(wires, False)
 
 
 @pytest.mark.long
@@ -68,14 +68,14 @@ def test_an_order_is_named(wires: str) -> None:
 def test_every_order_is_named(wires: str) -> None:
     """On one sensor or the other, and with C or D driven, by turns."""
     number, turned = ORDERS.index(wires) % 2, ORDERS.index(wires) % 4 > 1
-    assert identify(SENSORS[number], readings(number, Wiring(wires, turned))).wiring == Wiring(wires, turned)
+    assert _identify(SENSORS[number], readings(number, Wiring(wires, turned))).wiring == Wiring(wires, turned)
 
 
 @pytest.mark.parametrize("wires", ["ABCD", "BACD", "ABDC"])
 def test_which_of_c_and_d_the_firmware_drives_is_told_from_their_wires(wires: str) -> None:
-    assert identify(SENSORS[1], readings(1, Wiring(wires, True))).wiring == Wiring(wires, True)
+    assert _identify(SENSORS[1], readings(1, Wiring(wires, True))).wiring == Wiring(wires, True)
 
 
 def test_touches_of_one_place_alone_are_not_explained() -> None:
     read = readings(0, WIRINGS[0])
-    assert identify(SENSORS[0], dict.fromkeys(read, read["A"])).wiring is None
+    assert _identify(SENSORS[0], dict.fromkeys(read, read["A"])).wiring is None

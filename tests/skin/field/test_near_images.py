@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from coneskin.skin.field.circles import (
+    _edge_images,
+    _image_coefficients,
+    _image_distance,
+    _other_disc,
+    _pair_coefficients,
+    _pair_distance,
     circle,
-    edge_images,
-    image_coefficients,
-    image_distance,
-    other_disc,
-    pair_coefficients,
-    pair_distance,
 )
 from coneskin.skin.field.disc import Discs
 from coneskin.skin.field.fourport import radial_phase
@@ -40,12 +40,12 @@ def scene(u: float, phi: float, radius: float, g: float = math.inf) -> Discs:
 
 @pytest.mark.parametrize(("sheet", "u", "phi", "radius"), PLACES)
 def test_coefficients_are_those_of_the_logarithm(sheet: SectorSheet, u: float, phi: float, radius: float) -> None:
-    images = edge_images(sheet, scene(u, phi, radius), 0)
+    images = _edge_images(sheet, scene(u, phi, radius), 0)
     assert images
     for image in images:
         zeta, _, fourier = circle(7, 800)
-        sampled = fourier @ np.log(image_distance(image, zeta))[0] @ fourier.T
-        assert np.abs(image_coefficients(image, 7)[0] - sampled).max() < 1e-14
+        sampled = fourier @ np.log(_image_distance(image, zeta))[0] @ fourier.T
+        assert np.abs(_image_coefficients(image, 7)[0] - sampled).max() < 1e-14
 
 
 def test_distance_is_that_of_the_mirror_image() -> None:
@@ -54,7 +54,7 @@ def test_distance_is_that_of_the_mirror_image() -> None:
     zeta, _, _ = circle(3, 8)
     r, theta = (float(v) for v in PAPER.polar(u, phi))
     z = (r + radius * zeta) * np.exp(1j * theta)
-    seen = {image.arc: image_distance(image, zeta)[0] for image in edge_images(PAPER, scene(u, phi, radius), 0)}
+    seen = {image.arc: _image_distance(image, zeta)[0] for image in _edge_images(PAPER, scene(u, phi, radius), 0)}
     straight = np.abs(z[:, None] - z.conj()) ** 2
     assert np.allclose(seen[False] / straight, (seen[False] / straight)[0, 0], rtol=1e-13)
     arc = np.abs(z[:, None] - 0.1**2 / z.conj()) ** 2 * np.abs(z) ** 2
@@ -84,10 +84,10 @@ def test_from_disc_to_disc(name: str) -> None:
     u, phi = np.array([[0.4, 0.55]]) * sheet.width, np.array([[0.5, 0.35]]) * sheet.wrap
     apart = abs(complex(sheet.flat(u[0, 1], phi[0, 1], (u[0, 0], phi[0, 0]))))
     discs = Discs(u, phi, np.array([[0.5, 0.35]]) * apart, np.array([[math.inf, math.inf]]))
-    alpha, beta = other_disc(sheet, discs, 0, 1)
+    alpha, beta = _other_disc(sheet, discs, 0, 1)
     zeta, _, fourier = circle(6, 900)
-    sampled = fourier @ np.log(pair_distance(alpha, beta, zeta))[0] @ fourier.T
-    assert np.abs(pair_coefficients(alpha, beta, 6)[0] - sampled).max() < 1e-13
+    sampled = fourier @ np.log(_pair_distance(alpha, beta, zeta))[0] @ fourier.T
+    assert np.abs(_pair_coefficients(alpha, beta, 6)[0] - sampled).max() < 1e-13
     few, _, _ = circle(2, 6)
     w = [
         complex(float(sheet.along(u[0, k])[0]), float(sheet.across(phi[0, k])[0]))
@@ -101,7 +101,7 @@ def test_from_disc_to_disc(name: str) -> None:
             for c, d in zip(*places[0], strict=True)
         ]
     )
-    ratio = drawn**2 / pair_distance(alpha, beta, few)[0]
+    ratio = drawn**2 / _pair_distance(alpha, beta, few)[0]
     assert np.allclose(ratio, ratio[0, 0], rtol=1e-12)
 
 
@@ -119,9 +119,9 @@ def test_two_discs_may_all_but_touch(g: float) -> None:
 
 def test_coefficients_of_high_orders_are_finite() -> None:
     """At order 432 products of two binomials overflowed beside an arc, and zero times infinity was no number."""
-    arcs = [image for image in edge_images(PAPER, scene(0.0599, 0.8, 0.04), 0) if image.arc]
+    arcs = [image for image in _edge_images(PAPER, scene(0.0599, 0.8, 0.04), 0) if image.arc]
     assert arcs
     for image in arcs:
-        low, high = image_coefficients(image, 7), image_coefficients(image, 432)
+        low, high = _image_coefficients(image, 7), _image_coefficients(image, 432)
         assert np.isfinite(high).all()
         assert np.allclose(high[:, :15, :15], low, rtol=1e-13, atol=1e-16)

@@ -12,7 +12,7 @@ from coneskin.skin.field.disc import Disc, Discs
 from coneskin.skin.field.green import Strip
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.multipole import FIRST, solve_discs
-from coneskin.skin.field.rim import RimPoints, log_weights, solve_rims
+from coneskin.skin.field.rim import _log_weights, _RimPoints, solve_rims
 from coneskin.skin.field.sheet import SectorSheet
 from tests.support.field import rim_solution
 from tests.support.sweep import sweep
@@ -115,13 +115,13 @@ def test_weights_integrate_the_logarithm() -> None:
     t = 2.0 * math.pi * np.arange(16) / 16
     for m in range(8):
         wanted = -2.0 * math.pi / m * np.cos(m * t) if m else 0.0 * t
-        assert np.allclose(log_weights(16) @ np.cos(m * t), wanted, atol=1e-13)
+        assert np.allclose(_log_weights(16) @ np.cos(m * t), wanted, atol=1e-13)
 
 
 def test_points_crowd_beside_the_apex() -> None:
     sheet, disc = disc_of(*APEX["bond, 1 : 500, full turn"])
     one = Discs(*(np.array([[v]]) for v in (disc.u, disc.phi, disc.radius, disc.conductance)))
-    points = RimPoints.of(sheet, Strip.of(sheet.length, sheet.breadth), one, 16)
+    points = _RimPoints.of(sheet, Strip.of(sheet.length, sheet.breadth), one, 16)
     gap = float(sheet.stretch(disc.u)) / sheet.curvature / disc.radius - 1.0
     theta = np.sort(np.remainder(points.theta[0], 2.0 * math.pi))
     near = np.diff(theta)[np.abs(theta[1:] - math.pi) < gap]

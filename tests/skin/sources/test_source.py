@@ -3,7 +3,7 @@
 import pytest
 
 from coneskin.core.errors import SkinConnectionError
-from coneskin.skin.sources.source import Source, SourceReopening, open_again
+from coneskin.skin.sources.source import Source, SourceReopening
 
 
 class Absent(Source):
@@ -30,26 +30,15 @@ class Absent(Source):
         return b""
 
 
-def test_it_is_closed_once_and_tried_until_it_is_there():
-    source, waits = Absent(3), []
-    assert open_again(source, lambda time: bool(waits.append(time)))
-    assert source.calls == ["close", "open", "open", "open"]
-    assert waits == [0.5, 0.5, 0.5]
-
-
-def test_it_is_given_up_after_ten_minutes():
-    source, waits = Absent(10_000), []
-    assert not open_again(source, lambda time: bool(waits.append(time)))
-    assert sum(waits) == 600.0
-    assert source.calls.count("open") == 1200
-
-
-@pytest.mark.parametrize(("opens_at", "opened"), [(2, True), (10_000, False)])
-def test_a_thread_does_it_and_says_how_it_ended(opens_at, opened):
-    reopening = SourceReopening(Absent(opens_at), wait=lambda _: False)
+@pytest.mark.parametrize(("opens_at", "attempts"), [(2, 2), (3, 3), (10_000, 1200)])
+def test_it_is_closed_once_and_tried_for_ten_minutes_until_it_is_there(opens_at, attempts):
+    source, waits = Absent(opens_at), []
+    reopening = SourceReopening(source, wait=lambda time: bool(waits.append(time)))
     reopening._thread.join(10.0)
     assert reopening.done
-    assert reopening.opened is opened
+    assert reopening.opened is (attempts == opens_at)
+    assert source.calls == ["close", *["open"] * attempts]
+    assert waits == [0.5] * attempts
 
 
 def test_it_can_be_told_to_stop():

@@ -12,7 +12,7 @@ from coneskin.skin.detection.events import TouchBegan
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.source import Source
-from coneskin.skin.sources.source_group import FrameBoundary, SourceGroup
+from coneskin.skin.sources.source_group import SourceGroup, _FrameBoundary
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import FrameDecoder
@@ -90,7 +90,7 @@ def test_what_one_port_loses_costs_the_other_nothing() -> None:
 
 
 def test_the_boundary_hands_on_every_byte_in_its_order() -> None:
-    data, cut, out = b"noise" + sent(CUFF, 5) + b"\xc5\x3a", FrameBoundary(), b""
+    data, cut, out = b"noise" + sent(CUFF, 5) + b"\xc5\x3a", _FrameBoundary(), b""
     for at in range(0, len(data), 7):
         out += cut.cut(data[at : at + 7])
     assert data.startswith(out)

@@ -38,8 +38,8 @@ def run(*words: str) -> int:
 
 
 def test_a_touch_is_read_in_millimetres_and_degrees():
-    assert typed_script.parse_touch("1:1.5:200:90") == ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2)
-    assert typed_script.parse_touch("1:1.5:200:90:7").force == 7.0
+    assert typed_script._parse_touch("1:1.5:200:90") == ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2)
+    assert typed_script._parse_touch("1:1.5:200:90:7").force == 7.0
     assert typed_script.parse_press("1:1.5:200:90") == ("finger", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
     assert typed_script.parse_press("grip:1:1.5:200:90") == ("grip", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
     with pytest.raises(SensorError, match="must be one of finger, palm, fingers, grip, seam, got 'fist'"):
@@ -66,7 +66,7 @@ def test_every_shape_reaches_the_bytes_of_every_length(shape, contacts, tmp_path
 @pytest.mark.parametrize("text", ["", "1:2:3", "1:2:3:4:5:6", "a:b:c:d", "2:1:100:10"])
 def test_a_touch_that_cannot_be(text):
     with pytest.raises(SensorError, match="a touch must"):
-        typed_script.parse_touch(text)
+        typed_script._parse_touch(text)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from coneskin.core.errors import FieldError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
-from coneskin.skin.virtual.field_contacts import FixedDiscs
+from coneskin.skin.virtual.field_contacts import _FixedDiscs
 
 TUBE, CONE = Frustum(0.0376, 0.0373, 0.24), Frustum(0.04, 0.07, 0.15, 5.0)
 U, PHI, LARGEST = np.array([0.08, 0.11, 0.04]), np.array([2.0, 2.35, 0.5]), np.array([0.0095, 0.0095, 0.008])
@@ -20,7 +20,7 @@ U, PHI, LARGEST = np.array([0.08, 0.11, 0.04]), np.array([2.0, 2.35, 0.5]), np.a
 @pytest.mark.parametrize("k", [1, 2, 3])
 def test_any_force_is_the_full_solve(link: Frustum, lower: float, k: int) -> None:
     sheet = SectorSheet.of_frustum(link)
-    places = FixedDiscs.of(FieldModel(sheet, 1000.0, lower, 1e-7), U[:k], PHI[:k], LARGEST[:k])
+    places = _FixedDiscs.of(FieldModel(sheet, 1000.0, lower, 1e-7), U[:k], PHI[:k], LARGEST[:k])
     rng = np.random.default_rng(k)
     radius, conductance = LARGEST[:k] * rng.uniform(0.01, 1.0, (20, k)), 10 ** rng.uniform(-3, 5, (20, k))
     conductance[0] = np.inf
@@ -37,7 +37,7 @@ def test_any_force_is_the_full_solve(link: Frustum, lower: float, k: int) -> Non
 
 def test_reciprocal_and_without_net_current() -> None:
     model = FieldModel(SectorSheet.of_frustum(TUBE), 1000.0, 300.0)
-    places = FixedDiscs.of(model, U, PHI, LARGEST)
+    places = _FixedDiscs.of(model, U, PHI, LARGEST)
     y = model.admittance(places.coupling([[0.003, 0.002, 0.001]], [[1.0, 10.0, 100.0]]))[0]
     assert (y == y.T).all()
     assert np.abs(y.sum(axis=1)).max() < 1e-17  # entries are up to 1e-3 S
@@ -46,8 +46,8 @@ def test_reciprocal_and_without_net_current() -> None:
 def test_what_cannot_be_is_refused() -> None:
     model = FieldModel(SectorSheet.of_frustum(TUBE), 1000.0, 300.0)
     with pytest.raises(FieldError, match="discs must not overlap"):
-        FixedDiscs.of(model, [0.08, 0.09], [2.0, 2.0], [0.006, 0.006])
-    places = FixedDiscs.of(model, [0.08], [2.0], [0.006])
+        _FixedDiscs.of(model, [0.08, 0.09], [2.0, 2.0], [0.006, 0.006])
+    places = _FixedDiscs.of(model, [0.08], [2.0], [0.006])
     with pytest.raises(FieldError, match="radius of a contact must be above 0 and at most"):
         places.coupling([[0.007]], [[1.0]])
     with pytest.raises(FieldError, match="conductance of a contact must be above 0"):

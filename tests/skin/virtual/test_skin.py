@@ -16,7 +16,7 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, Matrix, counts_of, measure
 from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.imperfections import Foam, Imperfections
-from coneskin.skin.virtual.memory_source import ManualClock, MemorySource
+from coneskin.skin.virtual.memory_source import MemorySource
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import MODELS, VirtualSkin
 from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder
@@ -250,26 +250,24 @@ def test_a_gain_spoils_all_readings_of_its_input_and_nothing_else():
 
 
 def test_the_memory_source_tells_when_the_bytes_came():
-    clock = ManualClock(100.0)
-    with MemorySource(VirtualSkin(SENSOR, rate_hz=100, duration=0.05), clock, clock.sleep) as source:
+    with MemorySource(VirtualSkin(SENSOR, rate_hz=100, duration=0.05)) as source:
         arrivals = []
         for _ in range(5):
             assert len(source.read(1.0)) == FRAME_LENGTH
-            arrivals.append(clock())
+            arrivals.append(source.clock())
         with pytest.raises(SkinConnectionError, match=r"its time of 0.05 s is over"):
             source.read(1.0)
-    assert arrivals == pytest.approx([100.01, 100.02, 100.03, 100.04, 100.05])
+    assert arrivals == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05])
 
 
 def test_the_memory_source_waits_no_longer_than_asked():
-    clock = ManualClock()
-    with MemorySource(VirtualSkin(SENSOR, rate_hz=10), clock, clock.sleep) as source:
+    with MemorySource(VirtualSkin(SENSOR, rate_hz=10)) as source:
         with pytest.raises(SkinTimeout):
             source.read(0.03)
-        assert clock() == pytest.approx(0.03)
-        clock.sleep(0.3)
+        assert source.clock() == pytest.approx(0.03)
+        source.sleep(0.3)
         assert len(source.read(0.0)) == 3 * FRAME_LENGTH  # what was due meanwhile comes at once
-        assert clock() == pytest.approx(0.33)
+        assert source.clock() == pytest.approx(0.33)
 
 
 @pytest.mark.parametrize(

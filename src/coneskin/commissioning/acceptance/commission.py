@@ -26,10 +26,8 @@ from .procedure import Procedure, SensorMarks
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from coneskin.commissioning.touching import Notice
     from coneskin.robot.arm.model import Joints
     from coneskin.scene.values.scene import ArmScene
-    from coneskin.skin.detection.frame.reading import TouchReading
 
 __all__ = ["Commissioner", "commission_virtual_skin", "prepare"]
 
@@ -122,31 +120,16 @@ def prepare(scene: Scene, q: Sequence[float] | None) -> Procedure:
     return procedure
 
 
-class Commissioner(TouchSession):
+class Commissioner:
     """One commissioning of a scene.
 
     Args:
-        scene: as of ``TouchSession``, as all others but the last one.
-        notice: called with what the person is told.
-        reading: called with what the sensors read now.
-        refused: tells whether the person has said that a mark cannot be reached.
-        simulated: touch the scene's virtual skin as the marks say.
-        wired_as: scene from which the virtual skin is made: a wrong wiring, for tests.
+        session: with the skin of the scene.
         q: joint positions, where no arm is asked [rad].
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        notice: Callable[[Notice], None] = lambda _: None,
-        reading: Callable[[dict[str, TouchReading | None]], None] = lambda _: None,
-        refused: Callable[[], bool] = lambda: False,
-        simulated: bool = False,
-        wired_as: Scene | None = None,
-        q: Sequence[float] | None = None,
-    ) -> None:
-        super().__init__(scene, notice, reading, refused, simulated, wired_as)
-        self._q = q
+    def __init__(self, session: TouchSession, q: Sequence[float] | None = None) -> None:
+        self._session, self._scene, self._q = session, session.scene, q
 
     def plan(self) -> tuple[Procedure, Sequence[float] | None]:
         """Return the procedure with its marks, and the joint positions that they are described for [rad].
@@ -157,7 +140,7 @@ class Commissioner(TouchSession):
         """
         with ExitStack() as stack:
             q, _ = self._posture(stack)
-        return prepare(self.scene, q), q
+        return prepare(self._scene, q), q
 
     def run(
         self, by: str = "", begin: Callable[[Procedure, Sequence[float] | None], None] = lambda *_: None
@@ -178,27 +161,26 @@ class Commissioner(TouchSession):
         """
         with ExitStack() as stack:
             q, check_arm = self._posture(stack)
-            procedure = prepare(self.scene, q)
+            procedure = prepare(self._scene, q)
             begin(procedure, q)
-            watch = stack.enter_context(self.watch())
-            self.carry_out(procedure, watch, _VIRTUAL_DURATION, check_arm)
+            watch = stack.enter_context(self._session.watch())
+            self._session.carry_out(procedure, watch, _VIRTUAL_DURATION, check_arm)
             if procedure.incomplete:
                 raise RobotRefused(procedure.incomplete)
         wrong = [watch.contradiction(item.sensor.name) for item in procedure.sensors]
         cause = procedure.cause or "; ".join(filter(None, wrong))
         results = tuple(result for item in procedure.sensors for result in item.results)
         date = datetime.now(UTC).isoformat(timespec="seconds")
-        scene_hash = fingerprint(self.scene)
+        scene_hash = fingerprint(self._scene)
         return CommissioningRecord(date, __version__, scene_hash, procedure.passed and not cause, cause, by, results)
 
     def _posture(self, stack: ExitStack) -> tuple[Sequence[float] | None, Callable[[], None]]:
         """Return the joint positions to describe marks for, and a check that they stay."""
-        if self.scene.arm is None:
+        if self._scene.arm is None:
             return None, lambda: None
-        if self._q is not None or self.simulated:
+        if self._q is not None or self._session.simulated:
             return self._q or _SIMULATED_Q, lambda: None
-
-        watch = stack.enter_context(_ArmWatch(self.scene.arm))
+        watch = stack.enter_context(_ArmWatch(self._scene.arm))
         return watch.q, watch.check
 
 
@@ -211,7 +193,7 @@ def commission_virtual_skin(scene: Scene) -> Scene:
         SkinConnectionError: the skin is not virtual.
         RobotRefused: it has not passed; the message says why.
     """
-    record = Commissioner(scene, simulated=True).run()
+    record = Commissioner(TouchSession(scene, simulated=True)).run()
     if not record.passed:
         raise RobotRefused(f"the virtual skin of {scene.name} has not passed its commissioning: {record.cause}")
     note = f"virtual, {len(record.marks)} marks touched by this program"

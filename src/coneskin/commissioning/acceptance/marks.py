@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["MIN_MARKS", "MIN_POWER", "azimuth_margin", "offer_marks", "place_sensors", "plan_marks", "slant_places"]
+__all__ = ["MIN_MARKS", "MIN_POWER", "offer_marks", "place_sensors", "plan_marks"]
 
 MIN_MARKS = 5  #: marks on each sensor
 MIN_POWER = 2.0  #: tolerances by which each misreading must miss one of the marks
@@ -33,12 +33,12 @@ _EDGE_PART = 0.1  # part of the wrap beside each edge without marks
 _FINGER_WIDTH = 0.015  # m from an edge that a finger needs
 
 
-def slant_places(sensor: Sensor) -> list[float]:
+def _slant_places(sensor: Sensor) -> list[float]:
     """Return the slant distances at which a sensor may have marks [m]."""
     return [part * sensor.frustum.slant for part in _SLANT_PARTS]
 
 
-def azimuth_margin(sensor: Sensor) -> float:
+def _azimuth_margin(sensor: Sensor) -> float:
     """Return the azimuth beside each straight edge in which a sensor has no marks [rad]."""
     cone = sensor.frustum
     return min(max(_EDGE_PART * cone.wrap, _FINGER_WIDTH / min(cone.radius1, cone.radius2)), 0.25 * cone.wrap)
@@ -111,9 +111,9 @@ def offer_marks(sensor: Sensor, placed: SensorOnArm, q: Sequence[float] | None) 
 
 
 def _on_sheet(sensor: Sensor, step: float) -> list[Mark]:
-    cone, margin = sensor.frustum, azimuth_margin(sensor)
+    cone, margin = sensor.frustum, _azimuth_margin(sensor)
     marks = []
-    for u in slant_places(sensor):
+    for u in _slant_places(sensor):
         for number in range(1, math.ceil(math.degrees(cone.wrap) / step)):
             phi = math.radians(number * step)
             if margin <= phi <= cone.wrap - margin:
@@ -136,7 +136,7 @@ def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float
     twelve, reference = _twelve(along)
     right = _cross(along, twelve)
     near, far = _JOINT_NAMES[placed.link], _JOINT_NAMES[placed.link + 1]
-    margin, marks = azimuth_margin(sensor), []
+    margin, marks = _azimuth_margin(sensor), []
     for u in _rounded(sensor, placed, placed.model):
         distance = _distance(sensor, placed, placed.model, u, from_end1, near)
         azimuth = _azimuths(placed, u)
@@ -209,7 +209,7 @@ def _from_joint(placed: SensorOnArm, model: ArmModel, u: float) -> float:
 
 def _rounded(sensor: Sensor, placed: SensorOnArm, model: ArmModel) -> list[float]:
     """Return slant distances of marks whose distance from the joint is a round number [m]."""
-    places = slant_places(sensor)
+    places = _slant_places(sensor)
     if placed.link not in _TUBE_LINKS or sensor.frustum.slant < 20.0 * _DISTANCE_STEP:
         return places
     slope = (_from_joint(placed, model, places[-1]) - _from_joint(placed, model, places[0])) / (places[-1] - places[0])

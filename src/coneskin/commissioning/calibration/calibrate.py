@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,9 +20,7 @@ from .marks import calibration_marks, find_design, printed_marks
 from .touches import SensorTouches, TouchSequence
 
 if TYPE_CHECKING:
-    from coneskin.commissioning.touching import Mark, Notice
-    from coneskin.scene.values.scene import Scene
-    from coneskin.skin.detection.frame.reading import TouchReading
+    from coneskin.commissioning.touching import Mark
     from coneskin.skin.sensor import Sensor
 
 __all__ = ["CalibrationResult", "Calibrator"]
@@ -50,16 +48,11 @@ class CalibrationResult:
     refusal: str = ""
 
 
-class Calibrator(TouchSession):
+class Calibrator:
     """One calibration of all sensors of a scene.
 
     Args:
-        scene: with a source, read without calibrations; as of ``TouchSession``, as all others down to ``wired_as``.
-        notice: called with what the person is told.
-        reading: called with what the sensors read now.
-        refused: tells whether the person has said that a mark cannot be reached.
-        simulated: touch the scene's virtual skin at the marks.
-        wired_as: scene from which the virtual skin is made, where it is another.
+        session: with the skin of the scene, which was read without calibrations.
         marks: on each sensor, one of MARK_COUNTS; 0: those that its design has printed, else 9.
         mark_error: standard deviation with which marks are placed and found, at least [m].
         forces: known ones to press with after the marks [N]; none: no table of forces.
@@ -68,22 +61,17 @@ class Calibrator(TouchSession):
 
     def __init__(
         self,
-        scene: Scene,
-        notice: Callable[[Notice], None] = lambda _: None,
-        reading: Callable[[dict[str, TouchReading | None]], None] = lambda _: None,
-        refused: Callable[[], bool] = lambda: False,
-        simulated: bool = False,
-        wired_as: Scene | None = None,
+        session: TouchSession,
         marks: int = 0,
         mark_error: float = 0.3e-3,
         forces: Sequence[float] = (),
         files: Sequence[Path | None] = (),
     ) -> None:
-        super().__init__(scene, notice, reading, refused, simulated, wired_as)
+        self._session = session
         self._mark_error = mark_error
         self.sensors = [
             SensorTouches(item.sensor, _marks(item.sensor, marks, files[n] if files else None))
-            for n, item in enumerate(scene.sensors)
+            for n, item in enumerate(session.scene.sensors)
         ]
         self._forces = tuple(forces)
         self._pressed = [SensorPresses(item.sensor, _pressed_marks(item.marks)) for item in self.sensors]
@@ -100,7 +88,7 @@ class Calibrator(TouchSession):
         Raises:
             SkinError: the skin has a fault, cannot be read, or too few marks can be reached.
         """
-        with self.watch() as watch:
+        with self._session.watch() as watch:
             ohms = [watch.untouched_ohms(item.sensor) for item in self.sensors]
             self._touch(TouchSequence(self.sensors, self._mark_error), watch, _VIRTUAL_DURATION)
             if self._forces:
@@ -109,7 +97,7 @@ class Calibrator(TouchSession):
         return [_judged(result, watch.contradiction(result.touches.sensor.name)) for result in results]
 
     def _touch(self, sequence: TouchSequence | ForceSequence, watch: SkinWatch, duration: float) -> None:
-        self.carry_out(sequence, watch, duration)
+        self._session.carry_out(sequence, watch, duration)
         if sequence.incomplete:
             raise SkinError(sequence.incomplete)
 

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["ForceSequence", "KnownPress", "SensorPresses", "fit_forces"]
+__all__ = ["ForceSequence", "SensorPresses", "fit_forces"]
 
 _MIN_RISE = 2.0  # standard errors by which the next force must raise the level
 _MODEL_ERROR = 0.02  # of the force; no interpolation is better
 
 
-class KnownPress(NamedTuple):
+class _KnownPress(NamedTuple):
     """A press with a known force."""
 
     force: float  #: [N]
@@ -34,7 +34,7 @@ class KnownPress(NamedTuple):
     level: float  #: mean while it rested
 
 
-def fit_forces(presses: Sequence[KnownPress]) -> ForceTable:
+def fit_forces(presses: Sequence[_KnownPress]) -> ForceTable:
     """Return the table that presses make, with the error that they have at a place that had no part in it.
 
     Args:
@@ -67,7 +67,7 @@ def fit_forces(presses: Sequence[KnownPress]) -> ForceTable:
     return ForceTable(table.forces, table.levels, round(min(error, 0.99), 4))
 
 
-def _table(presses: Sequence[KnownPress]) -> ForceTable:
+def _table(presses: Sequence[_KnownPress]) -> ForceTable:
     forces = sorted({press.force for press in presses})
     strengths = [math.exp(statistics.fmean([_log(p.level) for p in presses if p.force == f])) for f in forces]
     try:
@@ -97,7 +97,7 @@ class SensorPresses:
 
     sensor: Sensor
     marks: Sequence[Mark]
-    presses: list[KnownPress] = field(default_factory=list)
+    presses: list[_KnownPress] = field(default_factory=list)
 
 
 class ForceSequence(TouchJudge["TouchReading"]):
@@ -152,7 +152,7 @@ class ForceSequence(TouchJudge["TouchReading"]):
             return []
         item, place, force = self._queue.pop(0)
         level = statistics.fmean(levels)
-        item.presses.append(KnownPress(force, place, level))
+        item.presses.append(_KnownPress(force, place, level))
         self.mark, self.over = None, not self._queue
         return [Notice("read", f"level {level:.3f}", {"sensor": item.sensor.name, "level": round(level, 4)})]
 

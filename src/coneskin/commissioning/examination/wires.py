@@ -31,7 +31,6 @@ __all__ = [
     "WirePatch",
     "Wiring",
     "examine_wires",
-    "identify",
     "touch_places",
     "touch_words",
 ]
@@ -93,7 +92,7 @@ def touch_places(sensor: Sensor) -> dict[str, tuple[float, float]]:
     }
 
 
-def identify(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> _WireVerdict:
+def _identify(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> _WireVerdict:
     """Find the order of the wires.
 
     Args:
@@ -206,7 +205,7 @@ def examine_wires(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> tuple
         the finding, and what in the scene would mend it; None where nothing is wrong, or the wires must be moved.
     """
     item, rule = f"{sensor.name}, wires", "terminals A, B, C, D carry the electrodes A, B, C, D"
-    wiring, likely, misfit, second = identify(sensor, touched)
+    wiring, likely, misfit, second = _identify(sensor, touched)
     if wiring is None:
         value = f"nothing explains the touches clearly (misfit {misfit:.2f}, the next best {second:.2f})"
         if misfit < _GOOD_MISFIT:

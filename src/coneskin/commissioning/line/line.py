@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -127,7 +126,7 @@ def _line_of_scene(path: Path) -> Line:
         from coneskin.session.skin_process import virtual_skin
         from coneskin.skin.virtual.memory_source import MemorySource
 
-        source: Source = MemorySource(virtual_skin(scene), time.monotonic, time.sleep)
+        source: Source = MemorySource(virtual_skin(scene), real_time=True)
     else:
         source = open_source(scene.source.kind, settings)
     return Line(scene.name, source, sensors=sensors, baud=baud)

@@ -17,7 +17,7 @@ from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, FrameDecoder, Status, encode
 
-__all__ = ["LineMonitor", "LineReport", "SensorReport", "describe_line", "describe_report", "draw_screen", "draw_sheet"]
+__all__ = ["LineMonitor", "LineReport", "describe_line", "describe_report", "draw_screen", "draw_sheet"]
 
 _TOUCH_LEVEL = 0.10  # level; that of a sensor about which nothing else is known
 _NEWEST_SIZE = 64  # bytes that are shown where there is no frame
@@ -25,7 +25,7 @@ _STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 
 
 @dataclass(frozen=True, slots=True)
-class SensorReport:
+class _SensorReport:
     """What one sensor sends.
 
     Attributes:
@@ -82,7 +82,7 @@ class LineReport:
     byte_rate: float
     skipped: int
     crc_errors: int
-    sensors: tuple[SensorReport, ...]
+    sensors: tuple[_SensorReport, ...]
     newest: bytes
 
 
@@ -164,7 +164,7 @@ class LineMonitor:
             data[-_NEWEST_SIZE:],
         )
 
-    def _sensor_report(self, heard: _Heard, numbers: FrameNumbers) -> SensorReport:
+    def _sensor_report(self, heard: _Heard, numbers: FrameNumbers) -> _SensorReport:
         frame, before = heard.newest, heard.before
         counts = {name: getattr(frame, name) for name in MEASURED}
         changed = frozenset(name for name in MEASURED if counts[name] != getattr(before, name))
@@ -175,7 +175,7 @@ class LineMonitor:
         name = f"sensor {frame.device}/{frame.sensor}" if sensor is None else sensor.name
         level = (frame.touch_c + frame.touch_d) / (2.0 * frame.touch_supply) if frame.touch_supply else 0.0
         look = _look_at(frame, level) if sensor is None else self._look_by_scene(sensor)
-        return SensorReport(
+        return _SensorReport(
             *(name, heard.frames, heard.missing, numbers, counts, changed, expected, level),
             *(*look, raw, raw_changed),
         )
@@ -262,7 +262,7 @@ def describe_report(report: LineReport) -> dict[str, Any]:
     }
 
 
-def _sensor_object(sensor: SensorReport) -> dict[str, Any]:
+def _sensor_object(sensor: _SensorReport) -> dict[str, Any]:
     return {
         "name": sensor.name,
         "frames": sensor.frames,
@@ -288,7 +288,7 @@ def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "?"
 
 
-def _draw_sensor(sensor: SensorReport, *, with_hex: bool, columns: int, color: bool) -> list[str]:
+def _draw_sensor(sensor: _SensorReport, *, with_hex: bool, columns: int, color: bool) -> list[str]:
     numbers = sensor.numbers
     bar = "#" * round(_BAR_WIDTH * min(max(sensor.level, 0.0), 1.0))
     lines = [
@@ -316,7 +316,7 @@ def _draw_sensor(sensor: SensorReport, *, with_hex: bool, columns: int, color: b
     return lines
 
 
-def _cell(sensor: SensorReport, name: str, color: bool) -> str:
+def _cell(sensor: _SensorReport, name: str, color: bool) -> str:
     text = f"{sensor.counts[name]:5d}"
     wanted = f"({sensor.expected[name]})" if sensor.expected else ""
     padding = " " * (14 - len(text) - len(wanted))

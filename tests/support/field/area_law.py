@@ -1,47 +1,26 @@
-"""Area error, from a round contact's centre to its decoded place: exact, over a grid of places, and as a law.
+"""The law of the area error, for arrays: a second method beside the exact solution and the live decode's plain floats.
 
-Truncating the multipole solution at the dipole gives, for a disc of radius a and conductance g per area,
-
-    displacement = -(pi a_eff^2 / (Ru + Rl)) grad gamma,      a_eff^2 = a^2 I_2(ka)/I_0(ka),   k^2 = g (Ru + Rl)
-
-with the Robin function gamma of the *flat* sheet. So the error grows with the area, is a gradient field, vanishes
-for a weak contact, and on the middle line of a sector only the taper is left: -a_eff^2/(2r) along r, nothing along
-theta.
-
-Valid while the disc is small beside its distance D to the next edge (to the next corner between equal sheets, whose
-images in edges cancel) and to the apex: the neglected part is about (a/D)^2 of the result. It describes the
-electrical centre, that is the readings taken *at the contact*, not the mean of the guide pair.
-
-The Robin function gamma(z), what a point of contact feels of the edges and of the taper, is the value at z' = z of Ru
-G_u + Rl G_l without its logarithm. In the strip of `green`,
-
-    gamma = (1/2 pi) [ (Ra+Rb) ln|theta(2w)| - (Ra-Rb) ln|theta(2s)/theta(2ip)| ] - Rb s^2/(pi Sigma) + const
-
-with w = s + ip and the odd theta(z) = 2 sinh(z/2) prod (1 - q^2n e^z)(1 - q^2n e^-z), q = exp(-Sigma). In the flat
-sheet the stretch adds (Ru+Rl)/(2 pi) ln(r/r1). Only its gradient matters; the live decode has its own in plain
-floats (`skin/sheet_functions.py`).
+The law is the multipole solution truncated at the dipole (docs/understand/field.md). It holds while the disc is small
+beside its distance D to the next edge (to the next corner between equal sheets) and to the apex: the neglected part is
+about (a/D)^2 of the result. It describes the electrical centre, not the mean of the guide pair. The series of the Robin
+function stands in `skin/sheet_functions.py`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from coneskin.core.arrays import Floats
+from coneskin.skin.field.disc import bessel_ratios
+from coneskin.skin.field.green import Strip
+from coneskin.skin.field.model import FieldModel
+from coneskin.skin.field.sheet import SectorSheet
 
-from .disc import bessel_ratios
-from .fourport import angular_phase, radial_phase
-from .green import Strip
-from .sheet import SectorSheet
-
-if TYPE_CHECKING:
-    from .model import FieldModel
-
-__all__ = ["ErrorMap", "Robin", "area_error", "decode_errors", "effective_area"]
+__all__ = ["Robin", "area_error", "effective_area"]
 
 
 class Robin:
@@ -130,50 +109,3 @@ def area_error(
     stretch = sheet.stretch(u)
     factor = -math.pi * effective_area(radius, conductance, rs) / rs / stretch
     return factor * (along + rs / (2.0 * math.pi) * sheet.curvature), factor * across
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ErrorMap:
-    """Errors of the decoded place over a grid of round contacts; NaN where the disc would not fit.
-
-    Attributes:
-        u: slant distances of the contacts [m], shape (n,).
-        phi: azimuths of the contacts [rad], shape (m,).
-        u_error: decoded minus true slant distance [m], shape (n, m).
-        phi_error: decoded minus true azimuth [rad], shape (n, m).
-    """
-
-    u: Floats
-    phi: Floats
-    u_error: Floats
-    phi_error: Floats
-
-    @classmethod
-    def of(cls, model: FieldModel, radius: float, u: Floats, phi: Floats, conductance: float = math.inf) -> ErrorMap:
-        """Compute the errors over a grid of discs of a radius [m]; conductance per area [S/m^2]."""
-        at_u, at_phi = (values.ravel() for values in np.meshgrid(u, phi, indexing="ij"))
-        fits = model.sheet.edge_distances(at_u, at_phi).min(axis=1) >= radius * (1.0 - 1e-13)
-        out = np.full((2, at_u.size), math.nan)
-        if fits.any():
-            out[:, fits] = decode_errors(model, at_u[fits], at_phi[fits], radius, conductance)
-        return cls(u, phi, *out.reshape(2, u.size, phi.size))
-
-
-def decode_errors(
-    model: FieldModel, u: Floats, phi: Floats, radius: ArrayLike, conductance: ArrayLike = math.inf
-) -> tuple[Floats, Floats]:
-    """Return decoded minus true (u [m], phi [rad]) by the paper's equations 20 and 24 from each guide pair's mean.
-
-    Args:
-        model: the sensor.
-        u: slant distance of the centres from end 1 [m].
-        phi: azimuth of the centres [rad].
-        radius: of the discs [m].
-        conductance: per area [S/m^2]; inf is a perfect bond.
-    """
-    sheet = model.sheet
-    coupling = model.contacts(u, phi, radius, conductance)
-    radial = model.read(coupling, radial_phase()).terminals[:, 2:].mean(axis=1)
-    angular = model.read(coupling, angular_phase()).terminals[:, :2].mean(axis=1)
-    seen_u, seen_phi = sheet.locate((1.0 - radial) * sheet.length, angular * sheet.breadth)
-    return seen_u - u, seen_phi - phi

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.skin.field.area_error import Robin, area_error, effective_area
 from coneskin.skin.field.model import FieldModel
+from tests.support.field.area_law import Robin, area_error, effective_area
 
 from ..field_cases import PAPER, SHEETS
 
