@@ -31,9 +31,10 @@ kind = "retreat"
 distance_mm = 30
 
 [monitoring]
-skin_silence_ms = 250
-skin_late_ms = 250
-arm_silence_ms = 250
+skin_silence_ms = 1000
+skin_late_ms = 1000
+arm_silence_ms = 1000
+program_silence_ms = 1000
 """
 
 

@@ -2,32 +2,25 @@
 
 import os
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 import pytest
-from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, settings
-
-from .support.hold_ups import HoldUpWatch
 
 # before numpy is loaded: each core has a worker of its own, and threads of linear algebra only wait for each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _TASKS = Path("/proc/self/task")  # Linux; elsewhere only threads are looked at
 _HERE = Path(__file__).parent
-_WITH_PROCESSES = (  # tests that run one at a time; below this folder
-    *("guarded", "commands/test_guard.py", "robot/sim/test_command.py", "robot/sim/test_wheel.py", "robot/ur"),
-    *("impact/simulation/test_live_plant.py", "test_demos.py", "test_measure_controller.py"),
+_WITH_PROCESSES = (  # tests that take turns with a few others; below this folder
+    *("guarded", "robot/sim/test_command.py", "robot/sim/test_wheel.py", "test_demos.py", "test_measure_controller.py"),
+    *("impact/simulation/test_live_plant.py", "robot/ur/test_examination.py", "robot/ur/test_input_writers.py"),
+    *("robot/ur/test_model_check.py", "robot/ur/test_program_io.py", "robot/ur/test_state_reader.py"),
 )
-_TRIES = 5  # of a test with processes, as long as the computer holds it up
 _SHORT = "not long"  # the marker expression of the short run, as in pyproject.toml
-
-_WATCH = pytest.StashKey[HoldUpWatch]()
-_REPEATED = pytest.StashKey[list[str]]()
 
 # A slow machine is no failure, so nothing here depends on time; the same examples every time, so nothing on luck.
 _STEADY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow], "database": None}
@@ -45,7 +38,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # before -m selects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests with real processes: their peers have to be punctual, so they do not run beside others."""
+    """Mark the tests with real processes: they mostly wait, and need a share of the computer when they do not."""
     for item in items:
         if _has_processes(item.path):
             item.add_marker(pytest.mark.processes)
@@ -54,40 +47,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @cache
 def _has_processes(path: Path) -> bool:
     return any(path.is_relative_to(_HERE / place) for place in _WITH_PROCESSES)
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
-    """Run a test with real processes again where it failed while something else held up this computer.
-
-    What it tests acts within tens of milliseconds, or stops the arm because it could not. A failure without a hold-up,
-    and one in each try, is a failure.
-    """
-    if "processes" not in item.keywords:
-        return None
-    if (watch := item.config.stash.get(_WATCH, None)) is None:
-        watch = item.config.stash[_WATCH] = HoldUpWatch()
-        item.config.add_cleanup(watch.close)
-    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-    assert isinstance(item, pytest.Function)
-    for tries_left in reversed(range(_TRIES)):
-        item._initrequest()  # as new: its fixtures are made again
-        began = time.monotonic()
-        reports = runtestprotocol(item, log=False, nextitem=nextitem)
-        if tries_left and any(report.failed for report in reports) and (late := watch.longest_since(began)):
-            item.config.stash.setdefault(_REPEATED, []).append(f"{item.nodeid} ({1e3 * late:.0f} ms)")
-            continue
-        break
-    for report in reports:
-        item.ihook.pytest_runtest_logreport(report=report)
-    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
-    return True
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Name the tests that were run again, and how long the computer had held them up."""
-    for line in config.stash.get(_REPEATED, []):
-        terminalreporter.write_line(f"held up, so run again: {line}")
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:

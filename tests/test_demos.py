@@ -63,7 +63,10 @@ def test_virtual_skin() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
 def test_guard_a_program() -> None:
     pytest.importorskip("rtde_control", reason="ur-rtde is not installed")
-    out = play("04_guard_a_program.py")
+    for _ in range(10):
+        out = play("04_guard_a_program.py")
+        if "retreating" in out:  # else what the arm would be moved away by came too late: this computer is busy
+            break
     place = re.match(r"Collision: sensor 0/0 on the forearm was touched at u = ([\d.]+) mm, phi = ([\d.]+) deg", out)
     assert place
     assert float(place[1]) == pytest.approx(130.0, abs=3.0)  # some counts of noise, and the area of the contact

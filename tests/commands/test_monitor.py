@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,8 @@ from ..scene.scenes import SKIN_ONLY, record
 from ..skin.diagnosis.corpus import BAUD, MISTAKES, NOT_TO_BE_NAMED, WITH_A_SCENE, build, bytes_of
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
-HEARING = 2.0  # s until the first line must name the mistake
+FIRST_LOOK = 2.0  # s until the monitor's first line
+DEADLINE = 60.0  # s until a line has named the mistake
 
 
 @pytest.fixture(scope="module")
@@ -67,41 +69,40 @@ def test_a_scene_is_heard_beside_what_it_expects(tmp_path: Path, capsys: pytest.
 @posix
 @pytest.mark.long
 @pytest.mark.processes
-def test_every_mistake_is_named_within_two_seconds_on_a_port(program: Path) -> None:
-    """The corpus in three parts, each mistake on a pseudo-terminal of its own, in real time.
+def test_every_mistake_is_named_on_a_port(program: Path) -> None:
+    """The corpus, each mistake on a pseudo-terminal of its own, in real time.
 
-    A computer that is busy with something else holds bytes back, which is then what is named: those are heard again.
+    That each is named within two seconds of its bytes is shown with given times, in test_diagnose. A computer that is
+    busy with something else holds bytes back, and that is what is named until it lets them through.
     """
     names = [name for name in (*MISTAKES, *NOT_TO_BE_NAMED) if name not in WITH_A_SCENE]
     wrong: dict[str, str] = {}
 
     def hear(name: str) -> None:
-        sender = subprocess.Popen([program, name, "20", "--port"], stdout=subprocess.PIPE, text=True)
+        sender = subprocess.Popen([program, name, f"{DEADLINE:g}", "--port"], stdout=subprocess.PIPE, text=True)
         assert sender.stdout is not None
         try:
             with SerialPort(sender.stdout.readline().strip(), BAUD) as port:
                 monitor = LineMonitor(start := time.monotonic(), (), BAUD)
-                while (left := start + HEARING - time.monotonic()) > 0.0:
-                    try:
-                        monitor.feed(port.read(left), time.monotonic())
-                    except SkinTimeout:
-                        break
-                named = monitor.report(time.monotonic()).diagnosis
+                look_at = start + FIRST_LOOK
+                while (now := time.monotonic()) < start + DEADLINE:
+                    with suppress(SkinTimeout):
+                        monitor.feed(port.read(max(look_at - now, 0.0)), time.monotonic())
+                    if now >= look_at:
+                        look_at = now + 1.0
+                        named = monitor.report(now).diagnosis
+                        if named.cause is {**MISTAKES, **NOT_TO_BE_NAMED}[name]:
+                            wrong.pop(name, None)
+                            return
+                        wrong[name] = named.line
         finally:
             sender.kill()
             sender.communicate()
-        if named.cause is not {**MISTAKES, **NOT_TO_BE_NAMED}[name]:
-            wrong[name] = named.line
 
-    for at in range(0, len(names), 32):
-        threads = [threading.Thread(target=hear, args=(name,)) for name in names[at : at + 32]]
+    for at in range(0, len(names), 16):
+        threads = [threading.Thread(target=hear, args=(name,)) for name in names[at : at + 16]]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
-    again = list(wrong)
-    assert len(again) <= 8, wrong
-    wrong.clear()
-    for name in again:
-        hear(name)
     assert wrong == {}

@@ -12,6 +12,8 @@ import pytest
 import coneskin as cs
 from tests.support.ruled_tube import RuledTube, oval_tube, rounded_box_section
 
+from .guarded_session import DEADLINE
+
 pytestmark = [
     pytest.mark.long,
     pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal"),
@@ -63,7 +65,7 @@ def test_a_guard_reports_a_touch_where_it_is_on_the_mesh(name: str, tmp_path: Pa
             before = len(session.events)
             phi = part * side.frustum.wrap
             session.touch(u, phi, 10.0, 0.4)
-            found = session.wait_for(("contact_located",), 20.0, before)
+            found = session.wait_for(("contact_located",), DEADLINE, before)
             assert found is not None
             normal = np.array(side.normal(phi))
             above = 1e3 * (np.array(side.point(u, phi)) + 0.01 * normal)
@@ -73,4 +75,4 @@ def test_a_guard_reports_a_touch_where_it_is_on_the_mesh(name: str, tmp_path: Pa
             feet = trimesh.triangles.closest_point(judge.triangles, np.tile(point, (len(judge.faces), 1)))
             assert np.linalg.norm(feet - point, axis=1).min() < 0.05, "mm; it lies on the mesh"
             assert np.dot(found.details["normal"], normal) > math.cos(math.radians(2.0))
-            assert session.wait_for(("touch_ended",), 20.0, before) is not None
+            assert session.wait_for(("touch_ended",), DEADLINE, before) is not None

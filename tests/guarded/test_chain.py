@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -15,9 +16,21 @@ from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused, 
 from coneskin.runs.replay.run import read_run, replay
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
-from coneskin.testing.scenes import GOAL, START
+from coneskin.testing.scenes import START
 
-from .guarded_session import assert_stopped_on_the_way, fast, kill, run_until_moving, scene_for, scene_text, until
+from .guarded_session import (
+    DEADLINE,
+    FAR,
+    assert_stopped_on_the_way,
+    fast,
+    is_reset,
+    kill,
+    refusal,
+    run_until_moving,
+    scene_for,
+    scene_text,
+    until,
+)
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
@@ -31,13 +44,21 @@ def controller():
         yield simulated
 
 
+def undisturbed_demo(*words):
+    """Run the demo, again as long as it says that this computer was too busy; its facts."""
+    *words, folder = map(str, words)
+    for number in range(10):
+        done = subprocess.run([sys.executable, *words, f"{folder}{number or ''}"], capture_output=True, text=True)
+        if "this computer was too busy" not in done.stderr:
+            break
+    assert done.returncode == 0, done.stdout + done.stderr
+    return json.loads(done.stdout)
+
+
 @pytest.mark.long
 def test_the_demo_that_runs_into_something_soft(tmp_path):
     pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
-    command = [sys.executable, "-m", "coneskin", "demo", "--json", "-o", str(tmp_path / "run")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90)
-    assert done.returncode == 0, done.stdout + done.stderr
-    facts = json.loads(done.stdout)
+    facts = undisturbed_demo("-m", "coneskin", "demo", "--json", "-o", tmp_path / "run")
     assert facts["same_in_replay"] is True
     assert 0.0 < facts["frame_ms"] <= facts["command_ms"] < facts["slower_ms"] < facts["standstill_ms"]
     assert 5.0 < facts["peak_n"] < 300.0
@@ -51,17 +72,15 @@ def test_the_demo_that_runs_into_something_soft(tmp_path):
 def test_the_demo_that_a_script_touches(tmp_path):
     code = "import sys; from coneskin.cli import main; from coneskin.commands import demo; "
     code += "demo.has_physics_engine = lambda: False; sys.exit(main(sys.argv[1:]))"
-    command = [sys.executable, "-c", code, "demo", "--json", "-o", str(tmp_path / "run")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90)
-    assert done.returncode == 0, done.stdout + done.stderr
-    facts = json.loads(done.stdout)
+    facts = undisturbed_demo("-c", code, "demo", "--json", "-o", tmp_path / "run")
     assert facts["contacts"] == 1
     assert facts["same_in_replay"] is True
     assert 0.0 < facts["frame_ms"] <= facts["command_ms"] < facts["slower_ms"] < facts["standstill_ms"]
     assert facts["retreat_mm"] == pytest.approx(20.0, abs=1.0)  # 0.5 mm are left for braking
     assert facts["u_mm"] == pytest.approx(130.0, abs=2.0)  # 12 bits and 0.7 counts of noise: 0.1 mm
-    assert {p.name for p in (tmp_path / "run").iterdir()} >= {"run.rec", "scene.toml", "summary.json"}
-    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    folder = Path(facts["folder"])
+    assert {path.name for path in folder.iterdir()} >= {"run.rec", "scene.toml", "summary.json"}
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["picture"] in (
         None,
         "run.png",
@@ -73,13 +92,13 @@ def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tm
     with guard(scene_for(controller), recording=path) as session:
         thread, raised = run_until_moving(controller, session)
         session.touch(0.13, 1.55, duration=0.2)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], Collision)
         assert_stopped_on_the_way(controller)
         with pytest.raises(Collision):
-            session.arm.move_j(GOAL)
-        assert session.wait_for(("touch_ended",), 5.0) is not None
-        session.reset()
+            session.arm.move_j(FAR)
+        assert session.wait_for(("touch_ended",), DEADLINE) is not None
+        until(lambda: is_reset(session))
         session.arm.move_j(START, speed=1.0, acceleration=4.0)
         assert controller.state()["q"] == pytest.approx(START, abs=1e-3)
     run = read_run(path)
@@ -93,7 +112,7 @@ def test_the_guard_killed_the_driver_stops_the_arm(controller, tmp_path):
     with guard(scene_for(controller), recording=path) as session:
         thread, raised = run_until_moving(controller, session)
         kill(session, "guard")
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotConnectionError)
         assert_stopped_on_the_way(controller)
     assert replay(read_run(path)).agrees  # up to the last that it sent
@@ -105,10 +124,10 @@ def test_the_driver_killed_the_guard_stops_the_arm(controller):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
         kill(session, "driver")
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotRefused | RobotConnectionError)
         assert_stopped_on_the_way(controller)
-        latched = session.wait_for(("latched",), 5.0)
+        latched = session.wait_for(("latched",), DEADLINE)
         assert "the driver process has ended" in latched.details["why"]
 
 
@@ -119,10 +138,10 @@ def test_the_driver_frozen_another_way_stops_the_arm(controller):
         thread, raised = run_until_moving(controller, session)
         kill(session, "driver", signal.SIGSTOP)
         session.touch(0.13, 1.55)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], Collision)
         assert_stopped_on_the_way(controller)
-        assert session.wait_for(("escalated",), 1.0).details["path"] == "program"
+        assert session.wait_for(("escalated",), DEADLINE).details["path"] == "program"
         kill(session, "driver", signal.SIGKILL)
 
 
@@ -136,7 +155,7 @@ def test_guard_and_driver_dead_the_controller_stops_itself(controller):
         kill(session, "driver")
         assert_stopped_on_the_way(controller)
         kill(session, "guard")
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotRefused | RobotConnectionError)
 
 
@@ -146,7 +165,7 @@ def test_the_skin_unplugged_stops_the_arm(controller):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
         kill(session, "skin")
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotRefused)
         assert_stopped_on_the_way(controller)
 
@@ -156,11 +175,11 @@ def test_a_frozen_controller_is_a_fault_and_stops_when_it_wakes(controller):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
         controller.freeze()
-        fault = session.wait_for(("fault",), 5.0)
+        fault = session.wait_for(("fault",), DEADLINE)
         controller.thaw()
         assert "has sent no state" in fault.details["what"]
         assert_stopped_on_the_way(controller)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotRefused)
 
 
@@ -169,7 +188,7 @@ def test_a_controller_that_stays_frozen_is_told_as_an_arm_that_nobody_saw_stand(
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
         controller.freeze()
-        thread.join(20)
+        thread.join(DEADLINE)
         controller.thaw()
         assert "standstill of the arm NOT confirmed" in str(raised[0])
         assert_stopped_on_the_way(controller)
@@ -183,11 +202,11 @@ def test_the_program_killed_the_arm_stops(controller, tmp_path):
     code = (
         "import sys\nfrom coneskin.session.session import guard\n"
         "with guard(sys.argv[1]) as g:\n"
-        f"    g.arm.move_j({GOAL}, 1.0, 4.0)\n"
+        f"    g.arm.move_j({FAR}, 1.0, 4.0)\n"
     )
     program = subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "scene.toml")])
     try:
-        until(lambda: fast(controller), 30.0)
+        until(lambda: fast(controller))
     finally:
         program.kill()
         program.wait()
@@ -200,7 +219,7 @@ def test_a_protective_stop_is_never_unlocked(controller):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
         controller.call("protective stop")
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotRefused)
         assert_stopped_on_the_way(controller)
         with pytest.raises(RobotRefused, match="the controller's own safety system holds the arm"):
@@ -224,8 +243,7 @@ def test_a_port_that_is_not_there_is_one_clear_line(controller):
 def test_a_touched_skin_does_not_arm(controller):
     touched = "[source.touch]]\nstart_s = 0\nend_s = 100\nu_mm = 100\nphi_deg = 10\n[reaction]"
     scene = scene_for(controller, {"[reaction]": "[" + touched})
-    with pytest.raises(RobotRefused, match="it is touched"):
-        guard(scene, start_timeout=3.0).__enter__()
+    assert "it is touched" in refusal(scene, "it is touched")
 
 
 @pytest.mark.long

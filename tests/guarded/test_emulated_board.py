@@ -15,7 +15,7 @@ from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard
 from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 from tests.support.firmware.guarded_board import board_scene
 
-from .guarded_session import assert_stopped_on_the_way, run_until_moving
+from .guarded_session import DEADLINE, assert_stopped_on_the_way, run_until_moving
 
 pytestmark = [
     pytest.mark.long,
@@ -49,7 +49,7 @@ def test_a_touch_stops_the_arm_where_it_is_and_replays_bit_by_bit(controller, bo
     with guard(board_scene(controller.host, board.path), recording=tmp_path / "run.rec") as session:
         thread, raised = run_until_moving(controller, session)
         board.touch(0.13, 1.55, duration=0.4)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], Collision)
         assert raised[0].u == pytest.approx(0.13, abs=1e-3)
         assert_stopped_on_the_way(controller)
@@ -74,9 +74,9 @@ def test_whatever_happens_to_the_board_the_arm_stops_and_a_line_names_it(control
             board.tell(*lines)
         else:
             board.unplug()
-        fault = session.wait_for(("fault",), 5.0)
+        fault = session.wait_for(("fault",), DEADLINE)
         assert_stopped_on_the_way(controller)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert named in fault.details["what"]
         assert isinstance(raised[0], RobotRefused)
         assert named in str(raised[0])

@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import suppress
 
 import pytest
 
@@ -18,7 +17,19 @@ from coneskin.session.session import guard
 from coneskin.testing.scenes import GOAL, START
 
 from ..robot import wheel
-from .guarded_session import assert_stopped_on_the_way, fast, kill, run_until_moving, scene_for, scene_text, until
+from .guarded_session import (
+    DEADLINE,
+    assert_stopped_on_the_way,
+    fast,
+    is_reset,
+    kill,
+    refusal,
+    run_until_moving,
+    scene_for,
+    scene_text,
+    until,
+    until_undisturbed,
+)
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
@@ -29,8 +40,9 @@ RETREAT = 'kind = "retreat"'
 
 
 @pytest.fixture
-def controller():
-    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as simulated:
+def controller(tmp_path):
+    log = tmp_path / "log.jsonl"
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START, log=log) as simulated:
         yield simulated
 
 
@@ -39,19 +51,17 @@ def controller():
 
 @pytest.mark.long
 def test_slow_by_the_controllers_own_slider_and_back(controller):
-    """The arm has .3 s more to become slower: on a busy machine it once was too late, and stopped."""
-    slow = 'kind = "slow"\nslow_to = 0.3\nslow_speed_mm_s = 250\npress_mm = 50'
-    scene = scene_for(controller, {RETREAT: slow, "[monitoring]": "[monitoring]\nescalate_ms = 100"})
-    with guard(scene) as session:
-        thread, raised = run_until_moving(controller, session)
+    slow = 'kind = "slow"\nslow_to = 0.3\nslow_speed_mm_s = 250\npress_mm = 100'
+    with guard(scene_for(controller, {RETREAT: slow})) as session:
+        thread, raised = run_until_moving(controller, session, GOAL)
         session.touch(0.13, 1.55, duration=0.3)
-        until(lambda: controller.state()["slider"] == pytest.approx(0.3))
-        until(lambda: 0.2 < controller.state()["qd"][0] < 0.4)
-        assert session.wait_for(("resumed",), 5.0) is not None, [(e.name, e.details) for e in session.events]
+        resumed = session.wait_for(("resumed", "stopping"), DEADLINE)
+        assert resumed.name == "resumed", [(e.name, e.details) for e in session.events]
         until(lambda: controller.state()["slider"] == 1.0)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert raised == [None]  # it arrives, late, and nobody is told of a collision
         assert controller.state()["q"] == pytest.approx(GOAL, abs=1e-3)
+    assert [event["fraction"] for event in controller.events("slider")][-2:] == pytest.approx([0.3, 1.0])
 
 
 @pytest.mark.long
@@ -62,24 +72,30 @@ def test_a_slider_that_somebody_else_owns_is_one_clear_line(controller):
     try:
         scene = scene_for(controller, {RETREAT: 'kind = "slow"'})
         with pytest.raises(RobotRefused, match=r"the guard cannot have the speed slider of .* in use"):
-            guard(scene, start_timeout=5.0).__enter__()
+            guard(scene).__enter__()
     finally:
         other.disconnect()
 
 
 @pytest.mark.long
 def test_comply_gives_way_and_latches_when_the_push_ends(controller):
-    scene = scene_for(controller, {RETREAT: 'kind = "comply"\nspeed_mm_s = 60'})
-    with guard(scene) as session:
-        thread, raised = run_until_moving(controller, session)
-        session.touch(0.13, 1.55, duration=0.3)  # until which it pushes: 18 of 50 mm
-        thread.join(20)
-        assert isinstance(raised[0], Collision)
-        made = session.wait_for(("retreated",), 5.0)
-        assert made.details["why"] == "the touch is over"
-        # from about 0.15 s on, when the arm stands, at 60 mm/s and with 50 ms of damping: 18 mm
-        assert 0.005 < made.details["progress"] < 0.03
-        assert_stopped_on_the_way(controller)
+    scene = scene_for(controller, {RETREAT: 'kind = "comply"\nspeed_mm_s = 30'})
+
+    def attempt():
+        controller.wait_for_standstill()
+        with guard(scene) as session:
+            session.arm.move_j(START, speed=1.0, acceleration=4.0)
+            thread, raised = run_until_moving(controller, session)
+            session.touch(0.13, 1.55, duration=1.0)  # until which it pushes: 30 mm at most
+            thread.join(DEADLINE)
+            assert isinstance(raised[0], Collision)
+            assert session.wait_for(("latched",), DEADLINE) is not None
+            assert_stopped_on_the_way(controller)
+            return session.events
+
+    (made,) = (event.details for event in until_undisturbed(attempt) if event.name == "retreated")
+    assert made["why"] == "the touch is over"
+    assert 0.005 < made["progress"] < 0.03
 
 
 # ---- a latched arm stays where it is
@@ -95,17 +111,6 @@ def test_the_arm_never_starts_by_itself_when_the_control_program_starts_again(co
     assert got["moved"] is not revive
 
 
-def let_go_on(session, controller):
-    """Whether the program runs again; a driver that was held up may fall silent once more, and is reset again."""
-    if controller.state()["runtime"] == "PLAYING":
-        return True
-    position = len(session.events)
-    with suppress(RobotRefused):
-        session.reset()
-        session.wait_for(("activated",), 3.0, after=position)
-    return controller.state()["runtime"] == "PLAYING"
-
-
 @pytest.mark.long
 def test_after_a_stop_by_another_way_a_person_lets_it_move_again(controller):
     with guard(scene_for(controller)) as session:
@@ -113,11 +118,11 @@ def test_after_a_stop_by_another_way_a_person_lets_it_move_again(controller):
         until(lambda: controller.state()["qd"][0] > 0.45)
         kill(session, "driver", signal.SIGSTOP)  # so that another way has to end the program
         session.touch(0.13, 1.55, duration=0.2)
-        assert session.wait_for(("latched",), 10.0) is not None
+        assert session.wait_for(("latched",), DEADLINE) is not None
         assert controller.wait_for_standstill()["runtime"] == "STOPPED"
         kill(session, "driver", signal.SIGCONT)
-        assert session.wait_for(("touch_ended",), 5.0) is not None
-        until(lambda: let_go_on(session, controller))
+        assert session.wait_for(("touch_ended",), DEADLINE) is not None
+        until(lambda: is_reset(session) and controller.state()["runtime"] == "PLAYING")
         stood = controller.state()["q"]
         session.arm.move_j([stood[0] + 0.2, *stood[1:]], 1.0, 4.0)
         assert controller.state()["q"][0] == pytest.approx(stood[0] + 0.2, abs=1e-3)
@@ -133,7 +138,7 @@ def test_sigterm_stops_the_arm(controller, name):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
         kill(session, name, signal.SIGTERM)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotRefused | RobotConnectionError)
         assert_stopped_on_the_way(controller)
 
@@ -145,9 +150,9 @@ def test_a_guard_that_hangs_is_missed_by_the_driver(controller):
         kill(session, "guard", signal.SIGSTOP)
         assert_stopped_on_the_way(controller)
         kill(session, "guard", signal.SIGCONT)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotRefused)
-        assert session.wait_for(("latched",), 10.0) is not None
+        assert session.wait_for(("latched",), DEADLINE) is not None
 
 
 @pytest.mark.promise("P59")
@@ -160,7 +165,7 @@ def test_after_a_suspension_of_all_processes_the_arm_is_stopped_at_once_and_latc
         "with guard(sys.argv[1]) as g:\n"
         "    print(*(child.pid for child in g._processes.children.values()), flush=True)\n"
         "    g.wait_for(('stopping',), 60.0)\n"
-        "    latched = g.wait_for(('latched',), 10.0)\n"
+        "    latched = g.wait_for(('latched',), 60.0)\n"
         "    print([event.details['what'] for event in g.events if event.name == 'fault'], latched, flush=True)\n"
     )
     (tmp_path / "scene.toml").write_text(scene_text(controller.host, control=control))
@@ -211,15 +216,14 @@ def test_a_driver_that_hangs_does_not_let_the_guard_arm(controller, monkeypatch)
 
     monkeypatch.setattr("coneskin.session.child_processes.spawn", frozen)
     monkeypatch.setattr("coneskin.session.child_processes._END_TIMEOUT", 1.0)
-    with pytest.raises(RobotRefused, match="the arm's driver is not ready"):
-        guard(scene_for(controller), start_timeout=3.0).__enter__()
+    assert "the arm's driver is not ready" in refusal(scene_for(controller), "the arm's driver is not ready")
 
 
 @pytest.mark.promise("P61")
 @pytest.mark.long
 def test_a_controller_that_dies_while_the_guard_arms_is_a_refusal(controller):
     scene = scene_for(controller, {"[monitoring]": "[monitoring]\nsettle_ms = 1500"})
-    session = guard(scene, start_timeout=5.0)
+    session = guard(scene)
     open_ = session._open
 
     def opened():
@@ -247,7 +251,7 @@ def test_rtde_closed_while_the_dashboard_is_up(controller):
         stood = controller.state()["q"]
         time.sleep(1.5)
         assert controller.state()["q"] == stood, "the arm has started by itself"
-        fault = session.wait_for(("fault",), 5.0)
+        fault = session.wait_for(("fault",), DEADLINE)
         assert "has closed the connection" in fault.details["what"]
         with pytest.raises((RobotRefused, RobotConnectionError)):
             session.reset()
@@ -260,7 +264,7 @@ def test_a_way_to_stop_that_is_gone_stops_the_arm(controller, fault):
     with guard(scene_for(controller)) as session:
         thread, raised = run_until_moving(controller, session)
         controller.call(fault)
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], RobotRefused)
         assert "which a stop may need" in str(raised[0])
         assert_stopped_on_the_way(controller)
@@ -280,11 +284,11 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(controller, tmp_path):
         with guard(scene_for(controller), recording=path) as session:
             thread, raised = run_until_moving(controller, session)
             resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 1000, before[1]))
-            message = session.wait_for(("message",), 10.0)
+            message = session.wait_for(("message",), DEADLINE)
             assert "recording ended: cannot write" in message.details["what"]
             assert fast(controller)
             session.touch(0.13, 1.55, duration=0.2)
-            thread.join(20)
+            thread.join(DEADLINE)
             assert isinstance(raised[0], Collision)
             assert_stopped_on_the_way(controller)
     finally:

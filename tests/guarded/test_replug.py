@@ -14,7 +14,7 @@ from coneskin.skin.virtual.pseudo_terminal import PseudoTerminal
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.testing.scenes import START, commissioned, forearm_scene
 
-from .guarded_session import assert_stopped_on_the_way, run_until_moving
+from .guarded_session import DEADLINE, PATIENT, assert_stopped_on_the_way, is_reset, run_until_moving, until
 
 pytestmark = [
     pytest.mark.long,
@@ -23,8 +23,6 @@ pytestmark = [
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
 
 from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
-
-_LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 300\nprogram_silence_ms = 500"
 
 
 @contextlib.contextmanager
@@ -39,43 +37,45 @@ def plugged(port, sensor):
 def open_again(session, after):
     """Wait until the port is open again; the position after that event."""
     while True:
-        event = session.wait_for(("message",), 10.0, after)
+        event = session.wait_for(("message",), DEADLINE, after)
         assert event is not None, "the port was not opened again"
         after = session.events.index(event) + 1
         if "open again" in event.details["what"]:
             return after
 
 
+def another_device(session):
+    """Try to reset; whether it is refused because of the other device, once that has sent something."""
+    with pytest.raises(RobotRefused) as refused:
+        session.reset()
+    return "another device is on the skin's port: it sends as device/sensor 5/0" in str(refused.value)
+
+
 def test_the_arm_stops_and_goes_on_only_with_the_same_device_and_a_reset(tmp_path):
     port = tmp_path / "skin"
     with contextlib.ExitStack() as stack, SimulatedController("UR5e", free_host(), START) as controller:
-        scene = commissioned(parse_scene(forearm_scene(controller.host, port=str(port), limits=_LIMITS)))
+        scene = commissioned(parse_scene(forearm_scene(controller.host, port=str(port), limits=PATIENT)))
         sensor = scene.sensors[0].sensor
         first = stack.enter_context(contextlib.ExitStack())
         first.enter_context(plugged(port, sensor))
         with guard(scene, recording=tmp_path / "run.rec") as session:
             thread, raised = run_until_moving(controller, session)
             first.close()
-            fault = session.wait_for(("fault",), 5.0)
+            fault = session.wait_for(("fault",), DEADLINE)
             assert "is gone" in fault.details["what"]
             assert_stopped_on_the_way(controller)
-            thread.join(20)
+            thread.join(DEADLINE)
             assert isinstance(raised[0], RobotRefused)
             with pytest.raises(RobotRefused, match="is gone"):
                 session.reset()
             with plugged(port, replace(sensor, device_id=5)):
                 seen = open_again(session, 0)
-                session.wait_for(("never",), 0.5)
-                with pytest.raises(
-                    RobotRefused, match="another device is on the skin's port: it sends as device/sensor 5/0"
-                ):
-                    session.reset()
-            assert session.wait_for(("fault",), 5.0, seen) is not None
+                until(lambda: another_device(session))
+            assert session.wait_for(("fault",), DEADLINE, seen) is not None
             with plugged(port, sensor):
                 open_again(session, seen)
-                session.wait_for(("never",), 1.0)  # until it is ready again
                 stop = controller.state()["q"]
-                session.reset()
+                until(lambda: is_reset(session))
                 session.arm.move_j([stop[0] - 0.1, *stop[1:]], speed=0.5, acceleration=2.0)
                 assert controller.state()["q"][0] == pytest.approx(stop[0] - 0.1, abs=1e-3)
     assert replay(read_run(tmp_path / "run.rec")).same

@@ -8,22 +8,22 @@ import pytest
 
 from coneskin.core.errors import Collision
 from coneskin.session.session import guard
-from coneskin.testing.scenes import GOAL, START
+from coneskin.testing.scenes import START
 
-from .guarded_session import kill, scene_for, until
+from .guarded_session import FAR, kill, scene_for, until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
 from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
 
-from .test_external_control import PATIENT, WHEEL  # noqa: E402
+from .test_external_control import WHEEL  # noqa: E402
 
-STOP = {**PATIENT, 'kind = "retreat"\ndistance_mm = 30': 'kind = "stop"'}
+STOP = {'kind = "retreat"\ndistance_mm = 30': 'kind = "stop"'}
 #: an ordinary loop around ur_rtde; its waits between two attempts [s]
 LOOP = f"""
 import sys, time, rtde_control
 c = rtde_control.RTDEControlInterface(sys.argv[1])
-goals, k = ({GOAL}, {START}), 0
+goals, k = ({FAR}, {START}), 0
 while True:
     if c.moveJ(goals[k % 2], 1.0, 4.0):
         k += 1
@@ -36,7 +36,7 @@ RESEND = f"""
 import socket, sys, time
 s = socket.create_connection((sys.argv[1], 30003))
 while True:
-    s.sendall(b"def users():\\n  movej({GOAL}, a=20, v=1)\\nend\\n")
+    s.sendall(b"def users():\\n  movej({FAR}, a=20, v=1)\\nend\\n")
     time.sleep(float(sys.argv[2]))
 """
 WAITS = (0.005, 0.02, 0.1, 0.3)

@@ -7,10 +7,10 @@ import tomli_w
 
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.session.session import guard
-from coneskin.testing.scenes import GOAL, START
+from coneskin.testing.scenes import START
 from tests.support.speed_limit_values import limit_values
 
-from .guarded_session import kill, moving, scene_text, until
+from .guarded_session import DEADLINE, FAR, kill, moving, scene_text, until
 
 pytestmark = pytest.mark.long
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
@@ -59,7 +59,7 @@ def test_a_guard_that_ends_in_the_middle_of_a_motion_leaves_the_slider_as_a_pers
     with guard(limited_scene(controller, tmp_path)) as session:
         thread, raised = moving(session)
         until(lambda: under_way(controller.state()))
-    thread.join(20)
+    thread.join(DEADLINE)
     assert isinstance(raised[0], Exception)
     assert controller.wait_for_standstill()["slider"] == PERSONS
     set_before = [event["fraction"] for event in controller.events("slider")]
@@ -73,11 +73,11 @@ def test_a_guard_that_is_killed_under_its_limit_leaves_an_arm_that_stands(contro
         until(lambda: under_way(controller.state()))
         kill(session, "guard")
         stood = controller.wait_for_standstill()
-        thread.join(20)
+        thread.join(DEADLINE)
         assert isinstance(raised[0], Exception)
         assert stood["slider"] < 0.5 * PERSONS  # nobody raises what it had lowered
     after = controller.state()
     assert max(map(abs, after["qd"])) == 0.0
     assert after["q"] == stood["q"]
-    assert math.dist(after["q"], START) < math.dist(GOAL, START) - 0.1
+    assert math.dist(after["q"], START) < math.dist(FAR, START) - 0.1
     assert after["slider"] < 0.5 * PERSONS

@@ -11,6 +11,8 @@ from coneskin.runs.what_if.what_if import judge_run, true_touches
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 
+from .guarded_session import DEADLINE
+
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
 SCENE = """
@@ -38,10 +40,10 @@ skin_late_ms = 1000
 @pytest.mark.long
 def test_the_script_and_the_programs_touches_are_recorded_as_they_were(tmp_path: Path) -> None:
     with guard(parse_scene(SCENE), recording=tmp_path / "run.rec") as session:
-        assert session.wait_for((EventName.TOUCH_ENDED,), 10.0) is not None
+        assert session.wait_for((EventName.TOUCH_ENDED,), DEADLINE) is not None
         seen = len(session.events)
         began = session.touch(0.1, 2.0, duration=0.1)
-        assert session.wait_for((EventName.TOUCH_ENDED,), 10.0, after=seen) is not None
+        assert session.wait_for((EventName.TOUCH_ENDED,), DEADLINE, after=seen) is not None
     run = read_run(tmp_path / "run.rec")
     assert run.start == session.began
     touches = true_touches(run)

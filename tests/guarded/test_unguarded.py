@@ -8,18 +8,18 @@ from contextlib import suppress
 
 import pytest
 
-from coneskin.core.errors import RobotConnectionError, RobotRefused, SensorError
+from coneskin.core.errors import RobotConnectionError, SensorError
 from coneskin.session.guard_monitor import FallbackStop
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 
-from .guarded_session import fast, kill, scene_for, until
+from .guarded_session import DEADLINE, fast, is_reset, kill, scene_for, until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
 from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
 
-from .test_external_control import PATIENT, RAW, send  # noqa: E402
+from .test_external_control import RAW, send  # noqa: E402
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def controller():
 
 
 def external(simulated):
-    return scene_for(simulated, PATIENT, "external")
+    return scene_for(simulated, control="external")
 
 
 def start_again(controller):
@@ -40,17 +40,7 @@ def start_again(controller):
     send(controller.host, 30002, RAW)
     until(lambda: controller.state()["q"][0] != before)
     until(lambda: controller.state()["runtime"] != "PLAYING")  # the protective stop pauses it
-    # found moving within 5 states, 1 rad/s at most, and braked at 10 rad/s2: 0.05 rad; a busy machine takes longer
-    assert abs(controller.wait_for_standstill()["q"][0] - before) < 0.5
-
-
-def reset(session):
-    """Whether a person's reset is taken; at first the frames that have waited are too old."""
-    try:
-        session.reset()
-    except (RobotRefused, RobotConnectionError):
-        return False
-    return True
+    assert abs(controller.wait_for_standstill()["q"][0] - before) < 2.0, "rad; to its goals are 3.3"
 
 
 @pytest.mark.promise("P46")
@@ -83,10 +73,10 @@ def test_a_program_that_starts_again_without_a_guard_is_stopped_again(controller
 def test_a_guard_that_has_hung_guards_again_and_is_missed_again(controller):
     with guard(external(controller)) as session:
         kill(session, "guard", signal.SIGSTOP)
-        assert session.wait_for(("guard_unresponsive",), 10.0) is not None
+        assert session.wait_for(("guard_unresponsive",), DEADLINE) is not None
         kill(session, "guard", signal.SIGCONT)
-        assert session.wait_for(("latched",), 10.0) is not None
-        until(lambda: reset(session))
+        assert session.wait_for(("latched",), DEADLINE) is not None
+        until(lambda: is_reset(session))
         send(controller.host, 30002, RAW)
         until(lambda: fast(controller))
         for name in ("watchdog", "guard"):
@@ -114,7 +104,7 @@ def test_a_touch_that_cannot_be_is_refused_and_nothing_else_happens(controller):
         assert fast(controller)
         session.check()
         session.touch(0.13, 1.55, duration=0.2, sensor=0)
-        assert session.wait_for(("latched",), 20.0) is not None
+        assert session.wait_for(("latched",), DEADLINE) is not None
 
 
 # ---- the last resort, by whatever port opens
@@ -162,7 +152,7 @@ class Ports:
 def test_a_stop_goes_out_by_whatever_port_opens(numbers):
     host = free_host()
     ports = Ports(host, numbers)
-    resort = FallbackStop(scene_for(type("Host", (), {"host": host}), PATIENT, "external"))
+    resort = FallbackStop(scene_for(type("Host", (), {"host": host}), control="external"))
     try:
         port, word = (30003, b"stopj(10.000)") if 30003 in numbers else (29999, b"stop\n")
         resort.poll(lambda: word in ports.got[port])

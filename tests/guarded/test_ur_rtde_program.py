@@ -84,10 +84,7 @@ def run(program, tmp_path):
     """Run a program against a controller of its own: what it has printed, what was set and moved, and the way."""
     with SimulatedController("UR5e", free_host(), START, log=tmp_path / f"{program.stem}.jsonl") as simulated:
         text = (FOLDER / "scene.toml").read_text(encoding="utf-8").replace("127.0.0.1", simulated.host)
-        (tmp_path / "scene.toml").write_text(
-            text.replace("_ms = 250", "_ms = 1000") + "program_silence_ms = 1000\n",
-            encoding="utf-8",
-        )
+        (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
         command = [sys.executable, str(program), simulated.host]
         with Way(simulated.host) as way:
             done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=90)

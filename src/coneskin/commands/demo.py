@@ -80,9 +80,10 @@ deceleration_rad_s2 = 40      # this arm's motors can, folded as it is here: doc
 distance_mm = 20              # and back what it moved while it stopped: the whole arm may go 100 mm
 
 [monitoring]                  # defaults: 50 ms each; a pseudo-terminal on a busy machine can stall for longer
-skin_silence_ms = 250
-skin_late_ms = 250
-arm_silence_ms = 250
+skin_silence_ms = 1000
+skin_late_ms = 1000
+arm_silence_ms = 1000
+program_silence_ms = 1000
 {more}"""
 #: with physics: servos follow 10 ms late, and what they do comes from one more process
 _FRAME_TIMEOUT = "escalate_ms = 100"

@@ -41,11 +41,14 @@ xyz_mm = [-192, -120, 587.5]
 mass_kg = 0.6
 stiffness_n_per_mm = 2
 """
-_PATIENT = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 500\nescalate_ms = 200"
+_PATIENT = (
+    "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
+)
 
 
 def scene_at(host: str) -> Scene:
     text = forearm_scene(host, limits=_PATIENT).replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 500')
+    text = text.replace("[arm]", "[arm]\nwatchdog_hz = 1")
     return parse_scene(text + _HAND)
 
 

@@ -12,7 +12,9 @@ __all__ = ["board_scene"]
 _SENSOR = "adc_bits = 11\nlead_ohm = [26, 3, 3, 26]"
 _BAUD = 500_000
 # patient, as the computer that emulates board and arm at once may stall; the watchdog of the board bites after 250 ms
-_LIMITS = "skin_silence_ms = 600\nskin_late_ms = 1000\narm_silence_ms = 300\nprogram_silence_ms = 500"
+_LIMITS = (
+    "skin_silence_ms = 600\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
+)
 
 
 def board_scene(host: str, port: str) -> Scene:
@@ -23,5 +25,5 @@ def board_scene(host: str, port: str) -> Scene:
         port: of the board.
     """
     text = forearm_scene(host, port=port, reaction='kind = "retreat"\ndistance_mm = 30', limits=_LIMITS)
-    text = text.replace("xyz_mm =", f"{_SENSOR}\nxyz_mm =")
+    text = text.replace("xyz_mm =", f"{_SENSOR}\nxyz_mm =").replace("[arm]", "[arm]\nwatchdog_hz = 1")
     return commissioned(parse_scene(text.replace('kind = "serial"', f'kind = "serial"\nbaud = {_BAUD}')))

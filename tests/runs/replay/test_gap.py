@@ -9,7 +9,7 @@ from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.signals.journal import BlockKind, RecordingOverflowFilter
 from coneskin.runs.replay.run import Verdict, read_run, replay
 
-from ..scene.scenes import record
+from ...scene.scenes import record
 
 
 def with_a_gap(whole, cut, since, until):
