@@ -20,11 +20,12 @@ from coneskin.impact.permissible_speed.speed_map import contact_at
 from coneskin.impact.permissible_speed.speed_search import ForceLimits
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.robot.arm.inertia import arm_inertia, effective_mass, mass_matrix
+from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.model import Joints
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.skin.materials import Padding
+from tests.support.effective_mass import effective_mass
 
 MODEL, LINK = arm_model("UR5e"), LINK_INDEX["forearm"]
 LINK_CONE = PlacedFrustum(Frustum(0.0376, 0.0372, 0.26), dh_mesh(MODEL, "forearm") @ Pose(translation=(0.0, 0.0, 0.08)))

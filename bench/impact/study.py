@@ -19,9 +19,10 @@ import numpy as np
 from bench.report import head, quantile
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.robot.arm.inertia import arm_inertia, effective_mass
+from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.skin.materials import Padding
+from tests.support.effective_mass import effective_mass
 
 SPRING, STRUCK = 75e3, 5.6  # N/m, kg; as the group's code has them
 BARE_PADDING = Padding(thickness=1.0, stiffness=1e9, loss=0.0)

@@ -1,15 +1,11 @@
-"""Inertia of an arm: what its links weigh, the mass that a contact on it feels, and the table of the UR family.
+"""Inertia of an arm: what its links weigh, what its joints take, and the table of the UR family.
 
     symbol    meaning
     M         joint-space mass matrix [kg m^2]: kinetic energy = qd^T M qd / 2
     J         Jacobian of a point [m/rad]
     tau       joint torques [N m] = M qdd + what gravity and the joint speeds take
-    n         unit vector in the base frame
-    m_n       effective mass along n [kg]: a blow at the point along n moves it as it would move a free mass of m_n
 
-Source: Khatib, "Inertial properties in robotic manipulation: an object-level framework", IJRR 14 (1995), eq. 9: the
-effective mass is 1 / (n^T J M^-1 J^T n). The joints are free in it; held joints make an arm heavier, never lighter.
-Torques: the recursion of Luh, Walker and Paul, as in Siciliano et al., *Robotics*, chapter 7.5.
+Source of the torques: the recursion of Luh, Walker and Paul, as in Siciliano et al., *Robotics*, chapter 7.5.
 
 Sources of the table:
     Masses, centres of mass and tensors: ``physical_parameters.yaml`` of Universal_Robots_ROS2_Description (commit
@@ -27,7 +23,6 @@ Sources of the table:
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -38,7 +33,7 @@ from .kinematics import JOINTS, link_poses, point_jacobian
 from .model import ArmModel, Joints
 from .ur_models import arm_model
 
-__all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "effective_mass", "joint_torques", "mass_matrix"]
+__all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "joint_torques", "mass_matrix"]
 
 #: of an arm that stands upright [m/s^2]; as a UR controller has it until it is told another
 GRAVITY = 9.82
@@ -146,48 +141,6 @@ def joint_torques(
         about = _minus(turned, _cross(poses[i].translation, carried))
         torques[i] = _dot(poses[i].rotate((0.0, 0.0, 1.0)), about) + inertia.rotor[i] * qdd[i]
     return torques
-
-
-def effective_mass(
-    model: ArmModel, inertia: ArmInertia, q: Sequence[float], link: int, p_link: Vector, direction: Vector
-) -> float:
-    """Return the mass that a blow at a point of a link feels along a direction [kg]; infinite where it cannot move.
-
-    Args:
-        model: the nominal arm.
-        inertia: of the arm.
-        q: joint positions [rad].
-        link: index of the link's DH frame, 0 to 6.
-        p_link: the point in that frame [m].
-        direction: in the base frame; its length does not matter.
-
-    Raises:
-        KinematicsError: q has not six finite numbers, there is no such link, or the direction is 0.
-    """
-    length = math.hypot(*direction)
-    if not (math.isfinite(length) and length > 0.0):
-        raise KinematicsError(f"a direction must be finite and not 0, got {direction}")
-    rows = point_jacobian(model, q, link, p_link)
-    along = [sum(d * row[j] for d, row in zip(direction, rows, strict=True)) / length for j in range(JOINTS)]
-    mobility = sum(a * b for a, b in zip(along, _solved(mass_matrix(model, inertia, q), along), strict=True))
-    return 1.0 / mobility if mobility > 0.0 else math.inf
-
-
-def _solved(matrix: list[list[float]], right: Sequence[float]) -> list[float]:
-    """Solve a symmetric positive definite system by Cholesky's method."""
-    n = len(right)
-    lower = [[0.0] * n for _ in range(n)]
-    for i in range(n):
-        for j in range(i + 1):
-            rest = matrix[i][j] - sum(lower[i][k] * lower[j][k] for k in range(j))
-            lower[i][j] = math.sqrt(rest) if i == j else rest / lower[j][j]
-    y: list[float] = []
-    for i in range(n):
-        y.append((right[i] - sum(lower[i][k] * y[k] for k in range(i))) / lower[i][i])
-    x = [0.0] * n
-    for i in reversed(range(n)):
-        x[i] = (y[i] - sum(lower[k][i] * x[k] for k in range(i + 1, n))) / lower[i][i]
-    return x
 
 
 def _columns(rows: Tensor) -> Tensor:

@@ -37,12 +37,19 @@ class ExaminationScope(NamedTuple):
     heartbeat: bool  #: a program on the controller may depend on the guard's heartbeat
 
 
-class PayloadReader(Protocol):
-    """Connection that brings payloads, of states or of the speed slider; it is opened in a ``with`` and never waits."""
+class _Connection(Protocol):
+    """Connection that is opened in a ``with``."""
 
     def __enter__(self) -> Self: ...
 
     def __exit__(self, *_: object) -> None: ...
+
+    def close(self) -> None:
+        """Close it; may be called again."""
+
+
+class PayloadReader(_Connection, Protocol):
+    """Connection that brings payloads, of states or of the speed slider, and never waits."""
 
     def fileno(self) -> int:
         """Return the descriptor, for select and poll."""
@@ -53,9 +60,6 @@ class PayloadReader(Protocol):
         Raises:
             RobotConnectionError: the controller is gone.
         """
-
-    def close(self) -> None:
-        """Close the connection; may be called again."""
 
 
 class SetpointWriter(PayloadReader, Protocol):
@@ -79,12 +83,8 @@ class HeartbeatWriter(PayloadReader, Protocol):
         """Send a count without waiting; return whether the system took the bytes."""
 
 
-class VariableReader(Protocol):
-    """Reader of what the controller says, for the guarded program; it waits. Any thread may ask."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
+class VariableReader(_Connection, Protocol):
+    """Reader of what the controller says, for the guarded program. It waits. Any thread may ask."""
 
     def value(self, name: str, /) -> Any:
         """Return the newest value of a variable, by the controller's name of it."""
@@ -92,16 +92,9 @@ class VariableReader(Protocol):
     def reading(self) -> ArmReading:
         """Return what the controller says at one moment."""
 
-    def close(self) -> None:
-        """Close the connection; may be called again."""
 
-
-class OutputWriter(Protocol):
-    """Writer of the controller's outputs, for the guarded program; it waits. Any thread may write."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
+class OutputWriter(_Connection, Protocol):
+    """Writer of the controller's outputs, for the guarded program. It waits. Any thread may write."""
 
     def set_digital(self, group: str, number: int, on: bool, /) -> None:
         """Switch a digital output of a group."""
@@ -112,11 +105,8 @@ class OutputWriter(Protocol):
     def set_register(self, number: int, value: int | float, /) -> None:
         """Write a register that programs on the controller read."""
 
-    def close(self) -> None:
-        """Close the connection; may be called again."""
 
-
-class StopConnections(Protocol):
+class StopConnections(_Connection, Protocol):
     """Connections through which an arm can be stopped, whatever moves it.
 
     Entering it in a ``with`` opens all of them, or raises RobotConnectionError; ``reopen`` opens what it can.
@@ -126,10 +116,6 @@ class StopConnections(Protocol):
     """
 
     host: str
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
 
     def sockets(self) -> dict[str, socket.socket]:
         """Return those that are open, by the name of the stop path that needs them."""
@@ -145,9 +131,6 @@ class StopConnections(Protocol):
 
     def reopen(self) -> bool:
         """Open again what is gone; return whether any was opened."""
-
-    def close(self) -> None:
-        """Close all of them; may be called again."""
 
 
 class ArmDriver(Protocol):

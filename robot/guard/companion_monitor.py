@@ -16,12 +16,12 @@ from coneskin.robot.stop.limits import MonitoringLimits
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
-__all__ = ["HELD_UP", "CompanionMonitor", "HeartbeatMonitor"]
+__all__ = ["HELD_UP", "CompanionMonitor"]
 
 HELD_UP = 0.02  #: s between two looks, from which on the guard itself was held up
 
 
-class HeartbeatMonitor:
+class _HeartbeatMonitor:
     """Ages of the heartbeats of several processes.
 
     While the guard itself is held up it hears nobody: that time is nobody's silence. What came meanwhile is read next.
@@ -96,7 +96,7 @@ class CompanionMonitor:
         self._arm = arm
         self._helper = "the guard watchdog" if arm is None or not arm.internal_control else "the driver process"
         silences = {} if arm is None else {_USER_PROGRAM: limits.program_silence, self._helper: limits.process_silence}
-        self._heartbeats = HeartbeatMonitor(silences)
+        self._heartbeats = _HeartbeatMonitor(silences)
         self._silent: dict[str, str] = {}  # process -> what is wrong with it now
         self._ran = False  # the driver's program, on the controller
         self._restart_end = math.inf  # by when it has to run again, after an announced end

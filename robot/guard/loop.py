@@ -10,7 +10,7 @@ import gc
 import json
 import selectors
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -117,15 +117,8 @@ class _Outbox:
 
 _HEARTBEAT_BYTES = Heartbeat().encode()
 _SESSION_GONE_TIMEOUT = 1.5  # s that the arm has to stand when there is nobody left to tell
-#: what can be lost -> the attribute of ``GuardPorts``
-_PORT_ATTRIBUTES = {
-    "skin": "source",
-    "controller": "reader",
-    "slider": "slider",
-    "heartbeat": "heartbeat",
-    "watchdog": "watchdog",
-    "driver": "driver",
-}
+#: what can be lost -> the attribute of ``GuardPorts``; of what is not here, it has the same name
+_PORT_ATTRIBUTES = {"skin": "source", "controller": "reader"}
 _TICK_PERIOD = 0.002  # s between two looks at the clocks where nothing else happens
 _OVERRUN_TIME = 0.02  # s between two rounds, from which on the loop reports that it was held up
 _SUSPENSION_TIME = 1.0  # s between two rounds, from which on nobody has guarded; the driver process waits half of it
@@ -215,8 +208,8 @@ class GuardLoop:
         ready = {key.data or key.fileobj for key, _ in self._selector.select(timeout)}
         self._note_overrun()
         arm_first = self._core.phase.stopping  # states that wait may show that the stop under way works
-        if arm_first and ports.reader is not None and ports.reader in ready:
-            self._read_arm(ports.reader)
+        if arm_first:
+            self._read(ports.reader, ready, "controller", BlockKind.ARM)
         if ports.source is not None and ("skin" in ready or ports.source.fileno() is None):
             self._read_skin(ports.source)
         if self._gone is not None and self._core.phase is Phase.LATCHED:
@@ -224,12 +217,13 @@ class GuardLoop:
         for channel in (ports.driver, ports.watchdog):  # before the states: they show what was announced here
             if channel is not None and channel in ready:
                 self._read_channel(channel)
-        if not arm_first and ports.reader is not None and ports.reader in ready:
-            self._read_arm(ports.reader)
-        if ports.slider is not None and ports.slider in ready:
-            self._read_slider(ports.slider)
-        if ports.heartbeat is not None:
-            self._keep_heartbeat(ports.heartbeat, ports.heartbeat in ready)
+        if not arm_first:
+            self._read(ports.reader, ready, "controller", BlockKind.ARM)
+        self._read(ports.slider, ready, "slider", BlockKind.SLIDER)
+        if ports.heartbeat is not None and (count := heartbeat_count(self._clock())) != self._count:
+            self._count = count
+            ports.heartbeat.write(count)
+        self._read(ports.heartbeat, ready, "heartbeat", BlockKind.ECHO)
         if self._clock() - self._beat >= HEARTBEAT_PERIOD:
             self._send_heartbeat()
         if "stops" in ready and ports.stops is not None:
@@ -303,31 +297,15 @@ class GuardLoop:
                 why = f"{source.name} is gone and could not be opened again: start the guard anew"
                 self._feed(BlockKind.LOST, encode_loss("skin", why))
 
-    def _read_arm(self, reader: PayloadReader) -> None:
+    def _read(self, reader: PayloadReader | None, ready: Set[object], what: str, kind: BlockKind) -> None:
+        """Feed what has come over a connection of the controller, if anything has."""
+        if reader is None or reader not in ready:
+            return
         try:
             for payload in reader.read():
-                self._feed(BlockKind.ARM, payload)
+                self._feed(kind, payload)
         except ConeSkinError as exc:
-            self._lose("controller", str(exc), reader)
-
-    def _read_slider(self, slider: SpeedSlider) -> None:
-        try:
-            for payload in slider.read():
-                self._feed(BlockKind.SLIDER, payload)
-        except ConeSkinError as exc:
-            self._lose("slider", str(exc), slider)
-
-    def _keep_heartbeat(self, heartbeat: HeartbeatWriter, ready: bool) -> None:
-        """Send the count that is due, and read what the program has seen of it."""
-        count = heartbeat_count(self._clock())
-        if count != self._count:
-            self._count = count
-            heartbeat.write(count)
-        try:
-            for payload in heartbeat.read() if ready else []:
-                self._feed(BlockKind.ECHO, payload)
-        except ConeSkinError as exc:
-            self._lose("heartbeat", str(exc), heartbeat)
+            self._lose(what, str(exc), reader)
 
     def _drain(self, stops: StopConnections) -> None:
         for name, sock in stops.drain():
@@ -359,7 +337,7 @@ class GuardLoop:
         self._forget(fileobj)
         if what == "skin" and self._ports.reopen is not None:
             self._gone = self._ports.source
-        setattr(self._ports, _PORT_ATTRIBUTES[what], None)
+        setattr(self._ports, _PORT_ATTRIBUTES.get(what, what), None)
         self._feed(BlockKind.LOST, encode_loss(what, why))
         if what == "controller" and (driver := self._ports.driver) is not None:
             # it would connect again by itself, and its program start with whatever command is still there

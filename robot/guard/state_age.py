@@ -13,12 +13,12 @@ import math
 
 from coneskin.robot.driver.values import ControllerState
 
-__all__ = ["ControllerClock", "StateAge"]
+__all__ = ["StateAge"]
 
 _OFFSET_WINDOW = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
 
 
-class ControllerClock:
+class _ControllerClock:
     """Map from the controller's time to the host's monotonic time."""
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class StateAge:
 
     def __init__(self, limit: float) -> None:
         self._limit = limit
-        self._clock = ControllerClock()
+        self._clock = _ControllerClock()
         self._controller_time = -math.inf  # the latest so far
         self._fresh = -math.inf  # host time of the newest state that was a new one
         self._late_since = self._very_late_since = math.inf  # host times of the first state that came so late

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, Workspace
@@ -22,44 +22,81 @@ from .contact_supervision import opposed
 from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
-__all__ = ["AdmittanceState", "admittance_step", "begin_admittance"]
+__all__ = ["AdmittanceMotion"]
 
 _DAMPING_TIME = 0.05  # s; a person's push rises in 50 ms and more
 _MIN_SPEED = 1e-3  # m/s; slower counts as standing
 
 
-@dataclass(frozen=True, slots=True)
-class AdmittanceState:
-    """State of a compliant motion; each step makes the next.
+class AdmittanceMotion:
+    """Compliant motion of an arm that stands as it begins.
 
-    Attributes:
+    Args:
         model: the arm.
+        state: of the arm, standing.
         reaction: the settings.
         space: the room that the arm has, or None.
-        sweep: where the whole arm was when the motion began.
-        start_time: [s].
-        time: of the last step [s].
-        speed: of the touched point that was wanted then [m/s].
-        progress: how far touched points have given way so far [m].
+
+    Attributes:
+        how: the arm leaves: "push".
+        speed: of the touched point that was wanted in the last step [m/s].
         plan: of the last step, whose tracks start where the touched points were then; None where nothing pushed.
     """
 
-    model: ArmModel
-    reaction: Reaction
-    space: Workspace | None
-    sweep: ArmSweep
-    start_time: float
-    time: float
-    speed: float = 0.0
-    progress: float = 0.0
-    plan: RetreatPlan | None = None
+    how = "push"
 
+    def __init__(self, model: ArmModel, state: ArmState, reaction: Reaction, space: Workspace | None = None) -> None:
+        self._model = model
+        self._reaction = reaction
+        self._space = space
+        self._sweep = ArmSweep.begin(model, state.q)
+        self._began = self._newest = state.time
+        self._progress = 0.0  # how far touched points have given way so far [m]
+        self.speed = 0.0
+        self.plan: RetreatPlan | None = None
 
-def begin_admittance(
-    model: ArmModel, state: ArmState, reaction: Reaction, space: Workspace | None = None
-) -> AdmittanceState:
-    """Return the first state of a compliant motion, with the arm standing as in ``state``."""
-    return AdmittanceState(model, reaction, space, ArmSweep.begin(model, state.q), state.time, state.time)
+    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
+        """Return what to do in this control cycle, as firm as the current push.
+
+        Args:
+            state: the arm as measured.
+            contacts: the touches there are. Without one it is over.
+        """
+        reaction = self._reaction
+        progress = self._progress
+        if self.plan is not None:
+            progress += max(0.0, _made(self.plan, state))
+        if not contacts:
+            return Done("the touch is over", progress, complete=True)
+        if not progress < reaction.distance - DISTANCE_TOLERANCE:
+            return Done("the distance is made", progress)
+        if not state.time - self._began < reaction.time_budget:
+            return Done(f"the time of {reaction.time_budget} s is over", progress)
+        placed = all(contact.location_valid for contact in contacts)  # as a push ends, its place is lost before itself
+        against = placed and opposed(self._model, state.q, contacts)
+        wanted = _wanted_speed(reaction, contacts) if placed and not against else 0.0
+        share = 1.0 - math.exp(-max(0.0, state.time - self._newest) / _DAMPING_TIME)
+        speed = self.speed + share * (wanted - self.speed)
+        if speed < _MIN_SPEED or not placed or against:
+            self._newest, self.speed, self._progress, self.plan = state.time, speed, progress, None
+            clipped_by = ("opposed" if against else "level" if placed else "place",)
+            # what is not known, or on the other side, may be pressed now: brake as a stop does, not as a push ends
+            gentle = placed and not against
+            rate = reaction.acceleration if gentle else max(reaction.acceleration, reaction.deceleration)
+            return JointVelocity(ZERO_VELOCITY, rate, 0.0, progress, clipped_by)
+        setting = replace(reaction, speed=speed, distance=reaction.distance - progress)
+        plan = plan_retreat(self._model, state, contacts, setting, self._space, self._sweep)
+        step = plan if isinstance(plan, Done) else retreat_step(plan, state)
+        if isinstance(plan, Done) or isinstance(step, Done):
+            assert isinstance(step, Done)
+            return Done(step.reason, progress)
+        clipped = step.clipped_by
+        if wanted < reaction.speed:
+            clipped += ("level",)
+        if speed < 0.99 * wanted:  # it gets there, but never quite
+            clipped += ("damping",)
+        self._newest, self.speed, self._progress, self.plan = state.time, speed, progress, plan
+        return replace(step, progress=progress, clipped_by=clipped)
 
 
 def _wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> float:
@@ -71,52 +108,6 @@ def _wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> floa
         share = above / span if span > 0.0 else 1.0 if above > 0.0 else 0.0
         most = max(most, min(1.0, share))
     return reaction.speed * most
-
-
-def admittance_step(
-    now: AdmittanceState, state: ArmState, contacts: Sequence[ContactOnLink]
-) -> tuple[AdmittanceState, JointVelocity | Done]:
-    """Return the next state, and what to do in this control cycle; the same for the same arguments.
-
-    Args:
-        now: where it is.
-        state: the arm as measured.
-        contacts: the touches there are; without one it is over.
-    """
-    reaction = now.reaction
-    progress = now.progress
-    if now.plan is not None:
-        progress += max(0.0, _made(now.plan, state))
-    if not contacts:
-        return now, Done("the touch is over", progress, complete=True)
-    if not progress < reaction.distance - DISTANCE_TOLERANCE:
-        return now, Done("the distance is made", progress)
-    if not state.time - now.start_time < reaction.time_budget:
-        return now, Done(f"the time of {reaction.time_budget} s is over", progress)
-    placed = all(contact.location_valid for contact in contacts)  # as a push ends, its place is lost before itself
-    against = placed and opposed(now.model, state.q, contacts)
-    wanted = _wanted_speed(reaction, contacts) if placed and not against else 0.0
-    share = 1.0 - math.exp(-max(0.0, state.time - now.time) / _DAMPING_TIME)
-    speed = now.speed + share * (wanted - now.speed)
-    if speed < _MIN_SPEED or not placed or against:
-        still = replace(now, time=state.time, speed=speed, progress=progress, plan=None)
-        clipped_by = ("opposed" if against else "level" if placed else "place",)
-        # what is not known, or on the other side, may be pressed now: brake as a stop does, not as a push ends
-        rate = reaction.acceleration if placed and not against else max(reaction.acceleration, reaction.deceleration)
-        return still, JointVelocity(ZERO_VELOCITY, rate, 0.0, progress, clipped_by)
-    setting = replace(reaction, speed=speed, distance=reaction.distance - progress)
-    plan = plan_retreat(now.model, state, contacts, setting, now.space, now.sweep)
-    step = plan if isinstance(plan, Done) else retreat_step(plan, state)
-    if isinstance(plan, Done) or isinstance(step, Done):
-        assert isinstance(step, Done)
-        return now, Done(step.reason, progress)
-    clipped = step.clipped_by
-    if wanted < reaction.speed:
-        clipped += ("level",)
-    if speed < 0.99 * wanted:  # it gets there, but never quite
-        clipped += ("damping",)
-    after = replace(now, time=state.time, speed=speed, progress=progress, plan=plan)
-    return after, replace(step, progress=progress, clipped_by=clipped)
 
 
 def _made(plan: RetreatPlan, state: ArmState) -> float:

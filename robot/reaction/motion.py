@@ -12,7 +12,7 @@ from typing import Protocol
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, Workspace
 
-from .admittance import AdmittanceState, admittance_step, begin_admittance
+from .admittance import AdmittanceMotion
 from .backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
 from .contact_supervision import clamped
 from .retreat import RetreatPlan, plan_retreat, retreat_step
@@ -38,44 +38,17 @@ class ReactionMotion(Protocol):
         """Return what to do in this control cycle, with the current touches."""
 
 
-class _RetreatMotion:
-    """Retreat along the normal of the touch (``retreat.py``)."""
+class _PlannedMotion:
+    """Retreat along the normal of the touch, or the way back along the path. Later touches change neither."""
 
-    how = ""
-
-    def __init__(self, plan: RetreatPlan) -> None:
+    def __init__(self, plan: RetreatPlan | BacktrackPlan) -> None:
         self._plan = plan
+        self.how = "path" if isinstance(plan, BacktrackPlan) else ""
 
     def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
-        """Return the next step; later touches do not change the direction."""
-        return retreat_step(self._plan, state)
-
-
-class _BacktrackMotion:
-    """Backtrack along the arm's own recent path (``backtrack.py``)."""
-
-    how = "path"
-
-    def __init__(self, plan: BacktrackPlan) -> None:
-        self._plan = plan
-
-    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
-        """Return the next step; the touches do not change the path."""
-        return backtrack_step(self._plan, state)
-
-
-class _AdmittanceMotion:
-    """Motion with the push (``admittance.py``)."""
-
-    how = "push"
-
-    def __init__(self, start: AdmittanceState) -> None:
-        self._now = start
-
-    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
-        """Return the next step, as firm as the current push."""
-        self._now, step = admittance_step(self._now, state, contacts)
-        return step
+        """Return the next step."""
+        plan = self._plan
+        return backtrack_step(plan, state) if isinstance(plan, BacktrackPlan) else retreat_step(plan, state)
 
 
 def plan_reaction_motion(
@@ -97,11 +70,11 @@ def plan_reaction_motion(
         space: the room that the arm has.
     """
     if reaction.kind == "comply":
-        return _AdmittanceMotion(begin_admittance(model, state, reaction, space))
+        return AdmittanceMotion(model, state, reaction, space)
     if clamped(contacts):
         return "touches on opposite sides, or on two links, may hold the arm between them"
     plan = plan_retreat(model, at_touch, contacts, reaction, space, ArmSweep.begin(model, state.q))
-    return plan.reason if isinstance(plan, Done) else _RetreatMotion(plan)
+    return plan.reason if isinstance(plan, Done) else _PlannedMotion(plan)
 
 
 def plan_way_back(
@@ -133,7 +106,7 @@ def plan_way_back(
     back = plan_backtrack(model, state, history, reaction, replace(space, avoid_self=False), since)
     if isinstance(back, Done):
         return back.reason
-    return _approached_touch(model, state, contacts, back) or _BacktrackMotion(back)
+    return _approached_touch(model, state, contacts, back) or _PlannedMotion(back)
 
 
 def _approached_touch(model: ArmModel, state: ArmState, contacts: Sequence[ContactOnLink], back: BacktrackPlan) -> str:

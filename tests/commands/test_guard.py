@@ -11,7 +11,7 @@ from coneskin.core.errors import Collision, RobotConnectionError
 from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene.reader import parse_scene
 from coneskin.session.outcome import exit_code, stands
-from coneskin.session.session import defer_interrupts
+from coneskin.session.session import _defer_interrupts
 
 from ..scene.scenes import SERIAL_RETREAT, SKIN_ONLY
 
@@ -270,7 +270,7 @@ def test_a_job_is_done_although_a_person_interrupts_it_twice():
         done.append(True)
 
     with pytest.raises(KeyboardInterrupt):
-        defer_interrupts(job)
+        _defer_interrupts(job)
     assert done == [True]
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)  # as before
@@ -281,7 +281,7 @@ def test_what_a_job_raises_is_raised():
         raise RobotConnectionError("gone")
 
     with pytest.raises(RobotConnectionError, match="gone"):
-        defer_interrupts(job)
+        _defer_interrupts(job)
 
 
 @pytest.mark.parametrize(("words", "bound"), [(["--duration-s", "3"], 3.0), (["--duration-s", "60"], 20.0), ([], 20.0)])

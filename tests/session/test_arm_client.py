@@ -8,7 +8,7 @@ from coneskin.core.channel import Channel, decode_json, encode_json, pair, wait_
 from coneskin.core.errors import Collision, KinematicsError, RobotConnectionError, RobotRefused
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.values import Waypoint
-from coneskin.session.arm_client import ArmClient, ArmRequests
+from coneskin.session.arm_client import ArmClient, _ArmRequests
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def call(function, into):
 def test_a_thread_that_waits_for_a_move_does_not_keep_the_answer_of_another(ends) -> None:
     """Two threads read one channel: each threw away what the other one waited for."""
     program, driver = ends
-    requests = ArmRequests(program, lambda stopped: None)
+    requests = _ArmRequests(program, lambda stopped: None)
     moved, stopped = [], []
     first = call(lambda: requests.do(do="move"), moved)
     number = asked(driver)["number"]
@@ -63,7 +63,7 @@ def test_answers_that_nobody_waits_for_any_more_are_not_kept(ends) -> None:
         if gone:
             raise RobotRefused("the guard has stopped the arm")
 
-    requests = ArmRequests(program, check)
+    requests = _ArmRequests(program, check)
     raised = []
 
     def ask():
@@ -102,7 +102,7 @@ def test_what_is_refused_is_raised(ends, reply, error, words) -> None:
     thread = threading.Thread(target=lambda: driver.send(encode_json({"number": asked(driver)["number"], **reply})))
     thread.start()
     with pytest.raises(error, match=words):
-        ArmRequests(program, check).do(do="move")
+        _ArmRequests(program, check).do(do="move")
     thread.join()
 
 
@@ -110,7 +110,7 @@ def test_a_driver_process_that_has_ended_is_told(ends) -> None:
     program, driver = ends
     driver.close()
     with pytest.raises(RobotConnectionError, match="the driver process has ended"):
-        ArmRequests(program, lambda stopped: None).do(do="move")
+        _ArmRequests(program, lambda stopped: None).do(do="move")
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ def test_a_request_that_is_too_long_is_refused_and_not_waited_for(ends) -> None:
         except RobotRefused as exc:
             refused.append(str(exc))
 
-    requests = ArmRequests(program, lambda stopped: None)
+    requests = _ArmRequests(program, lambda stopped: None)
     asking = threading.Thread(target=ask, daemon=True)
     asking.start()
     asking.join(5.0)

@@ -13,7 +13,7 @@ from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import RecordingScene
-from coneskin.session.event_log import EventDelivery, EventLog, HeardLine, new_recording
+from coneskin.session.event_log import EventLog, _EventDelivery, _HeardLine, new_recording
 from coneskin.session.guard_monitor import GuardMonitor
 from coneskin.session.outcome import activation_error
 from coneskin.skin.virtual.skin import VirtualSkin
@@ -199,7 +199,7 @@ def numbered(*numbers):
 
 def test_every_event_comes_in_order_and_the_rest_at_the_end():
     seen = []
-    delivery = EventDelivery(seen.append)
+    delivery = _EventDelivery(seen.append)
     for number in range(500):
         delivery.put(numbered(number))
     delivery.close()
@@ -216,7 +216,7 @@ def test_a_function_that_blocks_delays_nobody_and_is_told_what_it_has_missed(cap
         free.wait(20.0)
         seen.append(event)
 
-    delivery = EventDelivery(block, bound=5)
+    delivery = _EventDelivery(block, bound=5)
     delivery.put(numbered(0))
     assert took.wait(20.0)
     delivery.put(numbered(*range(1, 20)))  # returns, though nobody takes them
@@ -253,7 +253,7 @@ def test_the_function_itself_may_end_the_session():
         delivery.close()
         done.set()
 
-    delivery = EventDelivery(close)
+    delivery = _EventDelivery(close)
     delivery.put(numbered(1))
     assert done.wait(20.0)
 
@@ -274,9 +274,9 @@ NOW = 100.0  # s
 WAITS = [f"{SENSOR.name}: no valid frame"]
 
 
-def heard(change: Callable[[bytes], bytes]) -> HeardLine:
+def heard(change: Callable[[bytes], bytes]) -> _HeardLine:
     """Half a second of a skin, until ``NOW``."""
-    line = HeardLine()
+    line = _HeardLine()
     packets = list(VirtualSkin(SENSOR, model="ladder", duration=0.5, seed=1).packets())
     line.feed([Block(BlockKind.SKIN, NOW - 0.5 + at, change(data)) for at, data in packets])
     return line
@@ -297,7 +297,7 @@ def test_the_refusal_names_the_mistake_in_the_firmware() -> None:
 
 def test_a_silent_line_is_named_too() -> None:
     assert (
-        HeardLine()
+        _HeardLine()
         .describe(SCENE, WAITS, NOW)
         .startswith("no byte has come from serial hwgrep://0403:6001: check power")
     )

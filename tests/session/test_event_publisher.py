@@ -15,7 +15,7 @@ from coneskin.cli import main
 from coneskin.core.errors import SceneError
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.session.event_log import EventLog
-from coneskin.session.event_publisher import EventPublisher, event_message
+from coneskin.session.event_publisher import EventPublisher, _event_message
 from tests.support.paths import ROOT
 
 from ..scene.scenes import SKIN_ONLY
@@ -59,12 +59,12 @@ def test_a_subscriber_gets_the_events(kind: str, tmp_path: Path) -> None:
 
 
 def test_an_event_is_json_that_every_language_reads() -> None:
-    data = event_message(CONTACT, 10.0)
+    data = _event_message(CONTACT, 10.0)
     assert json.loads(data, parse_constant=pytest.fail) == {
         **{"t": 2.5, "name": "contact", "sensor": "skin", "u": 0.1},
         **{"phi": None, "normal": [0.0, None]},
     }
-    long = event_message(GuardEvent(EventName.MESSAGE, 11.0, {"what": "x" * 10_000}), 10.0)
+    long = _event_message(GuardEvent(EventName.MESSAGE, 11.0, {"what": "x" * 10_000}), 10.0)
     assert json.loads(long) == {"t": 1.0, "name": "message", "cut": 10_036}
 
 

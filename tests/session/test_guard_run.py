@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from coneskin.core.errors import RobotRefused
-from coneskin.session.guard_run import ArmLock
+from coneskin.session.guard_run import _arm_lock
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names of sockets that need no file")
 
@@ -17,16 +17,16 @@ def test_a_second_guard_of_one_arm_is_refused_and_two_names_are_one_arm():
     def wait(seconds):
         now[0] += seconds
 
-    with ArmLock("127.77.1.1"), ArmLock("127.77.1.2"):
+    with _arm_lock("127.77.1.1"), _arm_lock("127.77.1.2"):
         with pytest.raises(RobotRefused, match=r"another guard on this computer has the arm at 127\.77\.1\.1: end"):
-            ArmLock("127.77.1.1", 3.0, wait, lambda: now[0]).__enter__()
+            _arm_lock("127.77.1.1", 3.0, wait, lambda: now[0]).__enter__()
         assert now[0] == pytest.approx(3.0, abs=0.1)
-        with ArmLock("localhost", 0.0), pytest.raises(RobotRefused, match=r"the arm at 127\.0\.0\.1"):
-            ArmLock("127.0.0.1", 0.0).__enter__()
+        with _arm_lock("localhost", 0.0), pytest.raises(RobotRefused, match=r"the arm at 127\.0\.0\.1"):
+            _arm_lock("127.0.0.1", 0.0).__enter__()
 
 
 def test_the_guard_of_a_program_that_was_killed_has_time_to_end():
-    first = ArmLock("127.77.1.3")
+    first = _arm_lock("127.77.1.3")
     first.__enter__()
-    with ArmLock("127.77.1.3", 3.0, lambda _: first.__exit__()), pytest.raises(RobotRefused):
-        ArmLock("127.77.1.3", 0.0).__enter__()
+    with _arm_lock("127.77.1.3", 3.0, lambda _: first.__exit__(None, None, None)), pytest.raises(RobotRefused):
+        _arm_lock("127.77.1.3", 0.0).__enter__()

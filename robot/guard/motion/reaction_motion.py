@@ -21,7 +21,7 @@ from coneskin.robot.reaction.motion import ReactionMotion, plan_reaction_motion,
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
-__all__ = ["FollowingErrorMonitor", "MotionStream", "ReactionPlanner"]
+__all__ = ["MotionStream", "ReactionPlanner"]
 
 _SPEED_TOLERANCE = 0.03  # rad/s; absolute part of the tolerance of a joint's speed
 _RELATIVE_TOLERANCE = 0.3  # ratio; its relative part, to the leading joint's commanded speed
@@ -31,7 +31,7 @@ _MAX_OVERSPEED = 0.1  # rad/s above every commanded speed; such a motion ends it
 _MAX_APPROACH = 0.005  # m that a touched point may come nearer to what touched it; more ends it at once
 
 
-class FollowingErrorMonitor:
+class _FollowingErrorMonitor:
     """Monitor of one reaction motion.
 
     Args:
@@ -200,7 +200,7 @@ class MotionStream:
         self.began = now
         self._sent = -math.inf
         self._braking: float | None = None  # how far the touched surface went on until this began [m]
-        self._following_error = FollowingErrorMonitor(now)
+        self._following_error = _FollowingErrorMonitor(now)
         self._currents = JointCurrentMonitor() if motion.how != "push" else None  # a firmer push is what that follows
         emit(out, EventName.RETREATING, now, **self.details)
 

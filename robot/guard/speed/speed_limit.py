@@ -21,13 +21,13 @@ from coneskin.robot.guard.signals.journal import EventName, Outputs, emit
 
 from .permissible_speeds import PermissibleSpeeds, SurfaceSpeeds
 
-__all__ = ["SliderSetting", "SpeedLimit"]
+__all__ = ["SpeedLimit"]
 
 _READ_TOLERANCE = 0.01  # of the slider; between what was set and what is read
 _READ_DELAY = 0.5  # s after which it must show what was set
 
 
-class SliderSetting:
+class _SliderSetting:
     """Setting of one slider.
 
     Attributes:
@@ -122,7 +122,7 @@ class SpeedLimit:
         self._surfaces = SurfaceSpeeds(model, speeds)
         self._joint_speed = model.joint_speed
         self._fastest = max(model.joint_speed)
-        self.setting = SliderSetting()
+        self.setting = _SliderSetting()
         self._sliders: deque[tuple[float, float]] = deque()  # time, and where the slider is from then on
         self._before: deque[tuple[float, Joints]] = deque()
         self._over_since: float | None = None

@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # a scene without a slow reaction does not load it
     from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
     from coneskin.robot.reaction.contact_supervision import ContactApproach
 
-__all__ = ["CLEAR_TIME", "ReducedSpeedTouch", "SpeedReduction"]
+__all__ = ["CLEAR_TIME", "SpeedReduction"]
 
 CLEAR_TIME = 0.5  #: s without a touch after which the arm goes on at the speed it had
 _MAX_SPEED_RATIO = 0.9  # ratio; speed after the reduction to speed at the touch
@@ -32,7 +32,7 @@ _SLIDER_TOLERANCE = 0.02  # ratio; allowed difference of the slider from its set
 _MAX_SLIDER_AGE = 0.5  # s; it is read 50 times a second
 
 
-class ReducedSpeedTouch:
+class _ReducedSpeedTouch:
     """One touch during which the arm is slow.
 
     Args:
@@ -140,8 +140,8 @@ class SpeedReduction:
         self._held = ""  # why the arm counts as held by something
         self.slider: float | None = None
         self._read_at = -math.inf
-        self.now: ReducedSpeedTouch | None = None
-        self._last: tuple[float, ReducedSpeedTouch] | None = None  # when it was over, and what
+        self.now: _ReducedSpeedTouch | None = None
+        self._last: tuple[float, _ReducedSpeedTouch] | None = None  # when it was over, and what
         self._halted_from: float | None = None  # where the slider was before a stop put it to 0
 
     def feed(self, time: float, slider: float | None) -> None:
@@ -192,7 +192,7 @@ class SpeedReduction:
                 before = last.before
         budget = limits.stop_budget(state.speed, reaction.deceleration)
         longest, slow = reaction.time_budget, reaction.slow_speed
-        self.now = ReducedSpeedTouch(time, top, before, reaction.slow_to, budget, longest, slow)
+        self.now = _ReducedSpeedTouch(time, top, before, reaction.slow_to, budget, longest, slow)
         self.approach, self._currents, self._held = approach, self._monitor_of(), ""
         out.append(SetSpeedSlider(self.now.fraction))
         emit(out, EventName.SPEED_REDUCED, time, slider=self.now.fraction, before=before)

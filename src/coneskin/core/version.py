@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["__version__", "code_commit", "recorded_version", "running_version"]
+__all__ = ["code_commit", "recorded_version", "running_version"]
 
 __version__ = "0.1.0"  # the one place: pyproject.toml reads it from here
 

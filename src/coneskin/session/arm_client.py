@@ -18,12 +18,12 @@ from coneskin.robot.driver.values import Waypoint
 if TYPE_CHECKING:
     from coneskin.robot.driver.protocol import OutputWriter, VariableReader
 
-__all__ = ["ArmClient", "ArmOutputs", "ArmRequests"]
+__all__ = ["ArmClient"]
 
 _ANSWER_PERIOD = 0.05  # s between two looks at what else may have ended a wait
 
 
-class ArmRequests:
+class _ArmRequests:
     """Requests to one driver process.
 
     Args:
@@ -103,7 +103,7 @@ class ArmRequests:
                     self._answers[answer["number"]] = answer
 
 
-class ArmOutputs:
+class _ArmOutputs:
     """Digital and analog outputs, and the registers for users.
 
     After a touch a gripper must not go on either: whatever is set here is refused until a person has reset the guard.
@@ -171,7 +171,7 @@ class ArmClient:
     """
 
     def __init__(self, channel: Channel, check: Callable[[bool], None], model: ArmModel, host: str) -> None:
-        self._requests = ArmRequests(channel, check)
+        self._requests = _ArmRequests(channel, check)
         self._model = model
         self._host = host
 
@@ -185,13 +185,13 @@ class ArmClient:
         return load_driver(self._model.family).variable_reader(self._host).__enter__()
 
     @cached_property
-    def outputs(self) -> ArmOutputs:
+    def outputs(self) -> _ArmOutputs:
         """Outputs of the controller, over a connection of their own that the first use opens.
 
         Raises:
             RobotConnectionError, RobotTimeout: it cannot be opened.
         """
-        return ArmOutputs(load_driver(self._model.family).output_writer(self._host).__enter__(), self._requests.check)
+        return _ArmOutputs(load_driver(self._model.family).output_writer(self._host).__enter__(), self._requests.check)
 
     @property
     def connected(self) -> bool:

@@ -31,12 +31,6 @@ __all__ = ["ChildProcesses"]
 _END_TIMEOUT = 6.0  # s for the guard to stop the arm and end
 
 
-def _driver_settings(scene: Scene) -> dict[str, float]:
-    """Return what a driver process needs beside the settings of a stop."""
-    assert scene.arm is not None
-    return {"watchdog_hz": scene.arm.watchdog_hz, "request_lifetime": scene.monitoring_limits.process_silence}
-
-
 class ChildProcesses:
     """Child processes of one session, started once and ended once.
 
@@ -52,7 +46,7 @@ class ChildProcesses:
         self.guard: Channel | None = None
         self.program: Channel | None = None
         self.skin: SkinClient | None = None
-        self._heartbeat: _ProgramHeartbeat | None = None
+        self._stopped = threading.Event()  # ends the heartbeat
         self._lifelines: list[Channel] = []  # to the children besides the guard, which end with them
 
     def start(
@@ -94,15 +88,17 @@ class ChildProcesses:
             arm = arm_model(scene.arm.model)
             module = load_driver(arm.family).process if internal else "coneskin.robot.stop.watchdog_process"
             self.children[name] = spawn(module, other_guard_end, other_program_end)
-            channel.send(encode_json({**stop_settings(scene), **_driver_settings(scene)}))
+            lifetime = scene.monitoring_limits.process_silence
+            driver_settings = {"watchdog_hz": scene.arm.watchdog_hz, "request_lifetime": lifetime}
+            channel.send(encode_json({**stop_settings(scene), **driver_settings}))
             if internal:
                 self.program = channel
         self.guard = Channel(ours)
         self.children["guard"] = spawn("coneskin.session.guard_process", *ends)
         port = "" if self.skin is None else self.skin.port()  # the others start meanwhile
         self.guard.send(encode_json({**start, "port": port}))
-        self._heartbeat = _ProgramHeartbeat(self.guard)
-        self._heartbeat.start()
+        arguments = (self.guard, self._stopped)
+        threading.Thread(target=_send_heartbeat, args=arguments, name="coneskin heartbeat", daemon=True).start()
         return self.guard
 
     def note_script(self) -> None:
@@ -139,35 +135,15 @@ class ChildProcesses:
 
     def close(self) -> None:
         """End the heartbeat, and close the lines to guard and physics; may be called again."""
-        if self._heartbeat is not None:
-            self._heartbeat.stop()
+        self._stopped.set()
         if self.skin is not None:
             self.skin.close()
         if self.guard is not None:
             self.guard.close()
 
 
-class _ProgramHeartbeat:
-    """Heartbeat of this process on the guard's channel, from ``start`` to ``stop``.
-
-    Args:
-        channel: the guard's.
-    """
-
-    def __init__(self, channel: Channel) -> None:
-        self._channel = channel
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="coneskin heartbeat", daemon=True)
-
-    def start(self) -> None:
-        """Start the thread."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End the thread; may be called again."""
-        self._stopped.set()
-
-    def _run(self) -> None:
-        message = Heartbeat().encode()
-        while self._channel.send(message) and not self._stopped.wait(REPORT_PERIOD):
-            pass
+def _send_heartbeat(guard: Channel, stopped: threading.Event) -> None:
+    """Send the heartbeat of this process to the guard until its channel ends, or until it is stopped."""
+    message = Heartbeat().encode()
+    while guard.send(message) and not stopped.wait(REPORT_PERIOD):
+        pass

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.diagnosis.capture import CaptureWindow
 
-__all__ = ["EventDelivery", "EventLog", "HeardLine", "discard_recording", "new_recording"]
+__all__ = ["EventLog", "discard_recording", "new_recording"]
 
 #: kinds of block without which nothing can be replayed
 _COPIED_KINDS = frozenset({BlockKind.HEADER, BlockKind.SURFACE})
@@ -69,11 +69,11 @@ class EventLog:
         self.events: list[GuardEvent] = []
         self.began = time.monotonic()
         self.ended = self.activated = self.ending = False
-        self.line = HeardLine()
+        self.line = _HeardLine()
         self.physics: Callable[[], list[Block]] = list  # what it knows since it was last asked
         self._truths: deque[Block] = deque()  # that the thread which writes has not written yet
         self._recorder = _recorder(recording, limits) if recording else None
-        self._delivery = None if on_event is None else EventDelivery(on_event)
+        self._delivery = None if on_event is None else _EventDelivery(on_event)
         self._changed = threading.Condition()
 
     def open(self, header: dict[str, Any]) -> None:
@@ -231,7 +231,7 @@ _MAX_WAITING = 1000  # events that wait
 _CLOSE_TIMEOUT = 2.0  # s for the function to take what still waits
 
 
-class EventDelivery:
+class _EventDelivery:
     """Delivery of events to one function, in order, until ``close``.
 
     Args:
@@ -292,7 +292,7 @@ class EventDelivery:
                 return
 
 
-class HeardLine:
+class _HeardLine:
     """The newest bytes of the skin; whoever writes them and whoever asks may be different threads."""
 
     def __init__(self) -> None:
@@ -302,14 +302,11 @@ class HeardLine:
         """Keep the skin's bytes among these blocks, for some seconds."""
         for block in blocks:
             if block.kind == BlockKind.SKIN:
-                self._add(block)
+                if self._window is None:
+                    from coneskin.skin.diagnosis.capture import CaptureWindow
 
-    def _add(self, block: Block) -> None:
-        if self._window is None:
-            from coneskin.skin.diagnosis.capture import CaptureWindow
-
-            self._window = CaptureWindow(block.time)
-        self._window.feed(block.payload, block.time)
+                    self._window = CaptureWindow(block.time)
+                self._window.feed(block.payload, block.time)
 
     def describe(self, scene: Scene, reasons: Sequence[str], now: float) -> str:
         """Return what is wrong with the line, where a guard waits for its skin.

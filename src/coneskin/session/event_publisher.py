@@ -17,13 +17,13 @@ from urllib.parse import urlsplit
 from coneskin.core.errors import SceneError
 from coneskin.robot.guard.signals.journal import GuardEvent
 
-__all__ = ["EventPublisher", "event_message"]
+__all__ = ["EventPublisher"]
 
 _MAX_DATAGRAM = 8000  # bytes of a datagram; loopback and most networks carry them
 _URL_EXAMPLE = "write udp://127.0.0.1:9870"
 
 
-def event_message(event: GuardEvent, began: float) -> bytes:
+def _event_message(event: GuardEvent, began: float) -> bytes:
     """Return an event as JSON: ``t`` [s] since the run began, ``name``, and its details; what is not finite is null."""
     message = {"t": round(event.time - began, 6), "name": str(event.name), **_finite(event.details)}
     data = json.dumps(message, separators=(",", ":")).encode()
@@ -87,7 +87,7 @@ class EventPublisher:
             began: when the run began, on the clock of the events [s].
         """
         try:
-            self._socket.sendto(event_message(event, began), self._address)
+            self._socket.sendto(_event_message(event, began), self._address)
         except (OSError, ValueError, TypeError):
             self.dropped += 1
         else:

@@ -8,7 +8,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from coneskin.core.channel import Channel
@@ -22,14 +22,20 @@ from coneskin.scene.values.scene import Scene
 from coneskin.skin.sources.kinds import is_simulated, open_source
 from coneskin.skin.sources.source import SourceReopening
 
-__all__ = ["ArmLock", "run_guard"]
+__all__ = ["run_guard"]
 
 _LOCK_TIMEOUT = 3.0  # s for the guard of a program that was killed to stop its arm and end
 _LOCK_PERIOD = 0.05  # s
 
 
-class ArmLock:
-    """Lock on the arm of one controller, held in a ``with``; on Linux alone.
+@contextlib.contextmanager
+def _arm_lock(
+    host: str,
+    timeout: float = _LOCK_TIMEOUT,
+    wait: Callable[[float], None] = time.sleep,
+    clock: Callable[[], float] = time.monotonic,
+) -> Iterator[None]:
+    """Lock the arm of one controller; on Linux alone.
 
     Args:
         host: the controller.
@@ -38,46 +44,27 @@ class ArmLock:
         clock: monotonic seconds.
 
     Raises:
-        RobotRefused: on entering, where another guard of this computer has the arm.
+        RobotRefused: another guard of this computer has the arm.
     """
-
-    def __init__(
-        self,
-        host: str,
-        timeout: float = _LOCK_TIMEOUT,
-        wait: Callable[[float], None] = time.sleep,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._host = host
-        self._timeout = timeout
-        self._wait = wait
-        self._clock = clock
-        self._sock: socket.socket | None = None
-
-    def __enter__(self) -> ArmLock:
-        if sys.platform != "linux":
-            return self
-        name = f"\0coneskin guard of {_address(self._host)}"
-        self._sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        end = self._clock() + self._timeout
+    if sys.platform != "linux":
+        yield
+        return
+    end = clock() + timeout
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
         while True:
             try:
-                self._sock.bind(name)
-                return self
+                sock.bind(f"\0coneskin guard of {_address(host)}")
+                break
             except OSError as exc:
                 if exc.errno != errno.EADDRINUSE:  # a system without such names has no lock
-                    return self
-            if self._clock() >= end:
-                self._sock.close()
+                    break
+            if clock() >= end:
                 raise RobotRefused(
-                    f"another guard on this computer has the arm at {self._host}: end that program, or that "
-                    "coneskin guard, first"
+                    f"another guard on this computer has the arm at {host}: end that program, or that coneskin guard, "
+                    "first"
                 )
-            self._wait(_LOCK_PERIOD)
-
-    def __exit__(self, *_: object) -> None:
-        if self._sock is not None:
-            self._sock.close()
+            wait(_LOCK_PERIOD)
+        yield
 
 
 def _address(host: str) -> str:
@@ -126,7 +113,7 @@ def run_guard(
             ports.watchdog = other
         arm, needs = arm_model(scene.arm.model), core.needs
         driver, host = load_driver(arm.family), scene.arm.host
-        stack.enter_context(ArmLock(host))
+        stack.enter_context(_arm_lock(host))
         driver.check_model(arm, host)
         if needs.setpoints:
             ports.reader = ports.setpoints = stack.enter_context(driver.setpoint_writer(host))

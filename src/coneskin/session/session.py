@@ -35,7 +35,7 @@ from .outcome import activation_error, await_outcome, braking_time, exit_error, 
 if TYPE_CHECKING:
     import socket
 
-__all__ = ["Session", "defer_interrupts", "guard"]
+__all__ = ["Session", "guard"]
 
 _START_TIMEOUT = 20.0  # s for the children to start and the guard to become active
 _REASON_TIMEOUT = 5.0  # s for the guard to report why the driver process ended
@@ -160,7 +160,7 @@ class Session:
         Raises:
             KeyboardInterrupt: a person has interrupted meanwhile; all of it is done nevertheless.
         """
-        defer_interrupts(self._close)
+        _defer_interrupts(self._close)
 
     def _close(self) -> None:
         self._processes.end(lambda: stands(self._log.events))
@@ -325,7 +325,7 @@ class Session:
         raise activation_error(self._log.events, self._describe_line)
 
 
-def defer_interrupts(job: Callable[[], None]) -> None:
+def _defer_interrupts(job: Callable[[], None]) -> None:
     """Do a job to its end, and raise an interrupt only then; the job must have an end.
 
     Raises:

@@ -263,28 +263,20 @@ def _wait_period(_: ArmClient, t_cycle_start: timedelta) -> None:
 
 # ---- by name
 
+_READ_VARIABLES = """
+    timestamp actual_execution_time actual_q actual_qd actual_current target_q target_qd target_qdd
+    target_current target_moment actual_TCP_pose actual_TCP_speed target_TCP_pose target_TCP_speed
+    actual_TCP_force ft_raw_wrench actual_tool_accelerometer actual_momentum joint_control_output joint_mode
+    joint_temperatures actual_joint_voltage actual_main_voltage actual_robot_voltage actual_robot_current
+    robot_mode runtime_state safety_mode safety_status_bits speed_scaling target_speed_fraction
+    actual_digital_input_bits actual_digital_output_bits standard_analog_input0 standard_analog_input1
+    standard_analog_output0 standard_analog_output1 payload payload_cog payload_inertia
+"""
+#: name of a getter -> the variable that it reads: getActualQ reads actual_q
 _GETTER_VARIABLES = {
-    **{"getTimestamp": "timestamp", "getActualExecutionTime": "actual_execution_time"},
-    **{"getActualQ": "actual_q", "getActualQd": "actual_qd", "getActualCurrent": "actual_current"},
-    **{"getTargetQ": "target_q", "getTargetQd": "target_qd", "getTargetQdd": "target_qdd"},
-    **{"getTargetCurrent": "target_current", "getTargetMoment": "target_moment"},
-    **{"getActualTCPPose": "actual_TCP_pose", "getActualTCPSpeed": "actual_TCP_speed"},
-    **{"getTargetTCPPose": "target_TCP_pose", "getTargetTCPSpeed": "target_TCP_speed"},
-    **{"getActualTCPForce": "actual_TCP_force", "getFtRawWrench": "ft_raw_wrench"},
-    **{"getActualToolAccelerometer": "actual_tool_accelerometer", "getActualMomentum": "actual_momentum"},
-    **{"getJointControlOutput": "joint_control_output", "getJointMode": "joint_mode"},
-    **{"getJointTemperatures": "joint_temperatures", "getActualJointVoltage": "actual_joint_voltage"},
-    **{"getActualMainVoltage": "actual_main_voltage", "getActualRobotVoltage": "actual_robot_voltage"},
-    **{"getActualRobotCurrent": "actual_robot_current"},
-    **{"getRobotMode": "robot_mode", "getRobotStatus": "robot_status_bits", "getRuntimeState": "runtime_state"},
-    **{"getSafetyMode": "safety_mode", "getSafetyStatusBits": "safety_status_bits"},
-    **{"getSpeedScaling": "speed_scaling", "getTargetSpeedFraction": "target_speed_fraction"},
-    **{"getActualDigitalInputBits": "actual_digital_input_bits"},
-    **{"getActualDigitalOutputBits": "actual_digital_output_bits"},
-    **{"getStandardAnalogInput0": "standard_analog_input0", "getStandardAnalogInput1": "standard_analog_input1"},
-    **{"getStandardAnalogOutput0": "standard_analog_output0", "getStandardAnalogOutput1": "standard_analog_output1"},
-    **{"getPayload": "payload", "getPayloadCog": "payload_cog", "getPayloadInertia": "payload_inertia"},
-}
+    "get" + "".join(word[0].upper() + word[1:] for word in variable.split("_")): variable
+    for variable in _READ_VARIABLES.split()
+} | {"getRobotStatus": "robot_status_bits"}
 _ASKED_NAMES = (  # of robot/ur/ur_rtde.py; a test compares
     *("getForwardKinematics", "getInverseKinematics", "getInverseKinematicsHasSolution", "poseTrans"),
     *("isPoseWithinSafetyLimits", "isJointsWithinSafetyLimits", "getTCPOffset", "getStepTime", "getJointTorques"),

@@ -19,7 +19,7 @@ from coneskin.impact.permissible_speed.speed_map import contact_at
 from coneskin.impact.permissible_speed.speed_search import ForceLimits
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
-from coneskin.robot.arm.inertia import arm_inertia, effective_mass
+from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
@@ -29,6 +29,7 @@ pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco
 
 from coneskin.impact.simulation.mujoco_plant import MujocoPlant
 from coneskin.impact.simulation.scene_description import SheetOnLink
+from tests.support.effective_mass import effective_mass
 
 Q1 = tuple(math.radians(angle) for angle in (-2.0, -90.0, 90.0, -90.0, -90.0, 0.0))
 Q2 = tuple(math.radians(angle) for angle in (20.0, -60.0, 70.0, -90.0, -90.0, 0.0))

@@ -16,12 +16,13 @@ from coneskin.impact.permissible_speed.limits_file import parse_limits
 from coneskin.impact.permissible_speed.speed_map import LEVERS, contact_at, map_speeds, write_map
 from coneskin.impact.permissible_speed.speed_search import ForceLimits, keeps
 from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
-from coneskin.robot.arm.inertia import arm_inertia, effective_mass
+from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.skin.materials import Padding
 from coneskin.testing.scenes import forearm_scene
+from tests.support.effective_mass import effective_mass
 
 from .test_limits_file import TEXT
 

@@ -8,7 +8,7 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose, Vector
-from coneskin.robot.arm.inertia import arm_inertia, effective_mass, mass_matrix
+from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
 from coneskin.scene.values.scene import BodyScene
@@ -18,6 +18,7 @@ pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco
 
 from coneskin.impact.simulation.mujoco_plant import MujocoPlant
 from coneskin.impact.simulation.scene_description import SheetOnLink
+from tests.support.effective_mass import effective_mass
 
 MODEL = arm_model("UR5e")
 LINK = LINK_INDEX["forearm"]

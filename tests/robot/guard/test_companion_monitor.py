@@ -6,7 +6,7 @@ import pytest
 
 from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
 from coneskin.robot.driver.values import StopPath
-from coneskin.robot.guard.companion_monitor import HeartbeatMonitor
+from coneskin.robot.guard.companion_monitor import _HeartbeatMonitor
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact
 from coneskin.robot.reaction.rules import Rule
@@ -61,7 +61,7 @@ def test_a_frozen_process_is_a_fault_although_nobody_needs_it_and_another_path_s
 
 
 def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
-    monitor = HeartbeatMonitor({"it": 0.15})
+    monitor = _HeartbeatMonitor({"it": 0.15})
     monitor.feed("it", 1.0)
     assert monitor.silent(1.0) == {}
     assert monitor.silent(1.5) == {}  # its heartbeats wait to be read
@@ -77,7 +77,7 @@ def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
 @pytest.mark.promise("P48")
 def test_a_guard_that_is_held_up_again_and_again_notices_silence():
     """Held up for 30 ms after each 3 ms it took 1.3 s, and a frozen program's arm moved on by 64 deg."""
-    monitor = HeartbeatMonitor({"it": 0.15})
+    monitor = _HeartbeatMonitor({"it": 0.15})
     monitor.feed("it", 0.0)
     now = 0.0
     while not monitor.silent(now):

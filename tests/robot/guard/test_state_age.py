@@ -11,7 +11,7 @@ from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
-from coneskin.robot.guard.state_age import ControllerClock, StateAge
+from coneskin.robot.guard.state_age import StateAge, _ControllerClock
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from tests.support.guard_rig import GuardRig, touch
@@ -31,7 +31,7 @@ def run(clock, delays, start=1000.0, offset=500.0, rate=1.0):
 @given(st.lists(st.floats(0.0, 0.1), min_size=1, max_size=200))
 def test_never_before_it_was_measured_never_after_it_was_read(delays):
     quickest = float("inf")
-    for (measured, true, read), delay in zip(run(ControllerClock(), delays), delays, strict=True):
+    for (measured, true, read), delay in zip(run(_ControllerClock(), delays), delays, strict=True):
         quickest = min(quickest, delay)
         # 1e-9: differences of numbers near 1000 s, which have 1e-13 each
         assert true - 1e-9 <= measured <= read
@@ -39,13 +39,13 @@ def test_never_before_it_was_measured_never_after_it_was_read(delays):
 
 
 def test_drift_of_100_ppm_does_not_pile_up():
-    results = run(ControllerClock(), [0.0002 if k % 7 else 0.0001 for k in range(60_000)], rate=1.0 + 1e-4)
+    results = run(_ControllerClock(), [0.0002 if k % 7 else 0.0001 for k in range(60_000)], rate=1.0 + 1e-4)
     worst = max(abs(measured - true) for measured, true, _ in results)
     assert worst < 2 * 5.0 * 1e-4 + 0.0003  # two windows of 5 s at 100 ppm, and the delay itself
 
 
 def test_a_controller_that_starts_anew():
-    clock = ControllerClock()
+    clock = _ControllerClock()
     run(clock, [0.0001] * 10)
     assert clock.measured_at(2000.0, 0.002) == 2000.0  # nothing is known of its clock yet
     assert abs(clock.measured_at(2000.010, 0.004) - 2000.002) < 1e-9

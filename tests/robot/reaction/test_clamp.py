@@ -12,7 +12,7 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import Workspace
 from coneskin.robot.reaction.backtrack import PathHistory
-from coneskin.robot.reaction.motion import _BacktrackMotion, plan_reaction_motion, plan_way_back
+from coneskin.robot.reaction.motion import _PlannedMotion, plan_reaction_motion, plan_way_back
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 ARM = arm_model("UR5e")
@@ -69,7 +69,7 @@ def test_from_a_clamp_it_does_not_retreat():
 
 def test_the_way_back_opens_an_elbow_that_has_closed():
     motion = way_back(elbow_clamp())
-    assert isinstance(motion, _BacktrackMotion)
+    assert isinstance(motion, _PlannedMotion)
     step = motion.update(ArmState(0.1, Q, ZERO_VELOCITY), ())
     assert step.qd[2] < 0.0
     assert step.qd[:2] == pytest.approx((0.0, 0.0))
@@ -110,7 +110,7 @@ def test_the_way_back_leads_into_no_touch(qd, touches):
             ContactOnLink(link, (0.2, 0.0, 0.08), tuple(v / length for v in normal), 0.6, True, 0.1, number)
         )
     motion = way_back(contacts, qd)
-    assume(isinstance(motion, _BacktrackMotion))
+    assume(isinstance(motion, _PlannedMotion))
     step = motion.update(ArmState(0.1, Q, ZERO_VELOCITY), ())
     assume(not isinstance(step, Done))
     for contact in contacts:

@@ -12,9 +12,9 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import _LIMIT_MARGIN, TablePlane, Workspace, skeleton
-from coneskin.robot.reaction.admittance import _DAMPING_TIME, _wanted_speed, admittance_step, begin_admittance
+from coneskin.robot.reaction.admittance import _DAMPING_TIME, AdmittanceMotion, _wanted_speed
 from coneskin.robot.reaction.backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
-from coneskin.robot.reaction.motion import _RetreatMotion
+from coneskin.robot.reaction.motion import _PlannedMotion
 from coneskin.robot.reaction.retreat import plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
@@ -80,13 +80,13 @@ def test_the_speed_rises_with_the_level_and_never_above_what_is_set(level, thres
 
 def comply(level, reaction=None):
     """A complying arm that is pushed at the forearm, so firmly at each time."""
-    current = [begin_admittance(ARM, ArmState(0.0, Q), reaction or Reaction(kind="comply", speed=0.1, arm_speed=0.5))]
+    reaction = reaction or Reaction(kind="comply", speed=0.1, arm_speed=0.5)
+    motion = AdmittanceMotion(ARM, ArmState(0.0, Q), reaction)
 
     def step(state):
         push = level(state.time)
         contacts = [] if push is None else [ContactOnLink(*list_of(FOREARM)[:3], push, True, 0.1)]
-        current[0], answer = admittance_step(current[0], state, contacts)
-        return answer
+        return motion.update(state, contacts)
 
     return step
 
@@ -124,28 +124,32 @@ def test_no_push_no_motion_and_the_end_of_the_push_is_the_end():
 
 @pytest.mark.promise("P31")
 def test_a_push_whose_place_is_not_known_holds_the_arm():
-    start = begin_admittance(ARM, ArmState(0.0, Q), Reaction(kind="comply"))
+    motion = AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply"))
     lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
-    after, step = admittance_step(start, ArmState(0.1, Q), [FOREARM, lost])
+    step = motion.update(ArmState(0.1, Q), [FOREARM, lost])
     assert step.qd == ZERO_VELOCITY
     assert step.clipped_by == ("place",)
-    assert after.plan is None
+    assert motion.plan is None
 
 
 @pytest.mark.promise("P38")
 def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_where_a_push_ends():
     """In a grip, giving way to one hand met the other, and braked into that with 4 rad/s2."""
     reaction = Reaction(kind="comply", acceleration=4.0, deceleration=12.0)
-    moving = replace(begin_admittance(ARM, ArmState(0.0, Q), reaction), speed=0.1)
+
+    def complying(speed):
+        motion = AdmittanceMotion(ARM, ArmState(0.0, Q), reaction)
+        motion.speed = speed
+        return motion
+
     lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
-    _, step = admittance_step(moving, ArmState(0.002, Q), [lost])
+    step = complying(0.1).update(ArmState(0.002, Q), [lost])
     assert (step.qd, step.acceleration) == (ZERO_VELOCITY, 12.0)
     x, y, z = FOREARM.normal
     other = replace(FOREARM, normal=(-x, -y, -z), level=0.9, number=2)
-    _, step = admittance_step(moving, ArmState(0.002, Q), [FOREARM, other])
+    step = complying(0.1).update(ArmState(0.002, Q), [FOREARM, other])
     assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 12.0, ("opposed",))
-    at_rest = replace(moving, speed=0.0)
-    _, step = admittance_step(at_rest, ArmState(0.002, Q), [replace(FOREARM, level=0.1, threshold=0.1)])
+    step = complying(0.0).update(ArmState(0.002, Q), [replace(FOREARM, level=0.1, threshold=0.1)])
     assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 4.0, ("level",))
 
 
@@ -230,7 +234,7 @@ def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
     space = Workspace(ARM, TablePlane(height), avoid_self=False)
     plan = plan_retreat(ARM, ArmState(0.0, q), [contact], Reaction(kind="retreat", distance=0.2), space)
     assume(not isinstance(plan, Done))
-    states, over = follow(lambda state: _RetreatMotion(plan).update(state, ()), q)
+    states, over = follow(lambda state: _PlannedMotion(plan).update(state, ()), q)
     assert isinstance(over, Done)
     before = skeleton(ARM, q)
     last = states[-1]

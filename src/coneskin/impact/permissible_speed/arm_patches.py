@@ -107,7 +107,10 @@ def weigh(
 ) -> NDArray[np.float64]:
     """Return the effective mass at each patch in each position [kg], shape (positions, patches).
 
-    It is infinite where no joint moves the patch along its normal.
+    It is infinite where no joint moves the patch along its normal. The joints are free in it. Held joints make an arm
+    heavier, never lighter.
+
+    Source: Khatib, "Inertial properties in robotic manipulation: an object-level framework", IJRR 14 (1995), eq. 9.
     """
     import numpy as np
 

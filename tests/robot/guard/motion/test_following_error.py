@@ -3,7 +3,7 @@
 import pytest
 
 from coneskin.robot.driver.values import ControllerState
-from coneskin.robot.guard.motion.reaction_motion import FollowingErrorMonitor
+from coneskin.robot.guard.motion.reaction_motion import _FollowingErrorMonitor
 from coneskin.robot.reaction.types import JointVelocity
 
 REST = (0.0,) * 5
@@ -14,7 +14,7 @@ def moving(time, speed):
 
 
 def commanded(speed=0.2, acceleration=4.0):
-    monitor = FollowingErrorMonitor(0.0)
+    monitor = _FollowingErrorMonitor(0.0)
     monitor.command(JointVelocity((speed, *REST), acceleration, 0.1, 0.0))
     return monitor
 

@@ -15,7 +15,7 @@ from coneskin.robot.driver.values import SetSpeedSlider
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds, SurfaceSpeeds
-from coneskin.robot.guard.speed.speed_limit import SliderSetting, SpeedLimit
+from coneskin.robot.guard.speed.speed_limit import SpeedLimit, _SliderSetting
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.sim.mock_arm import MockArm
 from coneskin.robot.ur.driver import UR_DRIVER
@@ -23,7 +23,7 @@ from tests.support.guard_rig import CONE, LINK, MODEL, START_Q, GuardRig, touch
 
 
 def test_what_is_read_late_is_not_a_persons_doing() -> None:
-    setting = SliderSetting()
+    setting = _SliderSetting()
     assert not setting.feed(0.0, 1.0)
     setting.set(0.0, 0.6, 1.0)
     setting.set(0.06, 0.5, 1.0)
@@ -34,7 +34,7 @@ def test_what_is_read_late_is_not_a_persons_doing() -> None:
 
 @pytest.mark.parametrize("read", [0.0, 0.3, 0.55, 0.8, 1.0])
 def test_once_the_setting_was_read_anything_else_is_a_persons_doing(read: float) -> None:
-    setting = SliderSetting()
+    setting = _SliderSetting()
     setting.feed(0.0, 1.0)
     setting.set(0.0, 0.5, 1.0)
     setting.feed(0.02, 0.5)
@@ -43,7 +43,7 @@ def test_once_the_setting_was_read_anything_else_is_a_persons_doing(read: float)
 
 
 def test_a_slider_that_never_follows_is_a_persons_doing() -> None:
-    setting = SliderSetting()
+    setting = _SliderSetting()
     setting.feed(0.0, 1.0)
     setting.set(0.0, 0.5, 1.0)
     assert not setting.feed(0.5, 1.0)
@@ -51,7 +51,7 @@ def test_a_slider_that_never_follows_is_a_persons_doing() -> None:
 
 
 def test_a_value_that_was_passed_does_not_come_back_by_itself() -> None:
-    setting = SliderSetting()
+    setting = _SliderSetting()
     setting.feed(0.0, 1.0)
     setting.set(0.0, 0.7, 1.0)
     setting.set(0.1, 0.5, 1.0)
@@ -61,7 +61,7 @@ def test_a_value_that_was_passed_does_not_come_back_by_itself() -> None:
 
 
 def test_a_stop_by_the_slider_does_not_become_a_persons_zero() -> None:
-    setting = SliderSetting()
+    setting = _SliderSetting()
     setting.feed(0.0, 1.0)
     setting.set(0.0, 0.5, 1.0)
     setting.feed(0.1, 0.5)

@@ -5,7 +5,7 @@ import pytest
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.values import ControllerState, SetSpeedSlider, StopPath
-from coneskin.robot.guard.speed.speed_reduction import CLEAR_TIME, ReducedSpeedTouch, SpeedReduction
+from coneskin.robot.guard.speed.speed_reduction import CLEAR_TIME, SpeedReduction, _ReducedSpeedTouch
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
@@ -15,7 +15,7 @@ SLOW = 0.05  # m/s
 
 
 def slowing(speed=1.0, before=1.0, fraction=0.2):
-    return ReducedSpeedTouch(10.0, (speed, speed), before, fraction, 0.2, 1.0, SLOW)
+    return _ReducedSpeedTouch(10.0, (speed, speed), before, fraction, 0.2, 1.0, SLOW)
 
 
 def fast(one, time, speed):
