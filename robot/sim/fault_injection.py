@@ -9,15 +9,15 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from coneskin.core.errors import RobotRefused
 
 from .machine.controller import Controller
 
-__all__ = ["FaultInjector", "Services"]
+__all__ = ["FaultInjector"]
 
 _WITH_NUMBERS = ("resist JOINT AMPERES", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
 #: word of a line -> the services that it means
@@ -29,28 +29,19 @@ _SERVICE_PORTS = {
 }
 
 
-class Services(Protocol):
-    """Services of a controller on the network, by name; see `Server`."""
-
-    def drop_all(self, name: str, /) -> int:
-        """Close all connections, and return how many there were."""
-
-    def cut(self, name: str, /) -> None:
-        """Let the network drop every packet."""
-
-    def restore(self, name: str, /) -> None:
-        """End `cut`."""
-
-
 class FaultInjector:
     """Faults of the controller and of its network, switched by lines of text.
+
+    Args:
+        controller: whose faults they are.
+        network: first word of a line ("close", "cut", "restore") -> what does that to a service.
 
     Attributes:
         dashboard_silent: True while the dashboard takes connections and commands, but answers nothing.
         rtde_silent: True while RTDE connections stay open, but no outputs are sent.
     """
 
-    def __init__(self, controller: Controller, services: Services) -> None:
+    def __init__(self, controller: Controller, network: Mapping[str, Callable[[str], int | None]]) -> None:
         self._c = controller
         self.dashboard_silent = False
         self.rtde_silent = False
@@ -68,10 +59,9 @@ class FaultInjector:
             "reduced mode off": lambda: controller.reduce(False),
         }
         for word, names in _SERVICE_PORTS.items():
-            if word != "network":
-                self._lines[f"close {word}"] = partial(_sum, services.drop_all, names)
-            self._lines[f"cut {word}"] = partial(_each, services.cut, names)
-            self._lines[f"restore {word}"] = partial(_each, services.restore, names)
+            for verb, action in network.items():
+                if (verb, word) != ("close", "network"):
+                    self._lines[f"{verb} {word}"] = partial(_each, action, names)
 
     def answer(self, line: str) -> str:
         """Act on one line; return JSON: the result, or an error and the known lines."""
@@ -119,11 +109,7 @@ class FaultInjector:
         return value
 
 
-def _sum(action: Callable[[str], int], names: tuple[str, ...]) -> int:
-    return sum(action(name) for name in names)
-
-
-def _each(action: Callable[[str], None], names: tuple[str, ...]) -> bool:
-    for name in names:
-        action(name)
-    return True
+def _each(action: Callable[[str], int | None], names: tuple[str, ...]) -> int | bool:
+    """Do something to services; return how many connections that has closed, or True where it closes none."""
+    closed = [count for name in names if (count := action(name)) is not None]
+    return sum(closed) if closed else True

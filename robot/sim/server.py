@@ -30,49 +30,6 @@ from .urscript.translator import Translation
 __all__ = ["PORTS", "Server", "is_loopback"]
 
 _SCRIPT_PORTS = ("primary", "secondary", "realtime")  # that take URScript, and send the state
-
-
-class _PortServices:
-    """Services of one controller.
-
-    Args:
-        interface: its PolyScope, behind the dashboard.
-        faults: takes the lines of its port, and silences the dashboard.
-        publisher: makes what a new client gets first.
-    """
-
-    def __init__(self, interface: UserInterface, faults: FaultInjector, publisher: Publisher) -> None:
-        self._interface, self._faults, self._publisher = interface, faults, publisher
-        self._controller = interface.controller
-        self._outputs = RtdeOutputs(self._controller)
-
-    def client(self, name: str, sock: socket.socket) -> Client:
-        """Return a new client of a service."""
-        if name == "RTDE":
-            session = RtdeSession(self._controller, self._outputs)
-            return Client(sock, session.receive, session.close, outputs=session.outputs, patience=UNREAD_TIMEOUT)
-        if name == "dashboard":
-            dashboard = Dashboard(self._interface)
-            return Client(sock, LineReader(self._unless_silent(dashboard.answer)), left=lambda: dashboard.left)
-        if name == "faults":
-            return Client(sock, LineReader(self._faults.answer))
-        port = ScriptPort(self._controller, self._interface.run, messages=name == "primary")
-        return Client(sock, port, left=lambda: port.left)
-
-    def greeting(self, name: str) -> bytes:
-        """Return what a new client of a service gets first."""
-        if name == "dashboard" and not self._faults.dashboard_silent:
-            return WELCOME.encode() + b"\n"
-        return self._publisher.greeting(name) if name in _SCRIPT_PORTS else b""
-
-    def _unless_silent(self, answer: Callable[[str], str]) -> Callable[[str], str]:
-        def reply(line: str) -> str:
-            text = answer(line)
-            return "" if self._faults.dashboard_silent else text
-
-        return reply
-
-
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
 PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
 _MAX_LATENESS = 0.05  # s; later cycles are skipped, not made up for: the process was frozen
@@ -105,7 +62,7 @@ class Server:
     def __init__(self, controller: Controller, host: str, *, faults: bool = False) -> None:
         self.controller = controller
         self.host = host
-        self.faults = FaultInjector(controller, self)
+        self.faults = FaultInjector(controller, {"close": self.drop_all, "cut": self.cut, "restore": self.restore})
         self.fault_address: tuple[str, int] | None = None
         self.local = True
         self._with_faults = faults
@@ -115,7 +72,7 @@ class Server:
         self._clients: dict[str, list[Client]] = {name: [] for name in (*PORTS, "faults")}
         self._compiler = Compiler()
         self._interface = UserInterface(controller, self._program, self._compiler.check)
-        self._services = _PortServices(self._interface, self.faults, self._publisher)
+        self._outputs = RtdeOutputs(controller)
         self._cut: set[str] = set()  # services that the network does not reach
         self._fillers: dict[str, socket.socket] = {}
         self._programs = 0
@@ -272,10 +229,34 @@ class Server:
         if len(self._clients[name]) >= _MAX_CLIENTS:
             sock.close()
             return
-        client = self._services.client(name, sock)
+        client = self._client(name, sock)
         self._clients[name].append(client)
         self._selector.register(sock, selectors.EVENT_READ, (name, client))
-        self._send(name, client, self._services.greeting(name))
+        self._send(name, client, self._greeting(name))
+
+    def _client(self, name: str, sock: socket.socket) -> Client:
+        """Return a new client of a service."""
+        if name == "RTDE":
+            session = RtdeSession(self.controller, self._outputs)
+            return Client(sock, session.receive, session.close, outputs=session.outputs, patience=UNREAD_TIMEOUT)
+        if name == "dashboard":
+            dashboard = Dashboard(self._interface)
+
+            def reply(line: str) -> str:
+                text = dashboard.answer(line)
+                return "" if self.faults.dashboard_silent else text
+
+            return Client(sock, LineReader(reply), left=lambda: dashboard.left)
+        if name == "faults":
+            return Client(sock, LineReader(self.faults.answer))
+        port = ScriptPort(self.controller, self._program, messages=name == "primary")
+        return Client(sock, port, left=lambda: port.left)
+
+    def _greeting(self, name: str) -> bytes:
+        """Return what a new client of a service gets first."""
+        if name == "dashboard" and not self.faults.dashboard_silent:
+            return WELCOME.encode() + b"\n"
+        return self._publisher.greeting(name) if name in _SCRIPT_PORTS else b""
 
     def _read(self, name: str, client: Client) -> None:
         if client not in self._clients[name] or name in self._cut:

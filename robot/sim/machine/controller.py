@@ -21,7 +21,7 @@ from coneskin.robot.sim.urscript.values import ScriptError, values_of
 from coneskin.robot.ur.rtde_codec import Value
 
 from .inputs_outputs import ClientInputs, InputWatchdog, Terminals, digital_outputs
-from .program import Program, SecondaryPrograms
+from .program import Program
 from .safety_system import SafetySystem
 from .states import MOVING, Notice, Options, ProgramFailed, ProgramNotice, RobotMode, Runtime, SafetyMode
 
@@ -35,6 +35,7 @@ def _plain(value: object) -> object:
     return list(value) if isinstance(value, list | tuple) else str(value)
 
 
+_MAX_SECONDARY = 20  # sec programs that run at once
 _MAX_NOTICES = 1000  # that wait to be sent; a program that writes more in a cycle loses the oldest
 _HISTORY_LENGTH = 500  # cycles; the range of get_actual_joint_positions_history
 _REDUCED_SHARE = 0.5  # of the speed slider, in reduced mode; a real controller has limits of its own instead
@@ -83,7 +84,7 @@ class Controller:
         self.payload_cog: tuple[float, ...] = (0.0, 0.0, 0.0)
         self.payload_inertia: tuple[float, ...] = (0.0,) * 6
         self.program: Program | None = None
-        self.secondary = SecondaryPrograms(self)
+        self.secondary: list[Program] = []
         self.runtime = Runtime.STOPPED
         self.robot_mode = RobotMode.RUNNING
         self.safety_system = SafetySystem(options.unlock_after, self.log, self.tell)
@@ -140,7 +141,15 @@ class Controller:
             self.stop_program("the plant is lost")
 
     def _turn_programs(self) -> None:
-        self.secondary.turn()
+        for secondary in list(self.secondary):
+            try:
+                secondary.turn()
+            except ScriptError as exc:
+                self.fail(secondary.name, exc)
+            if not secondary.running:
+                self.secondary.remove(secondary)
+                secondary.close()
+                self.tell(ProgramNotice(secondary.name, "STOPPED"))
         program = self.program
         if program is None or self.runtime is not Runtime.PLAYING:
             return
@@ -164,7 +173,11 @@ class Controller:
     def load(self, translation: Translation) -> None:
         """Start a translated program: a ``sec`` program now, another once the start delay is over."""
         if translation.secondary:
-            self.secondary.start(translation)
+            if len(self.secondary) >= _MAX_SECONDARY:
+                self._refuse(translation.name, f"{_MAX_SECONDARY} sec programs run already")
+            else:
+                self.secondary.append(Program(self, translation))
+                self.tell(ProgramNotice(translation.name, "STARTED"))
             return
         delay = max(1, round(self.options.start_delay / CYCLE))
         self._due = (self._arrived + delay, translation)
@@ -172,15 +185,17 @@ class Controller:
     def _start(self, translation: Translation) -> None:
         self._due = None
         if not self.ready:
-            reason = f"{self.robot_mode.name}, {self.safety.name}"
-            self.log("refused", program=translation.name, reason=reason)
-            self.tell(ProgramFailed(f"{translation.name} does not start: {reason}"))
+            self._refuse(translation.name, f"{self.robot_mode.name}, {self.safety.name}")
             return
         self.stop_program("replaced by another")
         self.program = Program(self, translation)
         self.runtime = Runtime.PLAYING
         self.log("program", program=translation.name)
         self.tell(ProgramNotice(translation.name, "STARTED"))
+
+    def _refuse(self, name: str, reason: str) -> None:
+        self.log("refused", program=name, reason=reason)
+        self.tell(ProgramFailed(f"{name} does not start: {reason}"))
 
     @property
     def ready(self) -> bool:

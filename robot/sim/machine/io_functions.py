@@ -19,7 +19,6 @@ from .script_host import ScriptHost
 
 __all__ = ["IoFunctions", "index_of"]
 
-STANDARD, CONFIGURABLE, TOOL = 0, 8, 16  #: first bit of each kind of digital terminal
 _REGISTERS, _BITS = 48, 128
 _INPUT_ACTION_NAMES = ("pause", "stop", "ignore")
 
@@ -91,65 +90,6 @@ class IoFunctions:
         if wanted not in _INPUT_ACTION_NAMES:
             raise ScriptError(f"rtde_set_watchdog: an action is {', '.join(_INPUT_ACTION_NAMES)}, got {wanted[:99]!r}")
         self._host.inputs.watch(name, float(min_frequency), wanted, self._host.cycle)
-
-    # digital
-
-    def _input(self, n: Any, first: int, count: int) -> bool:
-        return bool(self._host.terminals.digital_inputs >> first + index_of(n, count) & 1)
-
-    def _output(self, n: Any, first: int, count: int) -> bool:
-        return bool(self._host.digital_outputs >> first + index_of(n, count) & 1)
-
-    def _switch(self, n: Any, on: Any, first: int, count: int) -> None:
-        self._host.set_digital(1 << first + index_of(n, count), bool(on))
-
-    def get_standard_digital_in(self, n: int) -> bool:
-        """Return whether a standard input is on."""
-        return self._input(n, STANDARD, 8)
-
-    def get_configurable_digital_in(self, n: int) -> bool:
-        """Return whether a configurable input is on."""
-        return self._input(n, CONFIGURABLE, 8)
-
-    def get_tool_digital_in(self, n: int) -> bool:
-        """Return whether an input of the tool is on."""
-        return self._input(n, TOOL, 2)
-
-    def get_digital_in(self, n: int) -> bool:
-        """Return whether an input is on: 0-7 standard, 8-15 configurable, 16-17 tool."""
-        return self._input(n, 0, 18)
-
-    def get_standard_digital_out(self, n: int) -> bool:
-        """Return whether a standard output is on."""
-        return self._output(n, STANDARD, 8)
-
-    def get_configurable_digital_out(self, n: int) -> bool:
-        """Return whether a configurable output is on."""
-        return self._output(n, CONFIGURABLE, 8)
-
-    def get_tool_digital_out(self, n: int) -> bool:
-        """Return whether an output of the tool is on."""
-        return self._output(n, TOOL, 2)
-
-    def get_digital_out(self, n: int) -> bool:
-        """Return whether an output is on: 0-7 standard, 8-15 configurable, 16-17 tool."""
-        return self._output(n, 0, 18)
-
-    def set_standard_digital_out(self, n: int, b: Any) -> None:
-        """Switch a standard output."""
-        self._switch(n, b, STANDARD, 8)
-
-    def set_configurable_digital_out(self, n: int, b: Any) -> None:
-        """Switch a configurable output."""
-        self._switch(n, b, CONFIGURABLE, 8)
-
-    def set_tool_digital_out(self, n: int, b: Any) -> None:
-        """Switch an output of the tool."""
-        self._switch(n, b, TOOL, 2)
-
-    def set_digital_out(self, n: int, b: Any) -> None:
-        """Switch an output: 0-7 standard, 8-15 configurable, 16-17 tool."""
-        self._switch(n, b, 0, 18)
 
     # analog
 
@@ -260,6 +200,26 @@ class IoFunctions:
         """Choose how the arm goes from one safety mode to another: 0 softly, 1 hard."""
         _one_of(type, (0, 1), "the hardness of a transition")
 
+
+def _add_digital(infix: str, first: int, count: int) -> None:
+    """Add the functions of digital inputs and outputs of one kind: ``get_{infix}digital_in`` and so on."""
+
+    def get_in(self: IoFunctions, n: int) -> bool:
+        return bool(self._host.terminals.digital_inputs >> first + index_of(n, count) & 1)
+
+    def get_out(self: IoFunctions, n: int) -> bool:
+        return bool(self._host.digital_outputs >> first + index_of(n, count) & 1)
+
+    def set_out(self: IoFunctions, n: int, b: Any) -> None:
+        self._host.set_digital(1 << first + index_of(n, count), bool(b))
+
+    setattr(IoFunctions, f"get_{infix}digital_in", get_in)
+    setattr(IoFunctions, f"get_{infix}digital_out", get_out)
+    setattr(IoFunctions, f"set_{infix}digital_out", set_out)
+
+
+for _infix, _first, _count in (("standard_", 0, 8), ("configurable_", 8, 8), ("tool_", 16, 2), ("", 0, 18)):
+    _add_digital(_infix, _first, _count)
 
 _BAUD_RATES = (9600, 19200, 38400, 57600, 115_200, 1_000_000, 2_000_000, 5_000_000)
 _INPUT_ACTIONS = ("default", "freedrive")

@@ -18,9 +18,8 @@ from coneskin.robot.sim.urscript.values import OPERATIONS, ScriptError
 from .builtins import Builtins
 from .script_host import ScriptHost
 from .script_socket import ScriptSocket
-from .states import ProgramFailed, ProgramNotice
 
-__all__ = ["Program", "SecondaryPrograms", "Thread"]
+__all__ = ["Program", "Thread"]
 
 _MAX_STEPS = 100_000  # iterations of loops, and calls, in one cycle; a program with more never waits, and is ended
 _MAX_TURN_TIME = 0.1  # s of the processor that a program may use in one cycle, likewise
@@ -178,39 +177,3 @@ class Program:
         self._steps += 1
         if self._steps > _MAX_STEPS or time.thread_time() > self._end_time:
             raise ScriptError("an endless loop without sync() or sleep()")
-
-
-_MAX_SECONDARY = 20  # that run at once
-
-
-class SecondaryPrograms:
-    """Secondary programs of one controller."""
-
-    def __init__(self, host: ScriptHost) -> None:
-        self._host = host
-        self._running: list[Program] = []
-
-    def __len__(self) -> int:
-        return len(self._running)
-
-    def start(self, translation: Translation) -> None:
-        """Start one, unless too many run already."""
-        if len(self._running) >= _MAX_SECONDARY:
-            reason = f"{_MAX_SECONDARY} sec programs run already"
-            self._host.log("refused", program=translation.name, reason=reason)
-            self._host.tell(ProgramFailed(f"{translation.name} does not start: {reason}"))
-            return
-        self._running.append(Program(self._host, translation))
-        self._host.tell(ProgramNotice(translation.name, "STARTED"))
-
-    def turn(self) -> None:
-        """Run each for one control cycle, and forget those that have ended."""
-        for program in list(self._running):
-            try:
-                program.turn()
-            except ScriptError as exc:
-                self._host.fail(program.name, exc)
-            if not program.running:
-                self._running.remove(program)
-                program.close()
-                self._host.tell(ProgramNotice(program.name, "STOPPED"))

@@ -39,7 +39,6 @@ __all__ = [
     "decelerate",
     "integrate",
     "max_abs",
-    "solve_linear",
 ]
 
 _JOINT_NAMES = ("Base", "Shoulder", "Elbow", "Wrist 1", "Wrist 2", "Wrist 3")
@@ -275,10 +274,10 @@ class SimulatedArm:
         Raises:
             MotionFault: the arm is in, or within 1e-4 of, a singular position.
         """
-        return solve_linear(self.jacobian(), twist)
+        return _solve_linear(self.jacobian(), twist)
 
 
-def solve_linear(rows: Sequence[Sequence[float]], right: Sequence[float]) -> list[float]:
+def _solve_linear(rows: Sequence[Sequence[float]], right: Sequence[float]) -> list[float]:
     """Solve six linear equations (Gauss, partial pivoting).
 
     Raises:

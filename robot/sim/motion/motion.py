@@ -161,22 +161,13 @@ class StopJoints:
         return q, qd
 
 
-class StopTool:
+class StopTool(StopJoints):
     """Ramp of the tool to a standstill at a deceleration [m/s^2, rad/s^2], joints in proportion (stopl)."""
-
-    brakes = True
 
     def __init__(self, arm: SimulatedArm, deceleration: float, angular: float) -> None:
         twist = arm.twist()
         duration = max(
             math.hypot(*twist[:3]) / max(abs(deceleration), 1e-3), math.hypot(*twist[3:]) / max(abs(angular), 1e-3)
         )
-        lead = max_abs(arm.qd)
-        self.rate = min(lead / duration if duration > 0.0 else DEFAULT_DECELERATION, MAX_ACCELERATION / 2.0)
-        self.done = False
-
-    def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
-        """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
-        q, qd = decelerate(arm.q, arm.qd, max(self.rate, DEFAULT_DECELERATION) if hold else self.rate)
-        self.done = not any(qd)
-        return q, qd
+        rate = max_abs(arm.qd) / duration if duration > 0.0 else DEFAULT_DECELERATION
+        super().__init__(min(rate, MAX_ACCELERATION / 2.0))

@@ -16,15 +16,6 @@ UNREAD_TIMEOUT = 10.0  #: s; a client of RTDE that reads nothing for so long is 
 _KEEPALIVE_OPTIONS = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 
 
-def _release_nothing() -> None:
-    """Release nothing: such a client owns no inputs."""
-
-
-def _stay() -> bool:
-    """Return False: such a client never takes its leave."""
-    return False
-
-
 class Client:
     """Connection of one client.
 
@@ -46,10 +37,10 @@ class Client:
         self,
         sock: socket.socket,
         receive: Callable[[bytes], bytes],
-        closed: Callable[[], None] = _release_nothing,
+        closed: Callable[[], None] = lambda: None,
         *,
         outputs: Callable[[], bytes] | None = None,
-        left: Callable[[], bool] = _stay,
+        left: Callable[[], bool] = lambda: False,
         patience: float | None = None,
     ) -> None:
         self.socket, self.receive, self.closed, self.outputs, self.left = sock, receive, closed, outputs, left

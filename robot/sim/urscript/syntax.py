@@ -72,12 +72,15 @@ _NEXT_TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<string>\"[^\"]*\"|'[^']*')|(?P<pose>p(?=\[))"
     r"|(?P<name>[A-Za-z_]\w*)|(?P<op>==|!=|<=|>=|[-+*/%^<>=()\[\],:.]))"
 )
-#: logical operators of URScript -> of Python, by rising precedence
-_LOGIC_OPERATORS = ({"or": "or", "xor": "^"}, {"and": "and"})
-_SUM_OPERATORS = {"+": "_add", "-": "_subtract"}
-_PRODUCT_OPERATORS = {"*": "_multiply", "/": "_divide", "%": "_modulo"}
-#: comparison operators
-_COMPARISON_OPERATORS = {"==", "!=", "<", ">", "<=", ">="}
+#: operators of two sides -> their Python, by rising precedence
+_BINARY_OPERATORS = (
+    {"or": "({} or {})", "xor": "(bool({}) ^ bool({}))"},
+    {"and": "({} and {})"},
+    {sign: f"({{}} {sign} {{}})" for sign in ("==", "!=", "<", ">", "<=", ">=")},
+    {"+": "_add({}, {})", "-": "_subtract({}, {})"},
+    {"*": "_multiply({}, {})", "/": "_divide({}, {})", "%": "_modulo({}, {})"},
+)
+_COMPARISON_LEVEL = 2
 
 
 class _ExpressionParser:
@@ -151,31 +154,15 @@ class _ExpressionParser:
         return found
 
     def _binary(self, level: int) -> str:
-        if level == len(_LOGIC_OPERATORS):
-            return self._comparison()
+        """Parse from one level of precedence on."""
+        if level == len(_BINARY_OPERATORS):
+            return self._unary()
         left = self._binary(level + 1)
-        while self._next_is(*_LOGIC_OPERATORS[level]):
-            operator = _LOGIC_OPERATORS[level][self._take()[1]]
-            right = self._binary(level + 1)
-            left = f"(bool({left}) ^ bool({right}))" if operator == "^" else f"({left} {operator} {right})"
-        return left
-
-    def _comparison(self) -> str:
-        left = self._sum()
-        if self._next_is(*_COMPARISON_OPERATORS):
-            return f"({left} {self._take()[1]} {self._sum()})"
-        return left
-
-    def _sum(self) -> str:
-        left = self._product()
-        while self._next_is("+", "-"):
-            left = f"{_SUM_OPERATORS[self._take()[1]]}({left}, {self._product()})"
-        return left
-
-    def _product(self) -> str:
-        left = self._unary()
-        while self._next_is("*", "/", "%"):
-            left = f"{_PRODUCT_OPERATORS[self._take()[1]]}({left}, {self._unary()})"
+        while self._next_is(*_BINARY_OPERATORS[level]):
+            made = _BINARY_OPERATORS[level][self._take()[1]]
+            left = made.format(left, self._binary(level + 1))
+            if level == _COMPARISON_LEVEL:
+                break  # there is no a < b < c
         return left
 
     def _unary(self) -> str:
@@ -191,7 +178,7 @@ class _ExpressionParser:
             return f"_negate({self._unary()})" if self._take()[1] == "-" else self._unary()
         if self._next_is("not"):
             self._take()
-            return f"(not {self._comparison()})"
+            return f"(not {self._binary(_COMPARISON_LEVEL)})"
         base = self._postfix()
         if self._next_is("^"):
             self._take()

@@ -19,6 +19,7 @@ import re
 from collections.abc import Set
 from dataclasses import dataclass
 from types import CodeType
+from typing import Any
 
 from .syntax import Function, Parser, numbered_lines
 from .values import ScriptError
@@ -122,6 +123,13 @@ def translate(text: str, builtins: Set[str], blocking: Set[str]) -> Translation:
         raise ScriptError(f"the program cannot be translated: {type(exc).__name__}: {exc}") from exc
 
 
+#: kind of a statement -> its Python, with the place of its expression; any other is the same in Python
+_STATEMENT_FORMS = {
+    **{"call": "{}", "return": "return {}", "kill": "_kill({})", "join": "yield from _join({})", "halt": "_halt()"},
+    **{"pause": "yield _pause()", "enter_critical": "pass", "exit_critical": "pass"},
+}
+
+
 class _Writer:
     """Writer of Python source from the tree of a program."""
 
@@ -171,25 +179,23 @@ class _Writer:
             lines.append("    return None")
         return "\n".join(lines)
 
-    def statements(self, body: list[tuple[object, ...]], lines: list[str], indent: str) -> None:
-        for statement in body:
-            kind, parts = statement[0], statement[2:]
+    def statements(self, body: list[tuple[Any, ...]], lines: list[str], indent: str) -> None:
+        for kind, _, *parts in body:
             if kind == "if":
                 branches, otherwise = parts
                 word = "if"
-                for test, inner in branches:  # type: ignore[attr-defined]
+                for test, inner in branches:
                     lines.append(f"{indent}{word} {self.text(test)}:")
                     self.statements(inner, lines, indent + "    ")
                     lines.append(f"{indent}    pass")
                     word = "elif"
                 if otherwise:
                     lines.append(f"{indent}else:")
-                    self.statements(otherwise, lines, indent + "    ")  # type: ignore[arg-type]
+                    self.statements(otherwise, lines, indent + "    ")
             elif kind == "while":
                 test, inner = parts
-                lines.append(f"{indent}while {self.text(test)}:")
-                lines.append(f"{indent}    _count_step()")
-                self.statements(inner, lines, indent + "    ")  # type: ignore[arg-type]
+                lines += [f"{indent}while {self.text(test)}:", f"{indent}    _count_step()"]
+                self.statements(inner, lines, indent + "    ")
             elif kind == "set":
                 name, value = parts
                 made = self.text(value)
@@ -197,22 +203,8 @@ class _Writer:
             elif kind == "element":
                 name, key, value = parts
                 lines.append(f"{indent}_set(v_{name}, {self.text(key)}, {self.text(value)})")
-            elif kind == "call":
-                lines.append(f"{indent}{self.text(parts[0])}")
-            elif kind == "return":
-                lines.append(f"{indent}return {self.text(parts[0])}")
-            elif kind == "kill":
-                lines.append(f"{indent}_kill({self.text(parts[0])})")
-            elif kind == "join":
-                lines.append(f"{indent}yield from _join({self.text(parts[0])})")
-            elif kind in ("enter_critical", "exit_critical"):
-                lines.append(f"{indent}pass")
-            elif kind == "halt":
-                lines.append(f"{indent}_halt()")
-            elif kind == "pause":
-                lines.append(f"{indent}yield _pause()")
-            else:
-                lines.append(f"{indent}{kind}")
+            else:  # of one expression, or of none
+                lines.append(indent + _STATEMENT_FORMS.get(kind, kind).format(*map(self.text, parts)))
 
     def text(self, made: object) -> str:
         """Return an expression with its calls filled in: ``yield from`` for generators, and name prefixes."""

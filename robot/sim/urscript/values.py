@@ -19,23 +19,15 @@ __all__ = [
     "Array",
     "PoseValue",
     "ScriptError",
-    "add",
-    "copy",
-    "divide",
     "interpolate",
     "make_list",
-    "modulo",
-    "multiply",
-    "negate",
     "number",
     "numbers",
     "pose_of",
-    "power",
     "rotation_of",
     "rotvec_between",
     "rotvec_of",
     "show",
-    "subtract",
     "values_of",
 ]
 
@@ -67,7 +59,7 @@ class PoseValue(Array):
     """URScript pose: position [m] and rotation vector [rad], six numbers."""
 
 
-def copy(value: Any) -> Any:
+def _copy(value: Any) -> Any:
     """Return a copy of a list, or the value itself: URScript assigns lists by value."""
     return type(value)(value) if isinstance(value, list) else value
 
@@ -174,40 +166,40 @@ _MAX_TEXT = 10_000  # characters
 _MAX_INTEGER = 2**31
 
 
-def add(a: Any, b: Any) -> Any:
+def _add(a: Any, b: Any) -> Any:
     """Return a sum of numbers, of texts, or of lists element by element."""
     if isinstance(a, list):
-        return _each(add, a, _same(a, b))
+        return _each(_add, a, _same(a, b))
     if isinstance(a, str) and isinstance(b, str) and len(a) + len(b) > _MAX_TEXT:
         raise ScriptError(f"a text has at most {_MAX_TEXT} characters, got {len(a) + len(b)}")
     return _bounded(a + b)
 
 
-def subtract(a: Any, b: Any) -> Any:
+def _subtract(a: Any, b: Any) -> Any:
     """Return a difference of numbers, or of lists element by element."""
-    return _each(subtract, a, _same(a, b)) if isinstance(a, list) else _bounded(a - b)
+    return _each(_subtract, a, _same(a, b)) if isinstance(a, list) else _bounded(a - b)
 
 
-def multiply(a: Any, b: Any) -> Any:
+def _multiply(a: Any, b: Any) -> Any:
     """Return a product of numbers, or of a list and a number."""
     if isinstance(a, list):
-        return _each(multiply, a, [_number(b)] * len(a))
+        return _each(_multiply, a, [_number(b)] * len(a))
     if isinstance(b, list):
-        return _each(multiply, b, [_number(a)] * len(b))
+        return _each(_multiply, b, [_number(a)] * len(b))
     return _bounded(_number(a) * _number(b))
 
 
-def divide(a: Any, b: Any) -> Any:
+def _divide(a: Any, b: Any) -> Any:
     """Return a quotient of numbers, or of a list and a number."""
-    return _each(divide, a, [_number(b)] * len(a)) if isinstance(a, list) else _number(a) / _number(b)
+    return _each(_divide, a, [_number(b)] * len(a)) if isinstance(a, list) else _number(a) / _number(b)
 
 
-def modulo(a: Any, b: Any) -> Any:
+def _modulo(a: Any, b: Any) -> Any:
     """Return the rest of a division."""
     return _number(a) % _number(b)
 
 
-def power(a: Any, b: Any) -> Any:
+def _power(a: Any, b: Any) -> Any:
     """Return a power: whole where both numbers are and it fits."""
     result = float(_number(a)) ** float(_number(b))
     if isinstance(result, complex):
@@ -216,9 +208,9 @@ def power(a: Any, b: Any) -> Any:
     return int(result) if whole else result
 
 
-def negate(a: Any) -> Any:
+def _negate(a: Any) -> Any:
     """Return a number, or a list, with the other sign."""
-    return type(a)(negate(x) for x in a) if isinstance(a, list) else -_number(a)
+    return type(a)(_negate(x) for x in a) if isinstance(a, list) else -_number(a)
 
 
 def make_list(items: tuple[Any, ...]) -> Array:
@@ -226,7 +218,7 @@ def make_list(items: tuple[Any, ...]) -> Array:
     for item in items:
         if isinstance(item, list) and any(isinstance(inner, list) for inner in item):
             raise ScriptError("a list may hold lists, and those no further ones")
-    return Array(map(copy, items))
+    return Array(map(_copy, items))
 
 
 def _make_pose(items: tuple[Any, ...]) -> PoseValue:
@@ -237,7 +229,7 @@ def _set_element(values: Any, key: Any, value: Any) -> None:
     """Set an element of a list of values, or of a list of lists."""
     if isinstance(value, list) and (value is values or any(isinstance(inner, list) for inner in value)):
         raise ScriptError("a list may hold lists, and those no further ones")
-    values[key] = copy(value)
+    values[key] = _copy(value)
 
 
 def _each(operation: Callable[[Any, Any], Any], a: list[Any], b: Sequence[Any]) -> Any:
@@ -263,15 +255,15 @@ def _bounded(value: Any) -> Any:
 
 #: name in a translated program -> operation
 OPERATIONS: dict[str, Callable[..., Any]] = {
-    "_add": add,
-    "_subtract": subtract,
-    "_multiply": multiply,
-    "_divide": divide,
-    "_modulo": modulo,
-    "_power": power,
-    "_negate": negate,
+    "_add": _add,
+    "_subtract": _subtract,
+    "_multiply": _multiply,
+    "_divide": _divide,
+    "_modulo": _modulo,
+    "_power": _power,
+    "_negate": _negate,
     "_list": make_list,
     "_pose": _make_pose,
     "_set": _set_element,
-    "_copy": copy,
+    "_copy": _copy,
 }

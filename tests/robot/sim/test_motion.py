@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.sim.motion.arm import CYCLE, DEFAULT_DECELERATION, Motion, MotionFault, SimulatedArm, solve_linear
+from coneskin.robot.sim.motion.arm import CYCLE, DEFAULT_DECELERATION, Motion, MotionFault, SimulatedArm, _solve_linear
 from coneskin.robot.sim.motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
 from coneskin.robot.sim.motion.path import JointLine, ToolLine
 
@@ -192,9 +192,9 @@ def test_solve_solves_and_refuses_singular_equations() -> None:
     rows = [[draw.uniform(-1, 1) for _ in range(6)] for _ in range(6)]
     x = [draw.uniform(-1, 1) for _ in range(6)]
     right = [sum(a * b for a, b in zip(row, x, strict=True)) for row in rows]
-    assert solve_linear(rows, right) == pytest.approx(x, abs=1e-11)  # condition about 1e2
+    assert _solve_linear(rows, right) == pytest.approx(x, abs=1e-11)  # condition about 1e2
     with pytest.raises(MotionFault, match="singular"):
-        solve_linear([rows[0], *rows[:5]], right)
+        _solve_linear([rows[0], *rows[:5]], right)
 
 
 def test_joint_speeds_invert_the_jacobian() -> None:

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coneskin.robot.sim.machine.builtins import Builtins
-from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.program import _MAX_SECONDARY
+from coneskin.robot.sim.machine.controller import _MAX_SECONDARY, Controller
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.ports.rtde import RtdeOutputs, RtdeSession
 from coneskin.robot.sim.process import free_host

@@ -12,18 +12,18 @@ from coneskin.robot.sim.urscript.values import (
     Array,
     PoseValue,
     ScriptError,
-    add,
-    copy,
-    divide,
-    modulo,
-    multiply,
-    negate,
+    _add,
+    _copy,
+    _divide,
+    _modulo,
+    _multiply,
+    _negate,
+    _power,
+    _subtract,
     numbers,
     pose_of,
-    power,
     rotation_of,
     rotvec_of,
-    subtract,
     values_of,
 )
 
@@ -74,34 +74,34 @@ def test_poses_go_both_ways() -> None:
 
 def test_lists_add_element_by_element_and_copy_by_value() -> None:
     first, second = Array((1, 2)), Array((3, 5))
-    assert add(first, second) == [4, 7]
-    assert subtract(second, first) == [2, 3]
-    assert multiply(first, 2) == multiply(2, first) == [2, 4]
-    assert negate(first) == [-1, -2]
-    assert divide(second, 2) == [1.5, 2.5]
-    assert isinstance(add(PoseValue((0,) * 6), PoseValue((1,) * 6)), PoseValue)
-    other = copy(first)
+    assert _add(first, second) == [4, 7]
+    assert _subtract(second, first) == [2, 3]
+    assert _multiply(first, 2) == _multiply(2, first) == [2, 4]
+    assert _negate(first) == [-1, -2]
+    assert _divide(second, 2) == [1.5, 2.5]
+    assert isinstance(_add(PoseValue((0,) * 6), PoseValue((1,) * 6)), PoseValue)
+    other = _copy(first)
     other[0] = 9
     assert first == [1, 2]
-    assert isinstance(copy(PoseValue((0,) * 6)), PoseValue)
+    assert isinstance(_copy(PoseValue((0,) * 6)), PoseValue)
     with pytest.raises(ScriptError, match="needs another of the same length"):
-        add(first, Array((1, 2, 3)))
+        _add(first, Array((1, 2, 3)))
 
 
 def test_no_result_grows_without_a_bound() -> None:
     """Whole numbers have 32 bits, beyond them they are doubles; a text and a list have a longest length."""
-    assert power(2, 10) == 1024
-    assert isinstance(power(2, 10), int)
-    assert power(9, 100) == pytest.approx(9.0**100)
-    assert isinstance(multiply(2**30, 2**30), float)
-    assert isinstance(add(2**31 - 1, 1), float)
+    assert _power(2, 10) == 1024
+    assert isinstance(_power(2, 10), int)
+    assert _power(9, 100) == pytest.approx(9.0**100)
+    assert isinstance(_multiply(2**30, 2**30), float)
+    assert isinstance(_add(2**31 - 1, 1), float)
     with pytest.raises(OverflowError):
-        power(9, power(9, 9))
+        _power(9, _power(9, 9))
     with pytest.raises(ScriptError, match="not a real number"):
-        power(-8, 0.5)
+        _power(-8, 0.5)
     with pytest.raises(ScriptError, match="at most 10000 characters, got 12000"):
-        add("x" * 6000, "x" * 6000)
-    for operation in (multiply, modulo):
+        _add("x" * 6000, "x" * 6000)
+    for operation in (_multiply, _modulo):
         with pytest.raises(ScriptError, match="expected a number"):
             operation("%1000000000d", 10**9)
 
