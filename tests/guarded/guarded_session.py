@@ -8,9 +8,11 @@ computer is busier than that the arm rightly stops, and says so. ``until_undistu
 
 import math
 import os
+import re
 import signal
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -67,7 +69,7 @@ def until(what, seconds=DEADLINE):
     end = time.monotonic() + seconds
     while not what():
         assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.005)
+        time.sleep(0.02)  # each look costs the controller something
 
 
 def until_undisturbed(attempt):
@@ -117,6 +119,14 @@ def run_until_moving(simulated, session, goal=FAR):
 def assert_stopped_on_the_way(simulated):
     state = simulated.wait_for_standstill()
     assert state["q"][0] < FAR[0] - 0.1, "the arm went on to its goal"
+
+
+def assert_short_slices(session, *names):
+    """Processes of a guard are let in soon: every thread of theirs has short time slices, where the kernel tells."""
+    for name in names:
+        for task in Path(f"/proc/{session._processes.children[name].pid}/task").glob("*"):
+            if told := re.search(r"se\.slice *: *(\d+)", (task / "sched").read_text()):
+                assert int(told[1]) == 100_000, name
 
 
 def kill(session, name, number=signal.SIGKILL):

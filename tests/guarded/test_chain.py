@@ -21,6 +21,7 @@ from coneskin.testing.scenes import START
 from .guarded_session import (
     DEADLINE,
     FAR,
+    assert_short_slices,
     assert_stopped_on_the_way,
     fast,
     is_reset,
@@ -90,6 +91,7 @@ def test_the_demo_that_a_script_touches(tmp_path):
 def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tmp_path):
     path = tmp_path / "run.rec"
     with guard(scene_for(controller), recording=path) as session:
+        assert_short_slices(session, "guard", "driver")
         thread, raised = run_until_moving(controller, session)
         session.touch(0.13, 1.55, duration=0.2)
         thread.join(DEADLINE)

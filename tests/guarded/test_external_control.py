@@ -22,7 +22,7 @@ from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 from tests.support.sweep import sweep
 
-from .guarded_session import DEADLINE, fast, kill, scene_for, scene_text, until, until_undisturbed
+from .guarded_session import DEADLINE, assert_short_slices, fast, kill, scene_for, scene_text, until, until_undisturbed
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
@@ -260,6 +260,7 @@ def test_without_its_guard_the_watchdog_stops_the_arm(controller, run, number):
 @pytest.mark.parametrize("number", sweep([signal.SIGKILL, signal.SIGSTOP]))
 def test_without_both_the_guarding_program_stops_the_arm(controller, run, number):
     with guard(external(controller)) as session:
+        assert_short_slices(session, "guard", "watchdog")
         run("raw URScript")
         for name in ("watchdog", "guard"):
             kill(session, name, number)

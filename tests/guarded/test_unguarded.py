@@ -4,6 +4,7 @@ import signal
 import socket
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import pytest
@@ -148,9 +149,15 @@ class Ports:
 
 
 @pytest.mark.promise("P45")
-@pytest.mark.parametrize("numbers", [(30003, 29999), (30003, 29999, 30004), (30003,), (29999,)])
-def test_a_stop_goes_out_by_whatever_port_opens(numbers):
-    host = free_host()
+def test_a_stop_goes_out_by_whatever_port_opens():
+    hosts = []
+    for _ in range(4):
+        hosts.append(free_host(hosts))
+    with ThreadPoolExecutor() as pool:  # each waits for ports that do not answer
+        list(pool.map(stop_by, hosts, [(30003, 29999), (30003, 29999, 30004), (30003,), (29999,)]))
+
+
+def stop_by(host, numbers):
     ports = Ports(host, numbers)
     resort = FallbackStop(scene_for(type("Host", (), {"host": host}), control="external"))
     try:

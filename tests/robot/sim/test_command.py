@@ -25,8 +25,8 @@ PROC = Path("/proc")
 
 
 def ends(pid: int) -> bool:
-    """Return whether a process ends within ten seconds; a zombie counts as ended."""
-    deadline = time.monotonic() + 10.0
+    """Return whether a process ends within a minute; a zombie counts as ended."""
+    deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline:
         try:
             if (PROC / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] == "Z":
@@ -57,7 +57,7 @@ def test_it_ends_cleanly_on_a_signal(number: signal.Signals) -> None:
     assert process.stdout is not None
     assert process.stdout.readline().startswith(f"simulated UR5e (PolyScope 5.25) ready on {host}: RTDE 30004")
     process.send_signal(number)
-    said, problem = process.communicate(timeout=10)
+    said, problem = process.communicate(timeout=60)
     assert (process.returncode, said, problem) == (0, "", "")
 
 
@@ -107,7 +107,7 @@ def test_a_taken_port_is_one_line_that_names_it() -> None:
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # an earlier test may just have left the port
         taken.bind((host, 29999))
         taken.listen()
-        done = subprocess.run([*COMMAND, "--host", host], capture_output=True, text=True, timeout=20, check=False)
+        done = subprocess.run([*COMMAND, "--host", host], capture_output=True, text=True, timeout=60, check=False)
         assert done.returncode == 1
         assert done.stdout == ""
         (line,) = done.stderr.splitlines()
