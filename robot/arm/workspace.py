@@ -9,6 +9,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 from coneskin.geometry.pose import Vector
@@ -173,9 +174,14 @@ def _close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[_PartPair]:
         corners: its skeleton [m].
     """
     least = _clearance_needed(model)
-    distances = ((a, b, _segment_distance(*corners[a : a + 2], *corners[b : b + 2])) for a, b in _PART_PAIRS)
-    pairs = (_PartPair(*found) for found in distances)
-    return [pair for pair in pairs if pair.distance < least]
+    sizes = [math.dist(a, b) for a, b in pairwise(corners)]
+    found = []
+    for a, b in _PART_PAIRS:
+        if math.dist(corners[a], corners[b]) < least + sizes[a] + sizes[b]:  # else no two of their points are so close
+            distance = _segment_distance(*corners[a : a + 2], *corners[b : b + 2])
+            if distance < least:
+                found.append(_PartPair(a, b, distance))
+    return found
 
 
 def _segment_distance(a: Vector, b: Vector, c: Vector, d: Vector) -> float:

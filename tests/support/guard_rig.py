@@ -148,7 +148,8 @@ class GuardRig:
                 self._packets = iter(())
             except StopIteration:
                 data = b""
-            if not self.mute_skin and data:
+            heard = not self.mute_skin and bool(data)
+            if heard:
                 self.feed(BlockKind.SKIN, data)
             if step % 2 == 0:
                 if step % 20 == 0 and self.core.needs.slider:
@@ -158,7 +159,9 @@ class GuardRig:
                 payload = self.arm.poll()
                 if not self.mute_arm:
                     self.feed(BlockKind.ARM, payload)
-            self.feed(BlockKind.TICK)
+                    heard = True
+            if not heard:  # as the live loop: any input is a look at the clocks as well
+                self.feed(BlockKind.TICK)
         return self
 
     @property
