@@ -54,7 +54,6 @@ Ctrl-C ends it. Exit code: 0 ended, or the file of --output is written; 1 an opt
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.epilog = EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add("--radius1-mm", type=float, default=54.0, help="radius of the link at end 1 (default 54)")
     add("--radius2-mm", type=float, help="radius at end 2 (default: radius 1, a cylinder)")

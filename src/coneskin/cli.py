@@ -14,10 +14,7 @@ from .core.errors import ConeSkinError, MissingExtra
 from .core.text import printable
 from .core.version import __version__
 
-__all__ = [
-    "COMMANDS",
-    "main",
-]
+__all__ = ["COMMANDS", "main"]
 
 _SHELLS = ("bash", "zsh", "fish", "powershell")
 _COMPLETION_VARIABLE = "_ARGCOMPLETE"  # set by the code of the shell
@@ -131,7 +128,11 @@ def _run(arguments: Sequence[str] | None) -> int:
     chosen = next((word for word in words if not word.startswith("-")), None)
     run = None
     for name, (module_name, help_text) in COMMANDS.items():
-        child = commands.add_parser(name, description=help_text[0].upper() + help_text[1:] + ".")
+        child = commands.add_parser(
+            name,
+            description=help_text[0].upper() + help_text[1:] + ".",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
         if name == chosen:
             module = importlib.import_module(module_name)
             module.add_arguments(child)

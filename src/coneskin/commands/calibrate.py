@@ -33,32 +33,30 @@ _MARKS_HELP = "marks on each sensor, to be measured (default: those that its des
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    parser.add_argument("--by", default="", metavar="NAME", help="who touches; goes into the record")
-    parser.add_argument("--marks", type=int, choices=(4, 9, 16), default=0, help=_MARKS_HELP)
-    parser.add_argument(
+    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    add("--by", default="", metavar="NAME", help="who touches; goes into the record")
+    add("--marks", type=int, choices=(4, 9, 16), default=0, help=_MARKS_HELP)
+    add(
         "--mark-error-mm",
         type=_mark_error,
         default=0.3,
         metavar="MM",
         help="standard deviation with which marks are placed and touched, along and around (default: 0.3)",
     )
-    parser.add_argument(
+    add(
         "--forces",
         type=_forces,
         default=(),
         metavar="N,N,...",
         help="then press three of the marks with these known forces [N], e.g. 1,2,5,10, for touch_force_n",
     )
-    parser.add_argument("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
-    parser.add_argument(
-        "--skin", type=Path, metavar="SCENE", help="with --simulated: scene that says how the virtual skin was built"
-    )
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the residuals (png, svg, pdf)")
-    parser.add_argument("--list", action="store_true", help="list the marks, and touch nothing")
-    parser.add_argument("--json", action="store_true", help="print JSON objects, one per line")
+    add("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
+    add("--skin", type=Path, metavar="SCENE", help="with --simulated: scene that says how the virtual skin was built")
+    add("--picture", type=Path, metavar="FILE", help="draw the residuals (png, svg, pdf)")
+    add("--list", action="store_true", help="list the marks, and touch nothing")
+    add("--json", action="store_true", help="print JSON objects, one per line")
 
 
 def _mark_error(text: str) -> float:

@@ -31,20 +31,20 @@ retreat or comply. Ctrl-C writes nothing. Exit code: 0 passed, 1 not passed, or 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    parser.add_argument("--by", default="", metavar="NAME", help="who touches; goes into the record")
-    parser.add_argument("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
-    parser.add_argument(
+    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    add("--by", default="", metavar="NAME", help="who touches; goes into the record")
+    add("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
+    add(
         "--posture-deg",
         type=_posture,
         metavar="Q1,...,Q6",
         help="joint positions [deg] for which the marks are described; by default the controller is asked",
     )
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the marks (png, svg, pdf)")
-    parser.add_argument("--list", action="store_true", help="list the marks, and touch nothing")
-    parser.add_argument("--json", action="store_true", help="print JSON objects, one per line")
+    add("--picture", type=Path, metavar="FILE", help="draw the marks (png, svg, pdf)")
+    add("--list", action="store_true", help="list the marks, and touch nothing")
+    add("--json", action="store_true", help="print JSON objects, one per line")
 
 
 def _posture(text: str) -> tuple[float, ...]:

@@ -44,13 +44,7 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.session.session import Session
 
-__all__ = [
-    "add_arguments",
-    "collision_facts",
-    "hold_up",
-    "print_report",
-    "run",
-]
+__all__ = ["add_arguments", "collision_facts", "hold_up", "print_report", "run"]
 
 #: the scene of the demo: the tube of the UR5e's forearm as ``coneskin design`` finds it. The limits of
 #: silence are long because a pseudo-terminal on a busy machine can stall for that long
@@ -259,17 +253,17 @@ _EVENT_TIMEOUT = 2.0  # s for an event that has happened to be printed
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the run (default runs/demo-TIME)")
-    parser.add_argument(
+    add("-o", "--output", type=Path, metavar="DIR", help="folder for the run (default runs/demo-TIME)")
+    add(
         "--reaction",
         choices=("stop", "retreat"),
         default="retreat",
         help="what the arm does when it is touched (default retreat)",
     )
-    parser.add_argument("--host", help="loopback address for the simulated controller (default: a free one)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object at the end")
+    add("--host", help="loopback address for the simulated controller (default: a free one)")
+    add("--json", action="store_true", help="print one JSON object at the end")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -42,14 +42,14 @@ _VERDICT_COLORS = {"ok": "green", "warning": "yellow", "bad": "red", "not tried"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    parser.add_argument("--check", action="store_true", help="list what is in the scene; open and start nothing")
-    parser.add_argument("--simulated", action="store_true", help="start a simulated controller at the scene's host")
-    parser.add_argument("--no-touches", action="store_true", help="ask for no touches: the wires are not tried")
-    parser.add_argument("--yes", action="store_true", help="make the changes of the scene without asking")
-    parser.add_argument("--json", action="store_true", help="print each finding as a JSON object, one per line")
+    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    add("--check", action="store_true", help="list what is in the scene; open and start nothing")
+    add("--simulated", action="store_true", help="start a simulated controller at the scene's host")
+    add("--no-touches", action="store_true", help="ask for no touches: the wires are not tried")
+    add("--yes", action="store_true", help="make the changes of the scene without asking")
+    add("--json", action="store_true", help="print each finding as a JSON object, one per line")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -37,7 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = "Solve the field of your sensor exactly: potential maps, error maps, resistances."
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
     add_key_options(add, LINK_CONE_KEYS, ("radius1", "height"), defaults)

@@ -31,11 +31,11 @@ give it to `coneskin monitor`. Exit code: 0 found and permitted, 1 not.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--list", action="store_true", help="list the ports that are there, and end")
-    parser.add_argument("--timeout-s", type=positive_seconds, default=60.0, help="give up after this time (default 60)")
-    parser.add_argument("--json", action="store_true", help="print the result as a JSON object")
+    add("--list", action="store_true", help="list the ports that are there, and end")
+    add("--timeout-s", type=positive_seconds, default=60.0, help="give up after this time (default 60)")
+    add("--json", action="store_true", help="print the result as a JSON object")
 
 
 def run(args: argparse.Namespace) -> int:

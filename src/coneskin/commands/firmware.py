@@ -26,18 +26,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     from coneskin.skin.firmware.boards import BUILT_IN, boards, converters
 
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("sensor", type=Path, metavar="SENSOR", help="sensor.toml, as coneskin design writes it")
-    parser.add_argument("--board", choices=list(boards()), default="uno", help="which board (default: %(default)s)")
-    parser.add_argument(
+    add("sensor", type=Path, metavar="SENSOR", help="sensor.toml, as coneskin design writes it")
+    add("--board", choices=list(boards()), default="uno", help="which board (default: %(default)s)")
+    add(
         "--converter",
         choices=[BUILT_IN, *converters()],
         default=BUILT_IN,
         help="the board's own, or two ADS1x15 on its I2C pins (default: %(default)s)",
     )
-    parser.add_argument("--to", type=Path, required=True, metavar="FOLDER", help="folder to write; made if need be")
-    parser.add_argument("--force", action="store_true", help="replace files that are there already and are others")
+    add("--to", type=Path, required=True, metavar="FOLDER", help="folder to write; made if need be")
+    add("--force", action="store_true", help="replace files that are there already and are others")
 
 
 def run(args: argparse.Namespace) -> int:

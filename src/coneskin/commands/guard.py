@@ -47,30 +47,30 @@ coneskin is not a safety-rated device; read docs/safety.md before you use it.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    parser.add_argument(
+    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    add(
         "--simulated",
         action="store_true",
         help="start a simulated controller at the scene's host, on this computer; its arm meets the scene's bodies",
     )
-    parser.add_argument(
+    add(
         "--publish",
         metavar="URL",
         action="append",
         default=[],
         help="send each event as JSON to udp://127.0.0.1:PORT; may be repeated",
     )
-    parser.add_argument("--publish-beyond", action="store_true", help="allow an address of another computer")
-    parser.add_argument("--once", action="store_true", help="end after the first collision or fault")
-    parser.add_argument(
+    add("--publish-beyond", action="store_true", help="allow an address of another computer")
+    add("--once", action="store_true", help="end after the first collision or fault")
+    add(
         "--duration-s",
         type=positive_seconds,
         metavar="S",
         help="end after this time [s], once the move under way is over",
     )
-    parser.add_argument("--json", action="store_true", help="print each event as a JSON object, one per line")
+    add("--json", action="store_true", help="print each event as a JSON object, one per line")
 
 
 def run(args: argparse.Namespace) -> int:

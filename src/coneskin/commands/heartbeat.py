@@ -23,7 +23,6 @@ Exit code: 0; 1 the scene has mistakes, or control = internal.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML, with control = external")
 
 

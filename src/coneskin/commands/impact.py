@@ -45,17 +45,17 @@ _COLUMN_NAMES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("scene", type=Path, help="scene file")
-    parser.add_argument(
+    add("scene", type=Path, help="scene file")
+    add(
         "--ways",
         default=",".join(_STOP_WAYS),
         help="what protects the body: guard (as the scene says), a reaction, force limit, nothing (default: all)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the skins' noise (default 0)")
-    parser.add_argument("--longest-s", type=float, default=20.0, metavar="T", help="for which to look on (default 20)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add("--seed", type=int, default=0, help="of the skins' noise (default 0)")
+    add("--longest-s", type=float, default=20.0, metavar="T", help="for which to look on (default 20)")
+    add("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:

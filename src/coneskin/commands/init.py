@@ -35,7 +35,6 @@ _SIMULATED_HOST = "127.0.0.1"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     from coneskin.skin.firmware.boards import BUILT_IN, boards, converters
 
     add = parser.add_argument
@@ -43,11 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--output", type=Path, metavar="SCENE", default=Path("scene.toml"), help="file to write (scene.toml)")
     add("--force", action="store_true", help="replace an existing scene")
     add("--simulated", action="store_true", help="a simulated arm and a virtual skin, which is touched in the motion")
-    add(
-        "--arm",
-        metavar="MODEL",
-        help=f"model of the arm, such as UR10e; with --simulated {DEFAULT_MODEL} by default",
-    )
+    add("--arm", metavar="MODEL", help=f"model of the arm, such as UR10e; with --simulated {DEFAULT_MODEL} by default")
     add("--host", metavar="ADDRESS", help=f"of the controller; with --simulated {_SIMULATED_HOST} by default")
     add(
         "--port",

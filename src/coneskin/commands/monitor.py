@@ -43,7 +43,6 @@ Ctrl-C ends with a summary. Exit code: 0 the last diagnosis is good, 1 it is not
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add(
         "target",

@@ -33,20 +33,14 @@ exit code: 0; 1 where no speed keeps the limits, or a file has a mistake."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("scene", type=Path, help="scene file")
-    parser.add_argument(
-        "--limits", type=Path, required=True, metavar="FILE", help="limits of the force, and how the arm stops"
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="write the speeds as TOML for speed_limit_from"
-    )
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw them (png, svg, pdf; extra pictures)")
-    parser.add_argument(
-        "--any-position", action="store_true", help="let the arm be anywhere, also where the scene has a [motion]"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add("scene", type=Path, help="scene file")
+    add("--limits", type=Path, required=True, metavar="FILE", help="limits of the force, and how the arm stops")
+    add("-o", "--output", type=Path, metavar="FILE", help="write the speeds as TOML for speed_limit_from")
+    add("--picture", type=Path, metavar="FILE", help="draw them (png, svg, pdf; extra pictures)")
+    add("--any-position", action="store_true", help="let the arm be anywhere, also where the scene has a [motion]")
+    add("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -44,35 +44,23 @@ Times count from the start of the run. Names of settings: docs/do/runs.md. Exit 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folder of a run, or its recording")
-    parser.add_argument(
-        "--scene",
-        type=Path,
-        help="replay with this scene instead of the recorded one: what would it have decided?",
-    )
-    parser.add_argument("--events", action="store_true", help="list the events")
-    parser.add_argument(
-        "--picture", type=Path, metavar="FILE", help="draw the run: joint speeds, touch, arm (PNG, SVG, PDF)"
-    )
-    parser.add_argument(
+    add("runs", nargs="+", type=Path, metavar="RUN", help="folder of a run, or its recording")
+    add("--scene", type=Path, help="replay with this scene instead of the recorded one: what would it have decided?")
+    add("--events", action="store_true", help="list the events")
+    add("--picture", type=Path, metavar="FILE", help="draw the run: joint speeds, touch, arm (PNG, SVG, PDF)")
+    add(
         "--allow-incomplete",
         action="store_true",
         help="exit with 0 where nothing differs as far as it can be compared, though blocks or all events are missing",
     )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="another value in the scene: what if?"
-    )
-    parser.add_argument(
-        "--vary", action="append", default=[], metavar="NAME=A,B,C", help="several values, each with each run"
-    )
-    parser.add_argument("--table", type=Path, metavar="FILE", help="rows of many runs, for DuckDB or pandas (parquet)")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes for many runs (default: one for each core)")
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="Dask cluster for many runs, such as tcp://10.0.0.5:8786"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add("--set", action="append", default=[], metavar="NAME=VALUE", help="another value in the scene: what if?")
+    add("--vary", action="append", default=[], metavar="NAME=A,B,C", help="several values, each with each run")
+    add("--table", type=Path, metavar="FILE", help="rows of many runs, for DuckDB or pandas (parquet)")
+    add("--jobs", type=int, metavar="N", help="processes for many runs (default: one for each core)")
+    add("--scheduler", metavar="ADDRESS", help="Dask cluster for many runs, such as tcp://10.0.0.5:8786")
+    add("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -206,13 +194,7 @@ def _replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
     if args.table is not None and args.table.suffix != ".parquet":
         raise RecordingError(f"the table of many runs is a .parquet file, got {args.table}")
     bar = ProgressBar(f"{len(paths)} run{'s'[: len(paths) != 1]}")
-    rows = judge_runs(
-        paths,
-        variants,
-        jobs=args.jobs,
-        scheduler=args.scheduler or "",
-        progress=bar,
-    )
+    rows = judge_runs(paths, variants, jobs=args.jobs, scheduler=args.scheduler or "", progress=bar)
     scores = score_variants(rows)
     if args.table is not None:
         write_rows(args.table, rows)

@@ -98,7 +98,6 @@ _TOLERANCE_HELP = "place_mm, angle_deg, level, speed_rad_s, time_ms or relative:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the jobs and their options."""
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     jobs = parser.add_subparsers(dest="job", metavar="JOB", required=True)
 
     def job(name: str, text: str, epilog: str) -> argparse.ArgumentParser:

@@ -32,21 +32,17 @@ Exit code: 0 shown; 1 the link cannot be read, or a package is not installed; 2 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("link", metavar="LINK", help="mesh file (STL, OBJ, DAE, PLY), or FILE.urdf#LINK")
-    parser.add_argument(
-        "-o", "--output", type=Path, default=Path("skin"), metavar="DIR", help="to write (default skin)"
-    )
-    parser.add_argument("--force", action="store_true", help="replace an earlier design in the folder")
-    parser.add_argument(
-        "--tolerance-mm", type=float, default=1.0, metavar="MM", help="largest distance to the mesh (1)"
-    )
-    parser.add_argument("--unit", choices=("m", "cm", "mm", "inch"), help="unit of the mesh (default: guessed)")
-    parser.add_argument("--port", type=int, default=8090, help="to listen at, the next free one if it is taken (8090)")
-    parser.add_argument("--no-browser", action="store_true", help="open no browser: only print the address")
-    parser.add_argument("--json", action="store_true", help="print one JSON object: the address")
-    parser.add_argument("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
+    add("link", metavar="LINK", help="mesh file (STL, OBJ, DAE, PLY), or FILE.urdf#LINK")
+    add("-o", "--output", type=Path, default=Path("skin"), metavar="DIR", help="to write (default skin)")
+    add("--force", action="store_true", help="replace an earlier design in the folder")
+    add("--tolerance-mm", type=float, default=1.0, metavar="MM", help="largest distance to the mesh (1)")
+    add("--unit", choices=("m", "cm", "mm", "inch"), help="unit of the mesh (default: guessed)")
+    add("--port", type=int, default=8090, help="to listen at, the next free one if it is taken (8090)")
+    add("--no-browser", action="store_true", help="open no browser: only print the address")
+    add("--json", action="store_true", help="print one JSON object: the address")
+    add("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
 
 
 def run(args: argparse.Namespace) -> int:

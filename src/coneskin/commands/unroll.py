@@ -26,7 +26,6 @@ Exit code: 0; 1 there is no such cone; 2 wrong usage.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.epilog = _EXAMPLES
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
     add_key_options(parser.add_argument, LINK_CONE_KEYS, ("radius1", "height"), defaults)
     parser.add_argument("--json", action="store_true", help="print one JSON object")

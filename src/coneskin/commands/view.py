@@ -43,21 +43,17 @@ Exit code: 0 shown, or written; 1 a scene or run cannot be read, or viser is not
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add = parser.add_argument
     parser.epilog = _EXAMPLE
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument(
-        "what", nargs="+", type=Path, metavar="SCENE|RUN", help="scene file, or run folders (or their recordings)"
+    add("what", nargs="+", type=Path, metavar="SCENE|RUN", help="scene file, or run folders (or their recordings)")
+    add("--html", type=Path, metavar="FILE", help="write the runs into one HTML file; serve nothing")
+    add(
+        "--host", default="127.0.0.1", help="address to listen at; any but this computer's own lets its network look in"
     )
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write the runs into one HTML file; serve nothing")
-    parser.add_argument(
-        "--host",
-        default="127.0.0.1",
-        help="address to listen at; any but this computer's own lets its network look in",
-    )
-    parser.add_argument("--port", type=int, default=8080, help="to listen at, the next free one if it is taken (8080)")
-    parser.add_argument("--no-browser", action="store_true", help="open no browser: only print the address")
-    parser.add_argument("--json", action="store_true", help="print one JSON object: the address, or the file")
-    parser.add_argument("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
+    add("--port", type=int, default=8080, help="to listen at, the next free one if it is taken (8080)")
+    add("--no-browser", action="store_true", help="open no browser: only print the address")
+    add("--json", action="store_true", help="print one JSON object: the address, or the file")
+    add("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -155,12 +155,7 @@ class Collision(RobotError, RuntimeError):
     """
 
     def __init__(
-        self,
-        message: str,
-        event: Any = None,
-        standstill_confirmed: bool = False,
-        reaction: str = "",
-        number: int = 0,
+        self, message: str, event: Any = None, standstill_confirmed: bool = False, reaction: str = "", number: int = 0
     ) -> None:
         super().__init__(message)
         self.number = number

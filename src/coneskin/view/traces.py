@@ -17,14 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = [
-    "COLOURS",
-    "MOST_LINES",
-    "TracePlot",
-    "trace_drawings",
-    "trace_names",
-    "traces",
-]
+__all__ = ["COLOURS", "MOST_LINES", "TracePlot", "trace_drawings", "trace_names", "traces"]
 
 _BIN_COUNT = 240  # each with its least and its largest value
 _LEVELS, _SPEEDS, _FORCE = "touch level", "joint speed [rad/s]", "contact force [N]"
@@ -160,11 +153,7 @@ class TracePlot:
         for number, name in enumerate(found.names):
             series.append({"label": name, "stroke": COLOURS[number % len(COLOURS)], "width": 1.5})  # type: ignore[dict-item]
         return self._gui.add_uplot(
-            (found.times, *found.values),
-            tuple(series),
-            scales=_scales(found),
-            legend={"show": True},
-            aspect=1.7,
+            (found.times, *found.values), tuple(series), scales=_scales(found), legend={"show": True}, aspect=1.7
         )
 
 

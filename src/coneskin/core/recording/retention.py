@@ -50,12 +50,7 @@ def prune_file(path: Path, windows: Sequence[tuple[float, float]], kept: frozens
 
 
 def _copy(
-    file: BinaryIO,
-    size: int,
-    target: BinaryIO,
-    run: int,
-    windows: Sequence[tuple[float, float]],
-    kept: frozenset[int],
+    file: BinaryIO, size: int, target: BinaryIO, run: int, windows: Sequence[tuple[float, float]], kept: frozenset[int]
 ) -> Iterator[None]:
     everywhere = bits(kept)
     shortened = _Shortened(run)

@@ -25,12 +25,7 @@ from .two_mass_contact import StruckBody
 
 __all__ = ["BodyRegion", "LimitsFile", "MeasuredReaction", "parse_limits", "read_limits"]
 
-_LIMIT_KEYS = (
-    Key("edition", str),
-    Key("transcribed_by", str),
-    Key("verified_by", str),
-    Key("region", dict),
-)
+_LIMIT_KEYS = (Key("edition", str), Key("transcribed_by", str), Key("verified_by", str), Key("region", dict))
 _MEASURED_KEYS = (
     Key("reaction_ms", low=0.0, high=1000.0),
     Key("deceleration_rad_s2", low=0.1, high=100.0),

@@ -146,10 +146,7 @@ class SheetField:
 
 
 #: vertices and faces of a patch before it is placed and scaled
-SQUARE = (
-    ((-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (0.5, 0.5, 0.0), (-0.5, 0.5, 0.0)),
-    ((0, 1, 2), (0, 2, 3)),
-)
+SQUARE = (((-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (0.5, 0.5, 0.0), (-0.5, 0.5, 0.0)), ((0, 1, 2), (0, 2, 3)))
 _ROWS, _COLUMNS = 32, 48
 _PATCH_HEIGHT = 0.0035  # m above the surface that is sensed: over the sheet as it is drawn
 _PATCH_OVERLAP = 1.03  # of a patch's size, so that no gap is seen between two
