@@ -11,9 +11,9 @@ from coneskin.core.errors import SceneError
 from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene.build import build_core
 from coneskin.scene.commissioning_record import (
+    _read_record,
+    _record_path,
     fingerprint,
-    read_record,
-    record_path,
     with_commissioning,
     write_record,
 )
@@ -118,7 +118,7 @@ def test_it_ages_where_the_scene_says_so(tmp_path: Path) -> None:
 
 def test_one_that_failed_is_void(tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
-    record = read_record(write_passed_record(scene))
+    record = _read_record(write_passed_record(scene))
     write_record(scene, replace(record, passed=False, cause="it reads as if C and D were exchanged"))
     assert "has failed, it reads as if C and D were exchanged" in known(scene).note
     assert not known(scene).valid
@@ -146,7 +146,7 @@ def test_one_that_failed_is_void(tmp_path: Path) -> None:
 )
 def test_nonsense_is_void_and_no_traceback(text: str, tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
-    record_path(scene).write_bytes(text.encode("utf-8", "surrogateescape"))
+    _record_path(scene).write_bytes(text.encode("utf-8", "surrogateescape"))
     assert not known(scene).valid
     assert "is of no use" in known(scene).note
 
@@ -162,7 +162,7 @@ def test_a_wrong_value_is_void(key: str, value: object, tmp_path: Path) -> None:
 
 def test_a_folder_in_its_place_is_void(tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
-    record_path(scene).mkdir()
+    _record_path(scene).mkdir()
     assert not known(scene).valid
     with pytest.raises(SceneError, match="cannot be written"):
         write_passed_record(scene)

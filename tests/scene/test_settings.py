@@ -10,7 +10,7 @@ import pytest
 from coneskin.core.errors import SceneError
 from coneskin.core.keys import Key
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.settings import detector_keys, override_detector, override_settings, parse_choices, parse_settings
+from coneskin.scene.settings import _detector_keys, override_detector, override_settings, parse_choices, parse_settings
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.sensor import Sensor
 
@@ -150,7 +150,7 @@ def in_file(key: Key, value: Any) -> Any:
 
 
 def defaults() -> list[tuple[Key, Any]]:
-    return [(key, getattr(DetectorSettings(), key.plain)) for key in detector_keys()]
+    return [(key, getattr(DetectorSettings(), key.plain)) for key in _detector_keys()]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import argparse
 import json
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .terminal import LiveReading, Person
 
@@ -28,6 +28,12 @@ names as its calibration; it applies once the sensor's table has `calibration = 
 with another calibration is void. Exit code: 0 all sensors are calibrated, 1 not all, or not carried out.
 """
 _DEFAULT_FOLDER = "calibrations"
+#: of a calibration, in the JSON object of its result
+_SHOWN_FIELDS = (
+    *("before_rms_mm", "after_rms_mm", "before_largest_mm", "after_largest_mm", "map_error_mm"),
+    *("map_along", "map_around", "fitted_along", "fitted_around", "extra_ohm", "sheet_ohm"),
+    *("forces_n", "force_levels", "force_error"),
+)
 _MARKS_HELP = "marks on each sensor, to be measured (default: those that its design has printed on the cover, else 9)"
 
 
@@ -89,10 +95,11 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.commissioning.skin_watch import TouchSession, check_touchable
     from coneskin.core.errors import SceneError
     from coneskin.scene.reader import load_scene
-    from coneskin.scene.tables.sensor_tables import sensor_files
+    from coneskin.scene.tables.sensor_tables import named_files
     from coneskin.skin.sources.kinds import is_simulated
 
     scene = load_scene(args.scene, calibrated=False)
+    tables = tomllib.loads(args.scene.read_text(encoding="utf-8-sig"))
     if args.skin and not args.simulated:
         raise SceneError(["--skin says how a virtual skin was built: give --simulated too"], scene.name)
     built = load_scene(args.skin, calibrated=False) if args.skin else None
@@ -108,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
         args.marks,
         1e-3 * args.mark_error_mm,
         args.forces,
-        sensor_files(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder),
+        named_files(tables, scene.folder, "file"),
     )
     if args.list:
         _list(calibrator, args.json)
@@ -121,46 +128,29 @@ def run(args: argparse.Namespace) -> int:
         from coneskin.commissioning.calibration.residuals_picture import draw_residuals
 
         draw_residuals(results, args.picture)
-    _write(args, scene, results)
+    _write(results, named_files(tables, scene.folder, "calibration"), scene.folder / _DEFAULT_FOLDER, args.json)
     return 0 if all(result.record for result in results) else 1
 
 
-def _write(args: argparse.Namespace, scene: Scene, results: list[CalibrationResult]) -> None:
+def _write(results: list[CalibrationResult], named: list[Path | None], default: Path, as_json: bool) -> None:
     """Add the results to the files of their devices, and show them."""
-    from coneskin.scene.tables.sensor_tables import named_calibrations
     from coneskin.scene.values.calibration_file import add_calibration, calibration_path
 
-    named = named_calibrations(tomllib.loads(args.scene.read_text(encoding="utf-8-sig")), scene.folder)
     for result, place in zip(results, named, strict=True):
         path = None
         if result.record is not None:
             device = result.touches.sensor.device_id
-            path = calibration_path(place or scene.folder / _DEFAULT_FOLDER, device)
+            path = calibration_path(place or default, device)
             add_calibration(path, device, result.record)
-        _show(result, path, place is None, args.json)
+        _show(result, path, place is None, as_json)
 
 
 def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: bool) -> None:
     record, name = result.record, result.touches.sensor.name
     if as_json:
-        line: dict[str, Any] = {
-            "kind": "end",
-            "sensor": name,
-            "calibrated": record is not None,
-            "cause": result.refusal,
-        }
+        line = {"kind": "end", "sensor": name, "calibrated": record is not None, "cause": result.refusal}
         if record is not None:
-            line |= {"file": str(path), "before_rms_mm": record.before_rms_mm, "after_rms_mm": record.after_rms_mm}
-            line |= {"before_largest_mm": record.before_largest_mm, "after_largest_mm": record.after_largest_mm}
-            line |= {
-                "map_error_mm": record.map_error_mm,
-                "map_along": record.map_along,
-                "map_around": record.map_around,
-            }
-            line |= {"fitted_along": record.fitted_along, "fitted_around": record.fitted_around}
-            line |= {"extra_ohm": record.extra_ohm, "sheet_ohm": record.sheet_ohm}
-            line |= {"forces_n": record.forces_n, "force_levels": record.force_levels}
-            line |= {"force_error": record.force_error}
+            line |= {"file": str(path), **{field: getattr(record, field) for field in _SHOWN_FIELDS}}
             line |= {"touches": len(record.touches), "used": sum(touch.used for touch in record.touches)}
         print(json.dumps(line), flush=True)
         return

@@ -25,8 +25,6 @@ from typing import Any, Protocol, TypeVar
 
 __all__ = [
     "Channel",
-    "HasDescriptor",
-    "OverflowFilter",
     "decode_json",
     "encode_json",
     "pair",
@@ -39,14 +37,14 @@ _MAX_LENGTH = 1 << 24  # bytes of one message
 _BOUND_FACTOR = 2  # bounds; the second is for what is left of a shortened message
 
 
-class HasDescriptor(Protocol):
+class _HasDescriptor(Protocol):
     """Object that the system can wait for."""
 
     def fileno(self) -> int:
         """Return the descriptor."""
 
 
-_Waited = TypeVar("_Waited", bound=HasDescriptor)
+_Waited = TypeVar("_Waited", bound=_HasDescriptor)
 
 
 def wait_readable(inputs: Sequence[_Waited], timeout: float) -> list[_Waited]:
@@ -57,7 +55,7 @@ def wait_readable(inputs: Sequence[_Waited], timeout: float) -> list[_Waited]:
     return _wait(inputs, timeout, write=False)
 
 
-def wait_writable(output: HasDescriptor, timeout: float) -> bool:
+def wait_writable(output: _HasDescriptor, timeout: float) -> bool:
     """Wait until this can be written, or for the timeout [s], and tell whether it can."""
     return bool(_wait([output], timeout, write=True))
 
@@ -78,7 +76,7 @@ def _wait(items: Sequence[_Waited], timeout: float, write: bool) -> list[_Waited
     return [by_number[number] for number, _ in poll.poll(1e3 * max(timeout, 0.0))]
 
 
-class OverflowFilter(Protocol):
+class _OverflowFilter(Protocol):
     """Filter that shortens what the other side of a full channel does not take."""
 
     def shorten(self, message: bytes) -> bytes:
@@ -106,7 +104,7 @@ class Channel:
         self.closed = False
         self._unheard = False  # the other side takes nothing more; what it has said may still be there to read
         self.dropped = 0
-        self.overflow: OverflowFilter | None = None
+        self.overflow: _OverflowFilter | None = None
         self._full = False
         self._sending = threading.Lock()
         _open_channels.add(self)

@@ -6,7 +6,6 @@ out on this skin, on this link; it is no lock, and a record that was edited by h
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -14,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
-from coneskin.core.files import write_whole
+from coneskin.core.files import read_file, write_whole
 from coneskin.core.text import read_json
 
-from .values.scene import Commissioning, round_facts, sensor_facts
+from .values.scene import Commissioning, facts_digest, sensor_facts
 
 if TYPE_CHECKING:
     from .values.scene import PlacedSensor, Scene
@@ -26,8 +25,6 @@ __all__ = [
     "CommissioningRecord",
     "MarkResult",
     "fingerprint",
-    "read_record",
-    "record_path",
     "with_commissioning",
     "write_record",
 ]
@@ -36,7 +33,7 @@ _CHAIN_NUMBER = 1  # to be raised where the way from a frame to a place on the a
 _MAX_BYTES = 1 << 20  # of a record
 _DAY_SECONDS = 86400.0  # s
 _CLOCK_ERROR = 1.0  # days that a record may be ahead of this computer's date
-HOW_TO = "see `coneskin commission`"
+_HOW_TO = "see `coneskin commission`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,14 +104,14 @@ def fingerprint(scene: Scene) -> str:
         "simulated": simulated,
         "sensors": [[_link_name(link.name), link.frame, _facts(item)] for link in scene.links for item in link.sensors],
     }
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+    return facts_digest(facts)
 
 
 def _link_name(name: str) -> str:
     return "".join(ch for ch in name.lower().removesuffix("_link") if ch.isalnum())
 
 
-def _facts(item: PlacedSensor) -> Any:
+def _facts(item: PlacedSensor) -> dict[str, Any]:
     sensor, pose = item.sensor, item.placed.link_frustum
     facts = {**sensor_facts(sensor), "pose": [pose.rotation, pose.translation]}
     if sensor.place_map is not None:
@@ -122,10 +119,10 @@ def _facts(item: PlacedSensor) -> Any:
     if bends := item.placed.bends:
         facts["bends"] = [[bend.width, bend.turn] for bend in bends]
         facts["lift"] = item.placed.lift
-    return round_facts(facts)
+    return facts
 
 
-def record_path(scene: Scene) -> Path:
+def _record_path(scene: Scene) -> Path:
     """Return the path of a scene's record, which lies beside its file."""
     return scene.folder / f"{Path(scene.name).stem}.commissioning.json"
 
@@ -136,7 +133,7 @@ def write_record(scene: Scene, record: CommissioningRecord) -> Path:
     Raises:
         SceneError: it cannot be written.
     """
-    path = record_path(scene)
+    path = _record_path(scene)
     try:
         write_whole(path, json.dumps(asdict(record), indent=2) + "\n")
     except OSError as exc:
@@ -144,7 +141,7 @@ def write_record(scene: Scene, record: CommissioningRecord) -> Path:
     return path
 
 
-def read_record(path: Path) -> CommissioningRecord:
+def _read_record(path: Path) -> CommissioningRecord:
     """Read a record.
 
     Raises:
@@ -152,19 +149,14 @@ def read_record(path: Path) -> CommissioningRecord:
         ValueError: it cannot be read, or is no record; the message says why.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(_MAX_BYTES + 1)
+        table = read_json(read_file(path, _MAX_BYTES))
+        marks = tuple(MarkResult(**mark) for mark in table.pop("marks"))
+        record = CommissioningRecord(**table, marks=marks)
+        datetime.fromisoformat(record.date)
     except FileNotFoundError:
         raise
     except OSError as exc:
         raise ValueError(f"it cannot be read: {exc.strerror or exc}") from exc
-    if len(data) > _MAX_BYTES:
-        raise ValueError(f"it has more than {_MAX_BYTES} bytes")
-    try:
-        table = read_json(data)
-        marks = tuple(MarkResult(**mark) for mark in table.pop("marks"))
-        record = CommissioningRecord(**table, marks=marks)
-        datetime.fromisoformat(record.date)
     except (ValueError, TypeError, AttributeError, KeyError) as exc:
         raise ValueError(f"it is no commissioning record: {exc}") from exc
     return record
@@ -183,31 +175,33 @@ def with_commissioning(scene: Scene, now: float) -> Scene:
 
 
 def _check(scene: Scene, now: float) -> Commissioning:
-    path = record_path(scene)
+    path = _record_path(scene)
     try:
-        record = read_record(path)
+        record = _read_record(path)
     except FileNotFoundError:
-        return Commissioning(False, f"there is no commissioning record {path.name}: {HOW_TO}")
+        return Commissioning(False, f"there is no commissioning record {path.name}: {_HOW_TO}")
     except ValueError as exc:
-        return Commissioning(False, f"the commissioning record {path.name} is of no use, {exc}: {HOW_TO}")
+        return Commissioning(False, f"the commissioning record {path.name} is of no use, {exc}: {_HOW_TO}")
     then = datetime.fromisoformat(record.date)
     then = then if then.tzinfo else then.replace(tzinfo=UTC)
     day = f"{then:%Y-%m-%d}"
     age = (now - then.timestamp()) / _DAY_SECONDS
     if record.passed is not True or not record.marks or not all(mark.passed is True for mark in record.marks):
-        why = f"the commissioning of {day} has failed{f', {record.cause}' if record.cause else ''}: {HOW_TO}"
+        why = f"the commissioning of {day} has failed{f', {record.cause}' if record.cause else ''}: {_HOW_TO}"
         return Commissioning(False, why)
     if record.fingerprint != fingerprint(scene):
         changed = (
             "arm, link, pose, geometry, wiring, electronics or calibration of a sensor, or the kind of source, is "
             "another now"
         )
-        return Commissioning(False, f"the commissioning of {day} was of another scene, {changed}: {HOW_TO}")
+        return Commissioning(False, f"the commissioning of {day} was of another scene, {changed}: {_HOW_TO}")
     limit = scene.commissioning_max_age
     if limit is not None and age * _DAY_SECONDS > limit:
         allowed = f"{limit / _DAY_SECONDS:g} days are allowed (commissioning.max_age_days)"
-        return Commissioning(False, f"the commissioning of {day} is {age:.1f} days old, {allowed}: {HOW_TO}")
+        return Commissioning(False, f"the commissioning of {day} is {age:.1f} days old, {allowed}: {_HOW_TO}")
     if limit is not None and age < -_CLOCK_ERROR:
-        return Commissioning(False, f"the commissioning is dated {day}, which is still to come: set the date; {HOW_TO}")
+        return Commissioning(
+            False, f"the commissioning is dated {day}, which is still to come: set the date; {_HOW_TO}"
+        )
     by = f" by {record.by}" if record.by else ""
     return Commissioning(True, f"passed on {day}{by}, {len(record.marks)} marks")

@@ -17,7 +17,7 @@ from coneskin.core.keys import check
 
 from .tables.arm_tables import read_arm, read_bodies, read_monitoring, read_motion, read_padding, read_reaction
 from .tables.keys import COMMISSIONING_KEYS, MAX_SIZE, RECORDING_KEYS
-from .tables.sensor_tables import count_sensors, inline_sensor_files, read_links
+from .tables.sensor_tables import inline_sensor_files, read_links, sensor_tables
 from .tables.source_tables import read_sources, read_touch
 from .values import scene as s
 
@@ -107,32 +107,38 @@ def parse_scene(
         if table in tables and not isinstance(tables[table], dict) and not several:
             problems.append(f"{table} must be one table: write [{table}], once, got {type(tables[table]).__name__}")
             del tables[table]
-    limited = "speed_limit_from" in text and _inline_speed_limit(tables, None if recorded else folder, problems)
-    text = inline_sensor_files(tables, None if recorded else folder, problems, calibrated, limited) or text
+    opened, limited = None if recorded else folder, False
+    if "speed_limit_from" in text:
+        from .tables.speed_limit_tables import inline_speed_limit
+
+        limited = inline_speed_limit(tables, opened, problems)
+    text = inline_sensor_files(tables, opened, problems, calibrated, limited) or text
     reaction, rules = read_reaction(tables["reaction"], problems) if "reaction" in tables else (None, ())
     scene = s.Scene(
         name=name,
         text=text,
         folder=folder,
         arm=read_arm(tables, problems),
-        links=read_links(tables, None if recorded else folder, problems),
+        links=read_links(tables, opened, problems),
         source=None,
         reaction=reaction,
         rules=rules,
         monitoring=read_monitoring(tables, problems),
         recording=_recording(tables, folder, problems),
         motion=read_motion(tables, problems),
-        commissioning_max_age=_max_age(tables, problems),
+        commissioning_max_age=check(tables.get("commissioning", {}), COMMISSIONING_KEYS, "commissioning", problems).get(
+            "max_age"
+        ),
         commissioning=commissioning,
         bodies=read_bodies(tables, problems),
         padding=read_padding(tables, problems),
-        **_speed_limit(tables, problems),
     )
     scene = replace(scene, source=_source(scene, tables, problems))
     _check_together(scene, named, tables, problems)
-    if scene.speed_limit is not None:
-        from .tables.speed_limit_tables import check_speed_limit
+    if "speed_limit" in tables:
+        from .tables.speed_limit_tables import check_speed_limit, read_speed_limit
 
+        scene = replace(scene, speed_limit=read_speed_limit(tables, problems))
         check_speed_limit(scene, recorded, problems)
     if problems:
         raise SceneError(problems, name)
@@ -148,7 +154,7 @@ def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s
         return None
     values = read_sources(tables["source"], problems)
     built = [item.sensor for item in scene.sensors]
-    sensors = [*built, *[None] * (count_sensors(tables) - len(built))]
+    sensors = [*built, *[None] * (len(sensor_tables(tables)) - len(built))]
     touches = [
         touch
         for number, table in enumerate(values.pop("touch", ()), 1)
@@ -170,27 +176,6 @@ def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> 
     return s.RecordingScene(folder / values["folder"], None if size is None else round(size), keep)
 
 
-def _inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: list[str]) -> bool:
-    from .tables.speed_limit_tables import inline_speed_limit
-
-    return inline_speed_limit(tables, folder, problems)
-
-
-def _speed_limit(tables: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
-    """Return what only a limit of the speed asks for."""
-    if "speed_limit" not in tables:
-        return {}
-    from .tables.speed_limit_tables import read_speed_limit
-
-    return {"speed_limit": read_speed_limit(tables, problems)}
-
-
-def _max_age(tables: Mapping[str, Any], problems: list[str]) -> float | None:
-    values = check(tables.get("commissioning", {}), COMMISSIONING_KEYS, "commissioning", problems)
-    age: float | None = values.get("max_age")
-    return age
-
-
 def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, Any], problems: list[str]) -> None:
     """Add the mistakes that only the tables together show."""
     seen: dict[tuple[int, int] | str, str] = {}
@@ -206,18 +191,19 @@ def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, 
             elif sensor.name in seen:
                 problems.append(f"link {link.name}: the name {sensor.name} is already on link {seen[sensor.name]}")
             seen[ident] = seen[sensor.name] = link.name
-    if "reaction" in named and "arm" not in named:
-        problems.append("[reaction] needs an [arm] that can react")
-    if "body" in named and "arm" not in named:
-        problems.append("[[body]] needs an [arm] that can run into it")
-    if "motion" in named and "arm" not in named:
-        problems.append("[motion] needs an [arm] that can move")
+    if "arm" not in named:
+        needed = {"reaction": "[reaction] needs an [arm] that can react"}
+        needed |= {
+            "body": "[[body]] needs an [arm] that can run into it",
+            "motion": "[motion] needs an [arm] that can move",
+        }
+        problems += [line for table, line in needed.items() if table in named]
     external = scene.arm is not None and scene.arm.control == "external"
     if external and "motion" in named:
         problems.append(
             "[motion] needs control = internal in [arm]: with control = external another program makes the motion"
         )
-    if "source" in named and isinstance(tables.get("link", []), list) and not count_sensors(tables):
+    if "source" in named and isinstance(tables.get("link", []), list) and not sensor_tables(tables):
         problems.append("[source] needs a [[link]] with a [[link.sensor]] that its bytes come from")
     if "arm" in named:
         _check_links(scene, problems)

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "changed_settings",
-    "detector_keys",
     "override_detector",
     "override_settings",
     "parse_choices",
@@ -90,10 +89,22 @@ def override_detector(settings: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         SceneError: one of them is unknown, or its value not possible.
     """
-    own = {
-        name.partition(".")[2]: value for name, value in settings.items() if name.partition(".")[0] == _DETECTOR_NAME
-    }
-    return _detector_settings(own)
+    parted = [(*name.partition(".")[::2], value) for name, value in settings.items()]
+    own = {key: value for table, key, value in parted if table == _DETECTOR_NAME}
+    if not own:
+        return {}
+    from coneskin.skin.detection.frame.settings import DetectorSettings
+
+    problems: list[str] = []
+    checked = check(own, _detector_keys(), _DETECTOR_NAME, problems)
+    found = {name: value for name, value in checked.items() if value is not None}
+    try:
+        DetectorSettings(**({} if problems else found))
+    except SensorError as exc:
+        problems.append(str(exc))
+    if problems:
+        raise SceneError(problems, "settings")
+    return found
 
 
 def override_settings(text: str, settings: Mapping[str, Any]) -> str:
@@ -213,41 +224,12 @@ _DETECTOR_UNITS = {
 _OF_THE_SCENE = frozenset({"stuck_frames", "timing"})  # [monitoring] has them
 
 
-def detector_keys() -> tuple[Key, ...]:
+def _detector_keys() -> tuple[Key, ...]:
     """Return a key for each field of ``DetectorSettings`` that no scene sets; the unit is in its name."""
     from coneskin.skin.detection.frame.settings import DetectorSettings
 
     own = (item for item in fields(DetectorSettings) if item.name not in _OF_THE_SCENE)
     return tuple(Key(item.name + _DETECTOR_UNITS.get(item.name, ""), type(item.default), None, low=0.0) for item in own)
-
-
-def _detector_settings(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values in SI by the names of the fields of ``DetectorSettings``.
-
-    Args:
-        values: by their keys, such as ``{"release_frames": 5, "move_distance_mm": 3.0}``.
-
-    Raises:
-        SceneError: a key is unknown, or a value is not possible.
-    """
-    problems: list[str] = []
-    checked = check(values, detector_keys(), _DETECTOR_NAME, problems) if values else {}
-    found = {name: value for name, value in checked.items() if value is not None}
-    if not problems and found:
-        problems += _refusals(found)
-    if problems:
-        raise SceneError(problems, "settings")
-    return found
-
-
-def _refusals(values: Mapping[str, Any]) -> list[str]:
-    from coneskin.skin.detection.frame.settings import DetectorSettings
-
-    try:
-        DetectorSettings(**values)
-    except SensorError as exc:
-        return [str(exc)]
-    return []
 
 
 def resolved_settings(scene: Scene) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -25,15 +26,11 @@ if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
 __all__ = [
-    "apply_calibration",
     "build_sensor",
-    "count_sensors",
-    "drop_calibration",
     "inline_sensor_files",
     "merge_sensor_file",
-    "named_calibrations",
+    "named_files",
     "read_links",
-    "sensor_files",
     "sensor_tables",
     "with_key_names",
 ]
@@ -62,12 +59,12 @@ def merge_sensor_file(table: Mapping[str, Any], where: str, folder: Path | None,
     return own
 
 
-def drop_calibration(table: Mapping[str, Any]) -> dict[str, Any]:
+def _drop_calibration(table: Mapping[str, Any]) -> dict[str, Any]:
     """Return a sensor's table without its calibration, the keys that stand for one, and those that need one."""
     return {key: value for key, value in table.items() if key not in (*_CALIBRATION_NAMES, _NEEDS_CALIBRATION)}
 
 
-def apply_calibration(
+def _apply_calibration(
     table: Mapping[str, Any], where: str, folder: Path | None, simulated: bool, problems: list[str]
 ) -> dict[str, Any]:
     """Return a sensor's table with the keys that its ``calibration`` stands for, in place of it.
@@ -79,7 +76,7 @@ def apply_calibration(
         simulated: the sensor is a virtual one.
         problems: every mistake is added here.
     """
-    plain = drop_calibration(table)
+    plain = _drop_calibration(table)
     (name,) = check({"calibration": table["calibration"]}, (Key("calibration", str, None),), where, problems).values()
     if folder is None:
         problems.append(f"{where}.calibration: a recording carries the numbers of its calibrations and names no file")
@@ -265,9 +262,9 @@ def inline_sensor_files(
             any_file = any_file or "file" in item
             merged = merge_sensor_file(item, sensor, folder, problems)
             if not calibrated:
-                any_file, merged = True, drop_calibration(merged)
+                any_file, merged = True, _drop_calibration(merged)
             elif "calibration" in merged:
-                any_file, merged = True, apply_calibration(merged, sensor, folder, _is_simulated(tables), problems)
+                any_file, merged = True, _apply_calibration(merged, sensor, folder, _is_simulated(tables), problems)
             table["sensor"][number] = merged
     if not any_file:
         return ""
@@ -276,20 +273,16 @@ def inline_sensor_files(
     return tomli_w.dumps(tables)
 
 
-def named_calibrations(tables: dict[str, Any], folder: Path) -> list[Path | None]:
-    """Return the places that the sensors of a scene name for their calibrations, in the order of the file.
+def named_files(tables: dict[str, Any], folder: Path, key: str) -> list[Path | None]:
+    """Return what the sensors of a scene name under a key, "file" or "calibration", in the order of the file.
 
     Args:
         tables: of a scene file without mistakes.
         folder: folder to which paths are relative.
+        key: of a sensor's table, or of the file that it names.
     """
-    merged = [merge_sensor_file(item, "", folder, []) for item in sensor_tables(tables)]
-    return [folder / str(table["calibration"]) if "calibration" in table else None for table in merged]
-
-
-def sensor_files(tables: dict[str, Any], folder: Path) -> list[Path | None]:
-    """Return the file of each sensor of a scene, where it names one; arguments as of ``named_calibrations``."""
-    return [folder / str(table["file"]) if "file" in table else None for table in sensor_tables(tables)]
+    merged = [{**merge_sensor_file(item, "", folder, []), **item} for item in sensor_tables(tables)]
+    return [folder / str(table[key]) if key in table else None for table in merged]
 
 
 def _is_simulated(tables: Mapping[str, Any]) -> bool:
@@ -338,24 +331,12 @@ def read_links(tables: Mapping[str, Any], folder: Path | None, problems: list[st
         built = [build_sensor(item, name, problems) for name, item in _sensor_tables(where, table)]
         sensors = tuple(PlacedSensor(*item) for item in built if item is not None)
         mesh = None if values["mesh"] is None else (folder or Path()) / values["mesh"]
-        if mesh is not None and folder is not None and not _is_file(mesh):
+        if mesh is not None and folder is not None and not os.path.isfile(mesh):
             problems.append(f"{where}.mesh: there is no file {mesh}")
         links.append(LinkScene(values.get("name", str(number)), values["frame"], mesh, sensors))
     return tuple(links)
 
 
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # a name that is too long, a folder without permission
-        return False
-
-
 def sensor_tables(tables: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the tables of all sensors in the file."""
     return [item for link, table in _link_tables(tables) for _, item in _sensor_tables(link, table)]
-
-
-def count_sensors(tables: Mapping[str, Any]) -> int:
-    """Return the number of sensors in the file, with or without mistakes."""
-    return len(sensor_tables(tables))

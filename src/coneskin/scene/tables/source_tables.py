@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
-__all__ = ["read_source", "read_sources", "read_touch", "source_label"]
+__all__ = ["read_sources", "read_touch", "source_label"]
 
 
 def read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str]) -> dict[str, Any]:
@@ -29,16 +29,14 @@ def read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str])
         problems: every mistake is added here.
 
     Returns:
-        as ``read_source`` does; of several the kind is ``GROUP`` and ``members`` holds kind and values of each.
+        as ``_read_source`` does; of several the kind is ``GROUP`` and ``members`` holds kind and values of each.
     """
-    if isinstance(tables, Mapping):
-        return read_source(tables, problems)
-    if len(tables) == 1:
-        return read_source(tables[0], problems)
+    if isinstance(tables, Mapping) or len(tables) == 1:
+        return _read_source(tables if isinstance(tables, Mapping) else tables[0], problems)
     members = []
     for number, table in enumerate(tables, 1):
         where = f"source {number}"
-        values = read_source(table, problems, where)
+        values = _read_source(table, problems, where)
         kind = values.pop("kind", None)
         if kind in SOURCE_KINDS and SOURCE_KINDS[kind].simulated:
             problems.append(f"{where}: a virtual skin plays all sensors of a scene, so it is the only [source]")
@@ -49,7 +47,7 @@ def read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str])
     return {"kind": GROUP, "members": tuple(members)}
 
 
-def read_source(table: Mapping[str, Any], problems: list[str], where: str = "source") -> dict[str, Any]:
+def _read_source(table: Mapping[str, Any], problems: list[str], where: str = "source") -> dict[str, Any]:
     """Check a [source] table and convert it.
 
     Args:
@@ -94,7 +92,7 @@ def _label(kind: str, settings: Mapping[str, Any]) -> str:
 
 
 def _optional(key: Key) -> Key:
-    """Return the key as an optional one; `read_source` reports better what is missing."""
+    """Return the key as an optional one; `_read_source` reports better what is missing."""
     return replace(key, default=None) if key.default is ... else key
 
 

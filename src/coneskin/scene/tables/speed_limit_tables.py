@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check
-from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene, round_facts
+from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene, facts_digest
 
 from .keys import CURVE_KEYS, MAX_ROWS, PATCH_KEYS, SPEED_LIMIT_KEYS
 
@@ -34,8 +34,6 @@ __all__ = [
     "limit_digest",
     "limit_fingerprint",
     "read_speed_limit",
-    "uncovered",
-    "unfit",
 ]
 
 _MODEL_NUMBER = 1  # part of the fingerprint: raise it where the computation changes, so that computed files are void
@@ -60,7 +58,7 @@ def limit_fingerprint(scene: Scene) -> str:
         "padding": asdict(scene.padding or Padding()),
         "reactions": [[reaction.kind, reaction.deceleration] for reaction in reactions],
     }
-    return hashlib.sha256(json.dumps(round_facts(facts), sort_keys=True).encode()).hexdigest()
+    return facts_digest(facts)
 
 
 def _place(placed: PlacedFrustum) -> list[Any]:
@@ -108,14 +106,7 @@ def _read(tables: dict[str, Any], path: Path, problems: list[str]) -> None:
 
 
 def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLimitScene | None:
-    """Return the permissible speeds of a scene; None where it names none, or they have a mistake.
-
-    Args:
-        tables: of the whole file.
-        problems: every mistake is added here.
-    """
-    if "speed_limit" not in tables:
-        return None
+    """Return the permissible speeds of a scene that has some; None where they have a mistake, which is added."""
     lines: list[str] = []
     table = tables["speed_limit"]
     values = check(table, SPEED_LIMIT_KEYS, "speed_limit", lines)
@@ -129,7 +120,7 @@ def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLim
         speeds = tuple(tuple(curve["speeds"]) for curve in curves)
         limited = tuple(LimitedPatch(*(row[key.plain] for key in PATCH_KEYS)) for row in patches)
         found = SpeedLimitScene(curves=speeds, patches=limited, **values)
-        lines += unfit(found)
+        lines += _unfit(found)
         if digest != limit_digest(table):
             lines.insert(0, "speed_limit.digest is not that of the table: the file was cut, or changed by hand")
     problems += [f"{line}; {_HOW_TO}" for line in lines[:_MAX_LINES]]
@@ -172,7 +163,7 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
     names = sorted({patch.sensor for patch in strange} | {name for name, patches in of_sheet.items() if not patches})
     lines = [f"{name}: not in both the scene and the speeds" for name in names]
     lines = lines or [
-        line for name, placed in sheets.items() for line in uncovered(name, placed.frustum, of_sheet[name])
+        line for name, placed in sheets.items() for line in _uncovered(name, placed.frustum, of_sheet[name])
     ]
     problems += [f"arm.speed_limit_from: {line}; {_HOW_TO}" for line in lines[:_MAX_LINES]]
 
@@ -191,7 +182,7 @@ def limit_digest(table: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def unfit(limit: SpeedLimitScene) -> list[str]:
+def _unfit(limit: SpeedLimitScene) -> list[str]:
     """Return what in a table does not fit together; nothing where all does."""
     lines = []
     levers = limit.levers
@@ -237,7 +228,7 @@ def _bends(levers: tuple[float, ...], curve: tuple[float, ...]) -> list[str]:
     return []
 
 
-def uncovered(name: str, sheet: Frustum, patches: list[LimitedPatch]) -> list[str]:
+def _uncovered(name: str, sheet: Frustum, patches: list[LimitedPatch]) -> list[str]:
     """Return what patches leave of a sheet without a speed, and which of them are not on it.
 
     The speed along the normal changes evenly between the ends of a sheet: both ends covered, all is.

@@ -6,7 +6,6 @@ sensor as the scene describes it: after a change of geometry, wiring or electron
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from coneskin.core.errors import ConeSkinError, SceneError
 from coneskin.core.files import read_file, write_whole
 from coneskin.core.text import read_json
 
-from .scene import round_facts, sensor_facts
+from .scene import facts_digest, sensor_facts
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
@@ -30,14 +29,13 @@ __all__ = [
     "add_calibration",
     "calibration_keys",
     "calibration_path",
-    "find_calibration",
     "read_calibrations",
     "sensor_fingerprint",
 ]
 
 _MAX_BYTES = 1 << 20  # of a file, about 250 calibrations
 _FIELD_KINDS = {"float": float, "int": int, "str": str, "bool": bool}  # of a record's fields that are one value each
-HOW_TO = "see `coneskin calibrate`"
+_HOW_TO = "see `coneskin calibrate`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +117,7 @@ class CalibrationRecord:
 
 def sensor_fingerprint(sensor: Sensor) -> str:
     """Return a hash of all that the places that a sensor decodes depend on; see ``sensor_facts``."""
-    return hashlib.sha256(json.dumps(round_facts(sensor_facts(sensor)), sort_keys=True).encode()).hexdigest()
+    return facts_digest(sensor_facts(sensor))
 
 
 def calibration_path(place: Path, device_id: int) -> Path:
@@ -212,7 +210,7 @@ def _old_path(path: Path, day: str) -> Path:
     return old
 
 
-def find_calibration(path: Path, sensor: Sensor, simulated: bool) -> CalibrationRecord:
+def _find_calibration(path: Path, sensor: Sensor, simulated: bool) -> CalibrationRecord:
     """Return the calibration that applies to a sensor.
 
     Args:
@@ -226,15 +224,15 @@ def find_calibration(path: Path, sensor: Sensor, simulated: bool) -> Calibration
     try:
         records = read_calibrations(path, sensor.device_id)
     except FileNotFoundError as exc:
-        raise ValueError(f"there is no calibration {path}: {HOW_TO}") from exc
+        raise ValueError(f"there is no calibration {path}: {_HOW_TO}") from exc
     kind = "virtual" if simulated else "real"
     own = [item for item in records if item.sensor == sensor.sensor_id and item.simulated is simulated]
     if not own:
-        raise ValueError(f"{path} has no calibration of the {kind} sensor {sensor.sensor_id}: {HOW_TO}")
+        raise ValueError(f"{path} has no calibration of the {kind} sensor {sensor.sensor_id}: {_HOW_TO}")
     if own[-1].fingerprint != sensor_fingerprint(sensor):
         raise ValueError(
             f"the calibration of sensor {sensor.sensor_id} of {own[-1].day} in {path} was made with another geometry, "
-            f"wiring or electronics than the scene has now: calibrate again, {HOW_TO}"
+            f"wiring or electronics than the scene has now: calibrate again, {_HOW_TO}"
         )
     return own[-1]
 
@@ -251,7 +249,7 @@ def calibration_keys(place: Path, sensor: Sensor, simulated: bool) -> dict[str, 
         ValueError: no calibration applies, or its map is none; the message says why.
     """
     path = calibration_path(place, sensor.device_id)
-    record = find_calibration(path, sensor, simulated)
+    record = _find_calibration(path, sensor, simulated)
     from coneskin.skin.calibration import PlaceMap
 
     try:

@@ -5,6 +5,8 @@ What a scene does not name is neither imported, started nor computed. ``reader``
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -34,7 +36,7 @@ __all__ = [
     "Scene",
     "SourceScene",
     "SpeedLimitScene",
-    "round_facts",
+    "facts_digest",
     "sensor_facts",
 ]
 
@@ -365,10 +367,14 @@ def sensor_facts(sensor: Sensor) -> dict[str, Any]:
     }
 
 
-def round_facts(value: Any) -> Any:
-    """Return facts with each number rounded, so that those of two machines agree."""
+def facts_digest(facts: Any) -> str:
+    """Return a hash of facts, with each number rounded, so that those of two machines agree."""
+    return hashlib.sha256(json.dumps(_rounded(facts), sort_keys=True).encode()).hexdigest()
+
+
+def _rounded(value: Any) -> Any:
     if isinstance(value, float):
         return round(value, _FACT_DIGITS) + 0.0  # no negative zero
     if isinstance(value, Mapping):
-        return {key: round_facts(item) for key, item in value.items()}
-    return [round_facts(item) for item in value] if isinstance(value, list | tuple) else value
+        return {key: _rounded(item) for key, item in value.items()}
+    return [_rounded(item) for item in value] if isinstance(value, list | tuple) else value
