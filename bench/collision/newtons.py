@@ -29,7 +29,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from bench.report import commit, head, quantile
-from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
+from coneskin.impact.simulation.collision_run import CollisionRun
 from coneskin.skin.materials import Padding
 
 from .cases import BODY_KINDS, RUN_UP_ACCELERATION, draw
@@ -76,7 +76,7 @@ def play(seed: int, way: str) -> tuple[CollisionRun, Row]:
     protection = "guard" if way in REACTIONS else way
     scene = impact.scene(way if way in REACTIONS else "stop")
     run = CollisionRun(scene, [impact.body], impact.start, protection=protection, seed=seed)
-    outcome = run.run(ConstantSpeed(impact.qd, RUN_UP_ACCELERATION), longest=0.9)
+    outcome = run.run(lambda _: (impact.qd, RUN_UP_ACCELERATION), longest=0.9)
     numbers = {name: round(value, 6) for name, value in asdict(outcome).items()}
     return run, Row(seed, way, impact.body.kind, impact.arm, round(impact.approach, 4), **numbers)
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from bench.report import head, show
 from coneskin.core.recording.block import Block
-from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
+from coneskin.impact.simulation.collision_run import CollisionRun
 from coneskin.impact.simulation.impact_outcome import CLAMP_TIME
 from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_event
@@ -35,7 +35,7 @@ def settle(seed: int, way: str, until: float) -> tuple[float, float, float]:
             shares.append(max(abs(own) / most for own, most in zip(run.plant.external, highest, strict=True)))
 
     run = CollisionRun(impact.scene(way), [impact.body], impact.start, seed=seed, note=note)
-    outcome = run.run(ConstantSpeed(impact.qd, RUN_UP_ACCELERATION), longest=1.0 + until, after=until - CLAMP_TIME)
+    outcome = run.run(lambda _: (impact.qd, RUN_UP_ACCELERATION), longest=1.0 + until, after=until - CLAMP_TIME)
     return outcome.clamp, run.plant.force, shares[min(1, len(shares) - 1)]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from bench.report import head, show
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
+from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.testing.scenes import forearm_scene
 
@@ -47,7 +48,7 @@ def main() -> None:
         box = list(zip(*scene.motion.waypoints, strict=True))
         chance = random.Random(1)
         others = [tuple(chance.uniform(min(joint), max(joint)) for joint in box) for _ in range(POSITION_COUNT)]
-        found, dense = weigh("UR5e", patches, sample), weigh("UR5e", patches, others)
+        found, dense = weigh(arm_model("UR5e"), patches, sample), weigh(arm_model("UR5e"), patches, others)
         heavier = np.maximum(dense.max(axis=0) / found.max(axis=0) - 1.0, 0.0)
         lighter = np.maximum(1.0 - dense.min(axis=0) / found.min(axis=0), 0.0)
         median, high = np.percentile(heavier, [50.0, 95.0])

@@ -12,7 +12,6 @@ import json
 import math
 import os
 import queue
-import signal
 import socket
 import subprocess
 import sys
@@ -22,6 +21,7 @@ from collections.abc import Container, Sequence
 from pathlib import Path
 from typing import Any
 
+from coneskin.core.child_process import OwnedProcess
 from coneskin.core.errors import RobotConnectionError, RobotTimeout
 
 from .machine.states import DEFAULT_MODEL
@@ -55,7 +55,7 @@ def free_host(used: Container[str] = ()) -> str:
     raise RobotConnectionError("no loopback address is free for a simulated controller; 20 000 were tried")
 
 
-class SimulatedController:
+class SimulatedController(OwnedProcess):
     """Simulated UR controller as a process of its own; use it in a ``with``.
 
     Args:
@@ -80,6 +80,8 @@ class SimulatedController:
         RobotConnectionError: on entry, it did not start; the message says why.
     """
 
+    _process_name = "the simulated controller"
+
     def __init__(
         self,
         model: str = DEFAULT_MODEL,
@@ -103,7 +105,6 @@ class SimulatedController:
         self.ready_within = ready_within
         self.facts: dict[str, Any] = {}
         self._plant = plant
-        self._process: subprocess.Popen[str] | None = None
         self._arguments = [
             *("--host", host, "--model", model, "--version", version),
             *("--start-delay-ms", repr(start_delay * 1000.0), "--unlock-after-s", repr(unlock_after)),
@@ -148,28 +149,6 @@ class SimulatedController:
             raise RobotConnectionError(f"the simulated controller did not start: {problem.strip() or 'no message'}")
         self.facts = json.loads(line)
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    @property
-    def pid(self) -> int:
-        """Process id."""
-        return self._running().pid
-
-    def freeze(self) -> None:
-        """Suspend the process, and with it the arm; `thaw` resumes it. POSIX only."""
-        os.kill(self.pid, signal.SIGSTOP)
-
-    def thaw(self) -> None:
-        """Resume the process after `freeze`."""
-        os.kill(self.pid, signal.SIGCONT)
-
-    def kill(self) -> None:
-        """Kill the process, as a power cut would."""
-        process = self._running()
-        process.kill()
-        process.wait()
 
     def call(self, line: str, timeout: float = 5.0) -> Any:
         """Inject a fault, or ask for the state; docs/look-up/sim-ur.md lists the lines.
@@ -216,30 +195,6 @@ class SimulatedController:
                 raise RobotTimeout(f"the simulated arm still moves after {timeout:g} s")
             time.sleep(0.005)
         return state
-
-    def close(self) -> None:
-        """End the process, whatever its state; may be called twice."""
-        process = self._process
-        if process is None:
-            return
-        self._process = None
-        if process.poll() is None:
-            if hasattr(signal, "SIGCONT"):
-                process.send_signal(signal.SIGCONT)  # a frozen process does not act on SIGTERM
-            process.terminate()
-            try:
-                process.wait(2.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-        for pipe in (process.stdout, process.stderr):
-            if pipe is not None:
-                pipe.close()
-
-    def _running(self) -> subprocess.Popen[str]:
-        if self._process is None:
-            raise RobotConnectionError("the simulated controller is not running; use it in a 'with'")
-        return self._process
 
 
 def _first_line(process: subprocess.Popen[str]) -> str:

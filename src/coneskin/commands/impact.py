@@ -98,14 +98,14 @@ def _with_reaction(scene: Scene, way: str) -> Scene:
 
 
 def _collide(scene: Scene, way: str, args: argparse.Namespace) -> ImpactOutcome:
-    from coneskin.impact.simulation.collision_run import CollisionRun, Waypoints
+    from coneskin.impact.simulation.collision_run import CollisionRun, follow_waypoints
 
     assert scene.motion is not None
     motion = scene.motion
     protection = "guard" if way in ("guard", *_REACTION_NAMES) else way
     first, *rest = motion.waypoints
     run = CollisionRun(scene, scene.bodies, first, protection=protection, seed=args.seed)
-    return run.run(Waypoints(rest, motion.speed, motion.acceleration), longest=args.longest_s)
+    return run.run(follow_waypoints(rest, motion.speed, motion.acceleration), longest=args.longest_s)
 
 
 def _plain(outcome: ImpactOutcome) -> dict[str, Any]:

@@ -11,18 +11,21 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import signal
 import socket
 import struct
 import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from typing import Any
 
 from .channel import Channel
 from .errors import RobotConnectionError
 
-__all__ = ["Lifeline", "inherit", "spawn"]
+__all__ = ["Lifeline", "OwnedProcess", "inherit", "spawn"]
 
+_END_TIMEOUT = 2.0  # s for a process to end by itself
 _LENGTH_FIELD = struct.Struct("<I")  # of what a child is told over its standard input
 
 
@@ -66,6 +69,58 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
     for end in ends:
         end.close()
     return child
+
+
+class OwnedProcess:
+    """Process of a ``with``: started on entry, ended on exit whatever its state."""
+
+    _process_name = "the process"  # for messages
+    _process: subprocess.Popen[Any] | None = None
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._running().pid
+
+    def freeze(self) -> None:
+        """Suspend the process; `thaw` resumes it. POSIX only."""
+        os.kill(self.pid, signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        """Resume the process after `freeze`."""
+        os.kill(self.pid, signal.SIGCONT)
+
+    def kill(self) -> None:
+        """Kill the process, as a power cut would."""
+        process = self._running()
+        process.kill()
+        process.wait()
+
+    def close(self) -> None:
+        """End the process, whatever its state; may be called twice."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        if process.poll() is None:
+            if hasattr(signal, "SIGCONT"):
+                process.send_signal(signal.SIGCONT)  # a frozen process acts on nothing else
+            process.terminate()
+            try:
+                process.wait(_END_TIMEOUT)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        for pipe in (process.stdout, process.stderr):
+            if pipe is not None:
+                pipe.close()
+
+    def _running(self) -> subprocess.Popen[Any]:
+        if self._process is None:
+            raise RobotConnectionError(f"{self._process_name} is not running; use it in a 'with'")
+        return self._process
 
 
 class Lifeline:

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from coneskin.impact.permissible_speed import taylor_integrator
 from coneskin.impact.permissible_speed.contact_course import ContactState
-from coneskin.impact.permissible_speed.taylor_integrator import POINTS, collocate, integrate
+from coneskin.impact.permissible_speed.taylor_integrator import POINTS, _collocate, integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
 
@@ -45,7 +45,7 @@ def exact(model: TwoMassContact, start: ContactState, time: float) -> list[float
 def test_a_linear_contact_is_that_of_the_matrix_exponential() -> None:
     model = pressed(0.6, 8.0, loss=0.0)
     start = start_of(model, 2e-3, 0.1, 1e-3, 0.3, 4e-3)
-    found = collocate(model, start, 2e-3)
+    found = _collocate(model, start, 2e-3)
     assert found is not None
     assert found.end == pytest.approx(exact(model, start, 2e-3), rel=1e-12)
     for part in (0.2, 0.6, 1.0):
@@ -57,7 +57,7 @@ def test_a_motion_far_faster_than_the_step_dies_away_as_it_does_in_truth() -> No
     """A body of a microgram, off its place: what is left is the slow motion, as the matrix exponential has it."""
     model = pressed(1e-9, 8.0, loss=0.0)
     start = start_of(model, 2e-3, 0.1, 1e-3, 0.3, 4e-3)
-    found = collocate(model, start, 3e-3)
+    found = _collocate(model, start, 3e-3)
     assert found is not None
     assert found.end[0] == pytest.approx(exact(model, start, 3e-3)[0], rel=1e-5)
     assert found.tail > 1e-4  # and says that it did not follow it
@@ -67,7 +67,7 @@ def test_each_series_keeps_the_equations_with_loss_at_the_points_and_between() -
     model = pressed(0.2, 8.0, loss=0.8)
     start = start_of(model, 2e-3, 0.1, 1e-3, 0.3, 4e-3)
     length = 4e-4
-    found = collocate(model, start, length)
+    found = _collocate(model, start, length)
     assert found is not None
     arm, body = model.arm, model.body
     s, w, x, v, f = found.series
@@ -91,7 +91,7 @@ def test_a_short_step_errs_by_the_sixteenth_power_of_its_length() -> None:
     start = start_of(model, 2e-3, 0.1, 1e-3, 0.3, 4e-3)
     errors = []
     for length in (0.03, 0.015):
-        found = collocate(model, start, length)
+        found = _collocate(model, start, length)
         assert found is not None
         errors.append(abs(found.end[0] - exact(model, start, length)[0]))
     assert math.log2(errors[0] / errors[1]) == pytest.approx(2.0 * POINTS, abs=2.0)
@@ -100,7 +100,7 @@ def test_a_short_step_errs_by_the_sixteenth_power_of_its_length() -> None:
 def test_an_arm_of_infinite_mass_goes_as_it_is_driven() -> None:
     model = TwoMassContact(DrivenArm(0.4), StruckBody(0.6, 75e3, 20e3, 10.0), Padding())
     start = start_of(model, 2e-3, 0.1, 1e-3, 0.3, 4e-3)
-    found = collocate(model, start, 2e-3)
+    found = _collocate(model, start, 2e-3)
     assert found is not None
     s, w, x, v = found.end
     assert s + x == pytest.approx(3e-3 + 0.4 * 2e-3 - 0.5 * 3.0 * 2e-3**2, rel=1e-13)

@@ -13,10 +13,10 @@ from coneskin.impact.permissible_speed.arm_patches import ArmPatch, patches_of
 from coneskin.impact.permissible_speed.extra_way import (
     BODY_RADIUS,
     ExtraWay,
+    _levers_and_changes,
+    _worst_bend,
+    _worst_lag,
     extra_ways,
-    levers_and_changes,
-    worst_bend,
-    worst_lag,
 )
 from coneskin.impact.permissible_speed.limits_file import BodyRegion, MeasuredReaction
 from coneskin.impact.permissible_speed.speed_map import contact_at
@@ -49,19 +49,19 @@ def patches(link: int = 3) -> list[ArmPatch]:
 
 
 def test_joints_that_do_not_pull_at_each_other_leave_no_lag() -> None:
-    levers, _ = levers_and_changes(MODEL, Q, 3, patches())
+    levers, _ = _levers_and_changes(MODEL, Q, 3, patches())
     masses = masses_at(Q)
-    assert worst_lag(levers, np.diag(np.diag(masses))) == pytest.approx(0.0, abs=1e-15)
-    assert worst_lag(levers, masses).min() > 1e-3
+    assert _worst_lag(levers, np.diag(np.diag(masses))) == pytest.approx(0.0, abs=1e-15)
+    assert _worst_lag(levers, masses).min() > 1e-3
 
 
 def test_the_worst_does_not_depend_on_the_order_of_the_joints() -> None:
-    levers, changes = levers_and_changes(MODEL, Q, 3, patches())
+    levers, changes = _levers_and_changes(MODEL, Q, 3, patches())
     masses = masses_at(Q)
     for order in list(permutations(range(6)))[::97]:
         at = np.ix_(order, order)
-        assert worst_lag(levers[:, order], masses[at]) == pytest.approx(worst_lag(levers, masses))
-        assert worst_bend(changes[:, at[0], at[1]]) == pytest.approx(worst_bend(changes))
+        assert _worst_lag(levers[:, order], masses[at]) == pytest.approx(_worst_lag(levers, masses))
+        assert _worst_bend(changes[:, at[0], at[1]]) == pytest.approx(_worst_bend(changes))
 
 
 def overshoot(
@@ -90,9 +90,9 @@ def overshoot(
 def test_the_lag_is_what_six_joints_on_their_servos_overshoot_by_beyond_one() -> None:
     """A long braking, in the worst direction; integrated without any of the code that is tested."""
     for q in positions(4):
-        levers, _ = levers_and_changes(MODEL, q, 3, patches()[:2])
+        levers, _ = _levers_and_changes(MODEL, q, 3, patches()[:2])
         masses = masses_at(q)
-        for lever, lag in zip(levers, worst_lag(levers, masses), strict=True):
+        for lever, lag in zip(levers, _worst_lag(levers, masses), strict=True):
             pulled = lever @ (masses / np.diag(masses)[:, None])
             direction = np.sign(pulled - lever)
             state = np.linalg.solve(np.diag(np.diag(masses)) * TURN**2, masses @ direction)
@@ -106,9 +106,9 @@ def test_a_delay_makes_up_for_the_lag_also_of_a_short_braking() -> None:
     """What six joints overshoot by is at most what one does, and the way of the delay; but for what they swing."""
     worst = -math.inf
     for q in positions(12):
-        levers, _ = levers_and_changes(MODEL, q, 3, patches()[:4])
+        levers, _ = _levers_and_changes(MODEL, q, 3, patches()[:4])
         masses = masses_at(q)
-        for row, lag in zip(levers, worst_lag(levers, masses), strict=True):
+        for row, lag in zip(levers, _worst_lag(levers, masses), strict=True):
             joint = int(np.argmax(np.abs(row)))
             direction = np.zeros(6)
             direction[joint] = math.copysign(1.0, row[joint])
@@ -126,7 +126,7 @@ def test_the_changes_of_the_levers_are_those_of_a_ball_that_comes_nearer() -> No
     step = 1e-3
     for link in (2, 3, 6):
         for patch in patches(link)[:3]:
-            _, (changes,) = levers_and_changes(MODEL, Q, link, [patch])
+            _, (changes,) = _levers_and_changes(MODEL, Q, link, [patch])
             pose = link_pose(MODEL, Q, link)
             centre = np.array(pose.apply(patch.point)) + BODY_RADIUS * np.array(pose.rotate(patch.normal))
 
@@ -149,12 +149,12 @@ def test_no_direction_bends_more_than_the_worst() -> None:
     chance = np.random.default_rng(2)
     directions = np.vstack((chance.uniform(-1.0, 1.0, (500, 6)), chance.choice([-1.0, 1.0], (500, 6))))
     for q in positions(5):
-        _, changes = levers_and_changes(MODEL, q, 5, patches(5)[:3])
+        _, changes = _levers_and_changes(MODEL, q, 5, patches(5)[:3])
         bends = np.einsum("di,pij,dj->pd", directions, changes, directions)
-        assert np.all(bends.max(axis=1) <= worst_bend(changes) + 1e-12)
+        assert np.all(bends.max(axis=1) <= _worst_bend(changes) + 1e-12)
     convex = np.array([[[2.0, -1.0], [-1.0, 3.0]]])
-    assert worst_bend(convex) == pytest.approx([7.0])  # at (1, -1)
-    assert worst_bend(-np.eye(2)[None]) == pytest.approx([0.0])  # standing still
+    assert _worst_bend(convex) == pytest.approx([7.0])  # at (1, -1)
+    assert _worst_bend(-np.eye(2)[None]) == pytest.approx([0.0])  # standing still
 
 
 def test_a_straight_way_with_the_mean_lever_is_ahead_of_the_bent_one_and_ends_with_it() -> None:

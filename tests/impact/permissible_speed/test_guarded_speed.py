@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from coneskin.impact.permissible_speed import speed_map
-from coneskin.impact.permissible_speed.limits_file import parse_limits
+from coneskin.impact.permissible_speed.limits_file import _parse_limits
 from coneskin.impact.permissible_speed.speed_map import map_speeds
 from coneskin.robot.guard.signals.journal import EventName
 from coneskin.scene.reader import parse_scene
@@ -17,7 +17,7 @@ from coneskin.testing.scenes import forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
-from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
+from coneskin.impact.simulation.collision_run import CollisionRun
 
 #: the hand of tests/impact/simulation, behind more room for the slider to act
 START = tuple(math.radians(angle) for angle in (-30.0, -90.0, 90.0, -90.0, -90.0, 0.0))
@@ -52,12 +52,12 @@ def test_an_arm_that_asks_for_too_much_meets_the_hand_with_less_than_the_limit(
         "[motion]\nwaypoints_deg = [[-30, -90, 90, -90, -90, 0], [20, -90, 90, -90, -90, 0]]\n"
         "speed_deg_s = 80\nacceleration_deg_s2 = 400\n"
     )
-    found = map_speeds(scene, parse_limits(LIMITS))
+    found = map_speeds(scene, _parse_limits(LIMITS))
     limited = replace(scene, speed_limit=found.table)
     peaks = {}
     for name, one in (("free", scene), ("limited", limited)):
         run = CollisionRun(one, [HAND], START)
-        run.run(ConstantSpeed((1.4, 0.0, 0.0, 0.0, 0.0, 0.0), 2.0), longest=4.0)
+        run.run(lambda _: ((1.4, 0.0, 0.0, 0.0, 0.0, 0.0), 2.0), longest=4.0)
         peaks[name] = run.outcome.peak
         assert run.event(EventName.CONTACT) is not None
         assert (run.event(EventName.SPEED_LIMITED) is not None) is (name == "limited")

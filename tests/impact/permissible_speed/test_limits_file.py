@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.core.errors import SceneError
-from coneskin.impact.permissible_speed.limits_file import parse_limits, read_limits
+from coneskin.impact.permissible_speed.limits_file import _parse_limits, read_limits
 
 TEXT = """\
 [limits]
@@ -32,7 +32,7 @@ by = "a test"
 
 
 def test_every_key_is_read_in_si() -> None:
-    limits = parse_limits(TEXT)
+    limits = _parse_limits(TEXT)
     (hand,) = limits.regions
     assert (limits.edition, limits.transcribed_by, limits.verified_by) == ("invented, edition 1", "one", "other")
     assert (hand.name, hand.links) == ("hand", frozenset({3}))
@@ -44,11 +44,11 @@ def test_every_key_is_read_in_si() -> None:
 
 def test_of_force_and_pressure_the_lower_counts() -> None:
     both = TEXT.replace("transient_force_n = 150", "transient_force_n = 150\ntransient_pressure_n_per_cm2 = 50")
-    assert parse_limits(both).regions[0].limits.transient == pytest.approx(100.0)
+    assert _parse_limits(both).regions[0].limits.transient == pytest.approx(100.0)
 
 
 def test_a_clamped_body_needs_no_mass() -> None:
-    assert math.isinf(parse_limits(TEXT.replace("mass_kg = 0.6", "clamped = true")).regions[0].body.mass)
+    assert math.isinf(_parse_limits(TEXT.replace("mass_kg = 0.6", "clamped = true")).regions[0].body.mass)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_clamped_body_needs_no_mass() -> None:
 def test_a_mistake_is_named(old: str, new: str, message: str) -> None:
     assert old in TEXT
     with pytest.raises(SceneError, match=message):
-        parse_limits(TEXT.replace(old, new, 1))
+        _parse_limits(TEXT.replace(old, new, 1))
 
 
 def test_a_file_that_is_not_there_and_one_that_is_no_text(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from coneskin.core.errors import SceneError
 from coneskin.impact.permissible_speed import speed_map
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.impact.permissible_speed.extra_way import ExtraWay, extra_ways
-from coneskin.impact.permissible_speed.limits_file import parse_limits
+from coneskin.impact.permissible_speed.limits_file import _parse_limits
 from coneskin.impact.permissible_speed.speed_map import LEVERS, contact_at, map_speeds, write_map
 from coneskin.impact.permissible_speed.speed_search import ForceLimits, keeps
 from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
@@ -42,7 +42,7 @@ def test_the_masses_are_those_of_the_mass_matrix() -> None:
     patches = patches_of(scene)
     assert len(patches) == 48
     model, q = arm_model("UR5e"), scene.motion.waypoints[0] if scene.motion else ()
-    found = weigh("UR5e", patches, [q])[0]
+    found = weigh(arm_model("UR5e"), patches, [q])[0]
     for patch, mass in list(zip(patches, found, strict=True))[::7]:
         normal = link_pose(model, q, patch.link).rotate(patch.normal)
         exact = effective_mass(model, arm_inertia(model), q, patch.link, patch.point, normal)
@@ -58,7 +58,7 @@ def test_the_positions_are_those_of_the_motion() -> None:
 
 @pytest.mark.long
 def test_a_map_keeps_the_limits_it_was_made_for_and_a_scene_takes_it(tmp_path: Path) -> None:
-    scene, limits = parse_scene(SCENE), parse_limits(FREE)
+    scene, limits = parse_scene(SCENE), _parse_limits(FREE)
     found = map_speeds(scene, limits)
     (hand,) = limits.regions
     for curve in found.curves:
@@ -67,7 +67,7 @@ def test_a_map_keeps_the_limits_it_was_made_for_and_a_scene_takes_it(tmp_path: P
         for lever, speed in zip(LEVERS[::3], curve.speeds[::3], strict=True):
             contact = contact_at(speed, lever, curve.mass, hand, limits.measured, scene.padding, curve.extra)  # type: ignore[arg-type]
             assert keeps(contact, hand.limits)
-    ways = extra_ways("UR5e", found.patches, motion_positions(scene))
+    ways = extra_ways(arm_model("UR5e"), found.patches, motion_positions(scene))
     for row, mass, way in zip(found.table.patches, found.masses, ways, strict=True):
         assert found.curves[row.curve].mass >= mass
         assert found.curves[row.curve].extra.up_to(way) == way
@@ -102,12 +102,12 @@ def _speeds(found: object, row: object) -> tuple[tuple[float, ...], tuple[float,
 )
 def test_a_scene_without_what_is_needed_is_refused(scene: str, limits: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
-        map_speeds(parse_scene(scene), parse_limits(limits))
+        map_speeds(parse_scene(scene), _parse_limits(limits))
 
 
 def test_two_regions_of_one_name_keep_their_own_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     """The second was searched with the limits of the first."""
-    limits = parse_limits(FREE)
+    limits = _parse_limits(FREE)
     (hand,) = limits.regions
     softer = replace(hand, limits=ForceLimits(0.5 * hand.limits.transient, 0.5 * hand.limits.lasting))
     monkeypatch.setattr(speed_map, "_CURVE_MASSES", (8.0,))
@@ -122,7 +122,7 @@ def test_two_regions_of_one_name_keep_their_own_limits(monkeypatch: pytest.Monke
 
 def test_a_speed_keeps_the_limits_also_without_the_extra_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """A body that swings may meet the arm harder where that goes less far; here, because it is made so."""
-    limits = parse_limits(FREE)
+    limits = _parse_limits(FREE)
 
     def gentler(speed: float, lever: float, *rest: Any) -> TwoMassContact:
         *others, extra = rest

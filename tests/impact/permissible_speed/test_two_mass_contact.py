@@ -6,13 +6,13 @@ import pytest
 
 from coneskin.core.errors import SensorError
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
-from coneskin.impact.permissible_speed.two_mass_contact import CompressionLaw, DrivenArm, StruckBody, TwoMassContact
+from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact, _CompressionLaw
 from coneskin.skin.materials import Padding
 
 
 def test_without_tissue_the_law_is_the_paddings() -> None:
     padding = Padding()
-    law = CompressionLaw.of(padding)
+    law = _CompressionLaw.of(padding)
     for depth in (-1e-3, 0.0, 1e-3, 6e-3, 8e-3):
         assert law.elastic(depth) == pytest.approx(padding.elastic(depth), rel=1e-14)
         assert law.energy(depth) == pytest.approx(padding.energy(depth), rel=1e-14)
@@ -21,7 +21,7 @@ def test_without_tissue_the_law_is_the_paddings() -> None:
 
 def test_tissue_and_padding_are_springs_in_series() -> None:
     padding = Padding()
-    law = CompressionLaw.of(padding, 30e3)
+    law = _CompressionLaw.of(padding, 30e3)
     for force in (10.0, 60.0, 200.0):
         depth = force / 10e3 if force <= 60.0 else 6e-3 + (force - 60.0) / 1e6
         assert law.under(force) == pytest.approx(depth + force / 30e3, rel=1e-13)

@@ -18,7 +18,7 @@ from coneskin.testing.scenes import commissioned, forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
-from coneskin.impact.simulation.collision_run import CollisionRun, ConstantSpeed
+from coneskin.impact.simulation.collision_run import CollisionRun
 
 START = tuple(math.radians(angle) for angle in (-2.0, -90.0, 90.0, -90.0, -90.0, 0.0))
 QD = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -32,7 +32,7 @@ def scene_of(kind: str, more: str = "") -> Scene:
 
 def collide(scene: Scene, body: BodyScene = HAND, **options: object) -> CollisionRun:
     run = CollisionRun(scene, [body], START, **options)  # type: ignore[arg-type]
-    run.run(ConstantSpeed(QD), longest=1.2)
+    run.run(lambda _: (QD, 20.0), longest=1.2)
     return run
 
 

@@ -19,6 +19,7 @@ pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco
 from coneskin.impact.simulation.mujoco_plant import MujocoPlant
 from coneskin.impact.simulation.scene_description import SheetOnLink
 from tests.support.effective_mass import effective_mass
+from tests.support.plant_state import part_velocity, plant_mass_matrix, plant_momentum, switch_off
 
 MODEL = arm_model("UR5e")
 LINK = LINK_INDEX["forearm"]
@@ -27,7 +28,7 @@ SHEET = SheetOnLink("forearm skin", LINK, CONE)
 Q = tuple(math.radians(angle) for angle in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0))
 QD = (1.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 U = 0.13
-FREE = (False,) * 6
+FREE = tuple(range(6))
 SOFT = Padding(thickness=0.02, stiffness=10e3, loss=0.0)
 
 
@@ -50,8 +51,10 @@ def ahead(kind: str = "mass", gap: float = 1e-3, **more: float) -> BodyScene:
     return BodyScene(kind, (x, y, z), **{"mass": 2.0, **more})  # type: ignore[arg-type]
 
 
-def plant(body: BodyScene, padding: Padding = SOFT, held: tuple[bool, ...] = FREE, step: float = 1e-4) -> MujocoPlant:
-    return MujocoPlant(MODEL, [SHEET], [body], padding, Q, QD, step, held)
+def plant(body: BodyScene, padding: Padding = SOFT, off: tuple[int, ...] = FREE, step: float = 1e-4) -> MujocoPlant:
+    built = MujocoPlant(MODEL, [SHEET], [body], padding, Q, QD, step)
+    switch_off(built, off)
+    return built
 
 
 @pytest.mark.parametrize("name", MODEL_NAMES)
@@ -60,7 +63,7 @@ def test_the_arm_of_mujoco_is_the_arm_of_our_tables(name: str) -> None:
     q = list(source.uniform(-3.0, 3.0, 6))
     built = MujocoPlant(model, [], [], SOFT, q)
     wanted = np.array(mass_matrix(model, arm_inertia(model), q))
-    np.testing.assert_allclose(built.mass_matrix(), wanted, rtol=0, atol=1e-13 * wanted.max())
+    np.testing.assert_allclose(plant_mass_matrix(built), wanted, rtol=0, atol=1e-13 * wanted.max())
 
 
 @pytest.mark.long
@@ -82,19 +85,19 @@ def test_energy_is_kept_where_nothing_damps_and_accounted_for_where_something_do
 def test_a_free_mass_gets_the_momentum_that_the_contact_has_given() -> None:
     arm = plant(ahead())
     arm.update(Q, QD, 0.12)
-    _, velocity = arm.part_state(0)
+    velocity = part_velocity(arm, 0)
     assert not arm.contacts
     # the normal turns with the link while the two touch, so the forces' sum is a little more than the vector's
     assert 2.0 * float(np.linalg.norm(velocity)) == pytest.approx(arm.impulse, rel=2e-3)
 
 
 def test_angular_momentum_about_the_base_axis_is_kept_while_no_servo_turns_that_joint() -> None:
-    arm = plant(ahead(), held=(False, True, True, True, True, True))
+    arm = plant(ahead(), off=(0,))
     rotor = arm_inertia(MODEL).rotor[0]  # it turns with the joint, about the same axis
-    before = arm.momentum()[5] + rotor * arm.qd[0]
+    before = plant_momentum(arm)[5] + rotor * arm.qd[0]
     arm.update(Q, (0.0,) * 6, 0.12)
     assert arm.impulse > 0.5
-    assert arm.momentum()[5] + rotor * arm.qd[0] == pytest.approx(before, rel=1e-4)
+    assert plant_momentum(arm)[5] + rotor * arm.qd[0] == pytest.approx(before, rel=1e-4)
 
 
 def test_a_short_blow_is_that_of_two_masses_and_a_spring() -> None:

@@ -17,7 +17,8 @@ from coneskin.testing.scenes import forearm_scene, start_with
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
 from coneskin.impact.simulation.mujoco_plant import MujocoPlant
-from coneskin.impact.simulation.scene_plant import LiveMujocoPlant, ScenePlant
+from coneskin.impact.simulation.scene_plant import ScenePlant, _LiveMujocoPlant
+from tests.support.plant_state import part_velocity
 
 START = start_with(-10.0)
 PLACE = (-0.192, -0.120, 0.5875)
@@ -48,7 +49,7 @@ def collide(bodies: Sequence[BodyScene], engine: type[MujocoPlant], **padding: f
     ids=["hand", "soft hand", "mass", "person"],
 )
 def test_in_real_time_the_forces_are_those_of_lock_step(body: BodyScene, padding: dict[str, float]) -> None:
-    exact, live = (collide([body], engine, **padding).physics for engine in (MujocoPlant, LiveMujocoPlant))
+    exact, live = (collide([body], engine, **padding).physics for engine in (MujocoPlant, _LiveMujocoPlant))
     assert exact.peak > 10.0
     assert live.peak == pytest.approx(exact.peak, rel=0.05)
     assert live.impulse == pytest.approx(exact.impulse, rel=0.03)
@@ -58,8 +59,8 @@ def test_in_real_time_the_forces_are_those_of_lock_step(body: BodyScene, padding
 
 
 def test_momentum_goes_from_the_arm_into_a_free_mass_and_no_energy_comes_from_nowhere() -> None:
-    plant = collide([BodyScene("mass", PLACE, mass=2.0)], LiveMujocoPlant, thickness=0.02).physics
-    _, velocity = plant.part_state(0)
+    plant = collide([BodyScene("mass", PLACE, mass=2.0)], _LiveMujocoPlant, thickness=0.02).physics
+    velocity = part_velocity(plant, 0)
     assert plant.impulse > 0.1
     # the normal turns with the link while the two touch, so the forces' sum is a little more than the vector's
     assert 2.0 * sum(v * v for v in velocity) ** 0.5 == pytest.approx(plant.impulse, rel=5e-3)

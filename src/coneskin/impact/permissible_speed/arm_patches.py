@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import SceneError
 from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import link_poses, point_jacobian
-from coneskin.robot.arm.ur_models import arm_model
 from coneskin.scene.build import place_on_arm
 
 if TYPE_CHECKING:
@@ -102,9 +101,7 @@ def motion_positions(scene: Scene) -> list[tuple[float, ...]]:
     return found
 
 
-def weigh(
-    model: ArmModel | str, patches: Sequence[ArmPatch], positions: Sequence[Sequence[float]]
-) -> NDArray[np.float64]:
+def weigh(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[Sequence[float]]) -> NDArray[np.float64]:
     """Return the effective mass at each patch in each position [kg], shape (positions, patches).
 
     It is infinite where no joint moves the patch along its normal. The joints are free in it. Held joints make an arm
@@ -114,7 +111,6 @@ def weigh(
     """
     import numpy as np
 
-    arm = arm_model(model) if isinstance(model, str) else model
     inertia = arm_inertia(arm)
     found = np.empty((len(positions), len(patches)))
     for row, q in enumerate(positions):

@@ -197,7 +197,5 @@ class ContactCourse:
             return 0.0
         index = bisect_right([stretch.start for stretch in self.stretches], time) - 1
         stretch = self.stretches[index]
-        value = 0.0
-        for coefficient in reversed(getattr(stretch, name)):
-            value = value * (time - stretch.start) + coefficient
+        value = evaluate(getattr(stretch, name), time - stretch.start)
         return value if math.isfinite(value) else 0.0

@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING
 
 from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import JOINTS, link_poses
-from coneskin.robot.arm.ur_models import arm_model
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
 
     from .arm_patches import ArmPatch
 
-__all__ = ["ExtraWay", "extra_ways", "levers_and_changes", "worst_bend", "worst_lag"]
+__all__ = ["ExtraWay", "extra_ways"]
 
 #: m; radius of what is struck. The flatter it is, the sooner a link that tilts has pressed it
 BODY_RADIUS = 0.1
@@ -91,13 +90,10 @@ class ExtraWay:
         return 1.0 + 0.5 * self.bend * min(angle, _MAX_EXTRA_WAY) / lever
 
 
-def extra_ways(
-    model: ArmModel | str, patches: Sequence[ArmPatch], positions: Sequence[Sequence[float]]
-) -> list[ExtraWay]:
+def extra_ways(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[Sequence[float]]) -> list[ExtraWay]:
     """Return the largest lag and bend of each patch in some joint positions [rad]."""
     import numpy as np
 
-    arm = arm_model(model) if isinstance(model, str) else model
     inertia = arm_inertia(arm)
     lags, bends = np.zeros(len(patches)), np.zeros(len(patches))
     links = sorted({patch.link for patch in patches})
@@ -105,13 +101,13 @@ def extra_ways(
         masses = np.array(mass_matrix(arm, inertia, q))
         for link in links:
             own = [number for number, patch in enumerate(patches) if patch.link == link]
-            levers, changes = levers_and_changes(arm, q, link, [patches[number] for number in own])
-            lags[own] = np.maximum(lags[own], worst_lag(levers, masses))
-            bends[own] = np.maximum(bends[own], worst_bend(changes))
+            levers, changes = _levers_and_changes(arm, q, link, [patches[number] for number in own])
+            lags[own] = np.maximum(lags[own], _worst_lag(levers, masses))
+            bends[own] = np.maximum(bends[own], _worst_bend(changes))
     return [ExtraWay(float(lag), float(bend)) for lag, bend in zip(lags, bends, strict=True)]
 
 
-def worst_lag(levers: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
+def _worst_lag(levers: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the lag of patches in the worst direction [m/rad], shape (patches,).
 
     Args:
@@ -125,7 +121,7 @@ def worst_lag(levers: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArr
     return worst
 
 
-def worst_bend(changes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _worst_bend(changes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a bound of the bend of patches in any direction [m/rad^2], shape (patches,).
 
     Without what is below 0 on its diagonal, a form is convex in each joint, so that a corner has the most.
@@ -143,7 +139,7 @@ def worst_bend(changes: NDArray[np.float64]) -> NDArray[np.float64]:
     return worst
 
 
-def levers_and_changes(
+def _levers_and_changes(
     arm: ArmModel, q: Sequence[float], link: int, patches: Sequence[ArmPatch]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the levers of patches of one link, and how they change with the joints on a ball that the patch touches.

@@ -23,7 +23,7 @@ from coneskin.scene.tables.keys import MAX_SIZE
 from .speed_search import ForceLimits
 from .two_mass_contact import StruckBody
 
-__all__ = ["BodyRegion", "LimitsFile", "MeasuredReaction", "parse_limits", "read_limits"]
+__all__ = ["BodyRegion", "LimitsFile", "MeasuredReaction", "read_limits"]
 
 _LIMIT_KEYS = (Key("edition", str), Key("transcribed_by", str), Key("verified_by", str), Key("region", dict))
 _MEASURED_KEYS = (
@@ -114,10 +114,10 @@ def read_limits(path: Path | str) -> LimitsFile:
         raise SceneError([f"the file cannot be read: {exc.strerror or exc}{hint}"], str(path)) from exc
     except UnicodeDecodeError as exc:
         raise SceneError([f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8"], str(path)) from exc
-    return parse_limits(text, path.name)
+    return _parse_limits(text, path.name)
 
 
-def parse_limits(text: str, name: str = "limits") -> LimitsFile:
+def _parse_limits(text: str, name: str = "limits") -> LimitsFile:
     """Read the text of a limits file.
 
     Raises:

@@ -21,6 +21,9 @@ from typing import TYPE_CHECKING, Any
 from coneskin.core.errors import SceneError
 from coneskin.core.files import write_whole
 from coneskin.core.version import __version__
+from coneskin.robot.arm.kinematics import link_index
+from coneskin.robot.arm.ur_models import arm_model
+from coneskin.scene.tables.keys import SPEED_LIMIT_KEYS
 from coneskin.scene.tables.speed_limit_tables import limit_digest, limit_fingerprint
 from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene
 from coneskin.skin.materials import Padding
@@ -150,14 +153,15 @@ def map_speeds(
     free = any_position or scene.motion is None
     lightest, masses = [0.0] * len(patches), [math.inf] * len(patches)
     assert scene.arm is not None  # or there were no patches
-    everywhere = extra_ways(scene.arm.model, patches, _any_positions())
+    arm = arm_model(scene.arm.model)
+    everywhere = extra_ways(arm, patches, _any_positions())
     extras = everywhere
     lowest: tuple[float, ...] = ()
     highest: tuple[float, ...] = ()
     if not free and scene.motion is not None:
         positions = motion_positions(scene)
-        weights = weigh(scene.arm.model, patches, positions)
-        extras = extra_ways(scene.arm.model, patches, positions)
+        weights = weigh(arm, patches, positions)
+        extras = extra_ways(arm, patches, positions)
         lightest, masses = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
         lowest = tuple(min(values) - _MOTION_MARGIN for values in zip(*scene.motion.waypoints, strict=True))
         highest = tuple(max(values) + _MOTION_MARGIN for values in zip(*scene.motion.waypoints, strict=True))
@@ -274,8 +278,6 @@ def _check(scene: Scene, limits: LimitsFile) -> None:
             )
     if scene.arm is not None:
         for item in scene.links:
-            from coneskin.robot.arm.kinematics import link_index
-
             index = link_index(item.name)
             if index and item.sensors and not any(not r.links or index in r.links for r in limits.regions):
                 problems.append(f"no [[limits.region]] may be struck by the {item.name}, which has a skin")
@@ -304,17 +306,8 @@ _FILE_HEADER = """\
 def map_table(found: SpeedMap) -> dict[str, Any]:
     """Return the table of a map, in the units of the file."""
     table = found.table
-    values: dict[str, Any] = {
-        "fingerprint": table.fingerprint,
-        "date": table.date,
-        "coneskin": table.coneskin,
-        "edition": table.edition,
-        "transcribed_by": table.transcribed_by,
-        "verified_by": table.verified_by,
-        "measured_by": table.measured_by,
-        "reaction_ms": 1e3 * table.reaction,
-        "deceleration_rad_s2": table.deceleration,
-    }
+    values: dict[str, Any] = {key.name: getattr(table, key.name) for key in SPEED_LIMIT_KEYS[1:] if key.kind is str}
+    values |= {"reaction_ms": 1e3 * table.reaction, "deceleration_rad_s2": table.deceleration}
     if table.lowest:
         values["lowest_deg"] = [math.degrees(q) for q in table.lowest]
         values["highest_deg"] = [math.degrees(q) for q in table.highest]

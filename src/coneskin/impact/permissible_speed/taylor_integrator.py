@@ -30,7 +30,7 @@ from .two_mass_contact import TwoMassContact
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["HORIZON", "POINTS", "collocate", "expand", "integrate", "reach"]
+__all__ = ["HORIZON", "POINTS", "expand", "integrate", "reach"]
 
 _SERIES_ORDER = 18
 _SERIES_TOLERANCE = 1e-14  # of the last coefficients of a step, relative to the largest
@@ -106,7 +106,7 @@ class _Collocation:
     tail: float
 
 
-def collocate(model: TwoMassContact, start: ContactState, length: float) -> _Collocation | None:
+def _collocate(model: TwoMassContact, start: ContactState, length: float) -> _Collocation | None:
     """Return the step of a length [s], in contact throughout; None where Newton's method finds none.
 
     Args:
@@ -274,7 +274,7 @@ class _Integration:
         start = self._state()
         tried = self.ahead or _MIN_GAIN * self.pace  # shorter ones cost more than the series
         while (h := min(tried, room)) >= _MIN_GAIN * self.pace:
-            found = collocate(self.model, start, h)
+            found = _collocate(self.model, start, h)
             better = 0.85 * h * (_MAX_TAIL / max(found.tail, 1e-30)) ** (1.0 / POINTS) if found else 0.1 * h
             if found and found.tail <= _MAX_TAIL:
                 self.ahead = max(min(better, 4.0 * h), h if h < tried else 0.0)

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from coneskin.core.errors import SensorError
 from coneskin.skin.materials import Padding
 
-__all__ = ["CompressionLaw", "DrivenArm", "StruckBody", "TwoMassContact"]
+__all__ = ["DrivenArm", "StruckBody", "TwoMassContact"]
 
 #: N; closes the layers of the sensor, "A Flexible Annular Sectorial Sensor ...", section 4.2
 _CLOSING_FORCE = 0.5
@@ -86,7 +86,7 @@ class StruckBody:
 
 
 @dataclass(frozen=True, slots=True)
-class CompressionLaw:
+class _CompressionLaw:
     """Force over the compression of padding and tissue in series: two straight pieces, and a factor for the speed.
 
     Attributes:
@@ -102,7 +102,7 @@ class CompressionLaw:
     loss: float
 
     @classmethod
-    def of(cls, padding: Padding, tissue: float = math.inf) -> CompressionLaw:
+    def of(cls, padding: Padding, tissue: float = math.inf) -> _CompressionLaw:
         """Return the law of a padding on a tissue [N/m]."""
         soft = 1.0 / (1.0 / padding.stiffness + 1.0 / tissue)
         hard = 1.0 / (1.0 / padding.hard_stiffness + 1.0 / tissue)
@@ -152,11 +152,11 @@ class TwoMassContact:
     body: StruckBody
     padding: Padding = field(default_factory=Padding)
     closing_force: float = _CLOSING_FORCE
-    law: CompressionLaw = field(init=False)
+    law: _CompressionLaw = field(init=False)
 
     def __post_init__(self) -> None:
         _check("closing_force", self.closing_force, "N", least=0.0)
-        object.__setattr__(self, "law", CompressionLaw.of(self.padding, self.body.tissue))
+        object.__setattr__(self, "law", _CompressionLaw.of(self.padding, self.body.tissue))
 
     @property
     def yielding(self) -> float:

@@ -15,14 +15,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.core.recording.block import Block
 from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
-from coneskin.robot.arm.model import ArmModel, Joints
+from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetSpeedSlider, StopPath
@@ -39,7 +38,7 @@ from .impact_outcome import ImpactMeter, ImpactOutcome, TouchRecorder, TruthReco
 from .mujoco_plant import MujocoPlant
 from .scene_plant import currents_of, presses_of, sheets_of
 
-__all__ = ["PROTECTIONS", "CollisionRun", "ConstantSpeed", "Waypoints"]
+__all__ = ["PROTECTIONS", "CollisionRun", "follow_waypoints"]
 
 _FILTER_TIME = 0.01  # s
 _ELBOW_LINK = 2  # index of the link at whose far end it is
@@ -76,58 +75,31 @@ class _ForceLimit:
 _ARRIVAL_TOLERANCE = 1e-4  # rad from a waypoint
 
 
-class _JointProgram(Protocol):
-    """Program that moves the arm."""
-
-    def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:
-        """Return joint speeds [rad/s] to go to and the acceleration of the leading joint; None at its end.
-
-        Args:
-            time: since it began [s].
-            q: commanded joint positions [rad].
-        """
+#: joint positions [rad] -> joint speeds to go to [rad/s], and the acceleration of the leading joint; None at its end
+_JointProgram = Callable[[Sequence[float]], tuple[Sequence[float], float] | None]
 
 
-class ConstantSpeed:
-    """Program that turns the joints at constant speeds.
-
-    Args:
-        qd: joint speeds [rad/s].
-        acceleration: of the leading joint until then [rad/s^2].
-    """
-
-    def __init__(self, qd: Joints, acceleration: float = 20.0) -> None:
-        self._qd, self._acceleration = list(qd), acceleration
-
-    def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:  # noqa: ARG002
-        """Return the speeds; see `_JointProgram`."""
-        return self._qd, self._acceleration
-
-
-class Waypoints:
-    """Program that goes through waypoints along straight lines in joint space, with a stop at each.
+def follow_waypoints(points: Sequence[Sequence[float]], speed: float, acceleration: float) -> _JointProgram:
+    """Return a program that goes through waypoints along straight lines in joint space, with a stop at each.
 
     Args:
         points: joint positions [rad].
         speed: of the leading joint [rad/s].
         acceleration: of the leading joint [rad/s^2].
     """
+    ahead = [list(point) for point in points]
 
-    def __init__(self, points: Sequence[Sequence[float]], speed: float, acceleration: float) -> None:
-        self._points = [list(point) for point in points]
-        self._speed, self._acceleration = speed, acceleration
-
-    def target(self, time: float, q: Sequence[float]) -> tuple[list[float], float] | None:  # noqa: ARG002
-        """Return the speeds towards the next waypoint; see `_JointProgram`."""
-        while self._points:
-            way = [goal - at for goal, at in zip(self._points[0], q, strict=True)]
+    def target(q: Sequence[float]) -> tuple[list[float], float] | None:
+        while ahead:
+            way = [goal - at for goal, at in zip(ahead[0], q, strict=True)]
             left = max(map(abs, way))
             if left > _ARRIVAL_TOLERANCE:
-                braking = math.sqrt(2.0 * 0.8 * self._acceleration * left)  # it sees a cycle late that it must brake
-                speed = min(self._speed, braking, left / CYCLE)
-                return [speed * value / left for value in way], self._acceleration
-            self._points.pop(0)
+                braking = math.sqrt(2.0 * 0.8 * acceleration * left)  # it sees a cycle late that it must brake
+                return [min(speed, braking, left / CYCLE) * value / left for value in way], acceleration
+            ahead.pop(0)
         return None
+
+    return target
 
 
 #: what protects the bodies: the scene's guard, the controller's own force limit, nothing
@@ -250,7 +222,7 @@ class CollisionRun:
         """Let the program say where to go, as long as it is the one that moves the arm."""
         if self._program is None:
             return
-        wanted = self._program.target(self.now - self._began, self.arm.q)
+        wanted = self._program(self.arm.q)
         if wanted is None:
             self._program = None
         else:

@@ -11,15 +11,12 @@ and 0.5 ms (at times 9 ms) while something does, which in the controller's proce
 from __future__ import annotations
 
 import math
-import os
-import signal
-import subprocess
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, decode_json, encode_json, pair, wait_readable
-from coneskin.core.child_process import spawn
+from coneskin.core.child_process import OwnedProcess, spawn
 from coneskin.core.errors import MissingExtra, RobotConnectionError, RobotRefused, RobotTimeout
 
 from .impact_outcome import ImpactOutcome
@@ -32,10 +29,9 @@ if TYPE_CHECKING:
 __all__ = ["LivePlant"]
 
 _ANSWER_TIMEOUT = 5.0  # s
-_END_TIMEOUT = 2.0  # s for the process to end by itself
 
 
-class LivePlant:
+class LivePlant(OwnedProcess):
     """Process of a plant; use it in a ``with``, around the controller and the guarded session.
 
     Args:
@@ -54,13 +50,13 @@ class LivePlant:
         RobotConnectionError: on entry, its process did not start, or ended.
     """
 
+    _process_name = "the physics"
     controller: socket.socket
     skin: socket.socket
 
     def __init__(self, scene: Scene, q: Sequence[float], ready_within: float = 30.0) -> None:
         self._start = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve()), "q": list(q)}
         self._ready_within = ready_within
-        self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
 
     def __enter__(self) -> LivePlant:
@@ -80,24 +76,6 @@ class LivePlant:
             self.close()
             raise
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    @property
-    def pid(self) -> int:
-        """Process id."""
-        return self._running().pid
-
-    def freeze(self) -> None:
-        """Suspend the process; POSIX only."""
-        os.kill(self.pid, signal.SIGSTOP)
-
-    def kill(self) -> None:
-        """Kill the process."""
-        process = self._running()
-        process.kill()
-        process.wait()
 
     def outcome(self) -> tuple[ImpactOutcome, float]:
         """Return what the bodies had to bear so far, and when the first contact began on the host's clock [s].
@@ -120,21 +98,7 @@ class LivePlant:
             line.close()
         if self._channel is not None:
             self._channel.close()
-        process, self._process = self._process, None
-        if process is None:
-            return
-        if hasattr(signal, "SIGCONT") and process.poll() is None:
-            process.send_signal(signal.SIGCONT)  # a frozen process does not see that its channel has ended
-        try:
-            process.wait(_END_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-    def _running(self) -> subprocess.Popen[bytes]:
-        if self._process is None:
-            raise RobotConnectionError("the physics is not running; use it in a 'with'")
-        return self._process
+        super().close()
 
     def _receive(self, timeout: float) -> dict[str, Any]:
         process, channel = self._running(), self._channel

@@ -117,7 +117,6 @@ class MujocoPlant:
         q: joint positions at the beginning [rad].
         qd: joint speeds then [rad/s].
         step: of the integration [s].
-        held: joints whose servos are on, all by default.
 
     Attributes:
         time: since the beginning [s].
@@ -140,7 +139,6 @@ class MujocoPlant:
         q: Sequence[float],
         qd: Sequence[float] = (0.0,) * _ARM_DOF,
         step: float = STEP,
-        held: Sequence[bool] = (True,) * _ARM_DOF,
     ) -> None:
         try:
             import mujoco
@@ -166,10 +164,6 @@ class MujocoPlant:
                 self._address.append(int(self._m.joint(f"{name}.x").dofadr[0]) if body.gives_way else None)
                 self.parts.append(_HeldPart(body, part))
         self._lead = self._m.actuator_biasprm[:, 2] / self._m.actuator_biasprm[:, 1]  # kv / kp [s]
-        for joint, on in enumerate(held):
-            if not on:
-                self._m.actuator_gainprm[joint] = 0.0
-                self._m.actuator_biasprm[joint] = 0.0
         self._step = step
         self._d.qpos[:_ARM_DOF], self._d.qvel[:_ARM_DOF] = q, qd
         self._starts = [place for body in bodies for place in body.parts]
@@ -195,11 +189,6 @@ class MujocoPlant:
         return tuple(self._d.qvel[:_ARM_DOF].tolist())
 
     @property
-    def torque(self) -> tuple[float, ...]:
-        """Torques of the servos [N m]."""
-        return tuple(self._d.actuator_force[:_ARM_DOF].tolist())
-
-    @property
     def external(self) -> tuple[float, ...]:
         """Torque that the contacts put on the joints [N m]."""
         return tuple(self._d.qfrc_applied[:_ARM_DOF].tolist())
@@ -223,35 +212,6 @@ class MujocoPlant:
         kinds = self._mj.mjtWarning
         bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
         return any(self._d.warning[int(kind)].number for kind in bad)
-
-    def mass_matrix(self) -> NDArray[np.float64]:
-        """Return the mass matrix of the arm at its present position [kg m^2], 6 x 6."""
-        columns = np.zeros((_ARM_DOF, self._m.nv))
-        for joint, unit in enumerate(np.eye(_ARM_DOF, self._m.nv)):
-            self._mj.mj_mulM(self._m, self._d, columns[joint], unit)
-        return columns[:, :_ARM_DOF]
-
-    def momentum(self) -> NDArray[np.float64]:
-        """Return linear momentum [N s] and angular momentum about the base [N m s] of all that moves, shape (6,).
-
-        The rotors of the motors are not in it: they turn about their own axes.
-        """
-        linear, angular = np.zeros(3), np.zeros(3)
-        for body in range(1, self._m.nbody):
-            spin = np.zeros(6)
-            self._mj.mj_objectVelocity(self._m, self._d, self._mj.mjtObj.mjOBJ_BODY, body, spin, 0)
-            mass, axes = self._m.body_mass[body], self._d.ximat[body].reshape(3, 3)
-            linear += mass * spin[3:]
-            angular += axes @ (self._m.body_inertia[body] * (axes.T @ spin[:3]))
-            angular += np.cross(self._d.xipos[body], mass * spin[3:])
-        return np.concatenate([linear, angular])
-
-    def part_state(self, part: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return how far a part is from where it began [m] and its velocity [m/s]; zeros where it does not move."""
-        at = self._address[part]
-        if at is None:
-            return np.zeros(3), np.zeros(3)
-        return self._d.qpos[at : at + 3].copy(), self._d.qvel[at : at + 3].copy()
 
     @property
     def places(self) -> list[Vector]:

@@ -1,6 +1,6 @@
 """Plant of a scene: its arm among its bodies, behind the protocol of the simulated controller, cycle by cycle.
 
-For real time, `LiveMujocoPlant` looks every millisecond where skins and bodies meet, not at each integration step.
+For real time, `_LiveMujocoPlant` looks every millisecond where skins and bodies meet, not at each integration step.
 Between two looks place and normal of a contact stay, and its indentation grows with the speeds. That takes a third of
 the time of `MujocoPlant` and has its forces within a few per cent (tests/impact/simulation).
 """
@@ -24,13 +24,13 @@ from coneskin.skin.virtual.skin import Press
 from .mujoco_plant import MujocoPlant, Touch
 from .scene_description import SheetOnLink
 
-__all__ = ["LiveMujocoPlant", "ScenePlant", "currents_of", "presses_of", "sheets_of"]
+__all__ = ["ScenePlant", "currents_of", "presses_of", "sheets_of"]
 
 _CONTACT_PERIOD = 5  # steps of the integration from one look to the next
 _CONTACT_RANGE = 0.002  # m between two surfaces that may meet before the next look; as far as MuJoCo reports it
 
 
-class LiveMujocoPlant(MujocoPlant):
+class _LiveMujocoPlant(MujocoPlant):
     """Plant of one arm and its surroundings in real time; arguments and attributes as of `MujocoPlant`.
 
     ``lost`` stays 0: energy is not accounted for.
@@ -126,7 +126,7 @@ class ScenePlant:
         SceneError: the scene has no arm.
     """
 
-    def __init__(self, scene: Scene, q: Sequence[float], engine: type[MujocoPlant] = LiveMujocoPlant) -> None:
+    def __init__(self, scene: Scene, q: Sequence[float], engine: type[MujocoPlant] = _LiveMujocoPlant) -> None:
         if scene.arm is None:
             raise SceneError(["a scene whose bodies are to be met needs an [arm]"], scene.name)
         self._skins = sheets_of(scene)
