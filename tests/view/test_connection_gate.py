@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from coneskin.view.connection_gate import ConnectionGate, is_value, refusal_of
+from coneskin.view.connection_gate import ConnectionGate, _is_value, _refusal_of
 
 HOSTS = frozenset({"127.0.0.1", "localhost"})
 
@@ -29,18 +29,18 @@ HOSTS = frozenset({"127.0.0.1", "localhost"})
     ],
 )
 def test_a_request_that_asks_for_too_much_is_refused(path: str, host: str, origin: str | None) -> None:
-    assert refusal_of(path, host, origin, HOSTS)
+    assert _refusal_of(path, host, origin, HOSTS)
 
 
 @pytest.mark.parametrize("path", ["/", "/?darkMode", "/index.html", "/hdri/studio..jpg", "/a?x=../y"])
 def test_the_page_itself_is_given(path: str) -> None:
-    assert refusal_of(path, "127.0.0.1:8080", None, HOSTS) == ""
-    assert refusal_of(path, "localhost:8080", "http://localhost:8080", HOSTS) == ""
+    assert _refusal_of(path, "127.0.0.1:8080", None, HOSTS) == ""
+    assert _refusal_of(path, "localhost:8080", "http://localhost:8080", HOSTS) == ""
 
 
 def test_a_server_for_a_network_answers_to_any_name() -> None:
-    assert refusal_of("/", "cell-3:8080", "http://cell-3:8080", None) == ""
-    assert refusal_of("/", "cell-3:8080", "http://elsewhere.example", None)
+    assert _refusal_of("/", "cell-3:8080", "http://cell-3:8080", None) == ""
+    assert _refusal_of("/", "cell-3:8080", "http://elsewhere.example", None)
 
 
 def decode(data: bytes) -> Any:
@@ -112,14 +112,14 @@ def test_too_many_viewers_are_refused_and_the_page_is_still_given() -> None:
 
 @pytest.mark.parametrize("value", [0, 1.5, True, None, "1x", "", [0.1, 2.0], ("a", "b")])
 def test_a_control_may_have_a_value(value: Any) -> None:
-    assert is_value(value)
+    assert _is_value(value)
 
 
 @pytest.mark.parametrize(
     "value", [float("nan"), float("inf"), "x" * 1001, [0.0] * 9, [[1.0]], {"a": 1}, b"bytes", [{}], [float("nan")]]
 )
 def test_a_control_may_not_have_any_value(value: Any) -> None:
-    assert not is_value(value)
+    assert not _is_value(value)
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.replay.run import read_run
 from coneskin.view.contact_mark import FADING, ContactLog
-from coneskin.view.history import UNKNOWN, History, PhaseWords, phase_after
+from coneskin.view.history import UNKNOWN, History, PhaseWords, _phase_after
 from coneskin.view.panel import event_list, status, timeline
 from coneskin.view.run_course import RunCourse, read_courses
-from coneskin.view.traces import trace_names, traces
+from coneskin.view.traces import _trace_names, traces
 from tests.support.paths import COLLISION
 
 RUN = COLLISION
@@ -47,15 +47,15 @@ def test_the_sheet_is_touched_while_the_touch_lasts(course: RunCourse) -> None:
 
 def test_the_mark_is_where_the_touch_was_read_and_fades_when_it_is_over(course: RunCourse) -> None:
     began, located = event(course, EventName.CONTACT), event(course, EventName.CONTACT_LOCATED)
-    assert course.history.marks(began.time - 0.001) == []
-    (mark,) = course.history.marks(located.time)
+    assert course.history.contacts.marks(began.time - 0.001) == []
+    (mark,) = course.history.contacts.marks(located.time)
     assert list(mark.point) == located.details["point"]
     assert list(mark.normal) == located.details["normal"]
     assert mark.located
     assert mark.strength == 1.0
     over = event(course, EventName.TOUCH_ENDED).time
-    assert course.history.marks(over + 0.5 * FADING)[0].strength == pytest.approx(0.5)
-    assert course.history.marks(over + FADING) == []
+    assert course.history.contacts.marks(over + 0.5 * FADING)[0].strength == pytest.approx(0.5)
+    assert course.history.contacts.marks(over + FADING) == []
 
 
 def touch(name: EventName, time: float, number: int = 1, **details: object) -> GuardEvent:
@@ -95,10 +95,10 @@ def test_the_phases_are_those_of_the_guard(course: RunCourse) -> None:
 
 
 def test_a_latched_arm_that_is_measured_standing_again_stays_latched() -> None:
-    latched = phase_after(UNKNOWN, EventName.LATCHED)
-    assert phase_after(latched, EventName.STANDSTILL) == latched
-    assert phase_after(latched, EventName.WAITING) == latched
-    assert phase_after(latched, EventName.ACTIVATED).text == "active"
+    latched = _phase_after(UNKNOWN, EventName.LATCHED)
+    assert _phase_after(latched, EventName.STANDSTILL) == latched
+    assert _phase_after(latched, EventName.WAITING) == latched
+    assert _phase_after(latched, EventName.ACTIVATED).text == "active"
 
 
 def test_a_page_that_follows_does_not_grow(course: RunCourse) -> None:
@@ -125,7 +125,7 @@ def test_what_a_recording_says_is_never_taken_for_html() -> None:
 
 def test_traces_keep_the_peak(course: RunCourse) -> None:
     since, until = course.span
-    names = trace_names([course])
+    names = _trace_names([course])
     assert names == ["touch level", "joint speed [rad/s]", "channels of forearm skin"]
     (series,) = course.history.levels.values()
     found = traces([course], "touch level", since, until)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.core.errors import RecordingError
-from coneskin.view.html_file import LevelChanges, write_html
+from coneskin.view.html_file import _LevelChanges, write_html
 from coneskin.view.page_server import page_client
 from coneskin.view.run_course import read_courses
 from coneskin.view.stage.level_scale import level_words
@@ -36,7 +36,7 @@ def test_a_page_is_replaced(tmp_path: Path) -> None:
 def test_the_last_change_is_the_level_of_the_run_within_a_percent() -> None:
     (course,) = read_courses([COLLISION])
     since, until = course.span
-    changes = LevelChanges(course.stage.sheets)
+    changes = _LevelChanges(course.stage.sheets)
     times = [since + (until - since) * k / 400 for k in range(401)]
     for time in times:
         changes.feed(time - since, course.moment(time))
@@ -54,7 +54,7 @@ def test_the_last_change_is_the_level_of_the_run_within_a_percent() -> None:
 def test_a_force_is_said_when_its_words_change() -> None:
     (course,) = read_courses([COLLISION])
     moment = course.moment(course.span[0])
-    changes = LevelChanges(course.stage.sheets)
+    changes = _LevelChanges(course.stage.sheets)
     for time, force in enumerate((0.0, 0.04, 12.34, 12.32, 0.0)):
         changes.feed(float(time), replace(moment, force=force))
     assert changes.data()["forces"] == [(0.0, "0.0 N"), (2.0, "12.3 N"), (4.0, "0.0 N")]

@@ -9,7 +9,7 @@ import re
 import pytest
 
 from coneskin.view.page_server import page_client
-from coneskin.view.viser_client import letters_to_bytes, unpacked
+from coneskin.view.viser_client import _letters_to_bytes, unpacked
 
 LETTERS = [letter for letter in map(chr, range(33, 127)) if letter not in "\"&<>'`"]
 
@@ -30,13 +30,13 @@ def in_letters(data: bytes) -> str:
 @pytest.mark.parametrize("length", [0, 1, 2, 3, 4, 5, 7, 8, 1001])
 def test_letters_say_the_bytes_that_were_written(length: int) -> None:
     data = random.Random(length).randbytes(length)
-    assert letters_to_bytes(in_letters(data)) == data
-    assert letters_to_bytes(in_letters(bytes([255] * length))) == bytes([255] * length)
+    assert _letters_to_bytes(in_letters(data)) == data
+    assert _letters_to_bytes(in_letters(bytes([255] * length))) == bytes([255] * length)
 
 
 def test_a_letter_that_is_none_is_refused() -> None:
     with pytest.raises(ValueError, match="88"):
-        letters_to_bytes("!!!&!")
+        _letters_to_bytes("!!!&!")
 
 
 def test_the_client_that_is_installed_is_unpacked_whole() -> None:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
-import signal
 import sys
-import threading
-import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.text import positive_seconds
+
+from .terminal import page_timeout, show_page
 
 if TYPE_CHECKING:
     from coneskin.design.link_design import LinkMesh
@@ -55,19 +53,11 @@ def run(args: argparse.Namespace) -> int:
     def bench_of(link: LinkMesh) -> Workbench:
         return Workbench.of(link, tolerance=1e-3 * args.tolerance_mm)
 
-    over = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: over.set())
     with PageServer("coneskin studio", port=args.port, uploads=True) as server:
         if not args.json:
             print(f"looking for sheets in {args.link} ...", file=sys.stderr, flush=True)
         bench = bench_of(next(iter(load_link(args.link, args.unit))))
         page = StudioPage(server, bench, args.output, args.force, bench_of)
-        if args.json:
-            print(json.dumps({"url": server.url}), flush=True)
-        else:
-            print(f"the studio is at {server.url} (Ctrl-C ends it)", flush=True)
-        if not args.no_browser:
-            webbrowser.open(server.url)
-        over.wait(None if args.duration_s is None else min(args.duration_s, threading.TIMEOUT_MAX))
+        show_page(args, server.url, "the studio is at {} (Ctrl-C ends it)").wait(page_timeout(args))
         del page
     return 0

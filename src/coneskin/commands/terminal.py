@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import queue
@@ -9,6 +10,7 @@ import signal
 import sys
 import threading
 import time
+import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     from coneskin.commissioning.touching import Notice
     from coneskin.skin.detection.frame.reading import TouchReading
 
-__all__ = ["LiveReading", "Person", "ending_signals", "print_hint", "typed_lines"]
+__all__ = ["LiveReading", "Person", "ending_signals", "page_timeout", "print_hint", "show_page", "typed_lines"]
 
 
 def print_hint(text: str) -> None:
@@ -85,6 +87,30 @@ def ending_signals() -> Iterator[Callable[[], None]]:
     finally:
         for number, handler in before:
             signal.signal(number, handler)
+
+
+def show_page(args: argparse.Namespace, url: str, words: str) -> threading.Event:
+    """Say where a page is, and open it in a browser, as the options want it.
+
+    Args:
+        args: with ``json`` and ``no_browser``.
+        url: of the page.
+        words: for people, with a place for the address.
+
+    Returns:
+        the event that SIGTERM sets.
+    """
+    over = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: over.set())
+    print(json.dumps({"url": url}) if args.json else words.format(url), flush=True)
+    if not args.no_browser:
+        webbrowser.open(url)
+    return over
+
+
+def page_timeout(args: argparse.Namespace) -> float | None:
+    """Return for how long a page is shown [s]; None without an end."""
+    return None if args.duration_s is None else min(args.duration_s, threading.TIMEOUT_MAX)
 
 
 _LIVE_PERIOD = 0.2  # s between two lines of what is read now

@@ -6,17 +6,16 @@ import argparse
 import contextlib
 import json
 import os
-import signal
 import sys
-import threading
 import time
-import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SceneError
 from coneskin.core.text import positive_seconds
+
+from .terminal import page_timeout, show_page
 
 if TYPE_CHECKING:
     from coneskin.view.live_run import LiveRun
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
+_PAGE_WORDS = "the page is at {} (Ctrl-C ends it); it is no safety display"
 _NICE_LEVEL = 10  # by how much the page of a running guard steps back for it: no picture is worth a late stop
 
 _EXAMPLE = """\
@@ -94,8 +94,7 @@ def _show(args: argparse.Namespace) -> int:
     with _server(args) as server:
         courses = read_courses(args.what)
         show_runs(server, courses)
-        over = _announce(args, server)
-        over.wait(None if args.duration_s is None else min(args.duration_s, threading.TIMEOUT_MAX))
+        show_page(args, server.url, _PAGE_WORDS).wait(page_timeout(args))
     return 0
 
 
@@ -140,7 +139,7 @@ def _follow(args: argparse.Namespace, stage: Stage, find: Callable[[], LiveRun |
     if hasattr(os, "nice"):
         os.nice(_NICE_LEVEL)
     with _server(args) as server, contextlib.closing(LivePage(server, stage, find)) as page:
-        over = _announce(args, server)
+        over = show_page(args, server.url, _PAGE_WORDS)
         end = None if args.duration_s is None else time.monotonic() + args.duration_s
         page.serve(over, lambda: end is not None and time.monotonic() >= end)
     return 0
@@ -150,16 +149,3 @@ def _server(args: argparse.Namespace) -> PageServer:
     from coneskin.view.page_server import PageServer
 
     return PageServer("coneskin: not a safety display", args.host, args.port)
-
-
-def _announce(args: argparse.Namespace, server: PageServer) -> threading.Event:
-    """Say where the page is, and return the event that Ctrl-C and SIGTERM set."""
-    over = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: over.set())
-    if args.json:
-        print(json.dumps({"url": server.url}), flush=True)
-    else:
-        print(f"the page is at {server.url} (Ctrl-C ends it); it is no safety display", flush=True)
-    if not args.no_browser:
-        webbrowser.open(server.url)
-    return over

@@ -15,7 +15,7 @@ from time import monotonic
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-__all__ = ["ALLOWED", "UPLOADS", "ConnectionGate", "is_value", "refusal_of"]
+__all__ = ["ALLOWED", "UPLOADS", "ConnectionGate"]
 
 #: types of message that a page may send
 ALLOWED = frozenset({"ViewerCameraMessage", "GuiUpdateMessage"})
@@ -31,16 +31,16 @@ _MAX_VALUE_LENGTH = 1000  # letters of a value
 _MAX_LIST_ITEMS = 8  # of a value that is a list
 
 
-def is_value(value: Any, depth: int = 1) -> bool:
+def _is_value(value: Any, depth: int = 1) -> bool:
     """Tell whether a value may be that of a control: a finite number, a few words, yes or no, or a few of them."""
     if isinstance(value, list | tuple):
-        return depth > 0 and len(value) <= _MAX_LIST_ITEMS and all(is_value(item, depth - 1) for item in value)
+        return depth > 0 and len(value) <= _MAX_LIST_ITEMS and all(_is_value(item, depth - 1) for item in value)
     if isinstance(value, str):
         return len(value) <= _MAX_VALUE_LENGTH
     return value is None or (isinstance(value, int | float) and math.isfinite(value))
 
 
-def refusal_of(path: str, host: str, origin: str | None, hosts: frozenset[str] | None) -> str:
+def _refusal_of(path: str, host: str, origin: str | None, hosts: frozenset[str] | None) -> str:
     """Return why a request is refused; empty where it is not.
 
     Args:
@@ -101,7 +101,7 @@ class ConnectionGate:
 
         def process_request(connection: Any, request: Any) -> Any:
             headers = request.headers
-            why = refusal_of(request.path, headers.get("Host", ""), headers.get("Origin"), self._hosts)
+            why = _refusal_of(request.path, headers.get("Host", ""), headers.get("Origin"), self._hosts)
             if not why and headers.get("Upgrade") and self.viewers >= _MAX_VIEWERS:
                 why = f"{_MAX_VIEWERS} viewers are served already"
             if why:
@@ -139,7 +139,7 @@ class ConnectionGate:
 def _sets_a_value(message: Any) -> bool:
     """Tell whether an update sets the value of a control, and nothing else of it."""
     updates = message.get("updates")
-    return isinstance(updates, dict) and set(updates) == {"value"} and is_value(updates["value"])
+    return isinstance(updates, dict) and set(updates) == {"value"} and _is_value(updates["value"])
 
 
 class _Sieve:

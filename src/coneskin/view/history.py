@@ -24,7 +24,7 @@ from coneskin.robot.guard.signals.journal import (
     decode_event,
 )
 
-from .contact_mark import ContactLog, ContactMark
+from .contact_mark import ContactLog
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["CHANNELS", "UNKNOWN", "History", "PhaseWords", "Series", "history_of", "phase_after"]
+__all__ = ["CHANNELS", "UNKNOWN", "History", "PhaseWords", "Series"]
 
 _GREY, _GREEN, _AMBER, _RED, _VIOLET, _BLUE = "#6b7280", "#15803d", "#b45309", "#b91c1c", "#6d28d9", "#1d4ed8"
 
@@ -78,7 +78,7 @@ _REPEATING_EVENTS = {EventName.WAITING, EventName.STANDSTILL}  # within the phas
 _FINAL_PHASES = {"latched: stands until a manual reset", "ending", "no guard: it has ended"}
 
 
-def phase_after(before: PhaseWords, name: str) -> PhaseWords:
+def _phase_after(before: PhaseWords, name: str) -> PhaseWords:
     """Return the phase after an event.
 
     Args:
@@ -120,6 +120,11 @@ class Series:
 
     times: list[float] = field(default_factory=list)
     values: list[tuple[float, ...]] = field(default_factory=list)
+
+    def append(self, time: float, value: tuple[float, ...]) -> None:
+        """Take a value that is later than those before."""
+        self.times.append(time)
+        self.values.append(value)
 
     def at(self, time: float) -> tuple[float, ...] | None:
         """Return the last values up to a time; None before the first."""
@@ -179,29 +184,25 @@ class History:
             self._pending_size += len(block.payload)
             if self._pending_size >= _BATCH_SIZE:
                 self.settle()
-        elif block.kind == BlockKind.ARM:
+        elif block.kind == BlockKind.ARM and self._decode is not None:
             with suppress(RobotConnectionError):
                 state = self._decode(block.time, block.payload)
-                self.joints.times.append(block.time)
-                self.joints.values.append(state.q)
-                self.speeds.times.append(block.time)
-                self.speeds.values.append(state.qd)
+                self.joints.append(block.time, state.q)
+                self.speeds.append(block.time, state.qd)
         elif block.kind == BlockKind.EVENT:
             with suppress(RecordingError):
                 self._take_event(decode_event(block))
-
         elif block.kind == BlockKind.TRUTH and (force := contact_force(block.payload)) is not None:
-            self.forces.times.append(block.time)
-            self.forces.values.append((force,))
+            self.forces.append(block.time, (force,))
             if places := body_places(block.payload):
-                self.bodies.times.append(block.time)
-                self.bodies.values.append(tuple(chain.from_iterable(places)))
+                self.bodies.append(block.time, tuple(chain.from_iterable(places)))
 
-    def feed_all(self, blocks: Iterable[Block]) -> None:
-        """Take blocks, and read the skin's bytes among them."""
+    def feed_all(self, blocks: Iterable[Block]) -> History:
+        """Take blocks, read the skin's bytes among them, and return itself."""
         for block in blocks:
             self.feed(block)
         self.settle()
+        return self
 
     def settle(self) -> None:
         """Read the skin's bytes that were taken, and forget what is too old."""
@@ -242,10 +243,6 @@ class History:
         at = bisect_right(self.phases, time, key=lambda change: change.time) - 1
         return self.phases[max(at, 0)].phase
 
-    def marks(self, time: float) -> list[ContactMark]:
-        """Return the contacts that are seen at a time."""
-        return self.contacts.marks(time)
-
     def health(self, time: float) -> str:
         """Return the last thing that was wrong up to a time, since the guard last became active; empty for none."""
         for event in reversed(self.events):
@@ -264,7 +261,7 @@ class History:
             del self.phases[:-_MAX_EVENTS]
         self.contacts.feed(event)
         before = self.phases[-1].phase
-        if (phase := phase_after(before, event.name)) != before:
+        if (phase := _phase_after(before, event.name)) != before:
             self.phases.append(_PhaseChange(event.time, phase))
 
     def _read_skin(self, times: list[float], parts: list[bytes]) -> None:
@@ -305,21 +302,10 @@ class History:
 _FRAME_FIELDS = (*CHANNELS, "touch_supply", "radial_supply", "angular_supply")
 
 
-def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState]:
+def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState] | None:
     if scene.arm is None:
-
-        def refuse(_time: float, _payload: bytes) -> ControllerState:
-            raise RobotConnectionError("the scene has no arm")
-
-        return refuse
+        return None
     from coneskin.robot.arm.ur_models import arm_model
     from coneskin.robot.driver.registry import load_driver
 
     return load_driver(arm_model(scene.arm.model).family).decode_state
-
-
-def history_of(scene: Scene, blocks: Iterable[Block]) -> History:
-    """Return the history of a recording that is over."""
-    found = History(scene)
-    found.feed_all(blocks)
-    return found

@@ -24,12 +24,12 @@ from .stage.sheet_surface import SheetSurface
 from .stage_nodes import StageNodes, look_at_stages
 from .traces import trace_drawings
 
-__all__ = ["LevelChanges", "write_html"]
+__all__ = ["write_html"]
 
 _LEVEL_STEPS = 100  # of a level, which a bar can show
 
 
-class LevelChanges:
+class _LevelChanges:
     """Changes of one run, taken moment by moment.
 
     Args:
@@ -176,7 +176,7 @@ def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
     since, until = min(item.span[0] for item in courses), max(item.span[1] for item in courses)
     duration = max(until - since, 1e-3)
     count = min(max(2, int(duration * _PICTURE_RATE)), _MAX_PICTURES)
-    changes = [LevelChanges(course.stage.sheets) for course in courses]
+    changes = [_LevelChanges(course.stage.sheets) for course in courses]
     scene = _serialized(courses, since, _pictures(courses, since, duration, count), changes)
     embedded = base64.b64encode(scene).decode("ascii")
     head = (
@@ -216,7 +216,7 @@ def _pictures(courses: Sequence[RunCourse], since: float, duration: float, count
 
 
 def _serialized(
-    courses: Sequence[RunCourse], since: float, pictures: Sequence[float], changes: Sequence[LevelChanges]
+    courses: Sequence[RunCourse], since: float, pictures: Sequence[float], changes: Sequence[_LevelChanges]
 ) -> bytes:
     """Return the scene and its pictures as viser's client reads them, and take the levels of each picture."""
     with PageServer("coneskin", port=0x2F00) as server:
@@ -240,7 +240,7 @@ def _serialized(
         return bytes(taken.serialize())
 
 
-def _panel(courses: Sequence[RunCourse], since: float, until: float, changes: Sequence[LevelChanges]) -> str:
+def _panel(courses: Sequence[RunCourse], since: float, until: float, changes: Sequence[_LevelChanges]) -> str:
     from .panel import timeline
 
     several = len(courses) > 1

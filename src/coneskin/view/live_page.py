@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 from coneskin.core.errors import ConeSkinError
@@ -127,8 +126,7 @@ class LivePage:
             self._text(now, [(self._stage.title, UNKNOWN, "")], "", "no guard records a run: what is drawn is at rest")
             return
         at = course.history.until - course.zero
-        moving = self._playout.time(at, now)
-        moment = replace(course.moment(at), poses=course.poses(moving), bodies=course.bodies(moving))
+        moment = course.moment(at, self._playout.time(at, now))
         assert self._nodes is not None
         with self._server.together():
             self._nodes.show(moment)

@@ -10,7 +10,6 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO
 
 from coneskin.core.errors import RecordingError
@@ -36,13 +35,13 @@ from .history import History
 from .run_course import RunCourse
 from .stage.stage import set_stage
 
-__all__ = ["KEPT", "LiveRun", "RecordingTail", "find_live_run", "is_live"]
+__all__ = ["KEPT", "LiveRun", "find_live_run", "is_live"]
 
 _SEARCH_SIZE = 1 << 16  # bytes that are looked at together for the next chunk, where one is damaged
 
 
-class RecordingTail:
-    """Reader of a recording that grows, for use in a ``with``.
+class _RecordingTail:
+    """Reader of a recording that grows.
 
     Args:
         path: its first file.
@@ -67,12 +66,6 @@ class RecordingTail:
         if decode_file_head(self._file.read(FILE_HEAD_SIZE)) is None:
             self._file.close()
             raise RecordingError(f"{path} is no recording that can be followed; look at it with: coneskin runs info")
-
-    def __enter__(self) -> RecordingTail:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None) -> None:
-        self.close()
 
     def read(self) -> list[Block]:
         """Return the blocks that have come since the last call; it does not wait for any.
@@ -169,7 +162,7 @@ class LiveRun:
     """
 
     def __init__(self, path: Path) -> None:
-        self._tail = RecordingTail(path, KEPT, _KINDS_KEPT)
+        self._tail = _RecordingTail(path, KEPT, _KINDS_KEPT)
         try:
             blocks = self._tail.read()
             run = Run(_header(blocks, path), blocks)

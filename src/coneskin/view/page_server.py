@@ -10,7 +10,6 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from coneskin.core.errors import ConeSkinError, MissingExtra
@@ -117,7 +116,7 @@ class PageServer:
     def __enter__(self) -> PageServer:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def look_from(self, position: tuple[float, float, float], at: tuple[float, float, float]) -> None:
@@ -143,11 +142,6 @@ class PageServer:
 
         self._server.on_client_connect(connected)
         self._server.on_client_disconnect(gone)
-
-    @property
-    def viewers(self) -> int:
-        """Number of viewers that are connected."""
-        return len(self._server.get_clients())
 
     @contextlib.contextmanager
     def together(self) -> Iterator[None]:

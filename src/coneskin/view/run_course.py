@@ -13,7 +13,7 @@ from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.replay.event_text import describe
 from coneskin.runs.replay.run import Run, read_run
 
-from .history import History, history_of
+from .history import History
 from .stage.stage import Stage, set_stage
 
 if TYPE_CHECKING:
@@ -48,14 +48,6 @@ class Moment:
     bodies: tuple[Vector, ...] = ()
 
 
-def _moment_at(stage: Stage, history: History, time: float) -> Moment:
-    """Return what is seen at a time [s, host clock]."""
-    levels = {sheet.name: history.level(sheet.name, time) for sheet in stage.sheets}
-    poses = stage.poses(history.q(time))
-    seen = history.marks(time), history.phase(time), history.health(time), history.force(time)
-    return Moment(time, poses, levels, *seen, stage.moved(history.places(time)))
-
-
 _BASE_DISTANCE = 0.75  # of the arms' reach, between two bases
 _ZERO_EVENTS = (EventName.CONTACT, EventName.STOPPING)  # by which two runs are laid side by side
 
@@ -81,17 +73,18 @@ class RunCourse:
         """From when to when it is, on the page's clock [s]."""
         return self.history.since - self.zero, self.history.until - self.zero
 
-    def moment(self, time: float) -> Moment:
-        """Return what is seen at a time on the page's clock [s]."""
-        return _moment_at(self.stage, self.history, self.zero + time)
+    def moment(self, time: float, moving: float | None = None) -> Moment:
+        """Return what is seen at a time on the page's clock [s].
 
-    def poses(self, time: float) -> dict[int, Pose]:
-        """Return the poses of the links' frames at a time on the page's clock [s]."""
-        return self.stage.poses(self.history.q(self.zero + time))
-
-    def bodies(self, time: float) -> tuple[Vector, ...]:
-        """Return how far each part of a body is from where the scene puts it at a time on the page's clock [m]."""
-        return self.stage.moved(self.history.places(self.zero + time))
+        Args:
+            time: of levels, contacts and phase.
+            moving: of the poses and the bodies; None for the same time.
+        """
+        at, history, stage = self.zero + time, self.history, self.stage
+        then = at if moving is None else self.zero + moving
+        levels = {sheet.name: history.level(sheet.name, at) for sheet in stage.sheets}
+        seen = history.contacts.marks(at), history.phase(at), history.health(at), history.force(at)
+        return Moment(at, stage.poses(history.q(then)), levels, *seen, stage.moved(history.places(then)))
 
 
 class _EventLine(NamedTuple):
@@ -138,13 +131,9 @@ def read_courses(paths: Sequence[Path]) -> list[RunCourse]:
 
 def _read_course(run: Run, title: str, aligned: bool) -> RunCourse:
     scene = run.scene()
-    history = history_of(scene, run.blocks)
+    history = History(scene).feed_all(run.blocks)
     if not history.since <= history.until:
         raise RecordingError(f"nothing was recorded in {title}: there is nothing to be shown")
     stage = set_stage(scene, run.place_sensors(), title)
-    first = (
-        next((event.time for event in history.events if event.name in _ZERO_EVENTS), run.start)
-        if aligned
-        else run.start
-    )
-    return RunCourse(stage, history, first)
+    zeros = (event.time for event in history.events if aligned and event.name in _ZERO_EVENTS)
+    return RunCourse(stage, history, next(zeros, run.start))

@@ -62,9 +62,7 @@ def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
         server.look_from((-away * (0.7 + count), 0.0, 0.7 * reach), (0.0, 0.0, 0.28 * reach))
     light_plainly(server.scene)
     lines, faces = floor_lines(reach)
-    server.scene.add_mesh_simple(
-        "/floor", _single(lines), faces, color=_FLOOR, side="front", cast_shadow=False, receive_shadow=False
-    )
+    _add_mesh(server.scene, "/floor", _single(lines), faces, _FLOOR)
 
 
 class StageNodes:
@@ -92,22 +90,8 @@ class StageNodes:
         for number, sheet in enumerate(stage.sheets):
             name = f"{root}/link {sheet.link}/sheet {number} {_node(sheet.name)}"
             colour = self._colours[sheet.name] = level_colour(0.0, sheet.touch_level)
-            self._sheets[sheet.name] = scene.add_mesh_simple(
-                name,
-                *_both_sides(sheet.vertices, sheet.faces),
-                color=colour,
-                side="front",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-            scene.add_mesh_simple(
-                f"{name}/active area",
-                *_both_sides(sheet.rim_vertices, sheet.rim_faces),
-                color=_RIM,
-                side="front",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            self._sheets[sheet.name] = _add_mesh(scene, name, *_both_sides(sheet.vertices, sheet.faces), colour)
+            _add_mesh(scene, f"{name}/active area", *_both_sides(sheet.rim_vertices, sheet.rim_faces), _RIM)
         links = sorted({sheet.link for sheet in stage.sheets})
         self._marks = {
             link: [_MarkNodes(scene, f"{root}/link {link}/contact {k}") for k in range(_MARKS_PER_LINK)]
@@ -161,24 +145,29 @@ class _MarkNodes:
         shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
         self._frame.position, self._frame.wxyz = mark.point, quaternion(along(mark.normal))
         arrow, faces = _arrow()
-        self._scene.add_mesh_simple(f"{self._name}/normal", arrow, faces, color=colour, opacity=shade, side="front")
-        patch, fan = _both_sides(*_ellipse(mark))
-        self._scene.add_mesh_simple(
-            f"{self._name}/uncertainty", patch, fan, color=colour, opacity=0.55 * (shade or 1.0), side="front"
+        _add_mesh(self._scene, f"{self._name}/normal", arrow, faces, colour, shade)
+        _add_mesh(
+            self._scene, f"{self._name}/uncertainty", *_both_sides(*_ellipse(mark)), colour, 0.55 * (shade or 1.0)
         )
 
 
+def _add_mesh(
+    scene: Any,
+    name: str,
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.int64],
+    colour: tuple[int, int, int],
+    opacity: float | None = None,
+    side: str = "front",
+) -> Any:
+    look = {"color": colour, "opacity": opacity, "side": side, "cast_shadow": False, "receive_shadow": False}
+    return scene.add_mesh_simple(name, vertices, faces, **look)
+
+
 def _add_solid(scene: Any, name: str, solid: Solid) -> None:
-    scene.add_mesh_simple(
-        name,
-        _single(solid.vertices),
-        solid.faces,
-        color=solid.colour,
-        opacity=None if solid.opacity >= 1.0 else solid.opacity,
-        side="front" if solid.closed else "double",
-        cast_shadow=False,
-        receive_shadow=False,
-    )
+    opacity = None if solid.opacity >= 1.0 else solid.opacity
+    side = "front" if solid.closed else "double"
+    _add_mesh(scene, name, _single(solid.vertices), solid.faces, solid.colour, opacity, side)
 
 
 def _arrow() -> tuple[NDArray[np.float32], NDArray[np.int64]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from html import escape
+from itertools import cycle
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .history import CHANNELS, Series
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["COLOURS", "MOST_LINES", "TracePlot", "trace_drawings", "trace_names", "traces"]
+__all__ = ["COLOURS", "MOST_LINES", "TracePlot", "trace_drawings", "traces"]
 
 _BIN_COUNT = 240  # each with its least and its largest value
 _LEVELS, _SPEEDS, _FORCE = "touch level", "joint speed [rad/s]", "contact force [N]"
@@ -37,7 +38,7 @@ class _Traces(NamedTuple):
     values: NDArray[np.float64]
 
 
-def trace_names(courses: Sequence[RunCourse]) -> list[str]:
+def _trace_names(courses: Sequence[RunCourse]) -> list[str]:
     """Return what can be drawn of runs."""
     sensors = [sheet.name for sheet in courses[0].stage.sheets]
     arm = [_SPEEDS] if any(course.history.speeds.times for course in courses) else []
@@ -50,7 +51,7 @@ def traces(courses: Sequence[RunCourse], what: str, since: float, until: float) 
 
     Args:
         courses: the runs.
-        what: one of ``trace_names``.
+        what: one of ``_trace_names``.
         since: from when on, on the page's clock [s].
         until: until when.
     """
@@ -65,6 +66,7 @@ def traces(courses: Sequence[RunCourse], what: str, since: float, until: float) 
         for name, series, column in _columns(course, what):
             names.append(before + name)
             rows.append(_envelope(series, column, course.zero, edges))
+    names, rows = names[:MOST_LINES], rows[:MOST_LINES]
     return _Traces(tuple(names), times, np.array(rows).reshape(len(rows), len(times)))
 
 
@@ -116,7 +118,7 @@ class TracePlot:
 
     def __init__(self, gui: Any, courses: Sequence[RunCourse], since: float, until: float, fixed: bool = False) -> None:
         self._gui, self._strands, self._since, self._until = gui, courses, since, until
-        names = self._names = trace_names(courses)
+        names = self._names = _trace_names(courses)
         self._folder = gui.add_folder("traces")
         self._shown = names[0]
         with self._folder:
@@ -128,7 +130,7 @@ class TracePlot:
     def move(self, since: float, until: float) -> None:
         """Draw another stretch of time."""
         self._since, self._until = since, until
-        found = self._traces()
+        found = traces(self._strands, self._shown, since, until)
         self._plot.data, self._plot.scales = (found.times, *found.values), _scales(found)
 
     def remove(self) -> None:
@@ -143,15 +145,10 @@ class TracePlot:
             self._plot = self._make()
         old.remove()
 
-    def _traces(self) -> _Traces:
-        found = traces(self._strands, self._shown, self._since, self._until)
-        return _Traces(found.names[:MOST_LINES], found.times, found.values[:MOST_LINES])
-
     def _make(self) -> Any:
-        found = self._traces()
-        series = [{"label": "time [s]"}]
-        for number, name in enumerate(found.names):
-            series.append({"label": name, "stroke": COLOURS[number % len(COLOURS)], "width": 1.5})  # type: ignore[dict-item]
+        found = traces(self._strands, self._shown, self._since, self._until)
+        series: list[dict[str, Any]] = [{"label": "time [s]"}]
+        series += [{"label": n, "stroke": c, "width": 1.5} for n, c in zip(found.names, cycle(COLOURS), strict=False)]
         return self._gui.add_uplot(
             (found.times, *found.values), tuple(series), scales=_scales(found), legend={"show": True}, aspect=1.7
         )
@@ -183,7 +180,7 @@ def trace_drawings(courses: Sequence[RunCourse], since: float, until: float) -> 
         since: from when on, on the page's clock [s].
         until: until when.
     """
-    names = trace_names(courses)
+    names = _trace_names(courses)
     options = "".join(f'<option value="{number}">{escape(name)}</option>' for number, name in enumerate(names))
     drawings = [_drawing(traces(courses, name, since, until)) for name in names]
     hidden = ["", *[" hidden"] * (len(names) - 1)]
@@ -196,7 +193,7 @@ def _drawing(found: _Traces) -> str:
     span = float(found.times[-1] - found.times[0])
     x = (found.times - found.times[0]) / max(span, 1e-9) * _WIDTH
     lines, words = [], []
-    for name, values, colour in zip(found.names, found.values, _colours(len(found.names)), strict=False):
+    for name, values, colour in zip(found.names, found.values, cycle(COLOURS), strict=False):
         course = _course(x, (high - values) / (high - low) * _HEIGHT)
         lines.append(f'<path d="{course}" fill="none" stroke="{colour}" vector-effect="non-scaling-stroke"/>')
         words.append(f'<span style="color:{colour}">&#9644;</span> {escape(name)}')
@@ -207,10 +204,6 @@ def _drawing(found: _Traces) -> str:
         f'<span style="position:absolute;left:2px;bottom:0">{low:.3g}</span><div class="coneskin-cursor"></div></div>'
         f"<div>{', '.join(words)}</div>"
     )
-
-
-def _colours(count: int) -> list[str]:
-    return [COLOURS[number % len(COLOURS)] for number in range(min(count, MOST_LINES))]
 
 
 def _course(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:

@@ -20,7 +20,7 @@ import gzip
 import json
 import re
 
-__all__ = ["letters_to_bytes", "unpacked", "with_file_drop", "with_plain_edges"]
+__all__ = ["unpacked", "with_file_drop", "with_plain_edges"]
 
 #: printable letters but those that mean something in HTML or in a string
 _BASE88_LETTERS = "".join(letter for letter in map(chr, range(0x21, 0x7F)) if letter not in "\"&<>'`")
@@ -38,7 +38,7 @@ def unpacked(page: str) -> str:
         return page
     try:
         style, program = _parts(found[1], int(found[2]), int(found[3]))
-        module = gzip.decompress(letters_to_bytes(json.loads(decoder[1])))
+        module = gzip.decompress(_letters_to_bytes(json.loads(decoder[1])))
     except ValueError:  # other letters, another compression
         return page
     if any(end in program for end in _FORBIDDEN_TEXT) or "</style" in style or len(_HALL_PICTURE.findall(program)) != 1:
@@ -57,7 +57,7 @@ def _parts(letters: str, style: int, program: int) -> tuple[str, str]:
     import zstandard
 
     try:
-        data = zstandard.ZstdDecompressor().decompress(letters_to_bytes(letters), style + program)
+        data = zstandard.ZstdDecompressor().decompress(_letters_to_bytes(letters), style + program)
     except zstandard.ZstdError as exc:
         raise ValueError(str(exc)) from exc
     if len(data) != style + program:
@@ -65,7 +65,7 @@ def _parts(letters: str, style: int, program: int) -> tuple[str, str]:
     return data[:style].decode("utf-8"), data[style:].decode("utf-8")
 
 
-def letters_to_bytes(text: str) -> bytes:
+def _letters_to_bytes(text: str) -> bytes:
     """Return what is written in 88 letters: four bytes in five of them, and k - 1 bytes in a rest of k.
 
     Raises:

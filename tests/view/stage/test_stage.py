@@ -17,7 +17,7 @@ from coneskin.scene.reader import parse_scene
 from coneskin.testing.scenes import forearm_scene
 from coneskin.view.stage.level_scale import level_colour
 from coneskin.view.stage.solids import Solid, along, arm_solids, barrel, joined, quaternion
-from coneskin.view.stage.stage import CLEAR, Stage, clear_where_buried, floor_lines, set_stage
+from coneskin.view.stage.stage import CLEAR, Stage, _clear_where_buried, floor_lines, set_stage
 from tests.scene.scenes import DOUBLE_CONE
 
 POSES = ((0.0, -1.57, 1.2, -1.2, -1.57, 0.0), (0.4, -0.9, -1.1, 2.0, 1.0, 0.5))
@@ -199,7 +199,7 @@ def stage() -> Stage:
 
 
 def clear(given: Stage, q: tuple[float, ...]) -> list[str]:
-    found = clear_where_buried(given.solids, given.sheets, given.poses(q))
+    found = _clear_where_buried(given.solids, given.sheets, given.poses(q))
     assert all(solid.opacity in (CLEAR, 1.0) for solid in found)
     return [solid.name for solid in found if solid.opacity < 1.0]
 
@@ -233,10 +233,10 @@ def test_what_is_inside_of_a_barrel_is_told_by_its_radius() -> None:
     for factor, opacity in ((0.9, 1.0), (1.1, CLEAR)):
         radius = factor * max(cone.radius1, cone.radius2)
         solid = barrel("b", link, frame, radius, (-1.0, 1.0), (1, 2, 3))
-        (found,) = clear_where_buried([solid], [sheet], poses)
+        (found,) = _clear_where_buried([solid], [sheet], poses)
         assert found.opacity == opacity
         assert np.array_equal(found.vertices, solid.vertices)
-        (found,) = clear_where_buried([solid._replace(closed=False)], [sheet], poses)
+        (found,) = _clear_where_buried([solid._replace(closed=False)], [sheet], poses)
         assert found.opacity == 1.0, "the mesh of a link is what it is"
-        (found,) = clear_where_buried([solid._replace(link=1)], [sheet], poses)
+        (found,) = _clear_where_buried([solid._replace(link=1)], [sheet], poses)
         assert found.opacity == 1.0, "what only passes a sheet does not bury it"

@@ -226,7 +226,7 @@ class CollisionRun:
         if wanted is None:
             self._program = None
         else:
-            self.arm.go(*wanted)
+            self.arm.go(list(wanted[0]), wanted[1])
 
     def _obey(self, command: object) -> None:
         if not isinstance(command, SetSpeedSlider | JointVelocitySetpoint):

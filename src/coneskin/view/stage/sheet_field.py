@@ -126,23 +126,17 @@ class SheetField:
         """Return a phase as the electronics of the sensor make it."""
         from coneskin.skin.field.fourport import DrivePhase, Terminal
 
-        parts, leads = self._sensor.electronics, self._sensor.electronics.lead_ohms
-
-        def driven(volts: float, lead: float) -> Terminal:
-            return Terminal(volts, 0.0, lead)
-
-        def read(ohms: float, lead: float) -> Terminal:
-            return Terminal(0.0, ohms, lead)
-
+        parts = self._sensor.electronics
         supply, b, c = parts.supply_volts, self._sensor.b_positive, self._sensor.c_positive
-        if name == "radial":
-            upper = driven(0.0 if b else supply, leads.a), driven(supply if b else 0.0, leads.b)
-            return DrivePhase(name, *upper, read(parts.input_ohms, leads.c), read(parts.input_ohms, leads.d))
-        if name == "angular":
-            lower = driven(supply if c else 0.0, leads.c), driven(0.0 if c else supply, leads.d)
-            return DrivePhase(name, read(parts.input_ohms, leads.a), read(parts.input_ohms, leads.b), *lower)
-        guides = read(parts.pulldown_ohms, leads.c), read(parts.pulldown_ohms, leads.d)
-        return DrivePhase(name, driven(supply, leads.a), driven(supply, leads.b), *guides)
+        driven: dict[str, tuple[float | None, ...]] = {  # A, B, C, D; None: a guide, which is read
+            "radial": (0.0 if b else supply, supply if b else 0.0, None, None),
+            "angular": (None, None, supply if c else 0.0, 0.0 if c else supply),
+            "touch": (supply, supply, None, None),
+        }
+        guide = parts.pulldown_ohms if name == "touch" else parts.input_ohms
+        leads = (parts.lead_ohms.a, parts.lead_ohms.b, parts.lead_ohms.c, parts.lead_ohms.d)
+        ports = zip(driven[name], leads, strict=True)
+        return DrivePhase(name, *(Terminal(v or 0.0, guide if v is None else 0.0, lead) for v, lead in ports))
 
 
 #: vertices and faces of a patch before it is placed and scaled

@@ -206,15 +206,8 @@ def _tube(model: ArmModel, name: str, joint: float, tube: float, whole: float) -
     ]
     for at, radius, end in zip(ends, radii, ("near", "far"), strict=True):
         half = 1.12 * radius
-        found.append(barrel(f"{words}, {end} joint", link, _joint_pose(at), radius, (-half, half), _CAP_COLOUR))
+        found.append(barrel(f"{words}, {end} joint", link, Pose(translation=at), radius, (-half, half), _CAP_COLOUR))
     return found
-
-
-def _joint_pose(point: Vector) -> Pose:
-    """Return a pose at a point, with z along that of the frame: the axis of the joint there."""
-    if not all(math.isfinite(value) for value in point):
-        raise AssertionError("a table of an arm is finite")
-    return Pose(translation=point)
 
 
 _BODY_COLOUR = (214, 177, 142)

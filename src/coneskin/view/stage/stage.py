@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["CLEAR", "SPACING", "Stage", "clear_where_buried", "floor_lines", "set_stage"]
+__all__ = ["CLEAR", "SPACING", "Stage", "floor_lines", "set_stage"]
 
 CLEAR = 0.3  #: opacity of a solid in which part of a sheet is buried
 _MIN_HIDDEN_SHARE = 0.005  # share of a sheet from which on it counts
 _ROWS, _COLUMNS = 16, 48  # places of a sheet that are looked at
 
 
-def clear_where_buried(
+def _clear_where_buried(
     solids: Sequence[Solid], sheets: Sequence[SheetSurface], poses: Mapping[int, Pose]
 ) -> tuple[Solid, ...]:
     """Return solids, those clear in which a sheet on their link or a neighbour is buried.
@@ -190,7 +190,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
         own = _link_meshes(scene, model)
         solids = (*(solid for solid in solids if solid.link not in {mesh.link for mesh in own}), *own)
     stage = Stage(title, model, tuple(solids), sheets, bodies, starts)
-    return replace(stage, solids=clear_where_buried(solids, sheets, stage.poses(None)))
+    return replace(stage, solids=_clear_where_buried(solids, sheets, stage.poses(None)))
 
 
 def _link_meshes(scene: Scene, model: ArmModel) -> list[Solid]:
