@@ -28,7 +28,7 @@ FLOORS = (
     "robot.sim.machine scene.values skin.detection.place",
     "scene.tables skin.detection",
     "design.sheets robot.guard.signals",
-    "commands.arguments design.workshop robot.guard.motion robot.guard.speed robot.sim.ports",
+    "design.workshop robot.guard.motion robot.guard.speed robot.sim.ports",
     "design robot.guard",
     "robot.sim scene",
     "impact.permissible_speed runs.replay session view.stage",

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from coneskin.commands.demo import _Transcript, hold_up
+from coneskin.commands.demo import _hold_up, _Transcript
 from coneskin.core.recording.block import Block
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 
@@ -34,11 +34,13 @@ def flow(kind: BlockKind, *times: float) -> list[Block]:
 def test_what_a_busy_computer_held_up_is_named_before_what_followed() -> None:
     skin, arm = flow(BlockKind.SKIN, 1.0, 1.01, 1.08, 1.09), flow(BlockKind.ARM, 1.0, 1.02, 1.06)
     late = Block(BlockKind.OVERRUN, 1.2, b'{"late": 0.12}')
-    assert hold_up([*skin, *arm]).startswith(
+    assert _hold_up([*skin, *arm]).startswith(
         "this computer was too busy: it held up frames of the skin for 70 ms (50 ms"
     )
-    assert "frames of the skin for 70 ms, the guard for 120 ms (" in hold_up([*skin, *arm, late])
+    assert "frames of the skin for 70 ms, the guard for 120 ms (" in _hold_up([*skin, *arm, late])
 
 
 def test_a_computer_that_was_not_busy_is_not_blamed() -> None:
-    assert hold_up([*flow(BlockKind.SKIN, 1.0, 1.04), *flow(BlockKind.ARM, 2.0), *flow(BlockKind.TICK, 1.0, 9.0)]) == ""
+    assert (
+        _hold_up([*flow(BlockKind.SKIN, 1.0, 1.04), *flow(BlockKind.ARM, 2.0), *flow(BlockKind.TICK, 1.0, 9.0)]) == ""
+    )

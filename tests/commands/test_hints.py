@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.commands.demo import collision_facts, print_report
+from coneskin.commands.demo import _collision_facts, _print_report
 from coneskin.commands.terminal import print_hint
 from coneskin.runs.replay.run import Run
 from coneskin.scene.reader import parse_scene
@@ -69,9 +69,9 @@ def test_a_guard_ends_with_the_replay_of_what_it_has_recorded(
 
 def test_the_demo_ends_with_the_replay_of_its_run(capsys: pytest.CaptureFixture[str]) -> None:
     folder = Path("runs") / "of two words"
-    facts = collision_facts(Run({}, ()), 0.0)
+    facts = _collision_facts(Run({}, ()), 0.0)
     facts |= {"peak_n": None, "clamp_n": None, "same_in_replay": True, "picture": None}
-    print_report(facts, folder, "")
+    _print_report(facts, folder, "")
     said = shlex.split(capsys.readouterr().out.splitlines()[-1])
     assert said == ["next:", "coneskin", "replay", str(folder), "--events"]
 

@@ -39,12 +39,14 @@ if TYPE_CHECKING:
 
     from coneskin.core.recording.block import Block
     from coneskin.impact.simulation.impact_outcome import ImpactOutcome
+    from coneskin.robot.arm.model import ArmModel
     from coneskin.robot.guard.signals.journal import GuardEvent
     from coneskin.runs.replay.run import Run
+    from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
     from coneskin.session.session import Session
 
-__all__ = ["add_arguments", "collision_facts", "hold_up", "print_report", "run"]
+__all__ = ["add_arguments", "run"]
 
 #: the scene of the demo: the tube of the UR5e's forearm as ``coneskin design`` finds it. The limits of
 #: silence are long because a pseudo-terminal on a busy machine can stall for that long
@@ -97,14 +99,7 @@ _TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)  #: joint positions at the end
 
 
 def _make_scene(host: str, reaction: str, soft: bool, folder: Path) -> Scene:
-    """Return the scene of the demo.
-
-    Args:
-        host: address of its controller.
-        reaction: kind of its reaction.
-        soft: True where it runs into something soft; else a script touches it.
-        folder: that its files belong to.
-    """
+    """Return the scene of the demo, in which the arm runs into something soft, or a script touches it."""
     from coneskin.scene.reader import parse_scene
 
     text = _SCENE_TEXT.format(host=host, reaction=reaction, more=_FRAME_TIMEOUT if soft else "")
@@ -112,17 +107,24 @@ def _make_scene(host: str, reaction: str, soft: bool, folder: Path) -> Scene:
     return parse_scene(text + _body_in_the_way(scene), "scene.toml", folder) if soft else scene
 
 
-def _body_in_the_way(scene: Scene) -> str:
-    """Return the table of a body that the sensor's leading side meets half way."""
-    from coneskin.robot.arm.kinematics import link_pose
+def _half_way(scene: Scene) -> tuple[ArmModel, SensorOnArm, list[float]]:
+    """Return the arm, the sensor on it, and the joint positions half way [rad]."""
     from coneskin.robot.arm.ur_models import arm_model
     from coneskin.scene.build import place_on_arm
 
     (placed,) = place_on_arm(scene)
     assert scene.arm is not None
     middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+    return arm_model(scene.arm.model), placed, middle
+
+
+def _body_in_the_way(scene: Scene) -> str:
+    """Return the table of a body that the sensor's leading side meets half way."""
+    from coneskin.robot.arm.kinematics import link_pose
+
+    arm, placed, middle = _half_way(scene)
     point, normal = placed.place(_TOUCHED_U, _leading_side(scene))
-    pose = link_pose(arm_model(scene.arm.model), middle, placed.link)
+    pose = link_pose(arm, middle, placed.link)
     out = pose.rotate(normal)
     x, y, z = (1e3 * (p + _LINK_RADIUS * n) for p, n in zip(pose.apply(point), out, strict=True))
     return _BODY_TEXT.format(x=x, y=y, z=z, radius_mm=1e3 * _LINK_RADIUS)
@@ -131,13 +133,8 @@ def _body_in_the_way(scene: Scene) -> str:
 def _leading_side(scene: Scene) -> float:
     """Return the azimuth of the sensor's leading side [rad]: there an obstacle would hit the arm."""
     from coneskin.robot.arm.kinematics import link_pose, point_jacobian
-    from coneskin.robot.arm.ur_models import arm_model
-    from coneskin.scene.build import place_on_arm
 
-    (placed,) = place_on_arm(scene)
-    assert scene.arm is not None
-    arm = arm_model(scene.arm.model)
-    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
+    arm, placed, middle = _half_way(scene)
     qd = [math.radians(b - a) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
 
     def towards(phi: float) -> float:
@@ -150,23 +147,19 @@ def _leading_side(scene: Scene) -> float:
 
 
 _MAX_DELAY = 0.05  # s between two inputs of a kind that come 500 times a second: what a scene allows by default
-_STREAM_NAMES = {BlockKind.SKIN: "frames of the skin", BlockKind.ARM: "states of the arm"}
+_STREAM_NAMES: dict[int, str] = {BlockKind.SKIN: "frames of the skin", BlockKind.ARM: "states of the arm"}
 
 
-def hold_up(blocks: Iterable[Block]) -> str:
-    """Return in words how long a busy computer held up what must not wait; empty where it did not.
-
-    Args:
-        blocks: of a recording.
-    """
+def _hold_up(blocks: Iterable[Block]) -> str:
+    """Return in words how long a busy computer held up what must not wait in a recording; empty where it did not."""
     longest: dict[str, float] = {}
     newest: dict[int, float] = {}
     for block in blocks:
         if block.kind == BlockKind.OVERRUN:
             name, late = "the guard", float(read_json(block.payload)["late"])
-        elif (kind := BlockKind(block.kind) if block.kind in _STREAM_NAMES else None) is not None:
-            name, late = _STREAM_NAMES[kind], block.time - newest.get(kind, block.time)
-            newest[kind] = block.time
+        elif (name := _STREAM_NAMES.get(block.kind, "")) != "":
+            late = block.time - newest.get(block.kind, block.time)
+            newest[block.kind] = block.time
         else:
             continue
         longest[name] = max(longest.get(name, 0.0), late)
@@ -179,7 +172,7 @@ def hold_up(blocks: Iterable[Block]) -> str:
     )
 
 
-def collision_facts(run: Run, touched: float) -> dict[str, Any]:
+def _collision_facts(run: Run, touched: float) -> dict[str, Any]:
     """Return the times after the touch [ms], and what happened."""
     events = run.events
     contact = next((e for e in events if e.name == EventName.CONTACT), None)
@@ -206,14 +199,8 @@ def collision_facts(run: Run, touched: float) -> dict[str, Any]:
     }
 
 
-def print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
-    """Print the facts of a run in this folder, what its recording misses, and the next command.
-
-    Args:
-        facts: of ``collision_facts``, with forces, replay and picture.
-        folder: of the run.
-        missing: from the recording; empty where nothing is.
-    """
+def _print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
+    """Print the facts of a run in this folder, what is missing from its recording, and the next command."""
     print("\nafter the touch began:")
     for key, words in (
         ("frame_ms", "frame over the threshold decoded"),
@@ -298,7 +285,7 @@ def run(args: argparse.Namespace) -> int:
         raise
     recorded = read_run(folder)
     again = replay(recorded)
-    facts = collision_facts(recorded, touched)
+    facts = _collision_facts(recorded, touched)
     facts["peak_n"], facts["clamp_n"] = (None, None) if force is None else (round(force.peak, 1), round(force.clamp, 1))
     facts["same_in_replay"] = again.same
     facts["picture"] = _draw(recorded, folder, say)
@@ -306,10 +293,10 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({**facts, "folder": str(folder)}))
     else:
-        print_report(facts, folder, recorded.missing)
+        _print_report(facts, folder, recorded.missing)
     alone = facts["contacts"] == 1 or (soft and facts["contacts"] > 1)  # what is soft may swing back
     as_it_should = facts["standstill_ms"] is not None and again.same and alone
-    if (not as_it_should or facts["cut_short"]) and (cause := hold_up(recorded.blocks)):
+    if (not as_it_should or facts["cut_short"]) and (cause := _hold_up(recorded.blocks)):
         print(f"coneskin demo: {cause}", file=sys.stderr)
     return 0 if as_it_should else 1
 
@@ -344,18 +331,13 @@ def _cause(folder: Path) -> str:
     from coneskin.runs.replay.run import read_run
 
     try:
-        return hold_up(read_run(folder).blocks)
+        return _hold_up(read_run(folder).blocks)
     except RecordingError:
         return ""
 
 
 class _Transcript:
-    """Lines of the guard, which come from a thread of their own, and of the program, in the order of their times.
-
-    Args:
-        say: prints a line.
-        began: gives the zero of the times, which is that of the recording [s].
-    """
+    """Lines of the guard, which come from a thread of their own, and of the program, in the order of their times."""
 
     def __init__(self, say: Callable[[str], None], began: Callable[[], float]) -> None:
         self._say = say
@@ -405,15 +387,7 @@ def _collide(
     meanwhile: Callable[[Session], None],
     pressed_by: socket.socket | None = None,
 ) -> None:
-    """Move, and print what the guard does.
-
-    Args:
-        scene: of the demo.
-        folder: of the run.
-        say: prints a line.
-        meanwhile: is called as the motion begins.
-        pressed_by: line from the physics.
-    """
+    """Move, print what the guard does, and call a function as the motion begins."""
     from coneskin.session.session import guard
 
     transcript = _Transcript(say, lambda: guarded.began)

@@ -25,7 +25,7 @@ from coneskin.robot.sim.machine.states import DEFAULT_MODEL
 from coneskin.scene.tables.sensor_keys import DOUBLE_CONE_KEYS
 from coneskin.skin.electronics import shunt_ohms
 
-from .arguments.dimensions import add_key_options, given_keys, option_name
+from .dimensions import add_key_options, given_keys, option_name
 from .terminal import ending_signals, print_hint
 
 __all__ = ["EXAMPLES", "add_arguments", "run"]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import FieldError
 from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
-from .arguments.dimensions import add_key_options, given_keys
+from .dimensions import add_key_options, given_keys
 
 if TYPE_CHECKING:
     from coneskin.skin.field.maps import ErrorMap

@@ -137,16 +137,7 @@ def _as_interrupt(_signal: int, _frame: object) -> None:
 
 
 class _Work:
-    """Work of the command while it guards.
-
-    Args:
-        session: entered before ``run``.
-        duration: of the whole [s].
-        once: end after the first collision or fault.
-
-    Attributes:
-        code: exit code of the errors so far.
-    """
+    """Work of the command while it guards, in an entered session and for a time [s]; ``code`` is that of its errors."""
 
     def __init__(self, session: Session, duration: float, once: bool) -> None:
         self.code = 0

@@ -8,7 +8,7 @@ import math
 
 from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
-from .arguments.dimensions import add_key_options, given_keys
+from .dimensions import add_key_options, given_keys
 
 __all__ = ["add_arguments", "run"]
 

@@ -10,7 +10,7 @@ import pytest
 import coneskin
 from coneskin.commands import design as design_command
 from coneskin.commands import unroll as unroll_command
-from coneskin.commands.arguments.dimensions import given_keys, option_name
+from coneskin.commands.dimensions import given_keys, option_name
 from coneskin.core.errors import GeometryError
 from coneskin.core.keys import Key, check
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets

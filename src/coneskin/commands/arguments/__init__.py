@@ -1,1 +1,0 @@
-"""Options of commands that have many, and the values that they describe."""
