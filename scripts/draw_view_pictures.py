@@ -45,7 +45,7 @@ def collision(folder: Path) -> Path:
     """Make the collision of docs/do/impact.md, and return its recording."""
     from coneskin.core.recording.block import Block
     from coneskin.core.recording.recorder import Recorder
-    from coneskin.impact.simulation.collision_run import CollisionRun, Waypoints
+    from coneskin.impact.simulation.collision_run import CollisionRun, follow_waypoints
     from coneskin.robot.guard.signals.journal import BlockKind
     from coneskin.scene.reader import parse_scene
 
@@ -57,7 +57,7 @@ def collision(folder: Path) -> Path:
     first, *rest = scene.motion.waypoints
     blocks: list[Block] = []
     run = CollisionRun(scene, scene.bodies, first, note=blocks.append)
-    run.run(Waypoints(rest, scene.motion.speed, scene.motion.acceleration), longest=3.0)
+    run.run(follow_waypoints(rest, scene.motion.speed, scene.motion.acceleration), longest=3.0)
     target = folder / "collision" / "run.rec"
     target.parent.mkdir()
     header = {"scene": scene.text, "name": scene.name, "folder": ".", "clocks": {"monotonic": 100.0}}

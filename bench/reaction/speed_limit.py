@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 
 from bench.report import head
-from coneskin.impact.simulation.collision_run import Waypoints
+from coneskin.impact.simulation.collision_run import follow_waypoints
 from coneskin.robot.driver.values import SetSpeedSlider
 from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds, SurfaceSpeeds
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
@@ -58,7 +58,7 @@ def run(legs: Sequence[Leg], seconds: float) -> str:
     speeds = PermissibleSpeeds(LEVERS, PATCHES, (-7.0,) * 6, (7.0,) * 6)
     limit, surfaces = SpeedLimit(MODEL, speeds), SurfaceSpeeds(MODEL, speeds)
     arm, moves = MockArm(list(START_Q), [0.0] * 6), itertools.cycle(legs)
-    program: Waypoints | None = None
+    program = None
     waiting: list[tuple[int, SetSpeedSlider]] = []
     slider, changes, ratios, ends = 1.0, [], [], []
     for step in range(round(seconds / CYCLE_TIME)):
@@ -67,13 +67,13 @@ def run(legs: Sequence[Leg], seconds: float) -> str:
             arm.feed(waiting.pop(0)[1])
         if step % SLIDER == 0:
             slider = arm.slider
-        wanted = program.target(now, arm.q) if program is not None else None
+        wanted = program(arm.q) if program is not None else None
         if wanted is None:
             ends.append(step)
             offsets, speed, acceleration = next(moves)
             goal = [q + math.radians(o) for q, o in itertools.zip_longest(START_Q, offsets, fillvalue=0.0)]
-            program = Waypoints([goal], speed, acceleration)
-            wanted = program.target(now, arm.q) or ([0.0] * 6, acceleration)
+            program = follow_waypoints([goal], speed, acceleration)
+            wanted = program(arm.q) or ([0.0] * 6, acceleration)
         arm.go(*wanted)
         state = UR_DRIVER.decode_state(now, arm.poll())
         ratios.append(surfaces.ratio(state.q, state.qd)[0])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from coneskin.impact.simulation.collision_run import Waypoints
+from coneskin.impact.simulation.collision_run import follow_waypoints
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.driver.values import SetSpeedSlider
 from coneskin.robot.guard.phase import Phase
@@ -122,8 +122,8 @@ class Loop:
 
     def stroke(self, angle: float, speed: float, acceleration: float) -> Loop:
         """Let the program turn the base to an angle from where it began [rad]."""
-        program = Waypoints([[START_Q[0] + angle, *START_Q[1:]]], speed, acceleration)
-        while not self.why and (wanted := program.target(self.now, self.arm.q)) is not None:
+        program = follow_waypoints([[START_Q[0] + angle, *START_Q[1:]]], speed, acceleration)
+        while not self.why and (wanted := program(self.arm.q)) is not None:
             self.arm.go(*wanted)
             self.step()
         return self
