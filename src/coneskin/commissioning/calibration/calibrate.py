@@ -126,7 +126,7 @@ class Calibrator:
             date=datetime.now(UTC).isoformat(timespec="seconds"),
             coneskin=__version__,
             by=by,
-            simulated=self.simulated,
+            simulated=self._session.simulated,
             fingerprint=sensor_fingerprint(sensor),
             map_along=fit.place_map.along,
             map_around=fit.place_map.around,
