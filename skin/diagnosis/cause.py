@@ -1,11 +1,12 @@
-"""Causes of a stream that a guard would not accept, each with what to do about it, and the diagnosis that names one."""
+"""Causes of a stream that a guard would not accept, each with what to do about it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum, unique
 
-__all__ = ["Cause", "Diagnosis"]
+from coneskin.core.finding import Finding
+
+__all__ = ["Cause"]
 
 
 @unique
@@ -105,27 +106,11 @@ class Cause(Enum):
     GUIDES_FLOAT = "give every input a resistor to ground (10 Mohm) (untouched guides then read 0); shield wires"
     UNKNOWN = "look at the bytes with --hex; most often it is the baud rate"
 
-
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
-    """What is wrong with a stream of bytes.
-
-    Attributes:
-        cause: the likeliest cause; ``Cause.NONE`` where frames come as they should.
-        what: what was seen, in plain words.
-        try_baud: a baud rate at which the bytes would be frames [1/s]; 0 where that is not known.
-    """
-
-    cause: Cause
-    what: str
-    try_baud: int = 0
-
     @property
-    def good(self) -> bool:
-        """True where frames come as they should."""
-        return self.cause is Cause.NONE
+    def key(self) -> str:
+        """Name of the cause for programs, and ``item`` of its finding."""
+        return self.name.lower()
 
-    @property
-    def line(self) -> str:
-        """The diagnosis in one line: what was seen, and what to do."""
-        return self.what if self.good else f"{self.what}: {self.cause.value}"
+    def found(self, what: str) -> Finding:
+        """Return the finding of this cause, with what was seen in plain words."""
+        return Finding(self.key, "ok", what) if self is Cause.NONE else Finding(self.key, "bad", what, "", self.value)

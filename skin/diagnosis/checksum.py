@@ -12,7 +12,9 @@ from collections.abc import Callable, Sequence
 from itertools import product
 from typing import Literal, NamedTuple
 
-from .cause import Cause, Diagnosis
+from coneskin.core.finding import Finding
+
+from .cause import Cause
 
 __all__ = ["crc16", "find_checksum"]
 
@@ -48,7 +50,7 @@ def crc16(data: bytes, polynomial: int, start: int = 0, reflected: bool = False)
     return int(f"{register:016b}"[::-1], 2) if reflected else register
 
 
-def find_checksum(frames: Sequence[bytes]) -> Diagnosis:
+def find_checksum(frames: Sequence[bytes]) -> Finding:
     """Name the checksum of frames that are right but for it.
 
     Args:
@@ -57,8 +59,7 @@ def find_checksum(frames: Sequence[bytes]) -> Diagnosis:
     bodies, tails = [frame[:-2] for frame in frames], [frame[-2:] for frame in frames]
     different = len(set(bodies)) > 1
     if different and len(set(tails)) == 1:
-        what = f"the checksum is {tails[0].hex(' ').upper()} in every frame"
-        return Diagnosis(Cause.CRC_CONSTANT, what)
+        return Cause.CRC_CONSTANT.found(f"the checksum is {tails[0].hex(' ').upper()} in every frame")
     for search in (_find_stale, _find_sum):
         if found := search(bodies, tails):
             return found
@@ -68,10 +69,10 @@ def find_checksum(frames: Sequence[bytes]) -> Diagnosis:
     body, tail = distinct[0]
     right = crc_hqx(body, 0).to_bytes(2, "big").hex(" ").upper()
     what = f"frames come with a wrong checksum that follows no rule known here ({tail.hex(' ').upper()} for {right})"
-    return Diagnosis(Cause.CRC_UNKNOWN, what)
+    return Cause.CRC_UNKNOWN.found(what)
 
 
-def _find_stale(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | None:
+def _find_stale(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Finding | None:
     """Find a CRC that was taken of the frame before, or before sequence or clock were written."""
     pairs = list(zip(bodies, bodies[1:], tails[1:], strict=False))
     if len(pairs) < 3:
@@ -87,11 +88,11 @@ def _find_stale(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | 
     for words, mix in parts.items():
         hits = sum(crc_hqx(mix(old, new) + tail, 0) == 0 for old, new, tail in pairs)
         if hits >= _AGREEING_SHARE * len(pairs):
-            return Diagnosis(Cause.CRC_STALE, f"the checksum {words}")
+            return Cause.CRC_STALE.found(f"the checksum {words}")
     return None
 
 
-def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | None:
+def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Finding | None:
     """Find a sum, an exclusive or, a Fletcher sum or a CRC of 8 bits."""
     kinds: dict[str, Callable[[bytes], int]] = {
         "the sum of the bytes": sum,
@@ -113,7 +114,7 @@ def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Diagnosis | No
             hits[1] += low == tail[0] and tail[1] == tails[0][1]
             hits[2] += low == tail[1] and tail[0] == tails[0][0]
         if max(hits) >= _AGREEING_SHARE * len(pairs) and len(pairs) >= 3:
-            return Diagnosis(Cause.CHECKSUM_KIND, f"the checksum is {words}, not a CRC of 16 bits")
+            return Cause.CHECKSUM_KIND.found(f"the checksum is {words}, not a CRC of 16 bits")
     return None
 
 
@@ -141,7 +142,7 @@ def _crc8(data: bytes) -> int:
     return register
 
 
-def _find_crc(frames: Sequence[tuple[bytes, bytes]]) -> Diagnosis | None:
+def _find_crc(frames: Sequence[tuple[bytes, bytes]]) -> Finding | None:
     """Find the parameters of a CRC of 16 bits from differences of frames."""
     if len(frames) < 4:
         return None
@@ -174,7 +175,7 @@ class _Found(NamedTuple):
     order: Literal["big", "little"]
 
 
-def _describe(body: bytes, tail: bytes, found: _Found) -> Diagnosis:
+def _describe(body: bytes, tail: bytes, found: _Found) -> Finding:
     """Name every parameter that differs from CRC-16/XMODEM, the gravest first."""
     polynomial, padded, reflected, order = found
     seen: list[tuple[Cause, str]] = []
@@ -196,7 +197,7 @@ def _describe(body: bytes, tail: bytes, found: _Found) -> Diagnosis:
     if order == "little":
         seen.append((Cause.CRC_BYTE_ORDER, "its low byte goes first"))
     cause = seen[0][0] if seen else Cause.CRC_UNKNOWN
-    return Diagnosis(cause, f"the checksum is another CRC: {', and '.join(words for _, words in seen)}")
+    return cause.found(f"the checksum is another CRC: {', and '.join(words for _, words in seen)}")
 
 
 def _find_start(message: bytes, wanted: int, polynomial: int, reflected: bool) -> tuple[int, int | None, bool]:

@@ -10,10 +10,11 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import groupby, product
 
+from coneskin.core.finding import Finding
 from coneskin.skin.wire import FRAME_LENGTHS, SYNC, VERSION
 
 from .capture import Capture, count_frames, printable_share, short_hex
-from .cause import Cause, Diagnosis
+from .cause import Cause
 from .checksum import crc16
 
 __all__ = [
@@ -78,7 +79,7 @@ def _receive_at(sent: bytes, ratio: float, inverted: bool = False, waits: bool =
             at += 1.0
 
 
-def find_baud(data: bytes, baud: int | None) -> Diagnosis | None:
+def find_baud(data: bytes, baud: int | None) -> Finding | None:
     """Name the baud rate of the sender where the bytes show it."""
     if len(data) < 64:
         return None
@@ -94,14 +95,14 @@ def find_baud(data: bytes, baud: int | None) -> Diagnosis | None:
         else (0.0, 0, False)
     )
     if best > 0.0 and inverted:
-        return Diagnosis(Cause.INVERTED, f"the bytes are what {rate} baud on an inverted line look like")
+        return Cause.INVERTED.found(f"the bytes are what {rate} baud on an inverted line look like")
     if best > 0.0:
-        return Diagnosis(Cause.BAUD, f"the device sends at {rate} baud, the port listens at {baud}", rate)
+        return Cause.BAUD.found(f"the device sends at {rate} baud, the port listens at {baud}")
     run = _shortest_run(data)
     if run >= _MIN_RUN:
         nearest = min(_BAUD_RATES, key=lambda item: abs(math.log(item * run / baud))) if baud else 0
         words = f"the device sends about {run:.0f} times more slowly than the port listens"
-        return Diagnosis(Cause.BAUD, f"{words}{f', at about {nearest} baud' if nearest else ''}", nearest)
+        return Cause.BAUD.found(f"{words}{f', at about {nearest} baud' if nearest else ''}")
     return None
 
 
@@ -136,12 +137,12 @@ def _shortest_run(data: bytes) -> float:
     return 0.0
 
 
-def find_coding(data: bytes) -> Diagnosis | None:
+def find_coding(data: bytes) -> Finding | None:
     """Name a coding of the bytes below which there are valid frames."""
     for cause, words, undo in _BYTE_CODINGS:
         frames, covered = count_frames(undo(data))
         if frames >= _MIN_FRAMES and covered >= _MIN_COVERED:
-            return Diagnosis(cause, words)
+            return cause.found(words)
     return None
 
 
@@ -184,7 +185,7 @@ _MIN_CHAIN = 4  # messages in a row
 _MODBUS_POLYNOMIAL = 0x8005  # polynomial
 
 
-def find_constant(data: bytes, rate: float, baud: int | None) -> Diagnosis | None:
+def find_constant(data: bytes, rate: float, baud: int | None) -> Finding | None:
     """Find a line on which one byte comes over and over.
 
     Args:
@@ -197,10 +198,10 @@ def find_constant(data: bytes, rate: float, baud: int | None) -> Diagnosis | Non
         return None
     if byte == 0 and baud and rate < 0.05 * baud:
         what = f"nothing but zeros comes, {rate:.0f} a second: the device sends much more slowly than {baud} baud"
-        return Diagnosis(Cause.BAUD, what)
+        return Cause.BAUD.found(what)
     how_often = f"{rate:.0f} a second" if math.isfinite(rate) else f"{count} times"
     what = f"nothing but the byte 0x{byte:02X} comes, {how_often}"
-    return Diagnosis(Cause.BREAK if byte == 0 else Cause.IDLE_NOISE, what)
+    return (Cause.BREAK if byte == 0 else Cause.IDLE_NOISE).found(what)
 
 
 def first_line(data: bytes) -> str:
@@ -211,16 +212,16 @@ def first_line(data: bytes) -> str:
     return text + ("..." if len(whole) > _SHOWN_LENGTH else "")
 
 
-def find_text(data: bytes) -> Diagnosis | None:
+def find_text(data: bytes) -> Finding | None:
     """Find text, and frames that are written in it."""
     if printable_share(data) < _MIN_TEXT:
         return None
     for cause, words, undo in _TEXT_CODINGS:
         if count_frames(undo(data))[0] >= _MIN_FRAMES:
-            return Diagnosis(cause, f"{words}: {first_line(data)!r}")
+            return cause.found(f"{words}: {first_line(data)!r}")
     if len(re.findall(rb"[$!][A-Z]{2,6},[^\r\n]*\*[0-9A-F]{2}", data)) >= 2:
-        return Diagnosis(Cause.NMEA, f"NMEA sentences come, not frames: {first_line(data)!r}")
-    return Diagnosis(Cause.TEXT, f"text comes, not frames: {first_line(data)!r}")
+        return Cause.NMEA.found(f"NMEA sentences come, not frames: {first_line(data)!r}")
+    return Cause.TEXT.found(f"text comes, not frames: {first_line(data)!r}")
 
 
 def _undo_hex(data: bytes) -> bytes:
@@ -244,15 +245,15 @@ def _undo_base64(data: bytes) -> bytes:
     return plain
 
 
-def find_protocol(capture: Capture, data: bytes) -> Diagnosis | None:
+def find_protocol(capture: Capture, data: bytes) -> Finding | None:
     """Find the messages of another device's protocol, by several of them in a row."""
     for cause, name, chains in _MESSAGE_CHAINS:
         if any(_longest_chain(data, *chain) >= _MIN_CHAIN for chain in chains):
-            return Diagnosis(cause, f"{name} messages come, not frames")
+            return cause.found(f"{name} messages come, not frames")
     messages = [message for message in _bursts(capture) if 4 <= len(message) <= 256]
     right = sum(crc16(message, _MODBUS_POLYNOMIAL, 0xFFFF, reflected=True) == 0 for message in messages[-16:])
     if len(messages) >= _MIN_CHAIN and right >= max(_MIN_CHAIN, 0.7 * len(messages[-16:])):
-        return Diagnosis(Cause.MODBUS, f"Modbus RTU messages come, not frames ({short_hex(messages[-1])})")
+        return Cause.MODBUS.found(f"Modbus RTU messages come, not frames ({short_hex(messages[-1])})")
     return None
 
 

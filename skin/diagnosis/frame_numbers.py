@@ -8,9 +8,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from coneskin.core.finding import Finding
 from coneskin.skin.wire import Frame
 
-from .cause import Cause, Diagnosis
+from .cause import Cause
 
 __all__ = ["FrameNumbers", "find_wrong_numbers", "measure_numbers"]
 
@@ -88,7 +89,7 @@ def _slope(ticks: Sequence[int], times: Sequence[float]) -> float:
     return slope * 1e-6
 
 
-def find_wrong_numbers(frames: Sequence[Frame], times: Sequence[float], sensors: int) -> Diagnosis | None:
+def find_wrong_numbers(frames: Sequence[Frame], times: Sequence[float], sensors: int) -> Finding | None:
     """Say what is wrong with sequence and clock of the frames of one sensor.
 
     Args:
@@ -107,33 +108,33 @@ def find_wrong_numbers(frames: Sequence[Frame], times: Sequence[float], sensors:
     )
 
 
-def _find_repeats(frames: Sequence[Frame]) -> Diagnosis | None:
+def _find_repeats(frames: Sequence[Frame]) -> Finding | None:
     pairs = len(frames) - 1
     same = sum(a[4:6] == b[4:6] for a, b in itertools.pairwise(frames))
     if len({frame[4:6] for frame in frames}) == 1 and len(set(frames)) > 1:
         return None  # neither sequence nor clock is ever written
     if same >= 0.3 * pairs:
-        return Diagnosis(Cause.REPEATED, f"{same} of {pairs} frames are the one before once more")
+        return Cause.REPEATED.found(f"{same} of {pairs} frames are the one before once more")
     return None
 
 
-def _find_sequence(frames: Sequence[Frame], sensors: int) -> Diagnosis | None:
+def _find_sequence(frames: Sequence[Frame], sensors: int) -> Finding | None:
     steps = [(b.sequence - a.sequence) & 0xFFFF for a, b in itertools.pairwise(frames)]
     (step, count), *_ = Counter(steps).most_common(1)
     share = count / len(steps)
     if step == 0 and share >= _STEADY_SHARE:
-        return Diagnosis(Cause.SEQUENCE_STANDS, f"the sequence stands at {frames[-1].sequence}")
+        return Cause.SEQUENCE_STANDS.found(f"the sequence stands at {frames[-1].sequence}")
     if step == 1 and share >= 0.5:
         if max(frame.sequence for frame in frames) == 0xFF and 0xFF01 in steps:
-            return Diagnosis(Cause.SEQUENCE_8_BIT, "the sequence goes from 255 back to 0")
+            return Cause.SEQUENCE_8_BIT.found("the sequence goes from 255 back to 0")
         return None
     forward = [step for step in steps if 0 < step < 0x8000]
     if len(forward) < 0.7 * len(steps) or max(forward) > 4096:
-        return Diagnosis(Cause.SEQUENCE_RANDOM, f"the sequence does not count: {_listing(frames)}")
+        return Cause.SEQUENCE_RANDOM.found(f"the sequence does not count: {_listing(frames)}")
     if share >= _STEADY_SHARE and step == sensors:
-        return Diagnosis(Cause.SEQUENCE_SHARED, f"the {sensors} sensors share one sequence, which goes up by {step}")
+        return Cause.SEQUENCE_SHARED.found(f"the {sensors} sensors share one sequence, which goes up by {step}")
     if share >= _STEADY_SHARE:
-        return Diagnosis(Cause.SEQUENCE_STEPS, f"the sequence goes up by {step} from frame to frame")
+        return Cause.SEQUENCE_STEPS.found(f"the sequence goes up by {step} from frame to frame")
     return None
 
 
@@ -141,16 +142,14 @@ def _listing(frames: Sequence[Frame]) -> str:
     return ", ".join(str(frame.sequence) for frame in frames[-4:])
 
 
-def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Diagnosis | None:
+def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Finding | None:
     ticks = _clock_steps(frames)
     if not any(ticks):
-        return Diagnosis(Cause.CLOCK_STANDS, f"the device's clock stands at {frames[-1].clock_us}")
+        return Cause.CLOCK_STANDS.found(f"the device's clock stands at {frames[-1].clock_us}")
     if max(frame.clock_us for frame in frames) <= 0xFFFF and any(-0x10000 <= tick < -0x4000 for tick in ticks):
-        return Diagnosis(Cause.CLOCK_16_BIT, "the device's clock goes from 65535 back to 0")
+        return Cause.CLOCK_16_BIT.found("the device's clock goes from 65535 back to 0")
     if sum(tick < 0 for tick in ticks) > 0.05 * len(ticks):
-        return Diagnosis(
-            Cause.CLOCK_JUMPS, f"the device's clock goes back: {[frame.clock_us for frame in frames[-4:]]} us"
-        )
+        return Cause.CLOCK_JUMPS.found(f"the device's clock goes back: {[frame.clock_us for frame in frames[-4:]]} us")
     ratio = numbers.clock_ratio
     if math.isnan(ratio):
         return None
@@ -160,14 +159,14 @@ def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameN
         (1e3, Cause.CLOCK_NANOSECONDS, "nanoseconds"),
     ):
         if 0.9 * factor < ratio < 1.1 * factor:
-            return Diagnosis(cause, f"the device's clock counts {unit}")
+            return cause.found(f"the device's clock counts {unit}")
     if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
         ratio = _steady_ratio(ticks, times, ratio)
     if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
-        return Diagnosis(Cause.CLOCK_RATIO, f"the device's clock runs {ratio:.3f} times as fast as the computer's")
+        return Cause.CLOCK_RATIO.found(f"the device's clock runs {ratio:.3f} times as fast as the computer's")
     uneven = sum(abs(tick - 1e6 * numbers.period) > 5e5 * numbers.period + 2e3 for tick in ticks)
     if uneven > 0.1 * len(ticks):
-        return Diagnosis(Cause.CLOCK_JUMPS, f"the device's clock jumps in {uneven} of {len(ticks)} frames")
+        return Cause.CLOCK_JUMPS.found(f"the device's clock jumps in {uneven} of {len(ticks)} frames")
     return None
 
 
@@ -193,15 +192,15 @@ def _steady_ratio(ticks: Sequence[int], times: Sequence[float], ratio: float) ->
     return ratio if 0.5 < middle / (1.0 - ratio) < 2.0 else 1.0 - middle
 
 
-def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Diagnosis | None:
+def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Finding | None:
     if numbers.missing > _LOST_SHARE:
-        return Diagnosis(Cause.FRAMES_LOST, f"{100.0 * numbers.missing:.1f} % of the frames never come")
+        return Cause.FRAMES_LOST.found(f"{100.0 * numbers.missing:.1f} % of the frames never come")
     if numbers.rate < _MIN_RATE:
-        return Diagnosis(Cause.RATE_LOW, f"a sensor sends only {numbers.rate:.1f} frames a second")
+        return Cause.RATE_LOW.found(f"a sensor sends only {numbers.rate:.1f} frames a second")
     groups = sorted({*times})
     pauses = sorted(b - a for a, b in itertools.pairwise(groups))
     pause = pauses[len(pauses) // 2] if pauses else 0.0
     if pause > max(_HELD_BACK, 3.0 * numbers.period) and len(frames) > 3 * len(groups):
         each = len(frames) / len(groups)
-        return Diagnosis(Cause.HELD_BACK, f"frames come {each:.0f} at a time, every {1e3 * pause:.0f} ms")
+        return Cause.HELD_BACK.found(f"frames come {each:.0f} at a time, every {1e3 * pause:.0f} ms")
     return None

@@ -7,10 +7,11 @@ from binascii import crc_hqx
 from collections import Counter
 from collections.abc import Sequence
 
+from coneskin.core.finding import Finding
 from coneskin.skin.wire import FRAME_LENGTHS, MAX_LENGTH, SYNC, VERSION
 
 from .capture import FoundFrames, count_frames, printable_share, short_hex, sync_places
-from .cause import Cause, Diagnosis
+from .cause import Cause
 from .checksum import crc16, find_checksum
 from .foreign_stream import first_line, undo_newlines, undo_slip
 
@@ -27,7 +28,7 @@ _PERIODIC_SHARE = 0.35  # share of the bytes that equal the one a frame before
 _HEADER_PLACES = (2, 3)
 
 
-def find_shape(data: bytes) -> Diagnosis | None:
+def find_shape(data: bytes) -> Finding | None:
     """Say what is wrong with frames that begin with the right sync, none of which is valid."""
     places, period, share = sync_places(data)
     if len(places) < _MIN_STARTS:
@@ -52,33 +53,29 @@ def find_shape(data: bytes) -> Diagnosis | None:
             return find_padding(frames) or find_checksum(frames)
         return _wrong_size(frames, length, period)
     if length == VERSION and version in FRAME_LENGTHS:
-        what = f"bytes 2 and 3 are {version} and {length}: version and length are exchanged"
-        return Diagnosis(Cause.HEADER_SWAPPED, what)
+        return Cause.HEADER_SWAPPED.found(f"bytes 2 and 3 are {version} and {length}: version and length are exchanged")
     if version == VERSION and period in FRAME_LENGTHS:
-        what = f"byte 3 says {length} bytes, but the frames are {period} bytes long"
-        return Diagnosis(Cause.LENGTH_BYTE, what)
+        return Cause.LENGTH_BYTE.found(f"byte 3 says {length} bytes, but the frames are {period} bytes long")
     if version == VERSION:
         return _wrong_size(frames, length, period)
-    what = f"the version in byte 2 is {version}; version {VERSION} can be read"
-    return Diagnosis(Cause.VERSION, what)
+    return Cause.VERSION.found(f"the version in byte 2 is {version}; version {VERSION} can be read")
 
 
-def _wrong_size(frames: Sequence[bytes], length: int, period: int) -> Diagnosis:
+def _wrong_size(frames: Sequence[bytes], length: int, period: int) -> Finding:
     """Name why frames are not as long as they should be."""
     right = length if length in FRAME_LENGTHS else min(FRAME_LENGTHS, key=lambda size: (abs(size - period), -size))
     if frames and not any(0 in frame for frame in frames) and len(frames) >= _MIN_STARTS:
-        what = f"the frames end after {period} bytes, and no byte of them is 0"
-        return Diagnosis(Cause.ZEROS_LOST, what)
+        return Cause.ZEROS_LOST.found(f"the frames end after {period} bytes, and no byte of them is 0")
     if found := find_padding(frames):
         return found
     said = f"they are {period} bytes long; one has 36, 40 or 52"
     if period == right - _LAST_FIELD and not _valid_alone(frames):
-        return Diagnosis(Cause.CRC_MISSING, f"the frames come without a checksum: {said}")
+        return Cause.CRC_MISSING.found(f"the frames come without a checksum: {said}")
     if period in _WIRE_BUFFERS and period < right:
-        return Diagnosis(Cause.CUT_AT_BUFFER, f"the frames are cut: {said}")
+        return Cause.CUT_AT_BUFFER.found(f"the frames are cut: {said}")
     if period < right:
-        return Diagnosis(Cause.FRAME_SIZE, f"the frames are too short, a field is missing: {said}")
-    return Diagnosis(Cause.FRAME_SIZE, f"the frames are too long: {said}")
+        return Cause.FRAME_SIZE.found(f"the frames are too short, a field is missing: {said}")
+    return Cause.FRAME_SIZE.found(f"the frames are too long: {said}")
 
 
 def _valid_alone(frames: Sequence[bytes]) -> bool:
@@ -86,7 +83,7 @@ def _valid_alone(frames: Sequence[bytes]) -> bool:
     return bool(frames) and all(crc16(frame, _RIGHT_POLYNOMIAL) == 0 for frame in frames[-4:])
 
 
-def find_padding(frames: Sequence[bytes]) -> Diagnosis | None:
+def find_padding(frames: Sequence[bytes]) -> Finding | None:
     """Find the two bytes that a compiler puts before the clock of a struct that is not packed."""
     whole = [frame for frame in frames if len(frame) >= 16]
     if len(whole) < _MIN_STARTS:
@@ -100,16 +97,16 @@ def find_padding(frames: Sequence[bytes]) -> Diagnosis | None:
         size = len(whole[0])  # of the struct, with two bytes more at its end
         right = max((length for length in FRAME_LENGTHS if length < size), default=FRAME_LENGTHS[0])
         what = f"the struct is padded: two bytes stand before the clock, and frames have {size} bytes, not {right}"
-        return Diagnosis(Cause.PADDING, what)
+        return Cause.PADDING.found(what)
     return None
 
 
-def find_foreign_sync(data: bytes) -> Diagnosis | None:
+def find_foreign_sync(data: bytes) -> Finding | None:
     """Find frames that begin with other bytes, by their regularity."""
     for sync, cause, words in ((SYNC[::-1], Cause.SYNC_SWAPPED, "the sync bytes come as 3A C5, exchanged"),):
         places, period, share = sync_places(data, sync)
         if len(places) >= _MIN_STARTS and share >= _AGREEING_SHARE and _MIN_LENGTH <= period <= MAX_LENGTH:
-            return Diagnosis(cause, words)
+            return cause.found(words)
     period = _find_period(data)
     if not period:
         return None
@@ -122,7 +119,7 @@ def find_foreign_sync(data: bytes) -> Diagnosis | None:
         constant = all(fixed[(phase + k) % period][1] >= 0.9 * total[(phase + k) % period] for k in range(4))
         if constant and version == VERSION and length in FRAME_LENGTHS and period == length:
             sync = bytes(fixed[(phase + k) % period][0] for k in range(2))
-            return Diagnosis(Cause.SYNC_OTHER, f"the frames begin with {short_hex(sync)}, not C5 3A")
+            return Cause.SYNC_OTHER.found(f"the frames begin with {short_hex(sync)}, not C5 3A")
     return None
 
 
@@ -146,7 +143,7 @@ _LOST_SHARE = 0.005  # share of the bytes that may be lost without a word
 _SAME_SHARE = 0.8  # share of what lies between frames that must be the same
 
 
-def find_damage(data: bytes, found: FoundFrames) -> Diagnosis | None:
+def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
     """Say what damages the frames of a capture, or stands between them; None where hardly anything does."""
     if found.covered >= 1.0 - _LOST_SHARE or not found.gaps:
         return None
@@ -157,29 +154,29 @@ def find_damage(data: bytes, found: FoundFrames) -> Diagnosis | None:
     ):
         frames, covered = count_frames(undo(data))
         if frames > len(found.frames) and covered > found.covered + 0.5 * (1.0 - found.covered):
-            return Diagnosis(cause, f"{share}: {words}")
+            return cause.found(f"{share}: {words}")
     between = b"".join(found.gaps)
     if SYNC not in between:
         gap, count = Counter(found.gaps).most_common(1)[0]
         if count >= _SAME_SHARE * len(found.gaps) and len(gap) <= 8:
-            return Diagnosis(Cause.EXTRA_BYTES, f"{short_hex(gap)} stands between the frames")
+            return Cause.EXTRA_BYTES.found(f"{short_hex(gap)} stands between the frames")
         if printable_share(between) > 0.9:
-            return Diagnosis(Cause.TEXT, f"text stands between the frames: {first_line(between)!r}")
+            return Cause.TEXT.found(f"text stands between the frames: {first_line(between)!r}")
     broken = _broken_frames(found.gaps)
     if (repaired := _repair(broken)) is not None:
-        return Diagnosis(repaired[0], f"{share}: {repaired[1]}")
+        return repaired[0].found(f"{share}: {repaired[1]}")
     whole = [piece for piece in broken if len(piece) == piece[3]]
     if sum(len(piece) < piece[3] for piece in broken) > 0.5 * len(broken):
-        return Diagnosis(Cause.BYTES_LOST, f"{share}: frames are shorter than they say")
+        return Cause.BYTES_LOST.found(f"{share}: frames are shorter than they say")
     if len(whole) >= 8 and len(whole) > 2 * len(found.frames):
         named = find_checksum(whole)
-        if named.cause not in (Cause.CRC_UNKNOWN, Cause.CRC_CONSTANT):
+        if named.item not in (Cause.CRC_UNKNOWN.key, Cause.CRC_CONSTANT.key):
             return named
     if whole and len(whole) >= 0.5 * len(found.gaps):
-        return Diagnosis(Cause.DAMAGED, f"{share}: {len(whole)} frames of the right length have a wrong checksum")
+        return Cause.DAMAGED.found(f"{share}: {len(whole)} frames of the right length have a wrong checksum")
     if printable_share(between) > 0.9:
-        return Diagnosis(Cause.TEXT, f"text stands between the frames: {first_line(between)!r}")
-    return Diagnosis(Cause.DAMAGED, f"{share}, such as {short_hex(max(found.gaps, key=len))}")
+        return Cause.TEXT.found(f"text stands between the frames: {first_line(between)!r}")
+    return Cause.DAMAGED.found(f"{share}, such as {short_hex(max(found.gaps, key=len))}")
 
 
 def _broken_frames(gaps: Sequence[bytes]) -> list[bytes]:

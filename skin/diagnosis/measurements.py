@@ -6,10 +6,11 @@ import itertools
 from collections.abc import Callable, Sequence
 from math import gcd
 
+from coneskin.core.finding import Finding
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
 
-from .cause import Cause, Diagnosis
+from .cause import Cause
 
 __all__ = [
     "MEASURED",
@@ -54,7 +55,7 @@ def expected_counts(sensor: Sensor) -> tuple[int, ...]:
     return (0, 0, 0, 0, 0, radial, 0, 0, angular, supply, supply, supply)
 
 
-def find_big_endian(frames: Sequence[Frame]) -> Diagnosis | None:
+def find_big_endian(frames: Sequence[Frame]) -> Finding | None:
     """Find frames whose numbers have their high byte first, by sequence and clock."""
     if len(frames) < _MIN_FRAMES:
         return None
@@ -80,13 +81,11 @@ def find_big_endian(frames: Sequence[Frame]) -> Diagnosis | None:
         if right > 0.8 and wrong < 0.5
     ]
     if names:
-        return Diagnosis(
-            Cause.BIG_ENDIAN, f"the {' and the '.join(names)} of the frames come high byte first (big-endian)"
-        )
+        return Cause.BIG_ENDIAN.found(f"the {' and the '.join(names)} of the frames come high byte first (big-endian)")
     counts = [count for frame in frames[-64:] for count in _measured(frame)]
     low = max(_turn2(count) for count in counts)
     if max(counts) > 0xFFF and low <= 0xFFF and gcd(*counts) % 16:
-        return Diagnosis(Cause.BIG_ENDIAN, "the measurements come high byte first (big-endian)")
+        return Cause.BIG_ENDIAN.found("the measurements come high byte first (big-endian)")
     return None
 
 
@@ -102,24 +101,24 @@ def _turn4(value: int) -> int:
     return int.from_bytes(value.to_bytes(4, "little"), "big")
 
 
-def find_status(frames: Sequence[Frame]) -> Diagnosis | None:
+def find_status(frames: Sequence[Frame]) -> Finding | None:
     """Say what the device reports about itself."""
     if len(frames) < _MIN_FRAMES:
         return None
     restarts = sum(bool(b.status & Status.RESTARTED) and a[4:6] != b[4:6] for a, b in itertools.pairwise(frames))
     if restarts >= 0.5 * len(frames):
-        return Diagnosis(Cause.RESTARTED_ALWAYS, "every frame says that the device has just started")
+        return Cause.RESTARTED_ALWAYS.found("every frame says that the device has just started")
     if restarts >= 2:
-        return Diagnosis(Cause.RESTARTS, f"the device has started {restarts} times in {len(frames)} frames")
+        return Cause.RESTARTS.found(f"the device has started {restarts} times in {len(frames)} frames")
     if sum(bool(frame.status & Status.RESERVED) for frame in frames) > 0.1 * len(frames):
-        return Diagnosis(Cause.STATUS_RESERVED, f"the status is 0x{frames[-1].status:02X}, with its reserved bit")
+        return Cause.STATUS_RESERVED.found(f"the status is 0x{frames[-1].status:02X}, with its reserved bit")
     for bit, name in _STATUS_NAMES.items():
         if sum(bool(frame.status & bit) for frame in frames) > 0.1 * len(frames):
-            return Diagnosis(Cause.STATUS, f"the device reports {name} in its status")
+            return Cause.STATUS.found(f"the device reports {name} in its status")
     return None
 
 
-def find_wrong_measurements(frames: Sequence[Frame], sensor: Sensor | None) -> Diagnosis | None:
+def find_wrong_measurements(frames: Sequence[Frame], sensor: Sensor | None) -> Finding | None:
     """Say what is wrong with the measurements of one sensor.
 
     Args:
@@ -142,52 +141,52 @@ def find_wrong_measurements(frames: Sequence[Frame], sensor: Sensor | None) -> D
 _Columns = Sequence[Sequence[int]]
 
 
-def _find_scaling(columns: _Columns, sensor: Sensor | None) -> Diagnosis | None:
+def _find_scaling(columns: _Columns, sensor: Sensor | None) -> Finding | None:
     counts = [count for column in columns for count in column]
     top = max(counts)
     bits = 12 if sensor is None else sensor.electronics.adc_bits
     full = (1 << bits) - 1
     if all(len({*column}) == 1 for column in columns) and min(counts) == top and top in _FULL_SCALES:
-        return Diagnosis(Cause.SATURATED, f"every reading is {top}")
+        return Cause.SATURATED.found(f"every reading is {top}")
     if top <= full:
         return None
     negative = sum(count >= 0xF000 for count in counts)
     middling = sum(full < count < 0xF000 for count in counts)
     if negative and not middling and negative < 0.6 * len(counts):
-        return Diagnosis(Cause.NEGATIVE, f"some readings are negative: {top} is {top - 0x10000}")
+        return Cause.NEGATIVE.found(f"some readings are negative: {top} is {top - 0x10000}")
     step = gcd(*counts)
     if step >= 4 and step & (step - 1) == 0 and top <= 0xFFFF:
         what = f"every reading is a multiple of {step}: the counts are shifted up by {step.bit_length() - 1} bits"
-        return Diagnosis(Cause.LEFT_JUSTIFIED, what)
-    return Diagnosis(Cause.SCALED, f"readings go up to {top}; the full scale of {bits} bits is {full}")
+        return Cause.LEFT_JUSTIFIED.found(what)
+    return Cause.SCALED.found(f"readings go up to {top}; the full scale of {bits} bits is {full}")
 
 
-def _find_zero(columns: _Columns) -> Diagnosis | None:
+def _find_zero(columns: _Columns) -> Finding | None:
     if max(columns[_SUPPLY_AT]) == 0:
-        return Diagnosis(Cause.SUPPLY_ZERO, "the supply reads 0 in every frame")
+        return Cause.SUPPLY_ZERO.found("the supply reads 0 in every frame")
     radial, angular = max(columns[_RADIAL_AT]) <= 2, max(columns[_ANGULAR_AT]) <= 2
     if radial and angular:
-        return Diagnosis(Cause.CURRENTS_ZERO, "both drive currents read 0 in every frame")
+        return Cause.CURRENTS_ZERO.found("both drive currents read 0 in every frame")
     if radial:
-        return Diagnosis(Cause.RADIAL_CURRENT_ZERO, "the drive current of the radial phase reads 0 in every frame")
+        return Cause.RADIAL_CURRENT_ZERO.found("the drive current of the radial phase reads 0 in every frame")
     if angular:
-        return Diagnosis(Cause.ANGULAR_CURRENT_ZERO, "the drive current of the angular phase reads 0 in every frame")
+        return Cause.ANGULAR_CURRENT_ZERO.found("the drive current of the angular phase reads 0 in every frame")
     return None
 
 
-def _find_frozen(columns: _Columns) -> Diagnosis | None:
+def _find_frozen(columns: _Columns) -> Finding | None:
     if len(columns[0]) < _STUCK_FRAMES or any(len({*column[-_STUCK_FRAMES:]}) > 1 for column in columns):
         return None
-    return Diagnosis(Cause.COUNTS_STUCK, f"no reading has changed in {_STUCK_FRAMES} frames")
+    return Cause.COUNTS_STUCK.found(f"no reading has changed in {_STUCK_FRAMES} frames")
 
 
-def _find_stuck(columns: _Columns) -> Diagnosis | None:
+def _find_stuck(columns: _Columns) -> Finding | None:
     """Find a reading without noise: each of those that the detector's STUCK looks at must have some."""
     if len(columns[0]) < _STUCK_FRAMES:
         return None
     for k in (_RADIAL_AT, _ANGULAR_AT, _SUPPLY_AT, _SUPPLY_AT + 1, _SUPPLY_AT + 2):
         if len({*columns[k][-_STUCK_FRAMES:]}) == 1:
-            return Diagnosis(Cause.NO_NOISE, f"{MEASURED[k]} has not changed in {_STUCK_FRAMES} frames")
+            return Cause.NO_NOISE.found(f"{MEASURED[k]} has not changed in {_STUCK_FRAMES} frames")
     return None
 
 
@@ -195,7 +194,7 @@ def _middle(column: Sequence[int]) -> float:
     return float(sorted(column)[len(column) // 2])
 
 
-def _find_unexpected(columns: _Columns, sensor: Sensor) -> Diagnosis | None:
+def _find_unexpected(columns: _Columns, sensor: Sensor) -> Finding | None:
     """Compare what does not depend on a touch with what the scene says: supply and drive currents."""
     parts, bounds = sensor.electronics, sensor.bounds
     expected = expected_counts(sensor)
@@ -205,19 +204,19 @@ def _find_unexpected(columns: _Columns, sensor: Sensor) -> Diagnosis | None:
     if not bounds.supply_low <= supply <= bounds.supply_high:
         for k, middle in enumerate(middles[:_SUPPLY_AT]):
             if abs(middle - wanted) < 0.03 * wanted:
-                return Diagnosis(Cause.FIELD_ORDER, f"{said}, and {MEASURED[k]} reads {middle:.0f}")
+                return Cause.FIELD_ORDER.found(f"{said}, and {MEASURED[k]} reads {middle:.0f}")
         if abs(supply - 1e3 * parts.supply_volts) < _NEAR_SHARE * supply:
-            return Diagnosis(Cause.MILLIVOLTS, f"{said}; these are the millivolts of {parts.supply_volts:g} V")
+            return Cause.MILLIVOLTS.found(f"{said}; these are the millivolts of {parts.supply_volts:g} V")
         for bits in range(8, 17):
             if bits != parts.adc_bits and abs(supply / wanted * 2.0 ** (parts.adc_bits - bits) - 1.0) < _NEAR_SHARE:
-                return Diagnosis(Cause.CONVERTER_BITS, f"{said}: as a converter of {bits} bits, not {parts.adc_bits}")
-        return Diagnosis(Cause.SUPPLY_OFF, said)
+                return Cause.CONVERTER_BITS.found(f"{said}: as a converter of {bits} bits, not {parts.adc_bits}")
+        return Cause.SUPPLY_OFF.found(said)
     radial, angular = middles[_RADIAL_AT] / expected[_RADIAL_AT], middles[_ANGULAR_AT] / expected[_ANGULAR_AT]
     turned = middles[_RADIAL_AT] / expected[_ANGULAR_AT], middles[_ANGULAR_AT] / expected[_RADIAL_AT]
     if all(abs(part - 1.0) < 0.1 for part in turned) and abs(radial - 1.0) > 0.2 and abs(angular - 1.0) > 0.2:
         what = f"the currents read {middles[_RADIAL_AT]:.0f} and {middles[_ANGULAR_AT]:.0f} counts"
-        return Diagnosis(
-            Cause.PHASES_EXCHANGED, f"{what}, the scene expects {expected[_RADIAL_AT]} and {expected[_ANGULAR_AT]}"
+        return Cause.PHASES_EXCHANGED.found(
+            f"{what}, the scene expects {expected[_RADIAL_AT]} and {expected[_ANGULAR_AT]}"
         )
     limits = sensor.thresholds
     for name, part, k in (("radial", radial, _RADIAL_AT), ("angular", angular, _ANGULAR_AT)):
@@ -225,7 +224,7 @@ def _find_unexpected(columns: _Columns, sensor: Sensor) -> Diagnosis | None:
             what = (
                 f"the drive current of the {name} phase reads {middles[k]:.0f} counts, the scene expects {expected[k]}"
             )
-            return Diagnosis(Cause.CURRENT_OFF, what)
+            return Cause.CURRENT_OFF.found(what)
     return None
 
 
@@ -245,7 +244,7 @@ def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
     return found
 
 
-def _find_floating(columns: _Columns) -> Diagnosis | None:
+def _find_floating(columns: _Columns) -> Finding | None:
     """Find guides that wander although nothing touches the sensor."""
     supply = _middle(columns[_SUPPLY_AT])
     untouched = [c + d < _UNTOUCHED_SHARE * supply for c, d in zip(columns[0], columns[1], strict=True)]
@@ -256,5 +255,5 @@ def _find_floating(columns: _Columns) -> Diagnosis | None:
         spread = column[int(0.95 * (len(column) - 1))] - column[int(0.05 * (len(column) - 1))]
         if spread > max(0.02 * supply, 12.0):
             what = f"{MEASURED[k]} wanders by {spread:.0f} counts although nothing touches the sensor"
-            return Diagnosis(Cause.GUIDES_FLOAT, what)
+            return Cause.GUIDES_FLOAT.found(what)
     return None

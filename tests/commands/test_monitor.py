@@ -91,7 +91,7 @@ def test_every_mistake_is_named_on_a_port(program: Path) -> None:
                     if now >= look_at:
                         look_at = now + 1.0
                         named = monitor.report(now).diagnosis
-                        if named.cause is {**MISTAKES, **NOT_TO_BE_NAMED}[name]:
+                        if named.item == {**MISTAKES, **NOT_TO_BE_NAMED}[name].key:
                             wrong.pop(name, None)
                             return
                         wrong[name] = named.line

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     line = find_line(args.target, args.baud)
     show = _shower(args)
     report = _play_file(line, show) if line.path is not None else _listen(line, args, show)
-    return 0 if report.diagnosis.good else 1
+    return 0 if report.diagnosis.verdict == "ok" else 1
 
 
 def _shower(args: argparse.Namespace) -> Callable[[LineReport], None]:
@@ -103,15 +103,15 @@ def _play_file(line: Line, show: Callable[[LineReport], None]) -> LineReport:
     from coneskin.commissioning.line.line_monitor import LineMonitor
 
     monitor: LineMonitor | None = None
-    seen, due, now = None, 0.0, 0.0
+    seen, due, now = "", 0.0, 0.0
     for now, data in line.pieces():
         if monitor is None:
             monitor, due = LineMonitor(now, line.sensors, line.baud, timed=line.recorded), now + _FIRST_PERIOD
         if now >= due:
             due = now + _LINE_PERIOD
             report = monitor.report(now)
-            if report.diagnosis.cause is not seen:
-                seen = report.diagnosis.cause
+            if report.diagnosis.item != seen:
+                seen = report.diagnosis.item
                 show(report)
         monitor.feed(data, now)
     report = (monitor or LineMonitor(now, line.sensors, line.baud, timed=False)).report(now)

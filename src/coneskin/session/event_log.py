@@ -327,10 +327,10 @@ class _HeardLine:
 
         capture = Capture((), now, since=now) if self._window is None else self._window.capture(now)
         found = diagnose(capture, [item.sensor for item in scene.sensors], scene.source.settings.get("baud"))
-        if found.good:
+        if found.verdict == "ok":
             return ""
         if not capture.pieces:
-            return f"no byte has come from {_source_name(scene)}: {found.cause.value}"
+            return f"no byte has come from {_source_name(scene)}: {found.remedy}"
         return f"on {_source_name(scene)}, {found.line}"
 
 

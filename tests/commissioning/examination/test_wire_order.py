@@ -6,7 +6,14 @@ from functools import cache
 
 import pytest
 
-from coneskin.commissioning.examination.wires import WIRINGS, TouchReadings, Wiring, _identify, touch_places
+from coneskin.commissioning.examination.wires import (
+    READING_NAMES,
+    WIRINGS,
+    TouchReadings,
+    Wiring,
+    _identify,
+    touch_places,
+)
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
@@ -43,12 +50,10 @@ def readings(number: int, wiring: Wiring) -> dict[str, TouchReadings]:
         at = measure(driven, [reorder(sheets(number, name), wire_order(wiring.wires))] * 3)
         counts = {
             key: round(getattr(at, key) / (parts.current_full_scale if "current" in key else parts.adc_volts) * 4095)
-            for key in TouchReadings._fields
+            for key in READING_NAMES
         }
         supply = parts.supply_volts / parts.adc_volts * 4095
-        touched[name] = TouchReadings._make(
-            min(n / (4095 if "current" in key else supply), 1.3) for key, n in counts.items()
-        )
+        touched[name] = tuple(min(n / (4095 if "current" in key else supply), 1.3) for key, n in counts.items())
     return touched
 
 

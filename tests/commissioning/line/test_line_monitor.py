@@ -39,7 +39,7 @@ def a_skin(**keys: object) -> VirtualSkin:
 
 def test_without_a_scene_it_shows_rate_clock_level_and_about_where() -> None:
     report = heard(a_skin(), 1.2)
-    assert report.diagnosis.cause is Cause.NONE, report.diagnosis.line
+    assert report.diagnosis.item == Cause.NONE.key, report.diagnosis.line
     (sensor,) = report.sensors
     assert sensor.numbers.rate == pytest.approx(1000.0, rel=0.01)
     assert sensor.numbers.clock_ratio == pytest.approx(1.0, rel=0.001)
@@ -64,7 +64,7 @@ def test_layers_that_are_off_the_design_are_remarked(ohms: float, said: str) -> 
     parts = SENSOR.electronics
     made = Sensor(SENSOR.frustum, electronics=parts, upper_sheet_ohms=ohms, name="cuff")
     report = heard(VirtualSkin(made, model="ladder", seed=3), 0.6, (SENSOR,))
-    assert report.diagnosis.good
+    assert report.diagnosis.verdict == "ok"
     assert said in report.diagnosis.line
     assert "angular current" not in report.diagnosis.line
 
@@ -74,7 +74,7 @@ def test_loss_wrong_checksums_and_a_fast_clock_are_counted() -> None:
     report = heard(skin, 0.8)
     (sensor,) = report.sensors
     assert sensor.missing == pytest.approx(0.8 * 1000 / 50, abs=2)
-    assert report.diagnosis.cause is Cause.CLOCK_RATIO
+    assert report.diagnosis.item == Cause.CLOCK_RATIO.key
     assert sensor.numbers.clock_ratio == pytest.approx(1.5, rel=0.01)
 
 
@@ -94,7 +94,7 @@ def test_a_computer_that_is_held_up_is_not_the_fault_of_the_board(
         now = max(now, time + (late if begins <= time < ends else 0.0))
         monitor.feed(data, now)
     found = monitor.report(now).diagnosis
-    assert (found.cause is Cause.CLOCK_RATIO) == (cause is Cause.CLOCK_RATIO), found.line
+    assert (found.item == Cause.CLOCK_RATIO.key) == (cause is Cause.CLOCK_RATIO), found.line
 
 
 def test_a_line_says_the_diagnosis_first_and_an_object_everything() -> None:

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from coneskin.core.finding import Finding
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.diagnosis.capture import Capture, CaptureWindow
-from coneskin.skin.diagnosis.cause import Cause, Diagnosis
+from coneskin.skin.diagnosis.cause import Cause
 from coneskin.skin.diagnosis.checksum import crc16
 from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import measure_numbers
@@ -28,7 +29,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build(tmp_path_factory.mktemp("mistakes"))
 
 
-def heard(program: Path, mistake: str, sensors: tuple[Sensor, ...] = ()) -> Diagnosis:
+def heard(program: Path, mistake: str, sensors: tuple[Sensor, ...] = ()) -> Finding:
     seconds = 1.6 if MISTAKES.get(mistake) in (Cause.STOPPED, Cause.SILENT) else SECONDS
     pieces = bytes_of(program, mistake, seconds)
     window = CaptureWindow(0.0)
@@ -40,13 +41,13 @@ def heard(program: Path, mistake: str, sensors: tuple[Sensor, ...] = ()) -> Diag
 @pytest.mark.parametrize("mistake", [*MISTAKES, *NOT_TO_BE_NAMED])
 def test_a_mistake_is_named(program: Path, mistake: str) -> None:
     named = heard(program, mistake, (SENSOR,) if mistake in WITH_A_SCENE else ())
-    assert named.cause is {**MISTAKES, **NOT_TO_BE_NAMED}[mistake], named.line
+    assert named.item == {**MISTAKES, **NOT_TO_BE_NAMED}[mistake].key, named.line
     assert "\n" not in named.line
 
 
 @pytest.mark.parametrize("mistake", ["none", "big endian", "supply 0", "currents 0", "shifted to 16 bits"])
 def test_with_a_scene_the_name_is_the_same(program: Path, mistake: str) -> None:
-    assert heard(program, mistake, (SENSOR,)).cause is MISTAKES[mistake]
+    assert heard(program, mistake, (SENSOR,)).item == MISTAKES[mistake].key
 
 
 @pytest.mark.parametrize("mistake", CLOCK_RATIOS)
@@ -111,4 +112,4 @@ def test_a_skin_on_which_all_is_right_is_not_blamed(length: int, count: int, rat
         window.feed(data[17:] if number == 0 else data, time)
     for scene in ((), sensors):
         named = diagnose(window.capture(1.2), scene, BAUD)
-        assert named.good, named.line
+        assert named.verdict == "ok", named.line

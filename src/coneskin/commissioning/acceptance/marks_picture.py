@@ -41,11 +41,8 @@ def draw_marks(scene: Scene, procedure: Procedure, q: Sequence[float] | None, pa
         MissingExtra: matplotlib is not installed.
         SceneError: the file cannot be written, or its suffix is another.
     """
-
-    def refusal(why: str) -> SceneError:
-        return SceneError([why], scene.name)
-
-    write_picture(path, "the picture of the marks", lambda: _compose(scene, procedure, q), refusal, dpi=110)
+    draw, refuse = lambda: _compose(scene, procedure, q), lambda why: SceneError([why], scene.name)
+    write_picture(path, "the picture of the marks", draw, refuse, dpi=110)
 
 
 def _compose(scene: Scene, procedure: Procedure, q: Sequence[float] | None) -> Figure:

@@ -32,11 +32,8 @@ def draw_residuals(results: Sequence[CalibrationResult], path: Path) -> None:
         MissingExtra: matplotlib is not installed.
         SceneError: the file cannot be written, or its suffix is another.
     """
-
-    def refusal(why: str) -> SceneError:
-        return SceneError([why], path.name)
-
-    write_picture(path, "the picture of the residuals", lambda: _compose(results), refusal, dpi=110)
+    draw, refuse = lambda: _compose(results), lambda why: SceneError([why], path.name)
+    write_picture(path, "the picture of the residuals", draw, refuse, dpi=110)
 
 
 def _compose(results: Sequence[CalibrationResult]) -> Figure:

@@ -180,8 +180,9 @@ class Doctor:
         if patch is not None:
             self.patches.append(patch)
         if finding.verdict == "ok":
-            period = untouched.host_time() / max(len(untouched.frames) - 1, 1)
-            self._note(examine_touches(sensor, [frame for _, frame in untouched.frames], kept, period))
+            self._note(
+                examine_touches(sensor, [frame for _, frame in untouched.frames], kept, 1.0 / untouched.numbers().rate)
+            )
         else:
             self._note(Finding(f"{sensor.name}, chi-squared", "not tried", "the wires are not in order"))
 

@@ -22,7 +22,7 @@ from coneskin.skin.detection.frame.untouched import UntouchedCurrents
 from coneskin.skin.detection.self_test import FrameSelfTest
 from coneskin.skin.wire import Frame, FrameDecoder
 
-from .wires import TouchReadings, touch_places, touch_words
+from .wires import READING_NAMES, TouchReadings, touch_places, touch_words
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
@@ -132,7 +132,7 @@ class _TouchCapture:
         columns = list(zip(*(values for _, values in recent), strict=True))
         if any(max(column) - min(column) > _REST_RANGE for column in columns):
             return False
-        mean = TouchReadings._make(sum(column) / len(column) for column in columns)
+        mean = tuple(sum(column) / len(column) for column in columns)
         if self._rest is None:
             self._rest = mean
         same = all(abs(a - b) <= _TOUCH_CHANGE for a, b in zip(mean, self._rest, strict=True))
@@ -148,9 +148,9 @@ def _normalize(sensor: Sensor, frame: Frame) -> TouchReadings:
     """Return the readings of a frame over its supplies and over the full scale; all 0 without a supply."""
     full = sensor.electronics.full_count
     supplies = {"touch": frame.touch_supply, "radial": frame.radial_supply, "angular": frame.angular_supply}
-    return TouchReadings._make(
+    return tuple(
         getattr(frame, name) / (full if name.endswith("current") else supplies[name.partition("_")[0]] or full)
-        for name in TouchReadings._fields
+        for name in READING_NAMES
     )
 
 

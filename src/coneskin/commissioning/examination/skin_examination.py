@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import statistics
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.finding import Finding, Verdict
 from coneskin.skin.diagnosis.capture import CaptureWindow
 from coneskin.skin.diagnosis.diagnose import diagnose
+from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
 from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder, Status
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ _CHANNELS = (
     *("touch_c", "touch_d", "touch_current", "radial_c", "radial_d", "radial_current"),
     *("angular_a", "angular_b", "angular_current", "touch_supply"),
 )
-_SEQUENCE_WRAP, _CLOCK_WRAP = 1 << 16, 1 << 32
 _MAX_FRAMES = 20_000  # frames that are kept of a sensor
 
 
@@ -44,32 +44,20 @@ class SensorStatistics:
         if len(self.frames) < _MAX_FRAMES:
             self.frames.append((time, frame))
 
-    def steps(self) -> list[int]:
-        """Return by how much the sequence grew from frame to frame."""
-        return [(b.sequence - a.sequence) % _SEQUENCE_WRAP for (_, a), (_, b) in self._pairs()]
-
-    def device_time(self) -> float:
-        """Return the time between the first frame and the last by the device's clock [s]."""
-        return sum((b.clock_us - a.clock_us) % _CLOCK_WRAP for (_, a), (_, b) in self._pairs()) * 1e-6
-
-    def host_time(self) -> float:
-        """Return the same by this computer's clock [s]."""
-        return self.frames[-1][0] - self.frames[0][0]
+    def numbers(self) -> FrameNumbers:
+        """Measure how the frames follow each other."""
+        return measure_numbers([frame for _, frame in self.frames], [time for time, _ in self.frames])
 
     def mean(self, channel: str) -> float:
         """Return the mean of a reading [counts]."""
-        return statistics.fmean(self.values(channel))
+        return statistics.fmean(self._values(channel))
 
     def noise(self, channel: str) -> float:
         """Return the standard deviation of a reading [counts]."""
-        return statistics.pstdev(self.values(channel))
+        return statistics.pstdev(self._values(channel))
 
-    def values(self, channel: str) -> Sequence[int]:
-        """Return a reading of every frame [counts]."""
+    def _values(self, channel: str) -> list[int]:
         return [getattr(frame, channel) for _, frame in self.frames]
-
-    def _pairs(self) -> list[tuple[tuple[float, Frame], tuple[float, Frame]]]:
-        return list(pairwise(self.frames))
 
 
 class SkinStatistics:
@@ -128,8 +116,8 @@ def examine_line(
     count, baud = seen.decoder.frames, settings.get("baud")
     named = diagnose(seen.window.capture(now), sensors, baud)
     value = f"{count} frames in {seen.received} bytes, {seen.decoder.crc_errors} damaged"
-    if not named.good:
-        found = [Finding("frames", "warning" if count else "bad", f"{value}; {named.what}", "", named.cause.value)]
+    if named.verdict != "ok":
+        found = [Finding("frames", "warning" if count else "bad", f"{value}; {named.value}", "", named.remedy)]
     else:
         found = [Finding("frames", "ok" if count else "bad", value)]
     expected = {(sensor.device_id, sensor.sensor_id) for sensor in sensors}
@@ -149,7 +137,8 @@ def examine_line(
             Finding(f"sensor {device}/{number}", "warning", "it sends, and the scene does not know it", "", "add it")
         )
     if baud is not None and expected & seen.sensors.keys():
-        rate = sum(_rate(one) for one in seen.sensors.values())
+        rates = [one.numbers().rate for one in seen.sensors.values()]
+        rate = sum(one for one in rates if math.isfinite(one))
         load = rate * FRAME_LENGTH * _BITS_PER_BYTE / baud
         value = f"{rate:.0f} frames/s take {100.0 * load:.0f} % of {baud} baud"
         full = load > _LINE_LOAD
@@ -180,22 +169,19 @@ def examine_sensor(sensor: Sensor, seen: SensorStatistics, drift: float, silence
     ]
 
 
-def _rate(seen: SensorStatistics) -> float:
-    return (len(seen.frames) - 1) / max(seen.host_time(), 1e-6) if len(seen.frames) > 1 else 0.0
-
-
 def _timing(name: str, seen: SensorStatistics, drift: float, silence: float) -> list[Finding]:
-    rate = _rate(seen)
+    numbers = seen.numbers()
+    rate = numbers.rate
     enough = rate >= _LOW_RATE or rate * silence >= _FRAMES_PER_SILENCE
     verdict: Verdict = "ok" if rate >= _GOOD_RATE else "warning" if enough else "bad"
     remedy = "" if verdict == "ok" else "shorten the settling, raise the baud rate, or raise monitoring.skin_silence_ms"
     found = [Finding(f"{name}, rate", verdict, f"{rate:.0f} frames/s", "200 to 1000", remedy)]
-    steps = seen.steps()
-    lost = sum(step - 1 for step in steps if 0 < step < 1000) / max(sum(step for step in steps if step < 1000), 1)
-    verdict = "ok" if lost <= _MAX_LOST else "bad"
+    verdict = "ok" if numbers.missing <= _MAX_LOST else "bad"
     remedy = "" if verdict == "ok" else "the line is too slow or disturbed, or this computer too busy"
-    found.append(Finding(f"{name}, lost", verdict, f"{100.0 * lost:.1f} % of the frames", "at most 2 %", remedy))
-    ratio = seen.device_time() / max(seen.host_time(), 1e-6)
+    found.append(
+        Finding(f"{name}, lost", verdict, f"{100.0 * numbers.missing:.1f} % of the frames", "at most 2 %", remedy)
+    )
+    ratio = numbers.clock_ratio
     verdict = "ok" if abs(ratio - 1.0) <= max(_CLOCK_ERROR, drift) else "bad"
     remedy = (
         "" if verdict == "ok" else "the frame's clock counts microseconds: correct the firmware's timer or prescaler"

@@ -19,13 +19,14 @@ from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.core.finding import Finding
-from coneskin.skin.virtual.circuit import LayerContact, Matrix, measure
+from coneskin.skin.virtual.circuit import ConverterInputs, LayerContact, Matrix, measure
 from coneskin.skin.virtual.ladder import RIGHT_WIRES, ResistorLadder, reorder, wire_order
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
 __all__ = [
+    "READING_NAMES",
     "WIRINGS",
     "TouchReadings",
     "WirePatch",
@@ -46,18 +47,10 @@ _VOLTS_ERROR, _CURRENT_ERROR = 0.03, 0.05  # parts of the supply, and of the lar
 _CLEAR_FACTOR, _CLEAR_MISFIT = 2.0, 0.25  # by which factor the second best must be worse, and how bad it must be
 
 
-class TouchReadings(NamedTuple):
-    """Mean readings of one touch: potentials over the supply, and drive currents over the full scale."""
-
-    touch_c: float
-    touch_d: float
-    touch_current: float
-    radial_c: float
-    radial_d: float
-    radial_current: float
-    angular_a: float
-    angular_b: float
-    angular_current: float
+#: Readings of one touch, in their order: of touch, radial and angular phase, two potentials and a drive current each.
+READING_NAMES = ConverterInputs._fields[:9]
+#: Means of these readings: potentials over the supply, and drive currents over the full scale.
+TouchReadings = tuple[float, ...]
 
 
 class Wiring(NamedTuple):
@@ -103,7 +96,7 @@ def _identify(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> _WireVerd
     rough = {wiring: sum(touch.rough(wiring) for touch in touches) for wiring in WIRINGS}
     near = sorted(rough, key=rough.__getitem__)[:_REFINED_WIRINGS]
     fine = {wiring: sum(touch.fine(wiring) for touch in touches) for wiring in near}
-    ranked, scale = sorted(near, key=fine.__getitem__), len(TouchReadings._fields) * len(touches)
+    ranked, scale = sorted(near, key=fine.__getitem__), len(READING_NAMES) * len(touches)
     best, second = (math.sqrt(fine[wiring] / scale) for wiring in ranked[:2])
     clear = second > _CLEAR_FACTOR * best and second > _CLEAR_MISFIT
     return _WireVerdict(ranked[0] if clear else None, (ranked[0], ranked[1]), best, second)
@@ -149,7 +142,7 @@ class _Touch:
         at = measure(sensor, (sheets, sheets, sheets))
         current = max(sensor.radial_amperes, sensor.angular_amperes) / parts.current_full_scale
         total = 0.0
-        for name, value in zip(TouchReadings._fields, self._read, strict=True):
+        for name, value in zip(READING_NAMES, self._read, strict=True):
             expected = getattr(at, name)
             if name.endswith("current"):
                 off = (min(expected / parts.current_full_scale, 1.0) - value) / (_CURRENT_ERROR * max(current, value))

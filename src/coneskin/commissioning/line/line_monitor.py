@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from coneskin.core.finding import Finding
 from coneskin.core.text import printable
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.diagnosis.capture import CaptureWindow, find_frames
-from coneskin.skin.diagnosis.cause import Diagnosis
+from coneskin.skin.diagnosis.cause import Cause
 from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
 from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
@@ -76,7 +77,7 @@ class LineReport:
         newest: the newest bytes.
     """
 
-    diagnosis: Diagnosis
+    diagnosis: Finding
     time: float
     size: int
     byte_rate: float
@@ -224,7 +225,7 @@ def draw_screen(report: LineReport, *, with_hex: bool, columns: int, color: bool
     """
     line = printable(report.diagnosis.line)
     if color:
-        line = f"{_GOOD_COLOR if report.diagnosis.good else _BAD_COLOR}{line}{_UNMARK_CODE}"
+        line = f"{_GOOD_COLOR if report.diagnosis.verdict == 'ok' else _BAD_COLOR}{line}{_UNMARK_CODE}"
     lines = [line, describe_line(report, with_diagnosis=False)]
     for sensor in report.sensors:
         lines += ["", *_draw_sensor(sensor, with_hex=with_hex, columns=columns, color=color)]
@@ -251,8 +252,8 @@ def describe_report(report: LineReport) -> dict[str, Any]:
     """Return a report as JSON has it; nan becomes null."""
     named = report.diagnosis
     return {
-        "diagnosis": {"cause": named.cause.name.lower(), "what": named.what, "do": named.cause.value},
-        "good": named.good,
+        "diagnosis": {"cause": named.item, "what": named.value, "do": named.remedy or Cause.NONE.value},
+        "good": named.verdict == "ok",
         "time_s": round(report.time, 3),
         "bytes": report.size,
         "bytes_per_s": _finite(report.byte_rate),
