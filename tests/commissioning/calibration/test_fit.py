@@ -69,7 +69,7 @@ def test_a_bend_is_recovered_where_there_are_enough_touches(sensor: Sensor) -> N
 
 def test_a_perfect_skin_is_mostly_left_alone() -> None:
     (sensor, _), left_alone = SENSORS, 0
-    for seed in range(40):
+    for seed in range(20):
         fit = fit_map(sensor, touched(sensor, lambda place: place, 9, 0.3e-3, seed))
         left_alone += (fit.along == "nothing") + (fit.around == "nothing")
         assert fit.after.rms <= fit.before.rms
@@ -80,14 +80,14 @@ def test_a_perfect_skin_is_mostly_left_alone() -> None:
         )
         assert fit.map_error > 0.15e-3  # also where nothing was fitted: so well do nine touches exclude it
         assert worst < 1.2e-3  # four times the error with which the marks were placed
-    assert left_alone >= 72
+    assert left_alone >= 36
 
 
 def test_the_error_of_the_map_is_what_is_stated() -> None:
     sensor = SENSORS[0]
     true = PlaceMap(sensor.frustum, AFFINE.along, AFFINE.around)
     squares, stated, corner = [], [], (0.0, 0.0)
-    for seed in range(60):
+    for seed in range(36):
         fit = fit_map(sensor, touched(sensor, through(true), 9, 0.3e-3, seed), 0.1e-3)
         if fit.along == fit.around == "offset and gain":
             read = true.invert(*corner)
@@ -100,8 +100,8 @@ def test_the_error_of_the_map_is_what_is_stated() -> None:
             squares.append(along**2 + around**2)
             stated.append(fit.map_error**2)
             assert read != corner
-    assert len(squares) > 50
-    assert sum(squares) / sum(stated) == pytest.approx(1.0, abs=0.4)  # two numbers a try: a deviation of 13 %
+    assert len(squares) > 30
+    assert sum(squares) / sum(stated) == pytest.approx(1.0, abs=0.4)  # two numbers a try: a deviation of 17 %
 
 
 @pytest.mark.parametrize("count", [9, 16])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import pytest
 
@@ -73,15 +74,20 @@ def finding(doctor: Doctor, item: str) -> Finding:
     return found
 
 
+@cache
+def right() -> Doctor:
+    return examine()
+
+
 def test_a_right_skin_is_found_right() -> None:
-    doctor = examine()
+    doctor = right()
     assert {one.verdict for one in doctor.findings} == {"ok"}
     assert doctor.patches == []
     assert finding(doctor, "skin, rate").value == "250 frames/s"
     assert finding(doctor, "line").value == "250 frames/s take 78 % of 115200 baud"
 
 
-@pytest.mark.parametrize("wires", ["CDAB", "ACBD", "ABDC"])
+@pytest.mark.parametrize("wires", ["CDAB", "ACBD"])
 def test_wires_that_must_be_moved_are_named(wires: str) -> None:
     doctor = examine(wires=wires)
     found = finding(doctor, "skin, wires")
@@ -95,10 +101,12 @@ def test_wires_that_must_be_moved_are_named(wires: str) -> None:
 def test_what_the_scene_can_mend_is_patched_and_then_read_where_it_is_touched(
     wires: str, firmware: str, keys: dict[str, str]
 ) -> None:
-    right = parse_scene(TEXT).sensors[0].sensor
-    made = replace(right, polarity=Polarity("B", firmware))  # type: ignore[arg-type]
+    plain = parse_scene(TEXT).sensors[0].sensor
+    made = replace(plain, polarity=Polarity("B", firmware))  # type: ignore[arg-type]
     doctor = examine(wires=wires, sensors=made)
     assert finding(doctor, "skin, wires").verdict == "bad"
+    mirrored = finding(doctor, "skin, chi-squared")
+    assert (mirrored.verdict, mirrored.value) == ("not tried", "the wires are not in order")
     assert [(patch.sensor, patch.keys) for patch in doctor.patches] == [("skin", keys)]
     patched = parse_scene(set_sensor_keys(TEXT, 0, keys)).sensors[0].sensor
     place = 0.07, math.radians(80.0)
@@ -106,7 +114,7 @@ def test_what_the_scene_can_mend_is_patched_and_then_read_where_it_is_touched(
     assert faults == []
     assert read is not None
     assert math.hypot(read.u - place[0], 0.04 * (read.phi - place[1])) < 0.003
-    read, faults = _touch(made, right, wires, place)
+    read, faults = _touch(made, plain, wires, place)
     astray = read is None or math.hypot(read.u - place[0], 0.04 * (read.phi - place[1])) > 0.05
     assert astray or faults, "without the patch it is mirrored, or contradicts itself"
 
@@ -114,12 +122,12 @@ def test_what_the_scene_can_mend_is_patched_and_then_read_where_it_is_touched(
 def _touch(
     made: Sensor, read: Sensor, wires: str, place: tuple[float, float]
 ) -> tuple[TouchMoved | None, list[SkinFault]]:
-    """The last place of a touch of 1 s, read as a scene says, if it has one, and the faults."""
-    touch = ScriptedTouch(1.0, 2.0, *place, force=8.0, radius=0.006)
-    skin = VirtualSkin(made, [touch], rate_hz=250.0, wires=wires, duration=2.0)
+    """The last place of a touch of 0.6 s, read as a scene says, if it has one, and the faults."""
+    touch = ScriptedTouch(0.5, 1.1, *place, force=8.0, radius=0.006)
+    skin = VirtualSkin(made, [touch], rate_hz=250.0, wires=wires, duration=1.1)
     stream, events = TouchStream([read]), []
     for time, data in skin.packets():
-        if time > 1.95:
+        if time > 1.05:
             break
         events += stream.feed(data, time)
     places = [event for event in events if isinstance(event, TouchMoved)]
@@ -152,13 +160,10 @@ def test_a_low_rate_for_which_the_scene_is_made_is_a_warning() -> None:
 
 
 def test_frames_of_touches_are_held_against_themselves() -> None:
-    right = finding(examine(), "skin, chi-squared")
-    assert right.verdict == "ok"
+    assert finding(right(), "skin, chi-squared").verdict == "ok"
     off = finding(examine(TEXT.replace("wrap_deg = 330", "wrap_deg = 330\npulldown_ohm = 11000")), "skin, chi-squared")
     assert off.verdict == "bad"
     assert "measure pulldown_ohm" in off.remedy
-    mirrored = finding(examine(wires="BACD"), "skin, chi-squared")
-    assert (mirrored.verdict, mirrored.value) == ("not tried", "the wires are not in order")
 
 
 def test_another_sheet_resistance_is_named_with_what_to_write() -> None:

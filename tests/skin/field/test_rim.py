@@ -93,10 +93,9 @@ def test_two_discs_agree_too() -> None:
     assert np.allclose(rims.matrix(), multipoles.matrix(), rtol=1e-12, atol=1e-13)
 
 
-@pytest.mark.parametrize("lower", [1e-4, 3e-5])
-def test_what_is_not_solved_is_refused(lower: float) -> None:
+def test_what_is_not_solved_is_refused() -> None:
     """A perfect bond 1e-5 radii from an edge, between very unequal sheets."""
-    model = FieldModel(PAPER, 1.0, lower, tolerance=1e-6)
+    model = FieldModel(PAPER, 1.0, 3e-5, tolerance=1e-6)
     with pytest.raises(FieldError, match=r"scene 0 \(u=0.0200002 m.*only to about .* of the supply, the tolerance is"):
         model.contacts(0.02 * (1 + 1e-5), 0.7, 0.02)
 

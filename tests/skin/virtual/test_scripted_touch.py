@@ -36,12 +36,12 @@ def test_the_way_is_straight_and_even_and_stays_where_it_ends():
 
 
 def test_a_slide_that_is_let_go_early_keeps_the_way_it_has_come():
-    skins = [VirtualSkin(SENSOR, [SLIDE], model="ladder", seed=2, duration=0.6) for _ in range(2)]
+    skins = [VirtualSkin(SENSOR, [SLIDE], model="ladder", seed=2, duration=0.25) for _ in range(2)]
     whole, short = ([frame for _, frame in skin.frames()] for skin in skins)
-    skins[0].release(0.5)
+    skins[0].release(0.15)
     early = [frame for _, frame in skins[0].frames()]
-    assert early[:500] == whole[:500] == short[:500]
-    assert early[599].touch_c < 10 < 300 < whole[599].touch_c
+    assert early[:150] == whole[:150] == short[:150]
+    assert early[249].touch_c < 10 < 300 < whole[249].touch_c
 
 
 @pytest.mark.parametrize(
@@ -109,10 +109,10 @@ def test_every_contact_of_a_shape_slides_the_same_way(shape):
 
 FOREARM = Frustum(0.0375, 0.0375, 0.24, math.radians(350))
 TURN = Frustum(0.0375, 0.0375, 0.24)
-TOUCH = ScriptedTouch(0.2, 1.0, 0.12, 2.0, force=8.0)
+TOUCH = ScriptedTouch(0.12, 1.0, 0.12, 2.0, force=8.0)
 
 
-def read(cone: Frustum, touches: Sequence[ScriptedTouch], end: float = 0.5) -> list[TouchReading]:
+def read(cone: Frustum, touches: Sequence[ScriptedTouch], end: float = 0.3) -> list[TouchReading]:
     """What a detector reads of each frame of the touches, at 1000 frames a second."""
     sensor = Sensor(cone)
     detector, found = Detector(sensor), []
@@ -136,7 +136,7 @@ def read(cone: Frustum, touches: Sequence[ScriptedTouch], end: float = 0.5) -> l
 )
 def test_no_place_of_several_contacts_is_certain(shape):
     found = read(FOREARM, shape)
-    assert len(found) > 200
+    assert len(found) > 120
     assert not any(reading.location_valid for reading in found)
 
 
@@ -145,13 +145,13 @@ def test_one_fingertip_is_certain():
 
 
 def test_a_body_over_the_gap_presses_both_sides():
-    press = ScriptedTouch(0.2, 1.0, 0.12, 0.05, force=30.0)  # 1.9 mm from the edge, 11.7 mm in radius
+    press = ScriptedTouch(0.12, 1.0, 0.12, 0.05, force=30.0)  # 1.9 mm from the edge, 11.7 mm in radius
     found = read(TURN, [press])
     places = [
         (reading.u, math.remainder(reading.phi - 0.05, 2.0 * math.pi)) for reading in found if reading.location_valid
     ]
     assert all(abs(u - 0.12) < 0.002 and abs(off) < math.radians(5.0) for u, off in places)  # one press, where it is
-    farther = ScriptedTouch(0.2, 1.0, 0.12, 0.35, force=30.0)
+    farther = ScriptedTouch(0.12, 1.0, 0.12, 0.35, force=30.0)
     assert read(TURN, [farther])[-1].location_valid
 
 
@@ -178,20 +178,20 @@ def test_a_press_grows_evenly_and_its_level_with_it():
     forces = [press.force_at(time) for time in (0.01, 0.51, 1.01, 1.5, 1.995, 2.0)]
     assert forces == pytest.approx([2.0, 51.0, 100.0, 100.0, 50.0, 0.0])
     assert press.firmest == 100.0
-    growing = ScriptedTouch(0.2, 2.0, 0.1, 1.0, force=2.0, grown_force=100.0, growth_time=0.5)
-    levels = [reading.level for reading in read(FOREARM, [growing], 0.7)]
-    assert levels[50] + 0.03 < levels[-1]
-    assert levels[50] < levels[150] < levels[-1]
+    growing = ScriptedTouch(0.12, 2.0, 0.1, 1.0, force=2.0, grown_force=100.0, growth_time=0.25)
+    levels = [reading.level for reading in read(FOREARM, [growing], 0.4)]
+    assert levels[30] + 0.03 < levels[-1]
+    assert levels[30] < levels[90] < levels[-1]
 
 
 def test_the_foam_under_a_growing_press_is_exact():
     """Against many small steps of constant force."""
     foam = Foam()
     press = ScriptedTouch(0.0, 1.0, 0.1, 1.0, force=2.0, grown_force=50.0, growth_time=0.3, rise=0.05)
-    state, step = 0.0, 1e-5
-    for k in range(100_000):
+    state, step = 0.0, 2e-5
+    for k in range(50_000):
         state = foam.advance(state, press.force_at((k + 0.5) * step), step)
-        if k % 9973 == 0:
+        if k % 4987 == 0:
             time = (k + 1) * step
             assert press.seated_at(time, foam) == pytest.approx(foam.seated(state, press.force_at(time)), abs=2e-3)
     assert ContactLaw().touch(press.firmest).radius > ContactLaw().touch(press.force).radius
