@@ -221,14 +221,6 @@ class Sensor:
         slope = self._from_end1.slope(u) * self.electronics.supply_volts
         return -slope if self.b_positive else slope
 
-    def angular_sensitivity(self) -> float:
-        """Return the change of the angular potential about the axis: dUt/dphi [V/rad], signed.
-
-        Eq. 26 is this times wrap/theta0.
-        """
-        slope = self.electronics.supply_volts / self._wrap
-        return slope if self.c_positive else -slope
-
     def _work_out_bounds(self) -> Bounds:
         parts, limits = self.electronics, self.thresholds
         full = parts.full_count

@@ -40,7 +40,7 @@ HELD_LINE = "drive_all(a == FREE ? GROUND : a, b == FREE ? GROUND : b, c == FREE
 
 def held_sheets(contacts: Sequence[LayerContact]) -> str:
     """A command of the emulator: the sheets with contacts that stay."""
-    matrix = FieldContacts().admittance(SENSOR, contacts)
+    matrix = FieldContacts().admittances(SENSOR, [contacts])[0]
     return "0 sheets " + " ".join(repr(float(y)) for row in matrix for y in row)
 
 

@@ -21,6 +21,7 @@ __all__ = [
     "find_frames",
     "printable_share",
     "short_hex",
+    "swap_bytes",
     "sync_places",
 ]
 
@@ -92,6 +93,7 @@ class CaptureWindow:
 
 EDGE = MAX_LENGTH  #: bytes at either end of a capture that may belong to a frame that is cut
 _LENGTH_AT = 3  # offset of the length in a frame
+_SHOWN_BYTES = 12  # bytes in a message
 _TEXT_BYTES = frozenset({9, 10, 13, *range(32, 127)})
 
 
@@ -158,6 +160,11 @@ def printable_share(data: bytes) -> float:
     return sum(byte in _TEXT_BYTES for byte in data) / len(data) if data else 0.0
 
 
-def short_hex(data: bytes, count: int = 12) -> str:
+def short_hex(data: bytes) -> str:
     """Return the first bytes in hexadecimal, for a message."""
-    return data[:count].hex(" ").upper() + (" ..." if len(data) > count else "")
+    return data[:_SHOWN_BYTES].hex(" ").upper() + (" ..." if len(data) > _SHOWN_BYTES else "")
+
+
+def swap_bytes(value: int, size: int = 2) -> int:
+    """Return a number of so many bytes with their order turned."""
+    return int.from_bytes(value.to_bytes(size, "little"), "big")

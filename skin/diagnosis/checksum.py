@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from binascii import crc_hqx
 from collections.abc import Callable, Sequence
+from functools import reduce
 from itertools import product
+from operator import xor
 from typing import Literal, NamedTuple
 
 from coneskin.core.finding import Finding
 
+from .capture import swap_bytes
 from .cause import Cause
 
 __all__ = ["crc16", "find_checksum"]
@@ -98,10 +101,10 @@ def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Finding | None
         "the sum of the bytes": sum,
         "the sum of the bytes, negated": lambda data: -sum(data),
         "the sum of the bytes, inverted": lambda data: ~sum(data),
-        "the exclusive or of the bytes": _exclusive_or,
+        "the exclusive or of the bytes": lambda data: reduce(xor, data),
         "the sum of the 16-bit words": lambda data: sum(data[::2]) + (sum(data[1::2]) << 8),
         "a Fletcher checksum": _fletcher,
-        "a CRC of 8 bits": _crc8,
+        "a CRC of 8 bits": lambda data: crc16(data, 0x0700) >> 8,
     }
     pairs = list(zip(bodies, tails, strict=True))
     for (words, kind), start in product(kinds.items(), _RANGE_WORDS):
@@ -118,28 +121,12 @@ def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Finding | None
     return None
 
 
-def _exclusive_or(data: bytes) -> int:
-    value = 0
-    for byte in data:
-        value ^= byte
-    return value
-
-
 def _fletcher(data: bytes) -> int:
     low = high = 0
     for byte in data:
         low = (low + byte) % 255
         high = (high + low) % 255
     return high << 8 | low
-
-
-def _crc8(data: bytes) -> int:
-    register = 0
-    for byte in data:
-        register ^= byte
-        for _ in range(8):
-            register = (register << 1 ^ 0x07 if register & 0x80 else register << 1) & 0xFF
-    return register
 
 
 def _find_crc(frames: Sequence[tuple[bytes, bytes]]) -> Finding | None:
@@ -153,17 +140,13 @@ def _find_crc(frames: Sequence[tuple[bytes, bytes]]) -> Finding | None:
             change = bytes(a ^ b for a, b in zip(body0, body, strict=True)).lstrip(b"\0") + padded
             crc = crc16(change, polynomial, 0, reflected)
             got = int.from_bytes(tail0, "big") ^ int.from_bytes(tail, "big")
-            orders &= {order for order, value in (("big", got), ("little", _swapped(got))) if value == crc}
+            orders &= {order for order, value in (("big", got), ("little", swap_bytes(got))) if value == crc}
             if not orders:
                 break
         if orders:
             order: Literal["big", "little"] = "big" if "big" in orders else "little"
             return _describe(body0, tail0, _Found(polynomial, bool(padded), reflected, order))
     return None
-
-
-def _swapped(value: int) -> int:
-    return (value & 0xFF) << 8 | value >> 8
 
 
 class _Found(NamedTuple):

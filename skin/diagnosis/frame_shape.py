@@ -12,7 +12,7 @@ from coneskin.skin.wire import FRAME_LENGTHS, MAX_LENGTH, SYNC, VERSION
 
 from .capture import FoundFrames, count_frames, printable_share, short_hex, sync_places
 from .cause import Cause
-from .checksum import crc16, find_checksum
+from .checksum import find_checksum
 from .foreign_stream import first_line, undo_newlines, undo_slip
 
 __all__ = ["find_damage", "find_foreign_sync", "find_padding", "find_shape"]
@@ -21,7 +21,6 @@ _MIN_STARTS = 4  # that look like a frame's beginning
 _AGREEING_SHARE = 0.6  # of them that must agree
 _SAMPLE_COUNT = 48  # frames that are compared
 _WIRE_BUFFERS = (32, 64)  # bytes; buffers of common libraries
-_RIGHT_POLYNOMIAL = 0x1021
 _LAST_FIELD = 2  # bytes of the CRC
 _MIN_LENGTH, _MAX_PERIOD = 8, 80
 _PERIODIC_SHARE = 0.35  # share of the bytes that equal the one a frame before
@@ -80,7 +79,7 @@ def _wrong_size(frames: Sequence[bytes], length: int, period: int) -> Finding:
 
 def _valid_alone(frames: Sequence[bytes]) -> bool:
     """Tell whether the frames have a right checksum for the length that they have."""
-    return bool(frames) and all(crc16(frame, _RIGHT_POLYNOMIAL) == 0 for frame in frames[-4:])
+    return bool(frames) and not any(crc_hqx(frame, 0) for frame in frames[-4:])
 
 
 def find_padding(frames: Sequence[bytes]) -> Finding | None:
@@ -103,10 +102,9 @@ def find_padding(frames: Sequence[bytes]) -> Finding | None:
 
 def find_foreign_sync(data: bytes) -> Finding | None:
     """Find frames that begin with other bytes, by their regularity."""
-    for sync, cause, words in ((SYNC[::-1], Cause.SYNC_SWAPPED, "the sync bytes come as 3A C5, exchanged"),):
-        places, period, share = sync_places(data, sync)
-        if len(places) >= _MIN_STARTS and share >= _AGREEING_SHARE and _MIN_LENGTH <= period <= MAX_LENGTH:
-            return cause.found(words)
+    places, period, share = sync_places(data, SYNC[::-1])
+    if len(places) >= _MIN_STARTS and share >= _AGREEING_SHARE and _MIN_LENGTH <= period <= MAX_LENGTH:
+        return Cause.SYNC_SWAPPED.found("the sync bytes come as 3A C5, exchanged")
     period = _find_period(data)
     if not period:
         return None

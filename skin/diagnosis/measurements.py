@@ -10,6 +10,7 @@ from coneskin.core.finding import Finding
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
 
+from .capture import swap_bytes
 from .cause import Cause
 
 __all__ = [
@@ -61,29 +62,18 @@ def find_big_endian(frames: Sequence[Frame]) -> Finding | None:
         return None
     pairs = list(itertools.pairwise(frames))
 
-    def share(number: Callable[[Frame], int], good: Callable[[int], bool], mask: int) -> float:
-        return sum(good((number(b) - number(a)) & mask) for a, b in pairs) / len(pairs)
+    def share(number: Callable[[Frame], int], size: int, most: int) -> float:
+        return sum(0 < (number(b) - number(a)) % (1 << 8 * size) <= most for a, b in pairs) / len(pairs)
 
-    def is_one(step: int) -> bool:
-        return step == 1
-
-    def is_short(step: int) -> bool:
-        return 0 < step < 1_000_000
-
-    straight = share(lambda f: f.sequence, is_one, 0xFFFF), share(lambda f: f.clock_us, is_short, 0xFFFFFFFF)
-    turned = (
-        share(lambda f: _turn2(f.sequence), is_one, 0xFFFF),
-        share(lambda f: _turn4(f.clock_us), is_short, 0xFFFFFFFF),
-    )
-    names = [
-        name
-        for name, right, wrong in zip(("sequence", "clock"), turned, straight, strict=True)
-        if right > 0.8 and wrong < 0.5
-    ]
+    names = []
+    for name, field, size, most in (("sequence", "sequence", 2, 1), ("clock", "clock_us", 4, 999_999)):
+        straight = share(lambda f: getattr(f, field), size, most)  # noqa: B023  # called at once
+        if share(lambda f: swap_bytes(getattr(f, field), size), size, most) > 0.8 and straight < 0.5:  # noqa: B023
+            names.append(name)
     if names:
         return Cause.BIG_ENDIAN.found(f"the {' and the '.join(names)} of the frames come high byte first (big-endian)")
     counts = [count for frame in frames[-64:] for count in _measured(frame)]
-    low = max(_turn2(count) for count in counts)
+    low = max(swap_bytes(count) for count in counts)
     if max(counts) > 0xFFF and low <= 0xFFF and gcd(*counts) % 16:
         return Cause.BIG_ENDIAN.found("the measurements come high byte first (big-endian)")
     return None
@@ -91,14 +81,6 @@ def find_big_endian(frames: Sequence[Frame]) -> Finding | None:
 
 def _measured(frame: Frame) -> tuple[int, ...]:
     return frame[_FIRST_MEASURED : _FIRST_MEASURED + len(MEASURED)]  # type: ignore[return-value]  # integers, all of them
-
-
-def _turn2(value: int) -> int:
-    return (value & 0xFF) << 8 | value >> 8
-
-
-def _turn4(value: int) -> int:
-    return int.from_bytes(value.to_bytes(4, "little"), "big")
 
 
 def find_status(frames: Sequence[Frame]) -> Finding | None:

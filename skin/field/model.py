@@ -65,12 +65,8 @@ class FieldModel:
         """Contrast of the sheets, |Ru - Rl| / (Ru + Rl): 0 for equal sheets."""
         return abs(self.upper_resistance - self.lower_resistance) / (self.upper_resistance + self.lower_resistance)
 
-    def discs(self, discs: Sequence[Disc], order: int | None = None) -> Coupling:
+    def discs(self, discs: Sequence[Disc]) -> Coupling:
         """Couple one scene (n = 1) of several discs that do not overlap.
-
-        Args:
-            discs: at least one.
-            order: multipole order M; None chooses it for the model's tolerance.
 
         Raises:
             FieldError: a disc that cannot be (see `check_discs`), or none at all.
@@ -80,7 +76,7 @@ class FieldModel:
         u, phi, radius, conductance = (
             np.array([[getattr(d, name) for d in discs]]) for name in ("u", "phi", "radius", "conductance")
         )
-        return self.contacts(u, phi, radius, conductance, order=order)
+        return self.contacts(u, phi, radius, conductance)
 
     def contacts(
         self,

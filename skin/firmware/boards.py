@@ -159,18 +159,9 @@ def board_header(converter: str = BUILT_IN) -> bytes:
 def _board(row: str) -> Board:
     words = [listed or quoted or word for quoted, listed, word in _WORD_PATTERN.findall(row)]
     name, bits, baud, sense, current, supply, rail, ground, pull_down, select, common = words
+    gates = _pins(rail), _pins(ground), _pins(pull_down)
     return Board(
-        name=name,
-        bits=int(bits),
-        baud=int(baud),
-        sense=_pins(sense),
-        current=current,
-        supply=supply,
-        rail=_pins(rail),
-        ground=_pins(ground),
-        pull_down=_pins(pull_down),
-        select=_pins(select),
-        common="".join(_pins(common)),
+        name, int(bits), int(baud), _pins(sense), current, supply, *gates, _pins(select), "".join(_pins(common))
     )
 
 

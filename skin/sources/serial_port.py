@@ -85,7 +85,7 @@ class SerialPort(Source):
         self.low_latency = False
         self._port: Any = None
         self._descriptor: int | None = None
-        self._wait: Callable[[float], bool] = _never
+        self._wait: Callable[[float], bool] = bool  # set with the descriptor
 
     def open(self) -> None:
         """Open the port for this process alone, and throw away what had piled up in it.
@@ -117,7 +117,6 @@ class SerialPort(Source):
     def close(self) -> None:
         """Close the port; it does not matter whether it is open or still there."""
         port, self._port, self._descriptor = self._port, None, None
-        self._wait = _never
         if port is not None:
             with suppress(OSError):  # a port that was pulled out cannot be closed any better than this
                 port.close()
@@ -163,10 +162,6 @@ class SerialPort(Source):
         except OSError as error:  # SerialException is one
             raise SkinConnectionError(f"{self.name} is gone: {error}") from error
         raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
-
-
-def _never(_: float) -> bool:
-    return False
 
 
 def _descriptor(port: Any) -> int | None:

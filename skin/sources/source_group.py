@@ -22,22 +22,13 @@ _TURN_TIME = 0.001  # s for each source in turn, where there is nothing to wait 
 
 
 class _FrameBoundary:
-    """A stream of bytes that is handed on in whole frames; what is no frame goes with the next one.
-
-    Attributes:
-        frames: whole frames handed on.
-    """
+    """A stream of bytes that is handed on in whole frames; what is no frame goes with the next one."""
 
     __slots__ = ("_decoder", "_rest")
 
     def __init__(self) -> None:
         self._decoder = FrameDecoder()
         self._rest = b""
-
-    @property
-    def frames(self) -> int:
-        """Number of frames handed on."""
-        return self._decoder.frames
 
     def cut(self, data: bytes) -> bytes:
         """Take the next bytes; return all that belong to whole frames, or to none, with what was kept before."""
@@ -75,11 +66,6 @@ class SourceGroup(Source):
         self._opened = False
         self._poll: Any = None
         self._by_descriptor: dict[int, Source] = {}
-
-    @property
-    def frames(self) -> dict[str, int]:
-        """Whole frames that have come from each source, by its name."""
-        return {name: cut.frames for name, cut in self._cuts.items()}
 
     def open(self) -> None:
         """Open all of them, or none."""

@@ -145,33 +145,11 @@ def run(args: argparse.Namespace) -> int:
         duration=args.duration_s,
         frame_length=args.frame_length,
     )
-    return _play_skin(skin, output=args.output, link=args.link, at_once=args.now, as_json=args.json)
+    return _play_skin(skin, args.output, args.link, args.now, args.json)
 
 
-def _play_skin(
-    skin: VirtualSkin,
-    *,
-    output: str | None = None,
-    link: str | None = None,
-    at_once: bool = False,
-    as_json: bool = False,
-) -> int:
-    """Play a virtual skin, from options or from a scene, until it ends or the program is told to stop.
-
-    Args:
-        skin: what to play.
-        output: file for the bytes, "-" for standard output; a pseudo-terminal by default.
-        link: name of a link to the port.
-        at_once: begin before the port is opened.
-        as_json: report in JSON.
-
-    Returns:
-        the exit code, 0.
-
-    Raises:
-        SensorError: the bytes are for a file, and the skin has no end.
-        SkinConnectionError: there are no pseudo-terminals, or the file or link cannot be made.
-    """
+def _play_skin(skin: VirtualSkin, output: str | None, link: str | None, at_once: bool, as_json: bool) -> int:
+    """Play a virtual skin until it ends or the program is told to stop, and return the exit code."""
     if output is not None:
         return _write_file(skin, output, as_json)
     from .pseudo_terminal import Pacing, drain, open_raw_terminal, play, wait_for_reader, write_all

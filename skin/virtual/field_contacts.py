@@ -156,10 +156,6 @@ class FieldContacts:
         self.tolerance = tolerance
         self._settings: OrderedDict[tuple[Sensor, _Key], _Setting] = OrderedDict()
 
-    def admittance(self, sensor: Sensor, contacts: Sequence[LayerContact]) -> Matrix:
-        """Return the 4 x 4 matrix Y [S] of one scene; see ``admittances``."""
-        return self.admittances(sensor, [contacts])[0]
-
     def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
         """Return for each scene the 4 x 4 matrix Y [S] in the order A, B, C, D: symmetric, its rows sum to zero.
 

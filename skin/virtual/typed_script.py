@@ -61,17 +61,12 @@ def parse_press(text: str) -> tuple[str, ScriptedTouch]:
         SensorError: it is something else.
     """
     text, _, sensor = text.partition("@")
-    shape, touch = _parse_shape(text)
-    return shape, replace(touch, sensor=sensor.strip())
-
-
-def _parse_shape(text: str) -> tuple[str, ScriptedTouch]:
     shape, separator, rest = text.partition(":")
-    if separator and shape in TOUCH_SHAPES:
-        return shape, _parse_touch(rest)
-    if shape[:1].isalpha():
-        raise SensorError(f"the shape of a touch must be one of {', '.join(TOUCH_SHAPES)}, got {shape!r}")
-    return "finger", _parse_touch(text)
+    if not (separator and shape in TOUCH_SHAPES):
+        if shape[:1].isalpha():
+            raise SensorError(f"the shape of a touch must be one of {', '.join(TOUCH_SHAPES)}, got {shape!r}")
+        shape, rest = "finger", text
+    return shape, replace(_parse_touch(rest), sensor=sensor.strip())
 
 
 def _parse_touch(text: str) -> ScriptedTouch:

@@ -31,7 +31,7 @@ FINE = Electronics(adc_bits=16, input_ohms=1e12, lead_ohms=LeadOhms.equal(1e-6))
 
 
 def through_the_electronics(sensor: Sensor, contact: LayerContact) -> Reading:
-    sheets = FieldContacts().admittance(sensor, [contact])
+    sheets = FieldContacts().admittances(sensor, [[contact]])[0]
     volts = measure(sensor, (sheets, sheets, sheets))
     parts = sensor.electronics
     counts = {n: parts.count_amperes(v) if "current" in n else parts.count_volts(v) for n, v in volts._asdict().items()}
@@ -69,7 +69,7 @@ def test_scenes_keep_their_order_and_are_the_field_models() -> None:
 def test_a_weak_contact_is_the_ladder_with_the_spreading_left_out() -> None:
     # 1 Mohm against a spreading resistance of some kohm: the couplings agree to that ratio
     sensor = Sensor(UR10)
-    exact = FieldContacts().admittance(sensor, [LayerContact(0.1, 1.0, 1e-6)])
+    exact = FieldContacts().admittances(sensor, [[LayerContact(0.1, 1.0, 1e-6)]])[0]
     rough = ResistorLadder().admittance(sensor, [LayerContact(0.1, 1.0, 1e-6)])
     for j in (0, 1):
         for k in (2, 3):
@@ -83,14 +83,14 @@ def test_a_contact_across_an_edge_against_the_general_patch(u: float, phi: float
     siemens = conductance * math.pi * radius**2
     model = FieldModel(SectorSheet.of_frustum(LINK), 1000.0, 1000.0)
     patch = model.admittance(solve_patch(model, ContactPatch(u, phi, disc(radius), conductance), 32, 7))[0].tolist()
-    mine = FieldContacts().admittance(sensor, [LayerContact(u, phi, siemens, radius)])
+    mine = FieldContacts().admittances(sensor, [[LayerContact(u, phi, siemens, radius)]])[0]
     got, wanted = measure(sensor, [mine] * 3), measure(sensor, [patch] * 3)
     for place in (3, 4, 6, 7):  # what says the place: 0.15 % of 2.5 V, 0.3 mm of 200 (measured 0.2 mm)
         assert got[place] == pytest.approx(wanted[place], abs=0.0015 * 2.5)
     for place in (0, 1):  # what says the level: the smaller disc's current spreads with 150 ohm more of 7 kohm
         assert got[place] == pytest.approx(wanted[place], rel=0.04)
     # Pressed so weakly that spreading does not matter, it conducts as much as what is on the sheet.
-    weak = FieldContacts().admittance(sensor, [LayerContact(u, phi, 1e-6 * siemens, radius)])
+    weak = FieldContacts().admittances(sensor, [[LayerContact(u, phi, 1e-6 * siemens, radius)]])[0]
     area = model.discs([Disc(0.1, 3.0, radius, 1e-6 * conductance)]).conductance[0]
     cut = solve_patch(model, ContactPatch(u, phi, disc(radius), 1e-6 * conductance), 32, 7).conductance[0]
     conducts = -sum(weak[upper][lower] for upper in (0, 1) for lower in (2, 3))
@@ -101,11 +101,12 @@ def test_a_contact_across_an_edge_against_the_general_patch(u: float, phi: float
 def test_overlapping_contacts_conduct_as_one() -> None:
     sensor, model = Sensor(LINK), FieldContacts()
     one = LayerContact(0.1, 3.0, 1e-3, 0.005)
-    same = model.admittance(sensor, [one, one])
-    assert np.allclose(same, model.admittance(sensor, [one._replace(conductance=2e-3, radius=0.005 * math.sqrt(2))]))
+    same = model.admittances(sensor, [[one, one]])[0]
+    joint = one._replace(conductance=2e-3, radius=0.005 * math.sqrt(2))
+    assert np.allclose(same, model.admittances(sensor, [[joint]])[0])
     # 6 mm apart: smaller discs of the same conductance, whose spreading differs by ln 2 at most, at the same place
-    apart = model.admittance(sensor, [one, one._replace(u=0.106)])
-    middle = model.admittance(sensor, [one._replace(u=0.103, conductance=2e-3, radius=0.007)])
+    apart = model.admittances(sensor, [[one, one._replace(u=0.106)]])[0]
+    middle = model.admittances(sensor, [[one._replace(u=0.103, conductance=2e-3, radius=0.007)]])[0]
     got, wanted = measure(sensor, [apart] * 3), measure(sensor, [middle] * 3)
     assert got.touch_current == pytest.approx(wanted.touch_current, rel=0.03)
     assert got.radial_c + got.radial_d == pytest.approx(wanted.radial_c + wanted.radial_d, rel=2e-3)
@@ -120,7 +121,7 @@ def test_any_script_is_solved() -> None:
                 10 ** rng.uniform(-4, -0.5, rng.integers(1, 5)), rng.uniform(0.01, 1, 5), strict=False
             )
         ]
-        y = np.array(FieldContacts().admittance(sensor, contacts))
+        y = np.array(FieldContacts().admittances(sensor, [contacts])[0])
         assert np.isfinite(y).all()
         assert (y == y.T).all()
         assert np.linalg.eigvalsh(y).min() > -1e-12 * y.max()  # passive
@@ -128,7 +129,7 @@ def test_any_script_is_solved() -> None:
 
 def test_the_model_agrees_with_ohm_without_contact() -> None:
     sensor = Sensor(LINK)
-    sheets = FieldContacts().admittance(sensor, [])
+    sheets = FieldContacts().admittances(sensor, [[]])[0]
     volts = measure(sensor, (sheets, sheets, sheets))
     assert volts.radial_current == pytest.approx(sensor.radial_amperes, rel=1e-9)
     assert volts.angular_current == pytest.approx(sensor.angular_amperes, rel=1e-9)
@@ -139,11 +140,11 @@ def test_the_model_agrees_with_ohm_without_contact() -> None:
     [
         (lambda: FieldContacts(point_radius=0.0), "point_radius must be positive"),
         (
-            lambda: FieldContacts().admittance(Sensor(LINK), [LayerContact(0.1, 3.0, -1.0)]),
+            lambda: FieldContacts().admittances(Sensor(LINK), [[LayerContact(0.1, 3.0, -1.0)]])[0],
             "must be 0 or more and finite",
         ),
         (
-            lambda: FieldContacts().admittance(Sensor(LINK), [LayerContact(0.3, 3.0, 1.0)]),
+            lambda: FieldContacts().admittances(Sensor(LINK), [[LayerContact(0.3, 3.0, 1.0)]])[0],
             "a contact must lie on sensor",
         ),
     ],
