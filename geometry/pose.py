@@ -74,6 +74,42 @@ class Pose:
             (xyz[0], xyz[1], xyz[2]),
         )
 
+    @classmethod
+    def from_rotation_vector(cls, vector: Sequence[float], xyz: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
+        """Make a pose from a rotation vector, which is the axis times the angle [rad], and xyz [m] (Rodrigues)."""
+        x, y, z = vector
+        angle = math.sqrt(x * x + y * y + z * z)
+        if angle < 1e-12:
+            return cls(((1.0, -z, y), (z, 1.0, -x), (-y, x, 1.0)), (xyz[0], xyz[1], xyz[2]))
+        x, y, z = x / angle, y / angle, z / angle
+        c, s = math.cos(angle), math.sin(angle)
+        k = 1.0 - c
+        return cls(
+            (
+                (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
+                (y * x * k + z * s, c + y * y * k, y * z * k - x * s),
+                (z * x * k - y * s, z * y * k + x * s, c + z * z * k),
+            ),
+            (xyz[0], xyz[1], xyz[2]),
+        )
+
+    @property
+    def rotation_vector(self) -> Vector:
+        """Rotation vector [rad], its angle in [0, pi]; exact near 0 and near pi."""
+        (a, b, c), (d, e, f), (g, h, i) = self.rotation
+        x, y, z = h - f, c - g, d - b  # 2 sin(angle) axis
+        twice_sine, cosine = math.sqrt(x * x + y * y + z * z), (a + e + i - 1.0) / 2.0
+        angle = math.atan2(twice_sine / 2.0, cosine)
+        if cosine > -0.9:
+            factor = 0.5 * (1.0 + angle * angle / 6.0) if angle < 1e-4 else angle / twice_sine
+            return x * factor, y * factor, z * factor
+        # near pi the sine hardly determines the axis: take it from the symmetric part, its sign from the sine
+        xy, xz, yz = 0.5 * (b + d), 0.5 * (c + g), 0.5 * (f + h)
+        rows: tuple[Vector, ...] = (a - cosine, xy, xz), (xy, e - cosine, yz), (xz, yz, i - cosine)
+        axis = rows[max(range(3), key=lambda k: rows[k][k])]
+        factor = math.copysign(angle, _dot(axis, (x, y, z)) or 1.0) / math.hypot(*axis)
+        return axis[0] * factor, axis[1] * factor, axis[2] * factor
+
     @property
     def rpy(self) -> Vector:
         """Roll, pitch and yaw [rad], the inverse of ``from_xyz_rpy``; pitch in [-pi/2, pi/2]."""

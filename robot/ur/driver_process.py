@@ -37,7 +37,7 @@ from coneskin.robot.driver.messages import (
 )
 from coneskin.robot.driver.values import Waypoint
 
-from .ur_rtde import MIN_ACCELERATION, MOVE_L_DECELERATION, SERVO_DECELERATION, UrArm, stop_time
+from .ur_rtde import MIN_ACCELERATION, MOVE_L_DECELERATION, SERVO_DECELERATION, STRAIGHT_MOVES, UrArm, stop_time
 
 __all__ = ["DriverProcess", "carry_out", "main"]
 
@@ -81,10 +81,10 @@ def carry_out(
     wait = bool(request.get("wait", True))
     match request["do"]:
         case "move_j" | "move_j_ik" | "move_l" | "move_l_fk" as move:
-            acceleration, straight = _stop_acceleration(request), move in ("move_l", "move_l_fk")
+            acceleration, straight = _stop_acceleration(request), move in STRAIGHT_MOVES
             work(stop_time(MOVE_L_DECELERATION if straight else acceleration))  # it first ends what is under way
             target = request["q"] if move in ("move_j", "move_l_fk") else request["pose"]
-            getattr(arm, move)(target, request["speed"], acceleration)
+            arm.move(move, target, request["speed"], acceleration)
             return _RequestOutcome(True, waits=wait)
         case "move_path":
             waypoints = [Waypoint.from_message(message) for message in request["waypoints"]]
@@ -98,13 +98,13 @@ def carry_out(
         case "speed_j" | "speed_l" as move:
             duration, acceleration = _duration(request), _stop_acceleration(request)
             work(stop_time(min(acceleration, MOVE_L_DECELERATION)))
-            getattr(arm, move)(request["qd" if move == "speed_j" else "twist"], acceleration)
+            arm.speed(move, request["qd" if move == "speed_j" else "twist"], acceleration)
             return _RequestOutcome(True, holds=duration)
         case "servo_j" | "servo_l" as move:
             duration = _duration(request)
             work(stop_time(SERVO_DECELERATION))
             target = request["q" if move == "servo_j" else "pose"]
-            getattr(arm, move)(target, float(request.get("lookahead", 0.1)), float(request.get("gain", 300.0)))
+            arm.servo(move, target, float(request.get("lookahead", 0.1)), float(request.get("gain", 300.0)))
             return _RequestOutcome(True, holds=duration)
         case "wait":
             return _RequestOutcome(waits=arm.moving())
@@ -113,9 +113,9 @@ def carry_out(
     work(_ANSWER_TIME)
     match request["do"]:
         case "set_tcp":
-            arm.set_tcp(request["pose"])
+            arm.set("set_tcp", list(request["pose"]))
         case "set_payload":
-            arm.set_payload(request["mass"], request["centre"])
+            arm.set("set_payload", request["mass"], list(request["centre"]))
         case "ask":
             return _RequestOutcome(answer={"value": arm.ask(request["what"], *request["values"])})
         case other:
@@ -258,7 +258,7 @@ class DriverProcess:
                     self._guard.send(StatusReport("done").encode())
                 case SetJointVelocity(qd, acceleration):
                     self._allowed, self._patience, self._expires = False, SETPOINT_TIMEOUT, math.inf
-                    self._arm.speed_j(qd, acceleration)
+                    self._arm.speed("speed_j", qd, acceleration)
                 case Release(number):
                     self._work(_START_TIMEOUT)
                     self._arm.revive()

@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from coneskin.core.errors import RobotRefused
-from coneskin.geometry.pose import Pose, Vector
+from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
@@ -58,8 +58,8 @@ def read_pose(host: str, timeout: float = 2.0) -> _ArmPose | None:
 
 def _flange_distance(arm: ArmModel, pose: _ArmPose) -> float:
     """Return the distance of the flange of a model from the flange that the controller reports [m]."""
-    base_flange = _pose(pose.tcp) @ _pose(pose.offset).inverse()
-    return math.dist(forward(arm, pose.q).translation, base_flange.translation)
+    base_tcp, flange_tcp = (Pose.from_rotation_vector(v[3:], v[:3]) for v in (pose.tcp, pose.offset))
+    return math.dist(forward(arm, pose.q).translation, (base_tcp @ flange_tcp.inverse()).translation)
 
 
 def check_model(arm: ArmModel, pose: _ArmPose, host: str) -> None:
@@ -76,18 +76,3 @@ def check_model(arm: ArmModel, pose: _ArmPose, host: str) -> None:
         f"the arm at {host} is no {arm.name}: its flange is {1e3 * distance:.0f} mm from where a {arm.name} would have "
         f"it; " + (f"it is where a {' or '.join(fits)} has it: correct arm.model" if fits else "no model fits")
     )
-
-
-def _pose(values: Joints) -> Pose:
-    """Return the pose of x, y, z [m] and a rotation vector [rad]."""
-    x, y, z, rx, ry, rz = values
-    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
-    s = math.sin(angle) / angle if angle > 1e-9 else 1.0
-    h = math.sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
-    c = 2.0 * h * h  # (1 - cos) / angle^2, without its cancellation
-    rows: tuple[Vector, Vector, Vector] = (
-        (1.0 - c * (ry * ry + rz * rz), c * rx * ry - s * rz, c * rx * rz + s * ry),
-        (c * rx * ry + s * rz, 1.0 - c * (rx * rx + rz * rz), c * ry * rz - s * rx),
-        (c * rx * rz - s * ry, c * ry * rz + s * rx, 1.0 - c * (rx * rx + ry * ry)),
-    )
-    return Pose(rows, (x, y, z))

@@ -29,6 +29,7 @@ __all__ = [
     "MIN_ACCELERATION",
     "MOVE_L_DECELERATION",
     "SERVO_DECELERATION",
+    "STRAIGHT_MOVES",
     "Mode",
     "UrArm",
     "stop_time",
@@ -52,89 +53,9 @@ def _rtde_errors(doing: str) -> Iterator[None]:
         raise RobotConnectionError(f"{doing}: {why}") from exc
 
 
-class _ControlProgram:
-    """Program by which RTDEControlInterface moves the arm; open it in a ``with``.
-
-    Args:
-        host: the controller.
-        watchdog_hz: the controller stops the program when this process is silent for longer than 1 / watchdog_hz.
-
-    Attributes:
-        control: the wheel's RTDEControlInterface; None outside the ``with``.
-        wheel: its module.
-
-    Raises:
-        MissingExtra: the wheel is not installed.
-        RobotConnectionError: on entering, where the controller refuses.
-    """
-
-    def __init__(self, host: str, watchdog_hz: float) -> None:
-        self.host = host
-        self.control: Any = None
-        self.wheel: Any = None
-        self._watchdog_hz = watchdog_hz
-
-    def __enter__(self) -> _ControlProgram:
-        try:
-            import rtde_control  # type: ignore[import-not-found,unused-ignore]
-        except ImportError as exc:
-            raise MissingExtra("ur-rtde", "moving a UR arm (wheels exist for Python 3.11 and 3.12)") from exc
-        self.wheel = rtde_control
-        with _rtde_errors(f"connecting ur_rtde to {self.host}"):
-            self.control = rtde_control.RTDEControlInterface(self.host)
-            if not self.set_watchdog():
-                raise RobotRefused(f"the controller {self.host} did not accept a watchdog of {self._watchdog_hz:g} Hz")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self.control is not None:
-            control, self.control = self.control, None
-            with _rtde_errors(f"disconnecting from {self.host}"):
-                control.stopScript()
-                control.disconnect()
-
-    @property
-    def runs(self) -> bool:
-        """True while the controller runs it."""
-        return bool(self.control.isProgramRunning())
-
-    def set_watchdog(self, silence: float = 0.0) -> bool:
-        """Let the controller allow this silence [s], or that of ``watchdog_hz`` if it is longer; True where it does."""
-        return bool(self.control.setWatchdog(min(self._watchdog_hz, 1.0 / silence) if silence else self._watchdog_hz))
-
-    def kick(self) -> None:
-        """Kick the controller's watchdog: this process is alive."""
-        with _rtde_errors("kicking the controller's watchdog"):
-            if self.runs:
-                self.control.kickWatchdog()
-
-    def restart(self) -> None:
-        """Start it again where something else has ended it; the arm does not move meanwhile.
-
-        The register of the last command is still there, and a new program would execute it at once: after speedJ the
-        arm would start by itself. So command 0 is written first: a kick without a program does nothing else.
-
-        Raises:
-            RobotRefused: the controller does not start it.
-        """
-        self.control.kickWatchdog()
-        time.sleep(_REGISTER_DELAY)
-        running = self.control.reuploadScript() and self._await_start()
-        if not (running and self.set_watchdog()):
-            raise RobotRefused(f"the controller {self.host} does not start ur_rtde's program again")
-
-    def _await_start(self) -> bool:
-        """Wait for it to run: uploading it only sends it."""
-        end = time.monotonic() + _START_TIMEOUT
-        while not self.runs:
-            if time.monotonic() > end:
-                return False
-            time.sleep(0.005)
-        return True
-
-
 MOVE_L_DECELERATION = 10.0  #: rad/s2, of the stop before a straight move
 SERVO_DECELERATION = 2.0  #: rad/s2, of the stop before servo positions
+STRAIGHT_MOVES = ("move_l", "move_l_fk")  #: kinds of a move on which the tool goes straight
 MIN_ACCELERATION = 0.1  #: rad/s2 or m/s2
 _STOP_MARGIN = 0.3  # s for a stop to begin and to be confirmed
 _MAX_JOINT_SPEED = 3.5  # rad/s, of any joint; a stop takes this divided by the deceleration at most
@@ -164,12 +85,24 @@ class Mode(Enum):
     SERVO = "servo"
 
 
+_WHEEL_NAMES = {
+    **{"move_j": "moveJ", "move_j_ik": "moveJ_IK", "move_l": "moveL", "move_l_fk": "moveL_FK"},
+    **{"speed_j": "speedJ", "speed_l": "speedL", "servo_j": "servoJ", "servo_l": "servoL"},
+    **{"set_tcp": "setTcp", "set_payload": "setPayload"},
+}
+
+
 class UrArm:
-    """Arm behind RTDEControlInterface; open it in a ``with``.
+    """Arm behind RTDEControlInterface, which has a program of its own on the controller; open it in a ``with``.
 
     Args:
         host: the controller.
         watchdog_hz: the controller stops the program when this process is silent for longer than 1 / watchdog_hz.
+
+    Attributes:
+        mode: what it does.
+        control: the wheel's RTDEControlInterface; None outside the ``with``.
+        wheel: its module.
 
     Raises:
         MissingExtra: the wheel is not installed.
@@ -179,65 +112,83 @@ class UrArm:
     def __init__(self, host: str, watchdog_hz: float) -> None:
         self.host = host
         self.mode = Mode.IDLE
-        self._program = _ControlProgram(host, watchdog_hz)
+        self.control: Any = None
+        self.wheel: Any = None
+        self._watchdog_hz = watchdog_hz
 
     def __enter__(self) -> UrArm:
-        self._program.__enter__()
+        try:
+            import rtde_control  # type: ignore[import-not-found,unused-ignore]
+        except ImportError as exc:
+            raise MissingExtra("ur-rtde", "moving a UR arm (wheels exist for Python 3.11 and 3.12)") from exc
+        self.wheel = rtde_control
+        with _rtde_errors(f"connecting ur_rtde to {self.host}"):
+            self.control = rtde_control.RTDEControlInterface(self.host)
+            if not self._set_watchdog():
+                raise RobotRefused(f"the controller {self.host} did not accept a watchdog of {self._watchdog_hz:g} Hz")
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._program.__exit__()
+        if self.control is not None:
+            control, self.control = self.control, None
+            with _rtde_errors(f"disconnecting from {self.host}"):
+                control.stopScript()
+                control.disconnect()
+
+    def _set_watchdog(self, silence: float = 0.0) -> bool:
+        """Let the controller allow this silence [s], or that of ``watchdog_hz`` if it is longer; True where it does."""
+        return bool(self.control.setWatchdog(min(self._watchdog_hz, 1.0 / silence) if silence else self._watchdog_hz))
 
     def kick(self) -> None:
         """Kick the controller's watchdog: this process is alive."""
-        self._program.kick()
+        with _rtde_errors("kicking the controller's watchdog"):
+            if self.control.isProgramRunning():
+                self.control.kickWatchdog()
 
     def revive(self) -> None:
         """Start the control program again where something else has ended it; the arm does not move meanwhile.
+
+        The register of the last command is still there, and a new program would execute it at once: after speedJ the
+        arm would start by itself. So command 0 is written first: a kick without a program does nothing else.
 
         Raises:
             RobotRefused: the controller does not start it.
         """
         with _rtde_errors("starting the control program again"):
-            if not self._program.runs:
-                self.mode = Mode.IDLE
-                self._program.restart()
+            if self.control.isProgramRunning():
+                return
+            self.mode = Mode.IDLE
+            self.control.kickWatchdog()
+            time.sleep(_REGISTER_DELAY)
+            running = self.control.reuploadScript() and self._await_start()
+            if not (running and self._set_watchdog()):
+                raise RobotRefused(f"the controller {self.host} does not start ur_rtde's program again")
 
-    def move_j(self, q: Sequence[float], speed: float, acceleration: float) -> None:
-        """Start a move in joint space to q [rad], with the leading joint's speed [rad/s] and acceleration [rad/s2].
+    def _await_start(self) -> bool:
+        """Wait for the control program to run: uploading it only sends it."""
+        end = time.monotonic() + _START_TIMEOUT
+        while not self.control.isProgramRunning():
+            if time.monotonic() > end:
+                return False
+            time.sleep(0.005)
+        return True
 
-        Raises:
-            RobotRefused: the controller did not take it.
-        """
-        self._end_streaming(acceleration)
-        self._started(self._program.control.moveJ(list(q), speed, acceleration, True), "moveJ", Mode.MOVE)
+    def move(self, kind: str, target: Sequence[float], speed: float, acceleration: float) -> None:
+        """Start a move to joint positions [rad] or to a pose of the tool (x, y, z [m], rotation vector [rad]).
 
-    def move_l(self, pose: Sequence[float], speed: float, acceleration: float) -> None:
-        """Start a straight move of the tool to a pose (x, y, z [m], rotation vector [rad]), in m/s and m/s2.
-
-        Raises:
-            RobotRefused: the controller did not take it.
-        """
-        self._end_streaming(MOVE_L_DECELERATION)
-        self._started(self._program.control.moveL(list(pose), speed, acceleration, True), "moveL", Mode.MOVE)
-
-    def move_l_fk(self, q: Sequence[float], speed: float, acceleration: float) -> None:
-        """Start a straight move of the tool to where it is at joint positions q [rad]; as ``move_l``.
-
-        Raises:
-            RobotRefused: the controller did not take it.
-        """
-        self._end_streaming(MOVE_L_DECELERATION)
-        self._started(self._program.control.moveL_FK(list(q), speed, acceleration, True), "moveL_FK", Mode.MOVE)
-
-    def move_j_ik(self, pose: Sequence[float], speed: float, acceleration: float) -> None:
-        """Start a move in joint space to a pose of the tool (x, y, z [m], rotation vector [rad]); as ``move_j``.
+        Args:
+            kind: "move_j" to positions and "move_j_ik" to a pose, in joint space; "move_l" to a pose and "move_l_fk" to
+                positions, straight.
+            target: where to.
+            speed: of the leading joint [rad/s], or of the tool [m/s] where it moves straight.
+            acceleration: likewise [rad/s2] or [m/s2].
 
         Raises:
             RobotRefused: the controller did not take it.
         """
-        self._end_streaming(acceleration)
-        self._started(self._program.control.moveJ_IK(list(pose), speed, acceleration, True), "moveJ_IK", Mode.MOVE)
+        if self.mode is not Mode.IDLE:
+            self.stop(MOVE_L_DECELERATION if kind in STRAIGHT_MOVES else acceleration, at_once=False)
+        self._start(kind, Mode.MOVE, list(target), speed, acceleration, True)
 
     def move_path(self, waypoints: Sequence[Waypoint]) -> None:
         """Start a move along way points. It takes some 0.1 s before the arm moves, in which nothing can be stopped.
@@ -246,73 +197,63 @@ class UrArm:
             RobotRefused: the controller did not take it.
             ValueError: a speed, an acceleration or a blend is not within the wheel's limits.
         """
-        self._end_streaming(MOVE_L_DECELERATION)
-        entry, path = self._program.wheel.PathEntry, self._program.wheel.Path()
+        if self.mode is not Mode.IDLE:
+            self.stop(MOVE_L_DECELERATION, at_once=False)
+        entry, path = self.wheel.PathEntry, self.wheel.Path()
         for point in waypoints:
             kind = {"j": entry.MoveJ, "l": entry.MoveL, "p": entry.MoveP}[point.kind]
             position = entry.PositionJoints if point.joints else entry.PositionTcpPose
             values = [*point.target, point.speed, point.acceleration, point.blend]
             path.addEntry(entry(kind, position, values))
         with _rtde_errors("movePath"):
-            self._started(self._program.control.movePath(path, True), "movePath", Mode.MOVE)
-            if not self._program.set_watchdog():
+            self._started(self.control.movePath(path, True), "movePath", Mode.MOVE)
+            if not self._set_watchdog():
                 self.stop(MOVE_L_DECELERATION)
                 raise RobotRefused(f"the controller {self.host} did not take the watchdog of a path: it was stopped")
 
-    def set_tcp(self, pose: Sequence[float]) -> None:
-        """Set the pose of the tool in the flange's frame (x, y, z [m], rotation vector [rad]); nothing may move.
+    def set(self, kind: str, *values: object) -> None:
+        """Set the tool or the payload; nothing may move.
+
+        Args:
+            kind: "set_tcp": pose of the tool in the flange's frame (x, y, z [m], rotation vector [rad]); or
+                "set_payload": mass [kg], and its centre in the flange's frame [m].
+            values: that.
 
         Raises:
             RobotRefused: the arm is being moved, or the controller did not take it.
         """
-        self._set("setTcp", list(pose))
+        name = _WHEEL_NAMES[kind]
+        self._stand_for(name)
+        with _rtde_errors(name):
+            accepted = getattr(self.control, name)(*values)
+        if not accepted:
+            raise RobotRefused(f"the controller {self.host} did not take {name}{values}")
 
-    def set_payload(self, mass: float, centre: Sequence[float]) -> None:
-        """Set what the arm carries: mass [kg] and its centre in the flange's frame [m]; nothing may move.
+    def speed(self, kind: str, target: Sequence[float], acceleration: float) -> None:
+        """Move at these speeds until the next command.
 
-        Raises:
-            RobotRefused: the arm is being moved, or the controller did not take it.
-        """
-        self._set("setPayload", mass, list(centre))
-
-    def speed_j(self, qd: Sequence[float], acceleration: float) -> None:
-        """Move the joints at these speeds [rad/s] until the next command; acceleration of the leading joint [rad/s2].
+        Args:
+            kind: "speed_j" for speeds of the joints [rad/s], "speed_l" for a velocity of the tool [m/s, rad/s].
+            target: the speeds.
+            acceleration: of the leading joint [rad/s2], or of the tool [m/s2].
 
         Raises:
             RobotRefused: the controller did not take it.
         """
         if self.mode not in (Mode.IDLE, Mode.SPEED):  # a speed thread beside another live thread aborts the program
-            self.stop(acceleration, at_once=False)
+            self.stop(acceleration if kind == "speed_j" else MOVE_L_DECELERATION, at_once=False)
         # one cycle: without a time URScript's speedj returns when the speed is reached, and takes no new target before
-        self._started(self._program.control.speedJ(list(qd), acceleration, 0.002), "speedJ", Mode.SPEED)
+        self._start(kind, Mode.SPEED, list(target), acceleration, 0.002)
 
-    def speed_l(self, twist: Sequence[float], acceleration: float) -> None:
-        """Move the tool at a velocity [m/s, rad/s] until the next command, with an acceleration [m/s2].
-
-        Raises:
-            RobotRefused: the controller did not take it.
-        """
-        if self.mode not in (Mode.IDLE, Mode.SPEED):
-            self.stop(MOVE_L_DECELERATION, at_once=False)
-        self._started(self._program.control.speedL(list(twist), acceleration, 0.002), "speedL", Mode.SPEED)
-
-    def servo_j(self, q: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
-        """Follow joint positions q [rad], one each control cycle.
+    def servo(self, kind: str, target: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
+        """Follow joint positions [rad] ("servo_j") or poses of the tool ("servo_l"), one each control cycle.
 
         Raises:
             RobotRefused: the controller did not take it.
         """
-        self._begin_servo()
-        self._started(self._program.control.servoJ(list(q), 0.0, 0.0, 0.002, lookahead, gain), "servoJ", Mode.SERVO)
-
-    def servo_l(self, pose: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
-        """Follow poses of the tool (x, y, z [m], rotation vector [rad]), one each control cycle.
-
-        Raises:
-            RobotRefused: the controller did not take it.
-        """
-        self._begin_servo()
-        self._started(self._program.control.servoL(list(pose), 0.0, 0.0, 0.002, lookahead, gain), "servoL", Mode.SERVO)
+        if self.mode is not Mode.SERVO:
+            self.stop(SERVO_DECELERATION, at_once=False)
+        self._start(kind, Mode.SERVO, list(target), 0.0, 0.0, 0.002, lookahead, gain)
 
     def moving(self) -> bool:
         """Tell whether a move that was started here still runs; False in the other modes."""
@@ -323,7 +264,7 @@ class UrArm:
         if self.mode is not Mode.MOVE:
             return None
         with _rtde_errors("asking for progress"):
-            status = self._program.control.getAsyncOperationProgressEx()
+            status = self.control.getAsyncOperationProgressEx()
             if status.isAsyncOperationRunning():
                 return int(status.progress())
         self.mode = Mode.IDLE
@@ -345,9 +286,9 @@ class UrArm:
         self._stand_for(name)
         with _rtde_errors(name):
             if name == "getForwardKinematics" and values:
-                tool = list(values[1]) if len(values) > 1 else self._program.control.getTCPOffset()  # type: ignore[call-overload]
+                tool = list(values[1]) if len(values) > 1 else self.control.getTCPOffset()  # type: ignore[call-overload]
                 values = (values[0], tool if any(tool) else _NO_TOOL)
-            return getattr(self._program.control, name)(*values)
+            return getattr(self.control, name)(*values)
 
     def stop(self, deceleration: float, at_once: bool = True) -> None:
         """Stop what was started here, by the stop of its mode, and wait until the wheel returns.
@@ -363,41 +304,30 @@ class UrArm:
         mode, self.mode = self.mode, Mode.IDLE
         if not at_once and mode is not Mode.IDLE:
             with _rtde_errors("stopping"):
-                self._program.set_watchdog(stop_time(deceleration))
+                self._set_watchdog(stop_time(deceleration))
                 self._stop(mode, deceleration)
-                self._program.set_watchdog()
+                self._set_watchdog()
             return
         with _rtde_errors("stopping"):
             self._stop(mode, deceleration)
 
     def _stop(self, mode: Mode, deceleration: float) -> None:
         if mode is Mode.SPEED:
-            self._program.control.speedStop(deceleration)
+            self.control.speedStop(deceleration)
         elif mode is Mode.SERVO:
-            self._program.control.servoStop(deceleration)
+            self.control.servoStop(deceleration)
         else:  # also when idle: a move may have been started by a call whose answer was lost
-            self._program.control.stopJ(deceleration)
-
-    def _end_streaming(self, deceleration: float) -> None:
-        if self.mode is not Mode.IDLE:
-            self.stop(deceleration, at_once=False)
-
-    def _begin_servo(self) -> None:
-        if self.mode is not Mode.SERVO:
-            self.stop(SERVO_DECELERATION, at_once=False)
+            self.control.stopJ(deceleration)
 
     def _stand_for(self, name: str) -> None:
         """Refuse a call while something moves: one that waited would keep a stop waiting as well."""
         if self.moving() or self.mode is not Mode.IDLE:
             raise RobotRefused(f"{name} must wait until the arm has arrived or was stopped: call stop first")
 
-    def _set(self, name: str, *values: object) -> None:
-        """Call a setter of the wheel."""
-        self._stand_for(name)
-        with _rtde_errors(name):
-            accepted = getattr(self._program.control, name)(*values)
-        if not accepted:
-            raise RobotRefused(f"the controller {self.host} did not take {name}{values}")
+    def _start(self, kind: str, mode: Mode, *values: object) -> None:
+        """Start a motion by the wheel's method of that kind."""
+        name = _WHEEL_NAMES[kind]
+        self._started(getattr(self.control, name)(*values), name, mode)
 
     def _started(self, accepted: bool, name: str, mode: Mode) -> None:
         if not accepted:

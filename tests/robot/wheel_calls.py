@@ -505,7 +505,7 @@ def start_again_after_a_stop(host: str, revive: bool) -> dict[str, Any]:
     receive = _receive(host)
     arm = UrArm(host, 1.0).__enter__()
     _KEPT.append(arm)
-    arm.speed_j([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], 4.0)
+    arm.speed("speed_j", [0.5, 0.0, 0.0, 0.0, 0.0, 0.0], 4.0)
     out: dict[str, Any] = {"moves": _until(lambda: receive.getActualQd()[0] > 0.45)}
     with StopSockets(host) as stops:
         out["sent"] = stops.use(StopPath.PROGRAM, 10.0)
@@ -514,7 +514,7 @@ def start_again_after_a_stop(host: str, revive: bool) -> dict[str, Any]:
         if revive:
             arm.revive()
         else:
-            arm._program.control.reuploadScript()
+            arm.control.reuploadScript()
         out["runs"] = _until(lambda: receive.getRuntimeState() == 2)
         out["moved"] = _until(lambda: receive.getActualQ() != stood, 0.3 if revive else 20.0)
         stops.use(StopPath.PROGRAM, 10.0)

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.inverse_kinematics import nearest
-from coneskin.robot.sim.urscript.values import interpolate, rotation_of, rotvec_between
+from coneskin.robot.sim.urscript.values import interpolate
 
 from .arm import CYCLE, DEFAULT_DECELERATION, INVALID_SETPOINT, JOINT_ACCELERATION, MotionFault, SimulatedArm, max_abs
 
@@ -205,7 +205,7 @@ class ToolLine(_ToolPath):
         self._begin(arm, acceleration)
         a, b = self.start.translation, target.translation
         self.shift: Vector = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-        self.turn = rotvec_between(self.start, target)
+        self.turn = (self.start.inverse() @ target).rotation_vector
         self.goal = target
         length = max(math.dist(a, b), _TURN_LENGTH * math.hypot(*self.turn))
         super().__init__(arm, length, acceleration, speed, time)
@@ -254,7 +254,7 @@ class ToolArc(_ToolPath):
         normal = _cross(u, w)
         area = _dot(normal, normal)
         self.fixed = fixed
-        self.turn = rotvec_between(self.start, target)
+        self.turn = (self.start.inverse() @ target).rotation_vector
         self.shift = w
         if math.sqrt(area) < _STRAIGHT_SINE:
             self.angle, length = 0.0, math.sqrt(_dot(w, w))
@@ -276,12 +276,13 @@ class ToolArc(_ToolPath):
     def _pose(self, share: float) -> Pose:
         if not self.angle:
             return interpolate(self.start, self.shift, self.turn, share)
-        spin = Pose(rotation_of(_scaled(self.axis, self.angle * share)))
+        spin = Pose.from_rotation_vector(_scaled(self.axis, self.angle * share))
         x, y, z = spin.rotate(self.arm_length)
         here = (self.centre[0] + x, self.centre[1] + y, self.centre[2] + z)
         if self.fixed:
             return Pose((spin @ Pose(self.start.rotation)).rotation, here)
-        return Pose((Pose(self.start.rotation) @ Pose(rotation_of(_scaled(self.turn, share)))).rotation, here)
+        turned = Pose(self.start.rotation) @ Pose.from_rotation_vector(_scaled(self.turn, share))
+        return Pose(turned.rotation, here)
 
 
 def _minus(a: Vector, b: Vector) -> Vector:

@@ -21,9 +21,6 @@ from .values import (
     make_list,
     numbers,
     pose_of,
-    rotation_of,
-    rotvec_between,
-    rotvec_of,
     show,
     values_of,
 )
@@ -46,13 +43,13 @@ class ValueFunctions:
 
     def pose_add(self, first: Any, second: Any) -> PoseValue:
         """Add positions, and turn by one rotation after the other, both in the base frame."""
-        turn = Pose(rotation_of(first[3:])) @ Pose(rotation_of(second[3:]))
-        return PoseValue((*(a + b for a, b in zip(first[:3], second[:3], strict=True)), *rotvec_of(turn.rotation)))
+        turn = Pose.from_rotation_vector(first[3:]) @ Pose.from_rotation_vector(second[3:])
+        return PoseValue((*(a + b for a, b in zip(first[:3], second[:3], strict=True)), *turn.rotation_vector))
 
     def pose_sub(self, first: Any, second: Any) -> PoseValue:
         """Subtract positions, and return the rotation from the second to the first, in the base frame."""
-        turn = Pose(rotation_of(first[3:])) @ Pose(rotation_of(second[3:])).inverse()
-        return PoseValue((*(a - b for a, b in zip(first[:3], second[:3], strict=True)), *rotvec_of(turn.rotation)))
+        turn = Pose.from_rotation_vector(first[3:]) @ Pose.from_rotation_vector(second[3:]).inverse()
+        return PoseValue((*(a - b for a, b in zip(first[:3], second[:3], strict=True)), *turn.rotation_vector))
 
     def inv(self, m: Any) -> Any:
         """Return the inverse of a pose; that of a matrix is not simulated."""
@@ -89,7 +86,7 @@ class ValueFunctions:
         first, last = pose_of(p_from), pose_of(p_to)
         a, b = first.translation, last.translation
         shift = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-        return values_of(interpolate(first, shift, rotvec_between(first, last), float(alpha)))
+        return values_of(interpolate(first, shift, (first.inverse() @ last).rotation_vector, float(alpha)))
 
     def wrench_trans(self, T_from_to: Any, w_from: Any) -> Array:
         """Return force [N] and torque [N m] as another frame has them, whose pose in the first one is given."""
@@ -102,17 +99,11 @@ class ValueFunctions:
 
     def rotvec2rpy(self, rotation_vector: Any) -> Array:
         """Return roll, pitch and yaw [rad] of a rotation vector: about x, then y, then z, all fixed axes."""
-        (a, _, _), (d, _, _), (g, h, i) = rotation_of(rotation_vector)
-        return Array((math.atan2(h, i), math.asin(max(-1.0, min(1.0, -g))), math.atan2(d, a)))
+        return Array(Pose.from_rotation_vector(rotation_vector).rpy)
 
     def rpy2rotvec(self, rpy_vector: Any) -> Array:
         """Return the rotation vector [rad] of roll, pitch and yaw."""
-        roll, pitch, yaw = (float(angle) for angle in rpy_vector)
-        turns = (rotation_of(axis) for axis in ((0.0, 0.0, yaw), (0.0, pitch, 0.0), (roll, 0.0, 0.0)))
-        whole = Pose()
-        for turn in turns:
-            whole = whole @ Pose(turn)
-        return Array(rotvec_of(whole.rotation))
+        return Array(Pose.from_xyz_rpy(rpy=rpy_vector).rotation_vector)
 
     def normalize(self, v: Any) -> Array:
         """Return a list of the same direction and of length 1."""

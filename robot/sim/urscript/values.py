@@ -8,7 +8,6 @@ largest size: ``9 ^ 9 ^ 9``, or a text doubled a hundred times, would never end.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -24,16 +23,12 @@ __all__ = [
     "number",
     "numbers",
     "pose_of",
-    "rotation_of",
-    "rotvec_between",
-    "rotvec_of",
     "show",
     "values_of",
 ]
 
 _MAX_NUMBER = 1e6  # of a position, a speed, a time, an acceleration
 _MAX_ITEMS_SHOWN, _MAX_TEXT_SHOWN = 50, 1000  # elements of a list, characters of a text
-_Rotation = tuple[Vector, Vector, Vector]
 
 
 class ScriptError(Exception):
@@ -95,70 +90,23 @@ def show(value: Any) -> str:
     return str(value)[:_MAX_TEXT_SHOWN]
 
 
-def rotation_of(rotvec: Sequence[float]) -> _Rotation:
-    """Return the rotation matrix of a rotation vector [rad] (Rodrigues)."""
-    x, y, z = rotvec
-    angle = math.sqrt(x * x + y * y + z * z)
-    if angle < 1e-12:
-        return (1.0, -z, y), (z, 1.0, -x), (-y, x, 1.0)
-    x, y, z = x / angle, y / angle, z / angle
-    c, s = math.cos(angle), math.sin(angle)
-    k = 1.0 - c
-    return (
-        (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
-        (y * x * k + z * s, c + y * y * k, y * z * k - x * s),
-        (z * x * k - y * s, z * y * k + x * s, c + z * z * k),
-    )
-
-
-def rotvec_of(rotation: _Rotation) -> Vector:
-    """Return the rotation vector [rad] of a rotation matrix, its angle in [0, pi]; exact near 0 and near pi."""
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    x, y, z = h - f, c - g, d - b  # 2 sin(angle) axis
-    twice_sine, cosine = math.sqrt(x * x + y * y + z * z), (a + e + i - 1.0) / 2.0
-    angle = math.atan2(twice_sine / 2.0, cosine)
-    if cosine > -0.9:
-        factor = 0.5 * (1.0 + angle * angle / 6.0) if angle < 1e-4 else angle / twice_sine
-        return x * factor, y * factor, z * factor
-    # near pi the sine hardly determines the axis: take the axis from the symmetric part, its sign from the sine
-    k = 1.0 - cosine
-    diagonal = (a - cosine) / k, (e - cosine) / k, (i - cosine) / k
-    lead = max(range(3), key=diagonal.__getitem__)
-    first = math.sqrt(max(0.0, diagonal[lead]))
-    symmetric = ((b + d) / (2 * k), (c + g) / (2 * k), (f + h) / (2 * k))  # xy, xz, yz
-    if lead == 0:
-        axis = (first, symmetric[0] / first, symmetric[1] / first)
-    elif lead == 1:
-        axis = (symmetric[0] / first, first, symmetric[2] / first)
-    else:
-        axis = (symmetric[1] / first, symmetric[2] / first, first)
-    sign = -1.0 if axis[0] * x + axis[1] * y + axis[2] * z < 0.0 else 1.0
-    factor = sign * angle / math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
-    return axis[0] * factor, axis[1] * factor, axis[2] * factor
-
-
 def pose_of(values: Iterable[float]) -> Pose:
     """Return the rigid motion of x, y, z [m], rx, ry, rz [rad]."""
-    x, y, z, rx, ry, rz = (float(value) for value in values)
-    return Pose(rotation_of((rx, ry, rz)), (x, y, z))
+    x, y, z, *rotation_vector = (float(value) for value in values)
+    return Pose.from_rotation_vector(rotation_vector, (x, y, z))
 
 
 def values_of(pose: Pose) -> PoseValue:
     """Return x, y, z [m], rx, ry, rz [rad] of a rigid motion."""
-    return PoseValue((*pose.translation, *rotvec_of(pose.rotation)))
-
-
-def rotvec_between(first: Pose, second: Pose) -> Vector:
-    """Return the rotation vector from one orientation to another [rad], in the axes of the first."""
-    return rotvec_of((first.inverse() @ second).rotation)
+    return PoseValue((*pose.translation, *pose.rotation_vector))
 
 
 def interpolate(start: Pose, shift: Vector, turn: Vector, share: float) -> Pose:
     """Return a pose on the straight path: start moved by share * shift [m] and turned by share * turn [rad]."""
-    spin = Pose(rotation_of((turn[0] * share, turn[1] * share, turn[2] * share)))
     p = start.translation
     here = (p[0] + share * shift[0], p[1] + share * shift[1], p[2] + share * shift[2])
-    return Pose((Pose(start.rotation) @ spin).rotation, here)
+    turned = Pose(start.rotation) @ Pose.from_rotation_vector([share * angle for angle in turn])
+    return Pose(turned.rotation, here)
 
 
 MAX_ITEMS = 200  #: of a list

@@ -128,8 +128,8 @@ class FakeEntry:
 
 def arm(accepts=True):
     made = UrArm("test", 4.0)
-    made._program.wheel = SimpleNamespace(Path=FakePath, PathEntry=FakeEntry)
-    made._program.control = FakeWheel(accepts)
+    made.wheel = SimpleNamespace(Path=FakePath, PathEntry=FakeEntry)
+    made.control = FakeWheel(accepts)
     return made
 
 

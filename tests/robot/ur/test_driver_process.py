@@ -21,11 +21,11 @@ def test_the_program_is_refused_until_the_guard_clears_it(driver):
     move(program)
     assert served.poll(0.0)
     assert answers(program)[0]["stopped"] is True
-    assert "moveJ" not in stops(made._program.control)
+    assert "moveJ" not in stops(made.control)
     guard.send(Release(7).encode())
     move(program)
     served.poll(0.0)
-    assert stops(made._program.control) == ["moveJ"]
+    assert stops(made.control) == ["moveJ"]
 
 
 def test_a_stop_comes_before_what_the_program_asked_and_ends_its_wait(driver):
@@ -37,7 +37,7 @@ def test_a_stop_comes_before_what_the_program_asked_and_ends_its_wait(driver):
     move(program)
     guard.send(StopProgram(9.0).encode())
     served.poll(0.0)
-    assert stops(made._program.control) == ["moveJ", "stopJ"]
+    assert stops(made.control) == ["moveJ", "stopJ"]
     assert [answer["stopped"] for answer in answers(program)] == [True, True]
     assert StatusReport("done").encode() in guard.receive()
 
@@ -47,7 +47,7 @@ def test_the_end_of_a_move_is_told(driver):
     guard.send(Release(7).encode())
     move(program)
     served.poll(0.0)
-    made._program.control.running = False
+    made.control.running = False
     served.poll(0.0)
     assert answers(program) == [{"number": 1, "ok": True}]
 
@@ -58,7 +58,7 @@ def test_a_retreat_and_its_halt(driver):
     served.poll(0.0)
     guard.send(EndReaction(8.0).encode())
     served.poll(0.0)
-    assert stops(made._program.control) == ["speedJ", "speedStop"]
+    assert stops(made.control) == ["speedJ", "speedStop"]
 
 
 @pytest.mark.parametrize("side", ["guard", "program"])
@@ -69,12 +69,12 @@ def test_when_either_side_ends_the_arm_is_stopped(driver, side):
     served.poll(0.0)
     (guard if side == "guard" else program).close()
     served.run()
-    assert stops(made._program.control)[-1] == "stopJ"
+    assert stops(made.control)[-1] == "stopJ"
 
 
 def test_an_error_of_the_wheel_goes_to_the_guard(driver):
     served, made, guard, _ = driver
-    made._program.control.accepts = False
+    made.control.accepts = False
     guard.send(SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0).encode())
     served.poll(0.0)
     notes = [StatusReport.decode(message) for message in guard.receive()]
@@ -86,22 +86,22 @@ def test_the_program_starts_again_only_after_command_0(driver):
     """The register of a latched speedJ is still there: a new program would execute it at once (see test_lifecycle)."""
     served, made, guard, _ = driver
     served.poll(0.0)
-    made._program.control.playing = False
-    made._program.control.calls.clear()
+    made.control.playing = False
+    made.control.calls.clear()
     served._kicked = -1.0
     served.poll(0.0)
-    assert made._program.control.calls == []  # no kick without a program: each would be a line on the terminal
+    assert made.control.calls == []  # no kick without a program: each would be a line on the terminal
     guard.send(Release(7).encode())
     served.poll(0.0)
-    assert [call[0] for call in made._program.control.calls] == ["kick", "reuploadScript", "setWatchdog"]
+    assert [call[0] for call in made.control.calls] == ["kick", "reuploadScript", "setWatchdog"]
     guard.send(Release(7).encode())
     served.poll(0.0)
-    assert "reuploadScript" not in [call[0] for call in made._program.control.calls[3:]]
+    assert "reuploadScript" not in [call[0] for call in made.control.calls[3:]]
 
 
 def test_a_program_that_does_not_start_again_is_an_error(driver):
     served, made, guard, program = driver
-    made._program.control.playing = made._program.control.accepts = False
+    made.control.playing = made.control.accepts = False
     guard.send(Release(7).encode())
     served.poll(0.0)
     assert "does not start ur_rtde's program again" in StatusReport.decode(guard.receive()[-1]).text
@@ -119,13 +119,13 @@ def test_a_silent_guard_counts_as_dead(driver, now):
         now[0] += 0.05
         guard.send(Heartbeat().encode())
         served.poll(0.0)
-    assert "stopJ" not in stops(made._program.control)
+    assert "stopJ" not in stops(made.control)
     now[0] += HEARTBEAT_TIMEOUT - 0.01
     served.poll(0.0)
-    assert "stopJ" not in stops(made._program.control)
+    assert "stopJ" not in stops(made.control)
     now[0] += 0.02
     served.poll(0.0)
-    assert stops(made._program.control)[-1] == "stopJ"
+    assert stops(made.control)[-1] == "stopJ"
     assert "silent" in answers(program)[0]["why"]
     assert "silent" in StatusReport.decode(guard.receive()[-1]).text
     guard.send(Heartbeat().encode())
@@ -140,17 +140,17 @@ def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(dr
     for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0)):
         guard.send(message.encode())
     served.poll(0.0)
-    before = len(stops(made._program.control))
+    before = len(stops(made.control))
     now[0] += SETPOINT_TIMEOUT - 0.01
     served.poll(0.0)
-    assert len(stops(made._program.control)) == before
+    assert len(stops(made.control)) == before
     now[0] += 0.02
     served.poll(0.0)
-    assert stops(made._program.control)[before:] == ["speedStop"]
+    assert stops(made.control)[before:] == ["speedStop"]
     assert f"silent for {SETPOINT_TIMEOUT:g} s" in StatusReport.decode(guard.receive()[-1]).text
     now[0] += 100.0  # the arm stands, and no heartbeat is due any more
     served.poll(0.0)
-    assert stops(made._program.control)[before:] == ["speedStop"]
+    assert stops(made.control)[before:] == ["speedStop"]
 
 
 def test_a_sign_of_life_is_no_new_speed(driver, now):
@@ -158,12 +158,12 @@ def test_a_sign_of_life_is_no_new_speed(driver, now):
     for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0)):
         guard.send(message.encode())
     served.poll(0.0)
-    before = len(stops(made._program.control))
+    before = len(stops(made.control))
     for _ in range(4):
         now[0] += 0.03
         guard.send(Heartbeat().encode())
         served.poll(0.0)
-    assert stops(made._program.control)[before:] == ["speedStop"]
+    assert stops(made.control)[before:] == ["speedStop"]
 
 
 def test_speeds_that_waited_are_overtaken_by_what_came_later(driver):
@@ -176,30 +176,30 @@ def test_speeds_that_waited_are_overtaken_by_what_came_later(driver):
     ):
         guard.send(message.encode())
     served.poll(0.0)
-    assert [call[2] for call in made._program.control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
+    assert [call[2] for call in made.control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
     for message in (*[SetJointVelocity((0.1 * k,) * 6, 4.0) for k in range(9)], EndReaction(10.0)):
         guard.send(message.encode())
     served.poll(0.0)
-    assert [call[0] for call in made._program.control.calls if call[0].startswith("speed")] == ["speedJ", "speedStop"]
+    assert [call[0] for call in made.control.calls if call[0].startswith("speed")] == ["speedJ", "speedStop"]
 
 
 def test_it_ends_on_request_and_first_limits_its_own_end(driver):
     served, made, guard, program = driver
     order = []
-    served._on_end = lambda: order.append([call[0] for call in made._program.control.calls])
+    served._on_end = lambda: order.append([call[0] for call in made.control.calls])
     guard.send(Release(7).encode())
     move(program)
     served.poll(0.0)
     served.end()
     served.run()
     assert order == [["moveJ", "kick"]]  # before the stop, which may block for minutes
-    assert stops(made._program.control)[-1] == "stopJ"
+    assert stops(made.control)[-1] == "stopJ"
 
 
 def test_the_watchdog_is_kicked(driver):
     served, made, _, _ = driver
     served.poll(0.0)
-    assert ("kick",) in made._program.control.calls
+    assert ("kick",) in made.control.calls
 
 
 def test_a_stop_of_the_program_that_fails_leaves_no_stream_going_on(driver):
@@ -212,32 +212,32 @@ def test_a_stop_of_the_program_that_fails_leaves_no_stream_going_on(driver):
     def fail(_):
         raise RuntimeError("the wheel has lost it")
 
-    made._program.control.speedStop = fail
+    made.control.speedStop = fail
     ask(program, do="stop", acceleration=2.0, number=2)
     served.poll(0.0)
-    assert stops(made._program.control) == ["speedJ", "stopJ"]
+    assert stops(made.control) == ["speedJ", "stopJ"]
     (note,) = (StatusReport.decode(message) for message in guard.receive())
     assert (note.kind, "a stop of the program has failed" in note.text) == ("error", True)
     move(program)
     served.poll(0.0)
     assert [answer["ok"] for answer in answers(program)] == [True, False, False]
-    assert stops(made._program.control) == ["speedJ", "stopJ"]
+    assert stops(made.control) == ["speedJ", "stopJ"]
 
 
 def test_a_stop_does_not_wait_behind_all_that_threads_have_asked_for(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
-    taken = made._program.control.speedJ
+    taken = made.control.speedJ
 
     def take(*values):
         guard.send(StopProgram(9.0).encode())  # while the first of them is carried out
         return taken(*values)
 
-    made._program.control.speedJ = take
+    made.control.speedJ = take
     for number in range(1, 4):
         ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=0.5, number=number)
     served.poll(0.0)
-    assert stops(made._program.control) == ["speedJ", "speedStop"]
+    assert stops(made.control) == ["speedJ", "speedStop"]
     assert [(answer["number"], answer["ok"]) for answer in answers(program)] == [(1, True), (2, False), (3, False)]
 
 
@@ -250,7 +250,7 @@ def test_the_retreat_of_the_guard_does_not_end_with_the_speeds_of_the_program(dr
     served.poll(0.0)
     now[0] += 0.09
     served.poll(0.0)
-    assert "speedStop" not in stops(made._program.control)
+    assert "speedStop" not in stops(made.control)
 
 
 def test_a_release_is_acknowledged_by_its_number_and_not_where_the_program_does_not_start(driver):
@@ -258,7 +258,7 @@ def test_a_release_is_acknowledged_by_its_number_and_not_where_the_program_does_
     guard.send(Release(41).encode())
     served.poll(0.0)
     assert StatusReport("released", "41").encode() in guard.receive()
-    made._program.control.playing = made._program.control.accepts = False
+    made.control.playing = made.control.accepts = False
     guard.send(Release(42).encode())
     served.poll(0.0)
     assert StatusReport("released", "42").encode() not in guard.receive()
@@ -281,13 +281,13 @@ def test_a_stop_that_the_program_asks_for_is_not_ended_by_the_watchdog_and_one_o
         ({"do": "stop", "acceleration": 2.0}, {"do": "servo_j", "q": [0.0] * 6, "duration": 1.0})
     ):
         ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=1.0)
-        made._program.control.calls.clear()
+        made.control.calls.clear()
         ask(program, number=2, **end)
         served.poll(0.0)
-        calls = [call for call in made._program.control.calls if call[0] in ("setWatchdog", "speedStop")]
+        calls = [call for call in made.control.calls if call[0] in ("setWatchdog", "speedStop")]
         assert [call[0] for call in calls] == ["setWatchdog", "speedStop", "setWatchdog"], number
         assert (1.0 / calls[0][1], calls[2][1]) == (pytest.approx(3.5 / 2.0 + 0.3), 4.0)  # as long as it may take
-    made._program.control.calls.clear()
+    made.control.calls.clear()
     guard.send(StopProgram(9.0).encode())
     served.poll(0.0)
-    assert [call[0] for call in made._program.control.calls if call[0] != "kick"] == ["servoStop"]
+    assert [call[0] for call in made.control.calls if call[0] != "kick"] == ["servoStop"]

@@ -24,13 +24,13 @@ def test_a_tool_is_set_for_the_program_unless_the_guard_forbids_it(driver):
     ask(program, do="set_payload", mass=2.0, centre=[0.0] * 3, number=2)
     served.poll(0.0)
     assert answers(program) == [{"number": 1, "ok": True}, {"number": 2, "ok": True}]
-    assert stops(made._program.control) == ["setTcp", "setPayload"]
+    assert stops(made.control) == ["setTcp", "setPayload"]
     ask(program, do="move_j_ik", pose=[0.1] * 6, speed=1.0, acceleration=2.0, number=3)
     ask(program, do="set_tcp", pose=[0.2] * 6, number=4)
     served.poll(0.0)
     (refused,) = answers(program)
     assert (refused["number"], refused["ok"], refused["stopped"]) == (4, False, False)
-    assert stops(made._program.control)[-1] == "moveJ_IK"
+    assert stops(made.control)[-1] == "moveJ_IK"
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_a_number_beyond_all_floats_is_answered_and_does_not_end_the_driver(driv
     ask(program, do="move_j", q=[0.0] * 6, speed=1.0, acceleration=10**400)
     assert served.poll(0.0)
     assert answers(program)[0]["ok"] is False
-    assert "moveJ" not in stops(made._program.control)
+    assert "moveJ" not in stops(made.control)
 
 
 @pytest.mark.parametrize("sent", [1e9, float("inf")])
@@ -62,11 +62,11 @@ def test_a_request_from_later_holds_no_longer_than_one_from_now(driver, now, sen
     now[0] += 0.49
     guard.send(Heartbeat().encode())
     served.poll(0.0)
-    assert stops(made._program.control) == ["speedJ"]
+    assert stops(made.control) == ["speedJ"]
     now[0] += 0.02
     guard.send(Heartbeat().encode())
     served.poll(0.0)
-    assert "speedStop" in stops(made._program.control)
+    assert "speedStop" in stops(made.control)
 
 
 @pytest.mark.promise("P41")
@@ -81,7 +81,7 @@ def test_a_request_that_has_waited_for_long_is_void_and_says_its_number(driver, 
     told = answers(program)
     assert [(answer["number"], answer["ok"]) for answer in told] == [(41, False), (42, False), (43, True)]
     assert "it is void: it was sent 3.00 s ago" in told[1]["why"]
-    assert stops(made._program.control) == ["stopJ"]
+    assert stops(made.control) == ["stopJ"]
 
 
 @pytest.mark.promise("P51")
@@ -103,21 +103,21 @@ def test_speeds_and_positions_are_not_kept_for_a_program_that_sends_no_more(driv
         now[0] += 0.4
         guard.send(Heartbeat().encode())
         served.poll(0.0)
-    assert stop not in stops(made._program.control)
+    assert stop not in stops(made.control)
     guard.receive()
     now[0] += 0.11
     guard.send(Heartbeat().encode())
     served.poll(0.0)
-    assert stops(made._program.control)[-1] == stop
+    assert stops(made.control)[-1] == stop
     reports = [StatusReport.decode(message) for message in guard.receive()]
     assert any(report.kind == "remark" and "no new speed or servo command" in report.text for report in reports)
-    count = len(stops(made._program.control))
+    count = len(stops(made.control))
     now[0] += 0.1
     served.poll(0.0)
-    assert len(stops(made._program.control)) == count  # once
+    assert len(stops(made.control)) == count  # once
     ask(program, sent=now[0], **request_)  # the program may go on
     served.poll(0.0)
-    assert stops(made._program.control)[-1] == start
+    assert stops(made.control)[-1] == start
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_a_request_that_is_refused_does_not_renew_what_is_under_way(driver, now,
     assert [answer["ok"] for answer in answers(program)] == [True, False]
     now[0] += 0.21
     served.poll(0.0)
-    assert stops(made._program.control)[-1] == "speedStop"
+    assert stops(made.control)[-1] == "speedStop"
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, 10.1, float("nan"), None, "x"])
@@ -155,7 +155,7 @@ def test_a_duration_that_cannot_be_moves_nothing(driver, duration):
     ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=duration)
     served.poll(0.0)
     assert answers(program)[0]["ok"] is False
-    assert "speedJ" not in stops(made._program.control)
+    assert "speedJ" not in stops(made.control)
 
 
 def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_at_once(driver):
@@ -163,8 +163,8 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
     guard.send(Release(7).encode())
     path(program)
     served.poll(0.0)
-    assert [call[0] for call in made._program.control.calls] == ["movePath", "setWatchdog", "kick"]
-    (_, *entries), _ = made._program.control.calls[-3:-1]
+    assert [call[0] for call in made.control.calls] == ["movePath", "setWatchdog", "kick"]
+    (_, *entries), _ = made.control.calls[-3:-1]
     assert entries == [
         ("movej", "joints", [1.05, 1.4, 0.02]),
         ("movel", "pose", [0.3, 1.2, 0.0]),
@@ -172,7 +172,7 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
     ]
     assert [StatusReport.decode(m).kind for m in guard.receive()][-2:] == ["restarts", "restarted"]
     assert answers(program) == []  # it waits
-    made._program.control.running = False
+    made.control.running = False
     served.poll(0.0)
     assert answers(program) == [{"number": 1, "ok": True}]
 
@@ -180,10 +180,10 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
 def test_a_path_that_gets_no_watchdog_is_stopped_and_not_reported_as_restarted(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
-    made._program.control.setWatchdog = lambda frequency: False
+    made.control.setWatchdog = lambda frequency: False
     path(program)
     served.poll(0.0)
-    assert stops(made._program.control) == ["movePath", "stopJ"]
+    assert stops(made.control) == ["movePath", "stopJ"]
     (answer,) = answers(program)
     assert "did not take the watchdog of a path: it was stopped" in answer["why"]
     assert "restarted" not in [StatusReport.decode(m).kind for m in guard.receive()]
@@ -192,18 +192,18 @@ def test_a_path_that_gets_no_watchdog_is_stopped_and_not_reported_as_restarted(d
 def test_a_stop_that_came_while_a_path_was_taken_is_the_next_thing_that_is_done(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
-    taken = made._program.control.movePath
+    taken = made.control.movePath
 
     def take(entries, asynchronous):
         guard.send(StopProgram(9.0).encode())
         return taken(entries, asynchronous)
 
-    made._program.control.movePath = take
+    made.control.movePath = take
     path(program)
     served.poll(0.0)
     assert answers(program) == []
     served.poll(0.0)
-    assert stops(made._program.control) == ["movePath", "stopJ"]
+    assert stops(made.control) == ["movePath", "stopJ"]
     assert [answer["stopped"] for answer in answers(program)] == [True]
 
 
@@ -217,7 +217,7 @@ def test_a_path_that_cannot_be_moves_nothing(driver, waypoints):
     ask(program, do="move_path", waypoints=waypoints)
     served.poll(0.0)
     assert answers(program)[0]["ok"] is False
-    assert "movePath" not in stops(made._program.control)
+    assert "movePath" not in stops(made.control)
 
 
 def test_progress_is_told_and_several_may_wait_for_the_end(driver):
@@ -232,7 +232,7 @@ def test_progress_is_told_and_several_may_wait_for_the_end(driver):
         {"number": 1, "ok": True},
         {"number": 2, "ok": True, "waypoint": 2, "mode": "move"},
     ]
-    made._program.control.running = False
+    made.control.running = False
     served.poll(0.0)
     ask(program, do="progress", number=5)
     ask(program, do="wait", number=6)
@@ -277,7 +277,7 @@ def test_a_question_is_answered_while_nothing_moves_with_the_tool_that_is_set(dr
     assert [a["ok"] for a in told] == [True, False, True, False]
     assert "stopScript is not a question" in told[1]["why"]
     assert "must wait until the arm has arrived or was stopped" in told[3]["why"]
-    (call,) = [call for call in made._program.control.calls if call[0] == "getForwardKinematics"]
+    (call,) = [call for call in made.control.calls if call[0] == "getForwardKinematics"]
     assert call[1] == [0.1] * 6
     assert call[2] == pytest.approx([0.0] * 6, abs=1e-11)
     assert any(call[2]), "exact zeros make the wheel send a packet of a wrong size"

@@ -13,40 +13,40 @@ from .fake_wheel import arm, stops
 @pytest.mark.parametrize(
     ("start", "stop"),
     [
-        (lambda a: a.move_j([0.0] * 6, 1.0, 1.0), "stopJ"),
-        (lambda a: a.move_l([0.0] * 6, 1.0, 1.0), "stopJ"),
-        (lambda a: a.move_j_ik([0.0] * 6, 1.0, 1.0), "stopJ"),
-        (lambda a: a.move_l_fk([0.0] * 6, 1.0, 1.0), "stopJ"),
+        (lambda a: a.move("move_j", [0.0] * 6, 1.0, 1.0), "stopJ"),
+        (lambda a: a.move("move_l", [0.0] * 6, 1.0, 1.0), "stopJ"),
+        (lambda a: a.move("move_j_ik", [0.0] * 6, 1.0, 1.0), "stopJ"),
+        (lambda a: a.move("move_l_fk", [0.0] * 6, 1.0, 1.0), "stopJ"),
         (lambda a: a.move_path([Waypoint.move_j([0.0] * 6)]), "stopJ"),
-        (lambda a: a.speed_j([0.0] * 6, 1.0), "speedStop"),
-        (lambda a: a.speed_l([0.0] * 6, 1.0), "speedStop"),
-        (lambda a: a.servo_j([0.0] * 6), "servoStop"),
-        (lambda a: a.servo_l([0.0] * 6), "servoStop"),
+        (lambda a: a.speed("speed_j", [0.0] * 6, 1.0), "speedStop"),
+        (lambda a: a.speed("speed_l", [0.0] * 6, 1.0), "speedStop"),
+        (lambda a: a.servo("servo_j", [0.0] * 6), "servoStop"),
+        (lambda a: a.servo("servo_l", [0.0] * 6), "servoStop"),
     ],
 )
 def test_each_mode_has_its_own_stop(start, stop):
     a = arm()
     start(a)
     a.stop(5.0)
-    assert stops(a._program.control)[-1] == stop
+    assert stops(a.control)[-1] == stop
     assert a.mode is Mode.IDLE
 
 
 def test_no_motion_starts_on_a_live_thread_of_another_kind():
     a = arm()
-    a.move_j([0.0] * 6, 1.0, 1.0)
-    a.speed_j([0.0] * 6, 1.0)
-    a.servo_j([0.0] * 6)
-    a.move_l([0.0] * 6, 1.0, 1.0)
-    assert stops(a._program.control) == ["moveJ", "stopJ", "speedJ", "speedStop", "servoJ", "servoStop", "moveL"]
-    a._program.control.calls.clear()
-    a.speed_l([0.0] * 6, 1.0)
-    a.speed_j([0.0] * 6, 1.0)  # one thread of the wheel's program does both
-    a.servo_l([0.0] * 6)
-    a.speed_l([0.0] * 6, 1.0)
+    a.move("move_j", [0.0] * 6, 1.0, 1.0)
+    a.speed("speed_j", [0.0] * 6, 1.0)
+    a.servo("servo_j", [0.0] * 6)
+    a.move("move_l", [0.0] * 6, 1.0, 1.0)
+    assert stops(a.control) == ["moveJ", "stopJ", "speedJ", "speedStop", "servoJ", "servoStop", "moveL"]
+    a.control.calls.clear()
+    a.speed("speed_l", [0.0] * 6, 1.0)
+    a.speed("speed_j", [0.0] * 6, 1.0)  # one thread of the wheel's program does both
+    a.servo("servo_l", [0.0] * 6)
+    a.speed("speed_l", [0.0] * 6, 1.0)
     a.move_path([Waypoint.move_l([0.0] * 6)])
-    a.servo_j([0.0] * 6)
-    assert stops(a._program.control) == [
+    a.servo("servo_j", [0.0] * 6)
+    assert stops(a.control) == [
         *("stopJ", "speedL", "speedJ", "speedStop", "servoL", "servoStop", "speedL", "speedStop"),
         *("movePath", "stopJ", "servoJ"),
     ]
@@ -55,7 +55,7 @@ def test_no_motion_starts_on_a_live_thread_of_another_kind():
 def test_what_the_wheel_refuses_is_an_error():
     a = arm(accepts=False)
     with pytest.raises(RobotRefused, match="did not take moveJ: its program is not running"):
-        a.move_j([0.0] * 6, 1.0, 1.0)
+        a.move("move_j", [0.0] * 6, 1.0, 1.0)
     assert a.mode is Mode.IDLE
     with pytest.raises(RobotConnectionError, match="stopping: broken"), _rtde_errors("stopping"):
         raise RuntimeError("broken")
@@ -64,21 +64,21 @@ def test_what_the_wheel_refuses_is_an_error():
 @pytest.mark.parametrize(
     "start",
     [
-        lambda a: a.move_j([0.0] * 6, 1.0, 1.0),
-        lambda a: a.speed_j([0.0] * 6, 1.0),
-        lambda a: a.servo_j([0.0] * 6),
+        lambda a: a.move("move_j", [0.0] * 6, 1.0, 1.0),
+        lambda a: a.speed("speed_j", [0.0] * 6, 1.0),
+        lambda a: a.servo("servo_j", [0.0] * 6),
     ],
 )
 def test_tool_and_payload_are_set_only_while_nothing_moves(start):
     a = arm()
     start(a)
-    for setter in (lambda: a.set_tcp([0.1] * 6), lambda: a.set_payload(1.0, [0.0] * 3)):
+    for setter in (lambda: a.set("set_tcp", [0.1] * 6), lambda: a.set("set_payload", 1.0, [0.0] * 3)):
         with pytest.raises(RobotRefused, match="must wait until the arm has arrived or was stopped"):
             setter()
     a.stop(5.0)
-    a.set_tcp([0.1] * 6)
-    a.set_payload(1.5, [0.0, 0.0, 0.04])
-    assert a._program.control.calls[-2:] == [("setTcp", *[0.1] * 6), ("setPayload", 1.5, 0.0, 0.0, 0.04)]
-    a._program.control.accepts = False
+    a.set("set_tcp", [0.1] * 6)
+    a.set("set_payload", 1.5, [0.0, 0.0, 0.04])
+    assert a.control.calls[-2:] == [("setTcp", *[0.1] * 6), ("setPayload", 1.5, 0.0, 0.0, 0.04)]
+    a.control.accepts = False
     with pytest.raises(RobotRefused, match="did not take setPayload"):
-        a.set_payload(1.0, [0.0] * 3)
+        a.set("set_payload", 1.0, [0.0] * 3)

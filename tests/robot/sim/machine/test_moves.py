@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from coneskin.robot.sim.urscript.values import rotvec_between, values_of
+from coneskin.robot.sim.urscript.values import values_of
 from tests.robot.sim.program_bench import FAR, Bench
 
 
@@ -98,7 +98,7 @@ def test_an_arc_runs_over_its_way_point_on_a_circle(bench: Bench, mode: int) -> 
         nearest = min(nearest, math.dist(here, places[0]))
     assert nearest < 0.1 * 0.002  # the way of a cycle
     assert math.dist(arm.tcp_pose().translation, places[1]) < 1e-9
-    turned = rotvec_between(start, arm.tcp_pose())
+    turned = (start.inverse() @ arm.tcp_pose()).rotation_vector
     assert math.hypot(*turned) == pytest.approx(angles[1] * mode, abs=1e-6)
 
 
