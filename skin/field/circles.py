@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,13 +31,13 @@ from .sheet import SectorSheet
 
 __all__ = [
     "PHASE",
+    "Centres",
     "Circles",
     "circle",
     "green_block",
     "make_circles",
     "offsets_of",
     "pair_points",
-    "places_of",
 ]
 
 _NEAR_ALPHA = 0.25  # |alpha| of an edge that counts as near: two radii between centre and edge
@@ -185,6 +185,21 @@ def _pair_coefficients(alpha: Complex, beta: Complex, order: int) -> Floats:
 PHASE = 0.3
 
 
+class Centres(NamedTuple):
+    """Distances of the centres of n scenes of k discs from the sides of the strip [(shorter side)/pi], shape (n, k)."""
+
+    s: Floats
+    s_far: Floats  #: from s = Sigma
+    p: Floats
+    p_far: Floats  #: from p = pi
+
+    @classmethod
+    def of(cls, sheet: SectorSheet, strip: Strip, discs: Discs) -> Centres:
+        """Measure them."""
+        x, y = sheet.along(discs.u), sheet.across(discs.phi)
+        return cls(*(strip.scale * distance for side in ((x, y) if strip.along_x else (y, x)) for distance in side))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Circles:
     """The circles of n scenes of k discs in the rectangle; lengths in units of (shorter side)/pi.
@@ -195,10 +210,7 @@ class Circles:
         order: M.
         offset: x + i y of the points from their centres, shape (n, k, N).
         slope: |d offset / d zeta| there, zeta on the unit circle, shape (n, k, N).
-        s: centres from s = 0, shape (n, k).
-        s_far: centres from s = Sigma, shape (n, k).
-        p: centres from p = 0, shape (n, k).
-        p_far: centres from p = pi, shape (n, k).
+        centres: of the circles.
         x: Fourier coefficients of x/L, shape (n, k, 2M+1).
         y: Fourier coefficients of y/T, shape (n, k, 2M+1).
         images: near edges of each of the k discs, to be taken out of the samples.
@@ -209,10 +221,7 @@ class Circles:
     order: int
     offset: Complex
     slope: Floats
-    s: Floats
-    s_far: Floats
-    p: Floats
-    p_far: Floats
+    centres: Centres
     x: Floats
     y: Floats
     images: tuple[tuple[_EdgeImage, ...], ...] = ()
@@ -256,7 +265,7 @@ def make_circles(
     k = strip.scale
     places = range(discs.u.shape[1]) if with_images else ()
     images = tuple(tuple(_edge_images(sheet, discs, place)) for place in places)
-    return Circles(sheet, discs, order, offset * k, slope * k, *places_of(sheet, strip, discs), fx, fy, images)
+    return Circles(sheet, discs, order, offset * k, slope * k, Centres.of(sheet, strip, discs), fx, fy, images)
 
 
 def offsets_of(sheet: SectorSheet, discs: Discs, zeta: Complex) -> tuple[Complex, Floats]:
@@ -281,31 +290,8 @@ def offsets_of(sheet: SectorSheet, discs: Discs, zeta: Complex) -> tuple[Complex
     return offset, local[:, :, None] / np.sqrt(1.0 + bend * (2.0 * cos + bend))
 
 
-def places_of(sheet: SectorSheet, strip: Strip, discs: Discs) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the centres' distances from s = 0, s = Sigma, p = 0 and p = pi [(shorter side)/pi], shape (n, k) each."""
-    x, y = sheet.along(discs.u), sheet.across(discs.phi)
-    (s, s_far), (p, p_far) = (x, y) if strip.along_x else (y, x)
-    k = strip.scale
-    return s * k, s_far * k, p * k, p_far * k
-
-
-class _RimPlaces(Protocol):
-    """Points on the rims of n scenes of k discs; attributes as those of `Circles`."""
-
-    @property
-    def offset(self) -> Complex: ...
-    @property
-    def s(self) -> Floats: ...
-    @property
-    def s_far(self) -> Floats: ...
-    @property
-    def p(self) -> Floats: ...
-    @property
-    def p_far(self) -> Floats: ...
-
-
 def pair_points(
-    strip: Strip, circles: _RimPlaces, i: int, j: int, equal: bool
+    strip: Strip, centres: Centres, offsets: Complex, i: int, j: int, equal: bool
 ) -> tuple[StripPoints, StripPoints, Floats, Floats, Floats]:
     """Return the points of discs i and j, mirrored to the near corner, and the linear part of the Green function.
 
@@ -313,16 +299,16 @@ def pair_points(
     on the offsets of i and of j and its value at the centres, so that a long strip loses nothing by that large
     value.
     """
-    flip_s = circles.s[:, i] + circles.s[:, j] > circles.s_far[:, i] + circles.s_far[:, j]
-    flip_p = circles.p[:, i] + circles.p[:, j] > circles.p_far[:, i] + circles.p_far[:, j]
-    s = [np.where(flip_s, circles.s_far[:, d], circles.s[:, d]) for d in (i, j)]
-    rest = [np.where(flip_s, circles.s[:, d], circles.s_far[:, d]) for d in (i, j)]
-    p = [np.where(flip_p, circles.p_far[:, d], circles.p[:, d]) for d in (i, j)]
+    flip_s = centres.s[:, i] + centres.s[:, j] > centres.s_far[:, i] + centres.s_far[:, j]
+    flip_p = centres.p[:, i] + centres.p[:, j] > centres.p_far[:, i] + centres.p_far[:, j]
+    s = [np.where(flip_s, centres.s_far[:, d], centres.s[:, d]) for d in (i, j)]
+    rest = [np.where(flip_s, centres.s[:, d], centres.s_far[:, d]) for d in (i, j)]
+    p = [np.where(flip_p, centres.p_far[:, d], centres.p[:, d]) for d in (i, j)]
     i_high = s[0] >= s[1]
     high, low, p_ref = np.where(i_high, s[0], s[1]), np.where(i_high, s[1], s[0]), np.where(i_high, p[0], p[1])
     made = []
     for place, d in enumerate((i,) if i == j else (i, j)):
-        offset = mirrored(circles.offset[:, d], strip.along_x, flip_s, flip_p)
+        offset = mirrored(offsets[:, d], strip.along_x, flip_s, flip_p)
         made.append(direct_features(strip, offset, s[place], p[place], high, p_ref, equal))
     above = np.where(i_high, rest[0], rest[1])
     weight_high, weight_low = 1.0 - low / strip.sigma, above / strip.sigma
@@ -342,7 +328,9 @@ def green_block(
         the coefficients, and an estimate of the aliasing in them, shape (n,).
     """
     _, squared, fourier = circle(circles.order, circles.offset.shape[2])
-    first, second, weight_i, weight_j, centre = pair_points(strip, circles, i, j, resistance_a == resistance_b)
+    first, second, weight_i, weight_j, centre = pair_points(
+        strip, circles.centres, circles.offset, i, j, resistance_a == resistance_b
+    )
     if i == j:
         slope = circles.slope[:, i] * np.abs(1.0 + first.direct)
         taken, put_back = _near_images(strip, circles, i)

@@ -146,9 +146,9 @@ class FieldMap:
         k = strip.scale
         x, y = sheet.along(u)[0], sheet.across(phi)[0]
         s, p = (x, y) if strip.along_x else (y, x)
-        flip_s, flip_p = source.s[:, 0] > source.s_far[:, 0], source.p[:, 0] > source.p_far[:, 0]
-        s0 = np.where(flip_s, source.s_far[:, 0], source.s[:, 0])
-        p0 = np.where(flip_p, source.p_far[:, 0], source.p[:, 0])
+        near_s, far_s, near_p, far_p = (distance[:, 0] for distance in source.centres)
+        flip_s, flip_p = near_s > far_s, near_p > far_p
+        s0, p0 = np.where(flip_s, far_s, near_s), np.where(flip_p, far_p, near_p)
         s_all = np.where(flip_s, strip.sigma - k * s, k * s)
         p_all = np.where(flip_p, math.pi - k * p, k * p)
         offset = np.asarray((s_all - s0 + 1j * (p_all - p0))[None], dtype=np.complex128)

@@ -23,7 +23,7 @@ import numpy as np
 
 from coneskin.core.arrays import Complex, Floats
 
-from .circles import offsets_of, pair_points, places_of
+from .circles import Centres, offsets_of, pair_points
 from .disc import Discs
 from .fourport import Coupling
 from .green import Strip, kernel
@@ -45,10 +45,7 @@ class _RimPoints:
         speed: dtheta/dt, shape (k, N).
         offset: x + i y of the points from their centres, shape (1, k, N).
         slope: |d offset / dt|, shape (1, k, N).
-        s: centres from s = 0, shape (1, k).
-        s_far: centres from s = Sigma, shape (1, k).
-        p: centres from p = 0, shape (1, k).
-        p_far: centres from p = pi, shape (1, k).
+        centres: of the rims.
     """
 
     t: Floats
@@ -56,10 +53,7 @@ class _RimPoints:
     speed: Floats
     offset: Complex
     slope: Floats
-    s: Floats
-    s_far: Floats
-    p: Floats
-    p_far: Floats
+    centres: Centres
 
     @classmethod
     def of(cls, sheet: SectorSheet, strip: Strip, discs: Discs, density: int) -> _RimPoints:
@@ -70,8 +64,7 @@ class _RimPoints:
         t = 2.0 * math.pi * np.arange(n) / n
         theta, speed = (np.array(v) for v in zip(*(_crowd(t, m) for m in maps), strict=True))
         offset, slope = offsets_of(sheet, discs, np.exp(1j * theta)[None])
-        s, s_far, p, p_far = places_of(sheet, strip, discs)
-        return cls(t, theta, speed, offset * strip.scale, slope * strip.scale * speed, s, s_far, p, p_far)
+        return cls(t, theta, speed, offset * strip.scale, slope * strip.scale * speed, Centres.of(sheet, strip, discs))
 
 
 def _maps(sheet: SectorSheet, discs: Discs, i: int) -> list[tuple[float, float]]:
@@ -235,7 +228,7 @@ def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density
 def _green(strip: Strip, points: _RimPoints, i: int, j: int, a: float, b: float, weights: Floats) -> Floats:
     """Return Ra G_a + Rb G_b from the charge of each point of disc j to each point of disc i, shape (N, N)."""
     n = points.t.size
-    first, second, weight_i, weight_j, centre = pair_points(strip, points, i, j, a == b)
+    first, second, weight_i, weight_j, centre = pair_points(strip, points.centres, points.offset, i, j, a == b)
     if i == j:
         slope = points.slope[:, i] * np.abs(1.0 + first.direct)
         lag = _lag(points.t)
