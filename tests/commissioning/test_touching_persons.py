@@ -262,7 +262,7 @@ def carry_out_case(machine: str, who: str, patch: pytest.MonkeyPatch) -> dict[st
 @pytest.mark.parametrize(
     ("machine", "who"),
     [
-        pytest.param(machine, who, marks=[pytest.mark.long] if number > (machine == "acceptance") else [])
+        pytest.param(machine, who, marks=[pytest.mark.long] if number else [])
         for machine, persons in CASES.items()
         for number, who in enumerate(persons)
     ],

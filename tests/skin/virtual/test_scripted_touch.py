@@ -127,12 +127,11 @@ def read(cone: Frustum, touches: Sequence[ScriptedTouch], end: float = 0.3) -> l
     "shape",
     [
         palm_over_seam(FOREARM, TOUCH, math.radians(20.0)),
-        grip(FOREARM, TOUCH),
         grip(FOREARM, TOUCH, 3.0),
         clamp(FOREARM, TOUCH, 0.05),
         fingers(FOREARM, TOUCH, [(-0.02, -0.03), (0.02, 0.03)]),
     ],
-    ids=["palm", "grip", "uneven grip", "clamp", "fingers"],
+    ids=["palm", "uneven grip", "clamp", "fingers"],
 )
 def test_no_place_of_several_contacts_is_certain(shape):
     found = read(FOREARM, shape)
