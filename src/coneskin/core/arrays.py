@@ -7,13 +7,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import GeometryError
 
-__all__ = ["Complex", "Floats", "frozen"]
+__all__ = ["Complex", "Floats", "Ints", "frozen"]
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Complex = NDArray[np.complex128]
 
 
-def frozen(values: ArrayLike, shape: tuple[int | None, ...], name: str) -> NDArray[np.float64]:
+def frozen(values: ArrayLike, shape: tuple[int | None, ...], name: str) -> Floats:
     """Copy values into a read-only float64 array and check it.
 
     Args:

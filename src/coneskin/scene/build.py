@@ -13,9 +13,7 @@ from coneskin.core.errors import KinematicsError, SceneError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats
     from coneskin.geometry.displacement_map import DisplacementMap
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.pose import Pose, Vector
@@ -211,7 +209,7 @@ class SensorOnArm:
         return base_link.apply(point), base_link.rotate(normal)
 
 
-def place_on_arm(scene: Scene, surfaces: Mapping[str, NDArray[np.float64]] | None = None) -> list[SensorOnArm]:
+def place_on_arm(scene: Scene, surfaces: Mapping[str, Floats] | None = None) -> list[SensorOnArm]:
     """Return the places of the scene's sensors on its arm.
 
     Args:
@@ -250,9 +248,7 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, NDArray[np.float64]] | Non
     return placed
 
 
-def _carried(
-    scene: Scene, name: str, frustum: PlacedFrustum, surfaces: Mapping[str, NDArray[np.float64]]
-) -> DisplacementMap:
+def _carried(scene: Scene, name: str, frustum: PlacedFrustum, surfaces: Mapping[str, Floats]) -> DisplacementMap:
     from coneskin.geometry.displacement_map import DisplacementMap
 
     if name not in surfaces:

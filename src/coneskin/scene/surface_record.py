@@ -10,9 +10,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.text import read_json
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats
     from coneskin.core.recording.block import Block
 
     from .build import SensorOnArm
@@ -42,7 +40,7 @@ def encode_surfaces(placed: Iterable[SensorOnArm], time: float) -> list[Block]:
     return blocks
 
 
-def decode_surfaces(blocks: Iterable[Block]) -> dict[str, NDArray[np.float64]]:
+def decode_surfaces(blocks: Iterable[Block]) -> dict[str, Floats]:
     """Return the heights of the meshes [m] by the names of the sensors.
 
     Args:
@@ -56,7 +54,7 @@ def decode_surfaces(blocks: Iterable[Block]) -> dict[str, NDArray[np.float64]]:
     return dict(_decode(block) for block in blocks if block.kind == BlockKind.SURFACE)
 
 
-def _decode(block: Block) -> tuple[str, NDArray[np.float64]]:
+def _decode(block: Block) -> tuple[str, Floats]:
     import numpy as np
 
     head, _, body = block.payload.partition(b"\n")

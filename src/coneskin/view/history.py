@@ -27,9 +27,7 @@ from coneskin.robot.guard.signals.journal import (
 from .contact_mark import ContactLog
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats
     from coneskin.geometry.pose import Vector
     from coneskin.robot.arm.model import Joints
     from coneskin.robot.driver.values import ControllerState
@@ -283,7 +281,7 @@ class History:
         read = int(batch.ends[-1]) if len(batch.ends) else 0
         self._rest = data[max(read, len(data) - _LONGEST_FRAME) :]
 
-    def _take_frames(self, sensor: Sensor, times: list[float], fields: dict[str, NDArray[np.float64]]) -> None:
+    def _take_frames(self, sensor: Sensor, times: list[float], fields: dict[str, Floats]) -> None:
         import numpy as np
 
         supply = np.maximum(fields["touch_supply"], 1.0)

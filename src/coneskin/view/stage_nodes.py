@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from coneskin.core.arrays import Floats, Ints
+
     from .contact_mark import ContactMark
     from .page_server import PageServer
     from .run_course import Moment
@@ -155,7 +157,7 @@ def _add_mesh(
     scene: Any,
     name: str,
     vertices: NDArray[np.float32],
-    faces: NDArray[np.int64],
+    faces: Ints,
     colour: tuple[int, int, int],
     opacity: float | None = None,
     side: str = "front",
@@ -170,7 +172,7 @@ def _add_solid(scene: Any, name: str, solid: Solid) -> None:
     _add_mesh(scene, name, _single(solid.vertices), solid.faces, solid.colour, opacity, side)
 
 
-def _arrow() -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def _arrow() -> tuple[NDArray[np.float32], Ints]:
     head, shaft, width = 0.035, 0.0035, 0.010
     profile = [
         (0.0, 0.0),
@@ -183,7 +185,7 @@ def _arrow() -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     return _single(vertices), faces
 
 
-def _ellipse(mark: ContactMark) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _ellipse(mark: ContactMark) -> tuple[Floats, Ints]:
     """Return the ellipse of a mark in its own frame; a small disc where nothing is known of its size."""
     import numpy as np
 
@@ -198,9 +200,7 @@ def _ellipse(mark: ContactMark) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     return vertices, np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % _SEGMENT_COUNT])
 
 
-def _both_sides(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def _both_sides(vertices: Floats, faces: Ints) -> tuple[NDArray[np.float32], Ints]:
     """Return a surface that is seen from either side, as one of twice the faces.
 
     "side" of viser does the same by another program of the drawing process, whose making takes longer than drawing.
@@ -210,14 +210,14 @@ def _both_sides(
     return np.concatenate([_single(vertices)] * 2), np.concatenate([faces, len(vertices) + faces[:, ::-1]])
 
 
-def _visible(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+def _visible(axis: Floats) -> Floats:
     import numpy as np
 
     length = float(np.linalg.norm(axis))
     return axis * max(1.0, _MIN_HALF_AXIS / length) if length > 0.0 else np.array((_MIN_HALF_AXIS, 0.0, 0.0))
 
 
-def _single(values: NDArray[np.float64]) -> NDArray[np.float32]:
+def _single(values: Floats) -> NDArray[np.float32]:
     return values.astype("float32")
 
 

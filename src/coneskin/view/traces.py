@@ -15,8 +15,7 @@ from .history import CHANNELS, Series
 from .run_course import RunCourse
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from coneskin.core.arrays import Floats
 
 __all__ = ["COLOURS", "MOST_LINES", "TracePlot", "trace_drawings", "traces"]
 
@@ -34,8 +33,8 @@ class _Traces(NamedTuple):
     """
 
     names: tuple[str, ...]
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
+    times: Floats
+    values: Floats
 
 
 def _trace_names(courses: Sequence[RunCourse]) -> list[str]:
@@ -60,7 +59,7 @@ def traces(courses: Sequence[RunCourse], what: str, since: float, until: float) 
     edges = np.linspace(since, max(until, since + 1e-6), _BIN_COUNT + 1)
     times = np.repeat(0.5 * (edges[:-1] + edges[1:]), 2)
     names: list[str] = []
-    rows: list[NDArray[np.float64]] = []
+    rows: list[Floats] = []
     for number, course in enumerate(courses, 1):
         before = f"run {number}: " if len(courses) > 1 else ""
         for name, series, column in _columns(course, what):
@@ -83,7 +82,7 @@ def _columns(course: RunCourse, what: str) -> list[tuple[str, Series, int]]:
     return [(channel, found, column) for column, channel in enumerate(CHANNELS)]
 
 
-def _envelope(series: Series, column: int, zero: float, edges: NDArray[np.float64]) -> NDArray[np.float64]:
+def _envelope(series: Series, column: int, zero: float, edges: Floats) -> Floats:
     """Return the least and the largest value of each bin, NaN for one without a value."""
     import numpy as np
 
@@ -206,7 +205,7 @@ def _drawing(found: _Traces) -> str:
     )
 
 
-def _course(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
+def _course(x: Floats, y: Floats) -> str:
     """Return the data of a path with a gap wherever there is no value."""
     import numpy as np
 

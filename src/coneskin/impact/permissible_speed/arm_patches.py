@@ -15,9 +15,7 @@ from coneskin.robot.arm.kinematics import link_poses, point_jacobian
 from coneskin.scene.build import place_on_arm
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats
     from coneskin.geometry.pose import Vector
     from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.values.scene import Scene
@@ -101,7 +99,7 @@ def motion_positions(scene: Scene) -> list[tuple[float, ...]]:
     return found
 
 
-def weigh(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[Sequence[float]]) -> NDArray[np.float64]:
+def weigh(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[Sequence[float]]) -> Floats:
     """Return the effective mass at each patch in each position [kg], shape (positions, patches).
 
     It is infinite where no joint moves the patch along its normal. The joints are free in it. Held joints make an arm

@@ -28,9 +28,7 @@ from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import JOINTS, link_poses
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats
     from coneskin.robot.arm.model import ArmModel
 
     from .arm_patches import ArmPatch
@@ -107,7 +105,7 @@ def extra_ways(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[S
     return [ExtraWay(float(lag), float(bend)) for lag, bend in zip(lags, bends, strict=True)]
 
 
-def _worst_lag(levers: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
+def _worst_lag(levers: Floats, masses: Floats) -> Floats:
     """Return the lag of patches in the worst direction [m/rad], shape (patches,).
 
     Args:
@@ -116,12 +114,12 @@ def _worst_lag(levers: NDArray[np.float64], masses: NDArray[np.float64]) -> NDAr
     """
     import numpy as np
 
-    beyond: NDArray[np.float64] = levers @ (masses / np.diag(masses)[:, None]) - levers
-    worst: NDArray[np.float64] = np.abs(beyond).sum(axis=1)
+    beyond: Floats = levers @ (masses / np.diag(masses)[:, None]) - levers
+    worst: Floats = np.abs(beyond).sum(axis=1)
     return worst
 
 
-def _worst_bend(changes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _worst_bend(changes: Floats) -> Floats:
     """Return a bound of the bend of patches in any direction [m/rad^2], shape (patches,).
 
     Without what is below 0 on its diagonal, a form is convex in each joint, so that a corner has the most.
@@ -135,13 +133,13 @@ def _worst_bend(changes: NDArray[np.float64]) -> NDArray[np.float64]:
     diagonal = np.eye(count, dtype=bool)
     form = np.where(diagonal, np.maximum(changes, 0.0), changes)
     corners = np.array([(1.0, *signs) for signs in product((-1.0, 1.0), repeat=count - 1)])
-    worst: NDArray[np.float64] = np.einsum("ci,pij,cj->pc", corners, form, corners).max(axis=1)
+    worst: Floats = np.einsum("ci,pij,cj->pc", corners, form, corners).max(axis=1)
     return worst
 
 
 def _levers_and_changes(
     arm: ArmModel, q: Sequence[float], link: int, patches: Sequence[ArmPatch]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Return the levers of patches of one link, and how they change with the joints on a ball that the patch touches.
 
     Returns:

@@ -17,8 +17,8 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.recording.block import Block
 from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
 from coneskin.robot.arm.model import ArmModel
@@ -55,7 +55,7 @@ class _ForceLimit:
 
     def __init__(self, model: ArmModel, limit: float = 150.0) -> None:
         self._model, self._limit = model, limit
-        self._torque: NDArray[np.float64] = np.zeros(JOINTS)
+        self._torque: Floats = np.zeros(JOINTS)
 
     def exceeded(self, q: Sequence[float], torque: Sequence[float], step: float) -> bool:
         """Take the torques from outside [N m] that have acted for a time [s]; tell whether the arm must stop."""

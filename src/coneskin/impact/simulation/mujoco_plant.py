@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import MissingExtra
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.inertia import arm_inertia
@@ -101,9 +101,9 @@ class Touch(NamedTuple):
     depth: float
     rate: float
     force: float
-    normal: NDArray[np.float64]
-    point: NDArray[np.float64]
-    jacobian: NDArray[np.float64]  #: of the point, for the arm's joints, 3 x 6
+    normal: Floats
+    point: Floats
+    jacobian: Floats  #: of the point, for the arm's joints, 3 x 6
 
 
 class MujocoPlant:
@@ -311,8 +311,8 @@ class MujocoPlant:
         sheet: int,
         part: int,
         found: list[tuple[float, int, float]],
-        frames: NDArray[np.float64],
-        places: NDArray[np.float64],
+        frames: Floats,
+        places: Floats,
     ) -> Touch:
         depth, index, sign = max(found)
         normal, point = sign * frames[index, :3], places[index]

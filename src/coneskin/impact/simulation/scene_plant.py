@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import SceneError
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.sim.motion.arm import CYCLE
@@ -44,7 +44,7 @@ class _LiveMujocoPlant(MujocoPlant):
         speed = np.asarray(qd, float)
         moved, target = step * speed, np.asarray(q, float) + self._lead * speed
         arm, control, applied, velocity = len(speed), d.ctrl, d.qfrc_applied, d.qvel
-        near: list[tuple[Touch, NDArray[np.float64]]] = []
+        near: list[tuple[Touch, Floats]] = []
         for number in range(round(duration / step)):
             look = number % _CONTACT_PERIOD == 0
             m.opt.disableflags = 0 if look else no_contacts
@@ -75,9 +75,9 @@ class _LiveMujocoPlant(MujocoPlant):
         m.opt.disableflags = 0
         self._look()
 
-    def _row(self, touch: Touch) -> NDArray[np.float64]:
+    def _row(self, touch: Touch) -> Floats:
         """Return what gives the rate of an indentation from all speeds, and the forces on all of them from its own."""
-        row: NDArray[np.float64] = np.zeros(self._m.nv)
+        row: Floats = np.zeros(self._m.nv)
         row[: touch.jacobian.shape[1]] = touch.normal @ touch.jacobian
         if (at := self._address[touch.part]) is not None:
             row[at : at + 3] = -touch.normal

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from coneskin.core.arrays import Floats
     from coneskin.skin.field.disc import Disc
     from coneskin.skin.field.fourport import DrivePhase
     from coneskin.skin.sensor import Sensor
@@ -68,7 +69,7 @@ class SheetField:
         supply: the potential that drives it [V].
     """
 
-    def __init__(self, sensor: Sensor, u: NDArray[np.float64], phi: NDArray[np.float64]) -> None:
+    def __init__(self, sensor: Sensor, u: Floats, phi: Floats) -> None:
         from coneskin.skin.field.model import FieldModel
         from coneskin.skin.field.sheet import SectorSheet
 
@@ -77,9 +78,9 @@ class SheetField:
         self._model = FieldModel(
             SectorSheet.of_frustum(sensor.frustum), sensor.upper_sheet_ohms, sensor.lower_sheet_ohms, _FIELD_TOLERANCE
         )
-        self._known: tuple[object, NDArray[np.float64]] | None = None
+        self._known: tuple[object, Floats] | None = None
 
-    def potentials(self, what: str, contact: ContactOnSheet | None) -> NDArray[np.float64]:
+    def potentials(self, what: str, contact: ContactOnSheet | None) -> Floats:
         """Return the potentials at the points [V].
 
         Args:
@@ -159,8 +160,8 @@ class FieldPatches(NamedTuple):
         sizes: around, along, and 1 [m], shape (n, 3).
     """
 
-    u: NDArray[np.float64]
-    phi: NDArray[np.float64]
+    u: Floats
+    phi: Floats
     positions: NDArray[np.float32]
     rotations: NDArray[np.float32]
     sizes: NDArray[np.float32]
@@ -194,7 +195,7 @@ def field_patches(sheet: SheetSurface) -> FieldPatches:
     return FieldPatches(u, phi, points.astype("float32"), np.array(turned, dtype="float32"), sizes.astype("float32"))
 
 
-def potential_colours(volts: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
+def potential_colours(volts: Floats, low: float, high: float) -> NDArray[np.uint8]:
     """Return the colour of each potential, in bands from low to high.
 
     Args:

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats, Ints
     from coneskin.scene.build import SensorOnArm
     from coneskin.skin.sensor import Sensor
 
@@ -42,10 +40,10 @@ class SheetSurface(NamedTuple):
 
     name: str
     link: int
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    rim_vertices: NDArray[np.float64]
-    rim_faces: NDArray[np.int64]
+    vertices: Floats
+    faces: Ints
+    rim_vertices: Floats
+    rim_faces: Ints
     touch_level: float
     slimmest: float
     sensor: Sensor
@@ -95,9 +93,7 @@ def _surface(item: SensorOnArm, sensor: Sensor) -> SheetSurface:
     )
 
 
-def _strip(
-    item: SensorOnArm, u: NDArray[np.float64], phi: NDArray[np.float64], above: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _strip(item: SensorOnArm, u: Floats, phi: Floats, above: float) -> tuple[Floats, Ints]:
     """Return vertices and faces of the part of a side between places, so far above what is sensed [m]."""
     import numpy as np
 

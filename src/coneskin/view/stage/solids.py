@@ -16,9 +16,7 @@ from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.model import ArmModel
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats, Ints
     from coneskin.scene.values.scene import BodyScene
 
 __all__ = ["Solid", "along", "arm_solids", "barrel", "body_solids", "joined", "quaternion", "revolve"]
@@ -74,16 +72,14 @@ class Solid(NamedTuple):
 
     name: str
     link: int
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    vertices: Floats
+    faces: Ints
     colour: tuple[int, int, int]
     closed: bool = False
     opacity: float = 1.0
 
 
-def revolve(
-    profile: Sequence[tuple[float, float]], segments: int = _SEGMENT_COUNT
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def revolve(profile: Sequence[tuple[float, float]], segments: int = _SEGMENT_COUNT) -> tuple[Floats, Ints]:
     """Return vertices and faces of the surface that a profile sweeps about the z axis.
 
     Each straight piece of the profile has vertices of its own, so that its rims are shaded as edges. A piece that
@@ -237,7 +233,7 @@ def _solid(name: str, body: BodyScene, place: Vector) -> Solid:
     return Solid(name, 0, Pose(translation=place).apply_all(vertices), faces, _BODY_COLOUR, closed=True)
 
 
-def _plate(half: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _plate(half: float) -> tuple[Floats, Ints]:
     """Return vertices and faces of a square plate whose front is in the plane z = 0, seen from z > 0."""
     import numpy as np
 

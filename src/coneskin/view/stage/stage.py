@@ -17,9 +17,7 @@ from .sheet_surface import SheetSurface, sheet_surfaces
 from .solids import Solid, body_solids
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats, Ints
     from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
@@ -51,7 +49,7 @@ def _clear_where_buried(
     return tuple(found)
 
 
-def _places(sheet: SheetSurface, poses: Mapping[int, Pose], link: int) -> NDArray[np.float64]:
+def _places(sheet: SheetSurface, poses: Mapping[int, Pose], link: int) -> Floats:
     """Return places all over a sheet, in the frame of a link [m], shape (n, 3)."""
     import numpy as np
 
@@ -62,7 +60,7 @@ def _places(sheet: SheetSurface, poses: Mapping[int, Pose], link: int) -> NDArra
     return np.asarray(poses[link].inverse().apply_all(here))
 
 
-def _share_inside(solid: Solid, points: NDArray[np.float64]) -> float:
+def _share_inside(solid: Solid, points: Floats) -> float:
     """Return which share of points is inside of a solid, which is convex as all that is closed here."""
     import numpy as np
 
@@ -76,7 +74,7 @@ SPACING = 0.25  #: m between two lines
 _LINE_WIDTH = 0.006  # m; from 2 m off still more than a pixel
 
 
-def floor_lines(reach: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def floor_lines(reach: float) -> tuple[Floats, Ints]:
     """Return vertices [m] and faces, seen from above, of lines that go as far as twice the reach each way.
 
     Args:
