@@ -76,6 +76,7 @@ class _HeldPart:
 
 
 STEP = 2e-4  #: s of the integration; the stiffest contact, 1e6 N/m against 0.3 kg, swings with 1800 rad/s
+_CONTACT_RANGE = 0.002  # m between surfaces that may meet before the next look; as far as MuJoCo reports it
 _ARM_DOF = 6  # degrees of freedom of the arm, the first ones
 
 
@@ -117,6 +118,9 @@ class MujocoPlant:
         q: joint positions at the beginning [rad].
         qd: joint speeds then [rad/s].
         step: of the integration [s].
+        period: steps from one look where skins and bodies meet to the next. Between two looks place and normal of a
+            contact stay, and its indentation grows with the speeds. 5 takes a third of the time, and has the forces of
+            1 within a few per cent (tests/impact/simulation).
 
     Attributes:
         time: since the beginning [s].
@@ -139,6 +143,7 @@ class MujocoPlant:
         q: Sequence[float],
         qd: Sequence[float] = (0.0,) * _ARM_DOF,
         step: float = STEP,
+        period: int = 1,
     ) -> None:
         try:
             import mujoco
@@ -164,7 +169,7 @@ class MujocoPlant:
                 self._address.append(int(self._m.joint(f"{name}.x").dofadr[0]) if body.gives_way else None)
                 self.parts.append(_HeldPart(body, part))
         self._lead = self._m.actuator_biasprm[:, 2] / self._m.actuator_biasprm[:, 1]  # kv / kp [s]
-        self._step = step
+        self._step, self._period = step, period
         self._d.qpos[:_ARM_DOF], self._d.qvel[:_ARM_DOF] = q, qd
         self._starts = [place for body in bodies for place in body.parts]
         self._moving = [(number, at) for number, at in enumerate(self._address) if at is not None]
@@ -234,16 +239,24 @@ class MujocoPlant:
         """
         m, d, step = self._m, self._d, self._step
         step1, step2 = self._mj.mj_step1, self._mj.mj_step2
+        no_contacts = int(self._mj.mjtDisableBit.mjDSBL_CONTACT)
         speed = np.asarray(qd, float)
         moved = step * speed
         target = np.asarray(q, float) + self._lead * speed  # a servo that damps its speed would follow behind by this
-        for _ in range(round(duration / step)):
+        near: list[tuple[Touch, Floats]] = []
+        for number in range(round(duration / step)):
+            look = number % self._period == 0
+            m.opt.disableflags = 0 if look else no_contacts
             step1(m, d)
+            if look:
+                near = [(touch, self._row(touch)) for touch in self._find(0.0 if self._period == 1 else _CONTACT_RANGE)]
+                depths = [touch.depth for touch, _ in near]
             d.ctrl[:_ARM_DOF] = target
-            self._press()
+            self._press(near, depths)
             step2(m, d)
             target += moved
             self.time += step
+        m.opt.disableflags = 0
         self._look()
 
     def _look(self) -> None:
@@ -251,27 +264,36 @@ class MujocoPlant:
         self._mj.mj_fwdPosition(self._m, self._d)
         self.contacts = tuple(self._contact(touch) for touch in self._find())
 
-    def _press(self) -> None:
-        """Put the forces of the contacts on skins and bodies, and let people act."""
+    def _row(self, touch: Touch) -> Floats:
+        """Return what gives the rate of an indentation from all speeds, and the forces on all of them from its own."""
+        row: Floats = np.zeros(self._m.nv)
+        row[:_ARM_DOF] = touch.normal @ touch.jacobian
+        if (at := self._address[touch.part]) is not None:
+            row[at : at + 3] = -touch.normal
+        return row
+
+    def _press(self, near: Sequence[tuple[Touch, Floats]], depths: list[float]) -> None:
+        """Put the forces of the contacts on skins and bodies, and let people act; the depths grow with the speeds."""
         d, step, padding = self._d, self._step, self._padding
-        applied = d.qfrc_applied
+        applied, velocity = d.qfrc_applied, d.qvel
         applied[:] = 0.0
         felt: dict[int, Touch] = {}
-        for touch in self._find():
-            push = touch.force * touch.normal
-            applied[:_ARM_DOF] -= push @ touch.jacobian
-            if (at := self._address[touch.part]) is not None:
-                applied[at : at + 3] += push
-            self.impulse += touch.force * step
-            self.deepest = max(self.deepest, touch.depth)
-            self.peak = max(self.peak, touch.force)
-            self.lost += (touch.force - padding.elastic(touch.depth)) * touch.rate * step
+        for number, (touch, row) in enumerate(near):
+            rate, depth = float(row @ velocity), depths[number]
+            depths[number] += rate * step
+            if depth <= 0.0:
+                continue
+            force = padding.force(depth, rate)
+            applied -= force * row
+            self.impulse += force * step
+            self.deepest, self.peak = max(self.deepest, depth), max(self.peak, force)
+            self.lost += (force - padding.elastic(depth)) * rate * step
             self._touched.setdefault(self._body_numbers[touch.part], self.time)
-            if touch.part not in felt or felt[touch.part].force < touch.force:
-                felt[touch.part] = touch
+            if touch.part not in felt or felt[touch.part].force < force:
+                felt[touch.part] = touch._replace(force=force)
         for number, at in self._moving:
-            speed = d.qvel[at : at + 3].tolist()
-            self.lost += self._damping[number] * (speed[0] ** 2 + speed[1] ** 2 + speed[2] ** 2) * step
+            x, y, z = velocity[at : at + 3].tolist()
+            self.lost += self._damping[number] * (x * x + y * y + z * z) * step
         self._let_people_act(felt)
 
     def _let_people_act(self, felt: Mapping[int, Touch]) -> None:
