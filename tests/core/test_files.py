@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.core.errors import ConeSkinError, RecordingError
-from coneskin.core.files import draft_of, format_size, open_file, read_file
+from coneskin.core.files import _format_size, draft_of, open_file, read_file
 from coneskin.core.recording.chunk import MAGIC
 from coneskin.core.recording.reader import read_recording
 from coneskin.geometry.mesh import load_mesh
@@ -88,7 +88,7 @@ def test_a_file_within_its_limit_is_read(tmp_path: Path) -> None:
 
 
 def test_sizes_for_people() -> None:
-    assert [format_size(n) for n in (999, 1000, 1_500_000, 10**10)] == ["999 bytes", "1 kB", "1.5 MB", "10 GB"]
+    assert [_format_size(n) for n in (999, 1000, 1_500_000, 10**10)] == ["999 bytes", "1 kB", "1.5 MB", "10 GB"]
 
 
 @pytest.mark.promise("P66")

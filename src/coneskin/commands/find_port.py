@@ -15,7 +15,7 @@ from coneskin.core.text import positive_seconds
 if TYPE_CHECKING:
     from coneskin.skin.sources.serial_port import PortFacts
 
-__all__ = ["add_arguments", "find_port", "run"]
+__all__ = ["add_arguments", "run"]
 
 _POLL_PERIOD = 0.2  # s between two looks at the list of ports
 
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     def say(words: str) -> None:
         print(words, file=sys.stderr, flush=True)
 
-    port = find_port(find_ports, say, args.timeout_s)
+    port = _find_port(find_ports, say, args.timeout_s)
     trouble, name = port_trouble(port.device), stable_name(port.device)
     if args.json:
         print(json.dumps({"port": name, "device": port.device, "hardware": port.hardware, "trouble": trouble}))
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if trouble else 0
 
 
-def find_port(
+def _find_port(
     look: Callable[[], Sequence[PortFacts]],
     say: Callable[[str], None],
     timeout: float,

@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["draft_of", "format_size", "open_file", "read_file", "write_whole"]
+__all__ = ["draft_of", "open_file", "read_file", "write_whole"]
 
 _FILE_KINDS = {
     stat.S_IFDIR: "a folder",
@@ -68,7 +68,7 @@ def open_file(path: Path, limit: int) -> BinaryIO:
         raise
 
 
-def format_size(count: int) -> str:
+def _format_size(count: int) -> str:
     """Return a number of bytes for people: "300 bytes", "1.5 MB"."""
     if count < 1000:
         return f"{count} bytes"
@@ -87,7 +87,7 @@ def _check(path: Path, found: os.stat_result, limit: int) -> None:
 
 
 def _too_long(path: Path, size: int, limit: int) -> OSError:
-    what = f"it has {format_size(size)} or more, and at most {format_size(limit)} are read; is it the right file?"
+    what = f"it has {_format_size(size)} or more, and at most {_format_size(limit)} are read; is it the right file?"
     return OSError(errno.EFBIG, what, str(path))
 
 

@@ -43,11 +43,7 @@ def _is_value(value: Any, depth: int = 1) -> bool:
 def _refusal_of(path: str, host: str, origin: str | None, hosts: frozenset[str] | None) -> str:
     """Return why a request is refused; empty where it is not.
 
-    Args:
-        path: that it asks for, as sent.
-        host: its header Host: what the browser believes to talk to.
-        origin: its header Origin, which a browser sends with a web socket; None without.
-        hosts: names of this server; None for any. A name that somebody else's page has led here is none of them.
+    An origin comes with a web socket alone. A name that another's page has led here is none of the ``hosts``.
     """
     plain = unquote(path.partition("?")[0])
     if not plain.startswith("/") or ".." in plain.split("/") or "//" in plain or "\\" in plain or "\0" in plain:

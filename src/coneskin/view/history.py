@@ -77,12 +77,7 @@ _FINAL_PHASES = {"latched: stands until a manual reset", "ending", "no guard: it
 
 
 def _phase_after(before: PhaseWords, name: str) -> PhaseWords:
-    """Return the phase after an event.
-
-    Args:
-        before: the phase.
-        name: of the event.
-    """
+    """Return the phase after an event."""
     if name in _REPEATING_EVENTS and before.text in _FINAL_PHASES:
         return before
     return _PHASE_OF_EVENT.get(name, before)

@@ -17,7 +17,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of
 
 from .page_server import PageServer, page_client
-from .panel import EVENT_STYLE, NOTICE
+from .panel import EVENT_STYLE, NOTICE, timeline
 from .run_course import Moment, RunCourse, event_lines
 from .stage.level_scale import force_words, level_bars, level_words
 from .stage.sheet_surface import SheetSurface
@@ -241,8 +241,6 @@ def _serialized(
 
 
 def _panel(courses: Sequence[RunCourse], since: float, until: float, changes: Sequence[_LevelChanges]) -> str:
-    from .panel import timeline
-
     several = len(courses) > 1
     runs, parts, bars = [], [], []
     for course, levels in zip(courses, changes, strict=True):
@@ -259,7 +257,7 @@ def _panel(courses: Sequence[RunCourse], since: float, until: float, changes: Se
         none = {sheet.name: 0.0 for sheet in course.stage.sheets}
         bars.append(level_bars(course.stage.sheets, none, force, f"run {len(runs)}" if several else ""))
     events = [(line.time - since, " ".join(line.text.split())) for line in event_lines(courses)[:_MAX_EVENTS]]
-    data = {"since": since, "duration": max(until - since, 1e-3), "several": several, "runs": runs, "events": events}
+    data = {"since": since, "duration": max(until - since, 1e-3), "runs": runs, "events": events}
     text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element
     drawn = timeline(courses, since, until)
     return (

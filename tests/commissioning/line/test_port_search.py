@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.commands.find_port import find_port
+from coneskin.commands.find_port import _find_port
 from coneskin.commissioning.line.port_search import PortSearch, port_trouble, stable_name
 from coneskin.core.errors import SkinTimeout
 from coneskin.skin.sources.serial_port import PortFacts
@@ -49,7 +49,7 @@ def test_a_hub_is_no_device() -> None:
 def test_it_waits_and_says_what_to_do() -> None:
     lists: Iterator[list[PortFacts]] = iter([[A], [A], [], [A]])
     said: list[str] = []
-    assert find_port(lambda: next(lists), said.append, 60.0, lambda: 0.0, lambda _: None) == A
+    assert _find_port(lambda: next(lists), said.append, 60.0, lambda: 0.0, lambda _: None) == A
     assert said == [
         "unplug the device (within 60 s; Ctrl-C ends)",
         "/dev/ttyUSB0 has gone: plug it in again",
@@ -60,7 +60,7 @@ def test_it_waits_and_says_what_to_do() -> None:
 def test_it_gives_up_with_advice() -> None:
     now = iter(range(100))
     with pytest.raises(SkinTimeout, match=r"no port has come within 5 s; try another cable"):
-        find_port(lambda: [A], lambda _: None, 5.0, lambda: float(next(now)), lambda _: None)
+        _find_port(lambda: [A], lambda _: None, 5.0, lambda: float(next(now)), lambda _: None)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="ports have no groups there")

@@ -106,12 +106,7 @@ def extra_ways(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[S
 
 
 def _worst_lag(levers: Floats, masses: Floats) -> Floats:
-    """Return the lag of patches in the worst direction [m/rad], shape (patches,).
-
-    Args:
-        levers: shape (patches, joints) [m/rad].
-        masses: mass matrix [kg m^2].
-    """
+    """Return the lag of patches in the worst direction [m/rad], shape (patches,)."""
     import numpy as np
 
     beyond: Floats = levers @ (masses / np.diag(masses)[:, None]) - levers

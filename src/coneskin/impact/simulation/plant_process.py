@@ -13,11 +13,16 @@ import math
 import os
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
 from coneskin.core.child_process import inherit
 from coneskin.core.errors import ConeSkinError, MissingExtra
+
+if TYPE_CHECKING:
+    from .impact_outcome import ImpactMeter
 
 __all__ = ["main"]
 
@@ -86,15 +91,10 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _report(program: Channel, meter: object) -> None:
+def _report(program: Channel, meter: ImpactMeter) -> None:
     """Answer the program, which asks what has come of it so far."""
-    from .impact_outcome import ImpactMeter
-
-    assert isinstance(meter, ImpactMeter)
     for _ in program.receive():
-        outcome = meter.outcome
-        values = {name: getattr(outcome, name) for name in outcome.__slots__}
-        values["began"] = meter.began
+        values = {**asdict(meter.outcome), "began": meter.began}
         program.send(encode_json({name: None if math.isnan(value) else value for name, value in values.items()}))
 
 

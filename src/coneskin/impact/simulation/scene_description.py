@@ -34,13 +34,7 @@ def body_link(model: ArmModel, link: int) -> Pose:
 
 
 def _describe_arm(model: ArmModel, inertia: ArmInertia, geoms: Mapping[int, str]) -> str:
-    """Return the bodies of an arm, nested; ``link1`` is the shoulder, ``joint1`` turns it.
-
-    Args:
-        model: the arm.
-        inertia: of its links.
-        geoms: what else stands in the body of a link, by the link's index.
-    """
+    """Return the bodies of an arm, nested; ``link1`` is the shoulder, ``joint1`` turns it."""
     opened: list[str] = []
     place = Pose()
     for link in range(1, JOINTS + 1):
@@ -58,12 +52,7 @@ def _describe_arm(model: ArmModel, inertia: ArmInertia, geoms: Mapping[int, str]
 
 
 def _describe_servos(inertia: ArmInertia, masses: Sequence[float]) -> str:
-    """Return the servos of the joints: stiff position loops that saturate at the joint's highest torque.
-
-    Args:
-        inertia: for the torques.
-        masses: what each servo turns [kg m^2]: the diagonal of the mass matrix.
-    """
+    """Return the servos of the joints: stiff position loops that saturate at the joint's highest torque."""
     rate = 2.0 * math.pi * SERVO_FREQUENCY
     return "".join(
         f'<position name="servo{i}" joint="joint{i}" kp="{mass * rate * rate!r}" kv="{2.0 * mass * rate!r}" '

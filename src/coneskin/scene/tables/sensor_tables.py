@@ -67,15 +67,7 @@ def _drop_calibration(table: Mapping[str, Any]) -> dict[str, Any]:
 def _apply_calibration(
     table: Mapping[str, Any], where: str, folder: Path | None, simulated: bool, problems: list[str]
 ) -> dict[str, Any]:
-    """Return a sensor's table with the keys that its ``calibration`` stands for, in place of it.
-
-    Args:
-        table: of the scene, its ``file`` merged.
-        where: name of the table, for messages.
-        folder: folder to which a relative path refers; None where no file may be opened.
-        simulated: the sensor is a virtual one.
-        problems: every mistake is added here.
-    """
+    """Return a sensor's table with the keys that its ``calibration`` stands for, in place of it."""
     plain = _drop_calibration(table)
     (name,) = check({"calibration": table["calibration"]}, (Key("calibration", str, None),), where, problems).values()
     if folder is None:

@@ -50,11 +50,6 @@ def read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str])
 def _read_source(table: Mapping[str, Any], problems: list[str], where: str = "source") -> dict[str, Any]:
     """Check a [source] table and convert it.
 
-    Args:
-        table: from the file.
-        problems: every mistake is added here.
-        where: name of the table in messages.
-
     Returns:
         ``kind``, absent where it is missing or wrong, and the values of its keys: SI, under their names without the
         unit. A key with a mistake has its default.

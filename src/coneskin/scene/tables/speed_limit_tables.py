@@ -232,11 +232,6 @@ def _uncovered(name: str, sheet: Frustum, patches: list[LimitedPatch]) -> list[s
     """Return what patches leave of a sheet without a speed, and which of them are not on it.
 
     The speed along the normal changes evenly between the ends of a sheet: both ends covered, all is.
-
-    Args:
-        name: of the sensor.
-        sheet: its frustum.
-        patches: of that sensor.
     """
     for patch in patches:
         if patch.u > sheet.slant + _ROUNDING_SLACK:

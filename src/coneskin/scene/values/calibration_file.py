@@ -213,11 +213,6 @@ def _old_path(path: Path, day: str) -> Path:
 def _find_calibration(path: Path, sensor: Sensor, simulated: bool) -> CalibrationRecord:
     """Return the calibration that applies to a sensor.
 
-    Args:
-        path: of the file.
-        sensor: as its scene describes it.
-        simulated: it is a virtual one: calibrations of real ones do not apply to it, nor the other way round.
-
     Raises:
         ValueError: none applies; the message says why.
     """

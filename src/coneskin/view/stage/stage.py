@@ -35,11 +35,6 @@ def _clear_where_buried(
     """Return solids, those clear in which a sheet on their link or a neighbour is buried.
 
     Neighbours turn about the axis of their joint, and so does each solid about it: one pose of the arm stands for all.
-
-    Args:
-        solids: of the arm; one that is not closed, a mesh of a link, is what it is.
-        sheets: on the arm.
-        poses: of the links' frames, at any joint positions.
     """
     found = []
     for solid in solids:
