@@ -128,7 +128,7 @@ class MujocoPlant:
         impulse: that all contacts together have given, over time [N s].
         deepest: greatest indentation so far [m].
         peak: greatest force of one skin on one body so far [N].
-        lost: energy that damping in padding and springs has taken [J].
+        lost: energy that damping in padding and springs has taken [J], with a period of 1.
 
     Raises:
         MissingExtra: MuJoCo is not installed.
@@ -287,11 +287,12 @@ class MujocoPlant:
             applied -= force * row
             self.impulse += force * step
             self.deepest, self.peak = max(self.deepest, depth), max(self.peak, force)
-            self.lost += (force - padding.elastic(depth)) * rate * step
+            if self._period == 1:
+                self.lost += (force - padding.elastic(depth)) * rate * step
             self._touched.setdefault(self._body_numbers[touch.part], self.time)
             if touch.part not in felt or felt[touch.part].force < force:
                 felt[touch.part] = touch._replace(force=force)
-        for number, at in self._moving:
+        for number, at in self._moving if self._period == 1 else ():
             x, y, z = velocity[at : at + 3].tolist()
             self.lost += self._damping[number] * (x * x + y * y + z * z) * step
         self._let_people_act(felt)
