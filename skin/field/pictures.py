@@ -16,6 +16,7 @@ from .sheet import SectorSheet
 
 __all__ = ["draw_potential", "make_figure", "paint_error"]
 
+_GRID_COUNT, _LINE_STEPS = 121, 160  # points along a side of a map; steps of a field line
 _MIN_ANGLE = 0.1  # rad of the sector; one of less is drawn as the rectangle that it nearly is
 
 
@@ -94,7 +95,8 @@ def draw_potential(
         MissingExtra: matplotlib is not installed.
     """
     sheet = field.model.sheet
-    u, phi = np.meshgrid(np.linspace(0.0, sheet.width, 121), np.linspace(0.0, sheet.wrap, 121), indexing="ij")
+    along, around = np.linspace(0.0, sheet.width, _GRID_COUNT), np.linspace(0.0, sheet.wrap, _GRID_COUNT)
+    u, phi = np.meshgrid(along, around, indexing="ij")
     volts = field.potentials(u, phi)[0 if upper else 1]
     x, y = _plane(sheet, u, phi)
     figure, (axes,) = make_figure(5.6, 4.9)
@@ -112,7 +114,7 @@ def draw_potential(
 def _field_lines(axes: Any, field: FieldMap, upper: bool) -> None:
     """Follow lines of current through the rectangle by the midpoint rule, from one driven electrode to the other."""
     sheet = field.model.sheet
-    steps = 160
+    steps = _LINE_STEPS
     start = np.asarray((np.arange(13) + 0.5) / 13.0, dtype=np.float64)
     length, breadth = sheet.length, sheet.breadth
     x: Floats

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import shutil
 import sys
 import tomllib
 
@@ -236,9 +237,9 @@ def test_a_failure_halfway_leaves_nothing(tmp_path, monkeypatch, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_is_replaced_only_by_force_and_only_if_it_is_a_design(tmp_path, capsys):
+def test_a_folder_is_replaced_only_by_force_and_only_if_it_is_a_design(tmp_path, capsys, cylinder_design):
     out = tmp_path / "out"
-    assert design(*CYLINDER, "-o", str(out)) == 0
+    shutil.copytree(cylinder_design, out)
     before = (out / "sensor.toml").read_text()
     assert design(*CYLINDER, *sets("electrodes.margin_mm=8"), "-o", str(out)) == 1
     assert "exists already: choose another folder, or replace the design there (--force" in capsys.readouterr().err

@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import os
+import shutil
 import signal
 import struct
 import sys
@@ -45,13 +46,13 @@ def turned(profile: list[tuple[float, float]], sides: int = 72) -> Iterator[Tria
             yield a, f, e
 
 
-def test_a_replaced_design_leaves_what_a_person_put_beside_it(tmp_path: Path) -> None:
+def test_a_replaced_design_leaves_what_a_person_put_beside_it(tmp_path: Path, cylinder_design: Path) -> None:
     out = tmp_path / "out"
-    assert design(*CYLINDER, "--set", "sheet.wires=end2", "-o", str(out)) == 0
+    shutil.copytree(cylinder_design, out)
     (out / "notes").mkdir()
     (out / "notes" / "thesis.tex").write_text("years of work")
     (out / "link").symlink_to(tmp_path)
-    assert design(*CYLINDER, "--set", "electrodes.margin_mm=8", "--force", "-o", str(out)) == 0
+    assert design(*CYLINDER, "--set", "sheet.wires=end2", "--force", "-o", str(out)) == 0
     assert (out / "notes" / "thesis.tex").read_text() == "years of work"
     assert (out / "link").is_symlink()
     listed = set(json.loads((out / "design.json").read_text())["files"])
@@ -61,9 +62,11 @@ def test_a_replaced_design_leaves_what_a_person_put_beside_it(tmp_path: Path) ->
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-def test_a_persons_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_persons_file_is_not_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], cylinder_design: Path
+) -> None:
     out = tmp_path / "out"
-    assert design(*CYLINDER, "-o", str(out)) == 0
+    shutil.copytree(cylinder_design, out)
     (out / "sheet-1").mkdir()
     (out / "sheet-1" / "sensor.toml").write_text("mine")
     two = ["--radius3-mm", "40", "--height2-mm", "150"]

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from coneskin.cli import main
+from coneskin.skin.field import pictures
 
 CONE = ["--radius1-mm", "40", "--radius2-mm", "70", "--height-mm", "150", "--wrap-deg", "300"]
 CYLINDER = ["--radius1-mm", "54", "--height-mm", "434"]
@@ -23,8 +24,10 @@ def test_numbers_of_a_cylinder_are_those_by_hand(capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.parametrize("cone", [CONE, CYLINDER], ids=("sector", "rectangle"))
-def test_every_picture_is_drawn(cone: list[str], tmp_path) -> None:
+def test_every_picture_is_drawn(cone: list[str], tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")
+    monkeypatch.setattr(pictures, "_GRID_COUNT", 21)
+    monkeypatch.setattr(pictures, "_LINE_STEPS", 12)
     assert main(["field", *cone, "-o", str(tmp_path / "new"), "--grid", "4"]) == 0
     names = sorted(path.name for path in (tmp_path / "new").iterdir())
     assert names == ["error_phi.png", "error_u.png", "potential_angular.png", "potential_radial.png"]

@@ -36,7 +36,7 @@ def test_longer_whole_numbers_are_floats() -> None:
     assert read_json(b"[-" + b"1" * 5000 + b"]") == [-math.inf]
 
 
-@given(st.recursive(ANY_TEXT, lambda inner: st.lists(inner) | st.dictionaries(ANY_TEXT, inner)))
+@given(st.recursive(ANY_TEXT, lambda inner: st.lists(inner) | st.dictionaries(ANY_TEXT, inner), max_leaves=8))
 @example("\udcff")
 @example({"\ud800": ["\udfff"]})
 def test_every_string_can_be_written_as_utf_8(value: Any) -> None:
