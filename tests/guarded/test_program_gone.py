@@ -132,8 +132,7 @@ def test_a_program_whose_main_thread_hangs_moves_its_arm_no_longer_than_it_said(
 @pytest.mark.promise("P41")
 def test_a_frozen_driver_is_not_armed_and_does_not_do_later_what_was_asked(controller):
     """A driver that was frozen for 1.8 s ends itself: where this computer took so long, another is frozen."""
-    while not has_gone_on_after_a_freeze(controller):
-        controller.wait_for_standstill()
+    assert any(has_gone_on_after_a_freeze(controller) for _ in range(10))
 
 
 def has_gone_on_after_a_freeze(controller):
@@ -145,7 +144,7 @@ def has_gone_on_after_a_freeze(controller):
         assert session.wait_for(("latched",), DEADLINE) is not None
         assert session.wait_for(("touch_ended",), DEADLINE) is not None
         kill(session, "driver", signal.SIGSTOP)
-        with pytest.raises(RobotRefused, match="the driver process: no heartbeat"):
+        with pytest.raises(RobotRefused, match=r"the driver process: no heartbeat|the driver process has ended"):
             session.reset(timeout=DEADLINE)
         stood = controller.wait_for_standstill()["q"]
         thread, raised = run(session, stood)
