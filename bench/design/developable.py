@@ -16,7 +16,8 @@ import time
 import numpy as np
 
 from bench.report import head
-from coneskin.geometry.fit.cones import fit_cones, sample_link
+from coneskin.geometry.fit.candidates import sample_link
+from coneskin.geometry.fit.cones import fit_cones
 from coneskin.geometry.fit.developable.packing import with_developables
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.pose import Pose

@@ -25,7 +25,8 @@ from scipy.sparse.linalg import splu
 
 from bench.report import head, show
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
-from coneskin.geometry.fit.cones import fit_cones, sample_link
+from coneskin.geometry.fit.candidates import sample_link
+from coneskin.geometry.fit.cones import fit_cones
 from coneskin.geometry.fit.developable.packing import with_developables
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.frustum import Frustum

@@ -34,7 +34,7 @@ from bench.report import head
 from coneskin.core.errors import MeshError
 from coneskin.geometry.fit import candidates as hypotheses
 from coneskin.geometry.fit.axis_plan import SheetRequirements, plan_sheets
-from coneskin.geometry.fit.candidates import AxisCandidate, find_revolution_axis
+from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink, find_revolution_axis
 from coneskin.geometry.fit.coarse_packing import Choice, grown, survey_axes
 from coneskin.geometry.fit.cone_fit import fit_cone
 from coneskin.geometry.fit.cones import LEAST_GAIN, find_cones
@@ -125,8 +125,9 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
         LEAST_GAIN * whole,
     )
     axes = brute_axes(hull)
-    stage = FineStage(mesh, rays, hull, wanted)
-    surveys = survey_axes(mesh, rays, axes, wanted)
+    link = SampledLink(mesh, rays, hull, hull, None, axes)
+    stage = FineStage(link, wanted)
+    surveys = survey_axes(link, wanted)
     loose = replace(wanted, tolerance=1.1 * wanted.tolerance, min_length=0.75 * wanted.min_length)
     alone = [plan_sheets(one.profile, one.lines, loose, sheets) for one in surveys]
     singles = [Choice(number, one) for number, plans in enumerate(alone) for one in plans]

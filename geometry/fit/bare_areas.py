@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,28 @@ from .profile import RadialProfile
 from .side import StraightSide, azimuth_columns, covered_points
 from .surface_samples import SurfaceSamples
 
-__all__ = ["BareArea", "BareTally", "bare_areas", "bare_lengths", "flat_samples", "hull_note", "sheet_more"]
+__all__ = [
+    "BareArea",
+    "BareLength",
+    "BareTally",
+    "bare_areas",
+    "bare_lengths",
+    "flat_samples",
+    "hull_note",
+    "sheet_more",
+]
 
 Floats = NDArray[np.float64]
 
-MAX_HULL_FACES = 5000  #: faces; a convex mesh with more is a smooth body, not a collision hull
+_MAX_HULL_FACES = 5000  # faces; a convex mesh with more is a smooth body, not a collision hull
+
+
+class BareLength(NamedTuple):
+    """A length of the link without a sheet."""
+
+    start: float  #: distance along the axis from end 1 of the first sheet [m]
+    end: float  #: the same of its far end [m]
+    reason: str  #: why no sheet lies there, in words
 
 
 def hull_note(mesh: Mesh, samples: SurfaceSamples, visual: bool = False) -> str:
@@ -38,7 +56,7 @@ def hull_note(mesh: Mesh, samples: SurfaceSamples, visual: bool = False) -> str:
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    if len(mesh.faces) > MAX_HULL_FACES:
+    if len(mesh.faces) > _MAX_HULL_FACES:
         return ""
     try:
         hull = ConvexHull(mesh.outermost)
@@ -64,10 +82,8 @@ def bare_lengths(
     tolerance: float,
     min_length: float,
     further: AxisPlan | None = None,
-) -> list[tuple[float, float, str]]:
-    """Return the lengths without a sheet: start, end and reason.
-
-    Start and end are heights along the axis from end 1 of the first side [m].
+) -> list[BareLength]:
+    """Return the lengths without a sheet, in order along the axis.
 
     Args:
         profile: the hull about the axis.
@@ -86,7 +102,7 @@ def bare_lengths(
     reason[covered] = 0
     zero = float(profile.z[sides[0].first]) if sides else float(profile.z[0]) - 0.5 * profile.step
     partial = any(side.columns < len(profile.phi) for side in sides)
-    bare: list[tuple[float, float, str]] = []
+    bare: list[BareLength] = []
     first = 0
     for k in range(1, len(high) + 1):
         same = k < len(high) and (reason[k] == 0) == (reason[first] == 0)
@@ -116,7 +132,7 @@ def bare_lengths(
             if partial and kinds[2] >= kinds[1]:
                 text += ", even within the angle wrapped"
             low_end = float(profile.z[first]) - 0.5 * profile.step - zero
-            bare.append((low_end, low_end + length, text))
+            bare.append(BareLength(low_end, low_end + length, text))
         first = k
     return bare
 

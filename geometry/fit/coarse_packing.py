@@ -12,11 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.ray_casting import RayCaster
-
 from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, largest_partial_wrap, plan_sheets, side_lines
-from .candidates import AxisCandidate
+from .candidates import SampledLink
 from .cone_fit import InfiniteCone
 from .profile import AxisFrame, RadialProfile, measure_profile
 from .side import StraightSide
@@ -132,26 +129,21 @@ class Choice:
         return full, len(self.plan.sides) - full
 
 
-def survey_axes(
-    mesh: Mesh, rays: RayCaster, candidates: list[AxisCandidate], requirements: SheetRequirements
-) -> list[AxisSurvey]:
-    """Measure a coarse profile about every candidate; ``best_plan`` packs sheets on them for any tolerance."""
+def survey_axes(link: SampledLink, requirements: SheetRequirements) -> list[AxisSurvey]:
+    """Measure a coarse profile about every axis; ``best_plan`` packs sheets on them for any tolerance."""
     surveys = []
-    for candidate in candidates:
+    for candidate in link.axes:
         frame = AxisFrame.along(candidate.origin, candidate.axis, requirements.seam_direction)
-        profile = profile_about(mesh, rays, frame, _COARSE_GRID, requirements)
+        profile = profile_about(link, frame, _COARSE_GRID, requirements)
         surveys.append(AxisSurvey(profile, side_lines(profile, candidate.cones)))
     return surveys
 
 
-def better_surveys(
-    mesh: Mesh, rays: RayCaster, surveys: list[AxisSurvey], requirements: SheetRequirements
-) -> list[AxisSurvey]:
+def better_surveys(link: SampledLink, surveys: list[AxisSurvey], requirements: SheetRequirements) -> list[AxisSurvey]:
     """Return surveys about axes near the best ones about which a sheet covers more, within a tolerance.
 
     Args:
-        mesh: the link.
-        rays: a ray caster of the same mesh.
+        link: the link.
         surveys: of the axes, as ``survey_axes`` returns them.
         requirements: on the sheets.
     """
@@ -167,7 +159,7 @@ def better_surveys(
         (side,) = plan.sides
         better = _search_axis(one.profile, side, one.lines, requirements)
         if better is not None:
-            profile = profile_about(mesh, rays, better, _COARSE_GRID, requirements)
+            profile = profile_about(link, better, _COARSE_GRID, requirements)
             moved = float((better.origin - frame.origin) @ frame.axis)
             cone = InfiniteCone(better.origin, better.axis, side.radius + side.slope * moved, math.atan(side.slope))
             found.append(AxisSurvey(profile, side_lines(profile, (cone,))))
@@ -239,10 +231,9 @@ def grown(
 
 
 def profile_about(
-    mesh: Mesh, rays: RayCaster, frame: AxisFrame, grid: tuple[int, int], requirements: SheetRequirements
+    link: SampledLink, frame: AxisFrame, grid: tuple[int, int], requirements: SheetRequirements
 ) -> RadialProfile:
     """Measure a profile about an axis, of at most so many slices and so many rays in each."""
-    slices, around = grid
-    length = float(np.ptp(mesh.outermost @ frame.axis))
-    profile = measure_profile(mesh, rays, frame, max(length / slices, 0.0005), around, requirements.max_bridge)
+    step = max(float(np.ptp(link.mesh.outermost @ frame.axis)) / grid[0], 0.0005)
+    profile = measure_profile(link.mesh, link.rays, frame, step, grid[1], requirements.max_bridge)
     return profile if requirements.weights is None else profile.weighed(requirements.weights)

@@ -1,8 +1,4 @@
-"""Search for the sheets of a link: the frusta that cover most of it within a tolerance.
-
-A sampled link is what the search sees: its rays, samples of its hull, what areas count, and the axes about which sheets
-may lie. The cones and the other developables of a link are looked for on the same samples and from the same axes.
-"""
+"""Search for the sheets of a link: the frusta that cover most of it within a tolerance."""
 
 from __future__ import annotations
 
@@ -12,110 +8,24 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.ray_casting import RayCaster
 
 from .axis_plan import AxisPlan, SheetRequirements
-from .bare_areas import BareArea, bare_areas, bare_lengths, hull_note
-from .candidates import AxisCandidate, find_axis_candidates
+from .bare_areas import BareArea, BareLength, bare_areas, bare_lengths, hull_note
+from .candidates import SampledLink, sample_link
 from .coarse_packing import AxisSurvey, better_surveys, survey_axes
 from .fit_options import MOST_TOLERANCE, FitOptions
 from .fitted_sheet import FittedSheet, fitted_sheet
 from .plan import FineStage, SheetPlan, best_plan
-from .surface_samples import SurfaceSamples, sample_surface
-from .touch_weights import TouchWeights, exposure_weights
+from .surface_samples import SurfaceSamples
+from .touch_weights import TouchWeights
 
-__all__ = ["LEAST_GAIN", "BareLength", "LinkFit", "SampledLink", "find_cones", "fit_cones", "sample_link"]
-
-_SEARCH_SAMPLES = 6000  #: points on the mesh from which the axes are found, whatever is asked
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SampledLink:
-    """A link with all that every search on it needs.
-
-    Attributes:
-        mesh: the link.
-        rays: a ray caster of the mesh.
-        hull: samples by which sheets are looked for.
-        counted: samples by which coverage is measured.
-        weights: what areas count; None where all count the same.
-        axes: about which sheets may lie.
-    """
-
-    mesh: Mesh
-    rays: RayCaster
-    hull: SurfaceSamples
-    counted: SurfaceSamples
-    weights: TouchWeights | None
-    axes: list[AxisCandidate]
-
-    @property
-    def hull_area(self) -> float:
-        """Area visible from outside [m2]."""
-        return len(self.hull) * self.hull.area
-
-    @property
-    def weighed_area(self) -> float:
-        """Area visible from outside, by the weights [m2]."""
-        if self.weights is None:
-            return self.hull_area
-        return float(self.weights.at(self.hull.points).sum()) * self.hull.area
-
-    @property
-    def worth(self) -> NDArray[np.float64] | None:
-        """What each counted sample counts, shape (n,); None where all count the same."""
-        return None if self.weights is None else self.weights.at(self.counted.points)
-
-
-def sample_link(mesh: Mesh, options: FitOptions, progress: Callable[[str], None]) -> SampledLink:
-    """Sample a link and find its axes; nothing is drawn by chance.
-
-    Args:
-        mesh: the link.
-        options: of the search.
-        progress: called with the name of each step.
-
-    Raises:
-        GeometryError: the weights are not about this link.
-        MeshError: no face of the mesh is visible from outside.
-    """
-    progress("sampling the hull")
-    rays = RayCaster(mesh)
-    hull = sample_surface(mesh, rays, _SEARCH_SAMPLES)
-    counted = hull if options.samples == _SEARCH_SAMPLES else sample_surface(mesh, rays, options.samples)
-    weights = options.weights
-    if options.exposure:
-        progress("casting rays to the outside")
-        weights = exposure_weights(hull, rays)
-    if weights is not None:
-        weights.check_place(hull.points)
-    progress("looking for axes")
-    return SampledLink(mesh, rays, hull, counted, weights, find_axis_candidates(hull))
-
-
-Floats = NDArray[np.float64]
+__all__ = ["LEAST_GAIN", "LinkFit", "find_cones", "fit_cones"]
 
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.04  #: share of the hull that a further sheet must add; a fillet adds less
 _HINT_STEP = 1e-5  # m; a tolerance is advised in hundredths of a millimetre
-
-
-@dataclass(frozen=True, slots=True)
-class BareLength:
-    """A length of the link without a sheet.
-
-    Attributes:
-        start: distance along the axis from end 1 of the first sheet [m].
-        end: the same of its far end [m].
-        reason: why no sheet lies there, in words.
-    """
-
-    start: float
-    end: float
-    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +46,7 @@ class LinkFit:
         ray_engine: the engine that cast the rays, "embree" or "grid".
         needed_tolerance: where nothing fits, a tolerance with which something does, tried [m]; infinite without one.
         bare_areas: what no sheet covers, by reason, the largest first; empty where no sheet fits.
-        weights: name of the map by which areas were weighed; empty where all count the same.
-        touch_weights: that map; None where all count the same.
+        touch_weights: map by which areas were weighed; None where all count the same.
     """
 
     sheets: tuple[FittedSheet, ...]
@@ -152,8 +61,12 @@ class LinkFit:
     ray_engine: str
     needed_tolerance: float = math.inf
     bare_areas: tuple[BareArea, ...] = ()
-    weights: str = ""
     touch_weights: TouchWeights | None = None
+
+    @property
+    def weights(self) -> str:
+        """Name of the map by which areas were weighed; empty where all count the same."""
+        return "" if self.touch_weights is None else self.touch_weights.name
 
 
 def find_cones(
@@ -202,73 +115,54 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         link.weights,
         options.min_arc,
     )
-    mesh, rays, hull, counted, worth = link.mesh, link.rays, link.hull, link.counted, link.worth
-    tolerance, min_length = options.tolerance, options.min_length
-    hull_area, weighed, candidates = link.hull_area, link.weighed_area, link.axes
     say("measuring profiles")
-    surveys = survey_axes(mesh, rays, candidates, requirements)
-    surveys += better_surveys(mesh, rays, surveys, requirements)
-    search = _Search(mesh, rays, hull, weighed, surveys, requirements, options.allow_hull)
+    surveys = survey_axes(link, requirements)
+    surveys += better_surveys(link, surveys, requirements)
+    search = _Search(link, surveys, requirements, options.allow_hull)
+    tolerance, worth = options.tolerance, link.worth
     plan, refusal = search.plan(tolerance)
-    name = "" if link.weights is None else link.weights.name
-    nearest, needed, length = None, math.inf, _longest(hull)
+    fit = LinkFit(
+        sheets=(),
+        nearest=None,
+        bare=(),
+        tolerance=tolerance,
+        link_length=_longest(link.hull),
+        hull_area=link.hull_area,
+        notes=link.mesh.notes,
+        reason="",
+        candidates=len(link.axes),
+        ray_engine=link.rays.engine,
+        needed_tolerance=tolerance,
+        touch_weights=link.weights,
+    )
     if plan is None:
-        reason = refusal or f"no cone fits within {tolerance * 1e3:g} mm over a length of {min_length * 1e3:g} mm"
-        if length < min_length:
-            reason = f"the link is {length * 1e3:.1f} mm long, but a sheet needs at least {min_length * 1e3:g} mm"
+        length, least = fit.link_length, options.min_length
+        reason = refusal or f"no cone fits within {tolerance * 1e3:g} mm over a length of {least * 1e3:g} mm"
+        if length < least:
+            reason = f"the link is {length * 1e3:.1f} mm long, but a sheet needs at least {least * 1e3:g} mm"
         say("looking for the nearest sheet")
         looser, needed = search.nearest()
+        nearest = None
         if looser is not None:
             first = looser.axes[0]
             widest = max(first.sides, key=lambda side: side.area(first.profile))
-            nearest = fitted_sheet(first, widest, 0, counted, needed, worth)
-        return LinkFit(
-            sheets=(),
-            nearest=nearest,
-            needed_tolerance=needed,
-            bare=(BareLength(0.0, length, reason),),
-            tolerance=tolerance,
-            link_length=length,
-            hull_area=hull_area,
-            notes=mesh.notes,
-            reason=reason,
-            candidates=len(candidates),
-            ray_engine=rays.engine,
-            weights=name,
-            touch_weights=link.weights,
-        )
+            nearest = fitted_sheet(first, widest, 0, link.counted, needed, worth)
+        bare = (BareLength(0.0, length, reason),)
+        return replace(fit, nearest=nearest, needed_tolerance=needed, bare=bare, reason=reason)
     first = plan.axes[0]
     further: AxisPlan | None = None
     if plan.count >= requirements.max_sheets:
         further = search.stage(tolerance).further(plan.axes, surveys)
-    return LinkFit(
+    return replace(
+        fit,
         sheets=tuple(
-            fitted_sheet(about, side, number, counted, tolerance, worth)
+            fitted_sheet(about, side, number, link.counted, tolerance, worth)
             for number, about in enumerate(plan.axes)
             for side in about.sides
         ),
-        nearest=None,
-        needed_tolerance=tolerance,
-        bare_areas=tuple(bare_areas(plan, further, surveys, hull, requirements)),
-        bare=tuple(
-            BareLength(*item)
-            for item in bare_lengths(
-                first.profile,
-                first.sides,
-                tolerance,
-                min_length,
-                further,
-            )
-        ),
-        tolerance=tolerance,
+        bare_areas=tuple(bare_areas(plan, further, surveys, link.hull, requirements)),
+        bare=tuple(bare_lengths(first.profile, first.sides, tolerance, options.min_length, further)),
         link_length=first.profile.step * len(first.profile.z),
-        hull_area=hull_area,
-        notes=mesh.notes,
-        reason="",
-        candidates=len(candidates),
-        ray_engine=rays.engine,
-        weights=name,
-        touch_weights=link.weights,
     )
 
 
@@ -276,10 +170,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
 class _Search:
     """What is known of a link when sheets are looked for, with one tolerance or another."""
 
-    mesh: Mesh
-    rays: RayCaster
-    hull: SurfaceSamples
-    weighed: float  # area of the hull, by the weights [m2]
+    link: SampledLink
     surveys: list[AxisSurvey]
     requirements: SheetRequirements
     allow_hull: bool
@@ -289,18 +180,18 @@ class _Search:
         """Return where packings are made anew within a tolerance [m]."""
         if tolerance not in self._stages:
             wanted = replace(self.requirements, tolerance=tolerance)
-            self._stages[tolerance] = FineStage(self.mesh, self.rays, self.hull, wanted)
+            self._stages[tolerance] = FineStage(self.link, wanted)
         return self._stages[tolerance]
 
     def plan(self, tolerance: float) -> tuple[SheetPlan | None, str]:
         """Return the best plan within a tolerance [m]; or None and, for a mesh that is a bare hull, the reason."""
         stage = self.stage(tolerance)
         plan, wanted = best_plan(stage, self.surveys), stage.requirements
-        area, whole = plan.area if plan else 0.0, self.weighed
+        area, whole = plan.area if plan else 0.0, self.link.weighed_area
         # a requested wrap implies that the shape is known; otherwise sheets should cover some of a convex body
         if self.allow_hull or area >= HULL_SHARE * whole or (plan and wanted.wrap):
             return plan, ""
-        hulled = hull_note(self.mesh, self.hull)
+        hulled = hull_note(self.link.mesh, self.link.hull)
         if hulled:
             share = f"{100.0 * area / whole:.0f} %"
             return None, f"{hulled} (a sheet within {tolerance * 1e3:g} mm would cover {share} of it)"

@@ -11,15 +11,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.ray_casting import RayCaster
-
 from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, plan_sheets
+from .candidates import SampledLink
 from .coarse_packing import AxisSurvey, Choice, packings, profile_about
 from .cone_fit import InfiniteCone, fit_cone
 from .profile import AxisFrame, RadialProfile
 from .side import StraightSide, covered_points, facet_offset
-from .surface_samples import SurfaceSamples
 
 __all__ = ["FineStage", "SheetPlan", "best_plan", "refine_axis"]
 
@@ -129,15 +126,11 @@ class FineStage:
     """Where packings are made anew on fine profiles; what is known about an axis without others is kept.
 
     Attributes:
-        mesh: the link.
-        rays: a ray caster of the same mesh.
-        hull: samples of it.
+        link: the link.
         requirements: on the sheets.
     """
 
-    mesh: Mesh
-    rays: RayCaster
-    hull: SurfaceSamples
+    link: SampledLink
     requirements: SheetRequirements
     _alone: list[list[AxisPlan]] = field(default_factory=list, repr=False)
     _first: dict[tuple[int, tuple[int, int]], AxisPlan | None] = field(default_factory=dict, repr=False)
@@ -212,11 +205,9 @@ class FineStage:
         """Return the sheets about one axis on a fine profile, clear of those that are there."""
         wanted = self.requirements
         lines = [(side.radius, side.slope) for side in choice.plan.sides]
-        profile = profile_about(self.mesh, self.rays, choice.plan.profile.frame, _FINE_GRID, wanted)
+        profile = profile_about(self.link, choice.plan.profile.frame, _FINE_GRID, wanted)
         plan = _fullest(kept_clear(profile, done, wanted), lines, wanted, choice.kinds)
-        if plan is None:
-            return None
-        return _refined(self.mesh, self.rays, self.hull, plan, wanted, done, choice.kinds)
+        return plan and _refined(self.link, plan, wanted, done, choice.kinds)
 
 
 def _fullest(
@@ -234,16 +225,14 @@ def _fullest(
 
 
 def _refined(
-    mesh: Mesh,
-    rays: RayCaster,
-    hull: SurfaceSamples,
+    link: SampledLink,
     plan: AxisPlan,
     requirements: SheetRequirements,
     others: list[AxisPlan],
     kinds: tuple[int, int],
 ) -> AxisPlan:
     """Refit the axis to the region that the sheets cover, and raise the sides from the facets to the corners."""
-    frame, grid = plan.profile.frame, (len(plan.profile.z), len(plan.profile.phi))
+    frame, grid, hull = plan.profile.frame, (len(plan.profile.z), len(plan.profile.phi)), link.hull
     full = [side for side in plan.sides if side.columns == grid[1]]
     lines = [(side.radius, side.slope) for side in plan.sides]
     if full:
@@ -265,8 +254,8 @@ def _refined(
         if not full:
             away = float((frame.origin - plan.profile.frame.origin) @ frame.axis)
             near = replace(near, radius=side.radius + side.slope * away)
-        rises.append(facet_offset(mesh, below, near, requirements.tolerance))
+        rises.append(facet_offset(link.mesh, below, near, requirements.tolerance))
         areas.append(side.area(plan.profile))
-    profile = kept_clear(profile_about(mesh, rays, frame, grid, requirements), others, requirements)
+    profile = kept_clear(profile_about(link, frame, grid, requirements), others, requirements)
     again = _fullest(profile, lines, requirements, kinds, float(np.average(rises, weights=areas)))
     return again if again is not None and again.area > 0.99 * plan.area else plan

@@ -15,7 +15,7 @@ from .intervals import least_deviation
 from .profile import RadialProfile
 from .surface_samples import SurfaceSamples
 
-__all__ = ["StraightSide", "azimuth_columns", "covered_points", "facet_offset", "fit_side"]
+__all__ = ["StraightSide", "azimuth_columns", "covered_points", "facet_offset", "fit_side", "longest_run"]
 
 Floats = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def fit_side(
     start += offset * math.hypot(1.0, slope)
     limit = tolerance * math.hypot(1.0, slope)
     line = start + slope * z
-    run = _longest_run((high <= line + limit) & (low >= line - limit))
+    run = longest_run((high <= line + limit) & (low >= line - limit))
     straight = float(np.median(np.abs(means + offset * math.hypot(1.0, slope) - line))) < 0.15 * limit
     if run[1] > run[0] and (straight or run[1] - run[0] >= 0.97 * (end - first)):
         return StraightSide(first + run[0], first + run[1], column, columns, start, slope, offset)
@@ -129,12 +129,12 @@ def _median(values: Floats) -> float:
     return float(ordered[middle] if len(ordered) % 2 else 0.5 * (ordered[middle - 1] + ordered[middle]))
 
 
-def _longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:
+def longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the first and the end of the longest run of True, 0 and 0 where there is none."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     if len(edges) == 0:
         return 0, 0
-    lengths = edges[1::2] - edges[::2]
-    longest = int(lengths.argmax())
+    longest = int((edges[1::2] - edges[::2]).argmax())
     return int(edges[2 * longest]), int(edges[2 * longest + 1])
 
 

@@ -8,20 +8,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.core.errors import GeometryError
+from coneskin.geometry.fit.candidates import SampledLink
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.profile import AxisFrame, RadialProfile, measure_profile
+from coneskin.geometry.fit.side import longest_run
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 from coneskin.geometry.hole_bridging import bridge_holes
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.ray_casting import RayCaster
 
 from .ruling_candidates import RulingCandidate
 from .side_fit import fit_developable
@@ -148,22 +150,20 @@ _CHECK_ROWS = 60  # slices by which a fit is judged
 _MIN_NORMAL_COSINE = 0.9  # cosine between the normals of the hull and of a sheet on it
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FoundSheet:
+class FoundSheet(NamedTuple):
     """A fitted side with what is left of its region after the fit was checked."""
 
-    placed: PlacedDevelopable
     sheet: FittedSheet
-    covers: NDArray[np.bool_]
+    covers: NDArray[np.bool_]  #: samples of the hull that it covers, shape (n,)
 
 
 def ruled_profile(
-    mesh: Mesh, rays: RayCaster, candidate: RulingCandidate, grid: tuple[int, int], options: FitOptions
+    link: SampledLink, candidate: RulingCandidate, grid: tuple[int, int], options: FitOptions
 ) -> RadialProfile:
     """Measure a profile about a line, of about so many slices and rays, with holes filled up to its section."""
     frame = AxisFrame.along(candidate.origin, candidate.axis, options.seam)
-    length = float(np.ptp(mesh.outermost @ frame.axis))
-    profile = measure_profile(mesh, rays, frame, max(length / grid[0], 0.0005), grid[1], options.max_bridge)
+    step = max(float(np.ptp(link.mesh.outermost @ frame.axis)) / grid[0], 0.0005)
+    profile = measure_profile(link.mesh, link.rays, frame, step, grid[1], options.max_bridge)
     return _bridged_anew(profile, _apex_height(profile, candidate), options.max_bridge)
 
 
@@ -207,9 +207,8 @@ def hull_points(profile: RadialProfile, rows: slice = slice(None), columns: NDAr
 
 
 def fit_sheet(
-    mesh: Mesh,
+    link: SampledLink,
     profile: RadialProfile,
-    hull: SurfaceSamples,
     worth: Floats,
     candidate: RulingCandidate,
     options: FitOptions,
@@ -222,10 +221,10 @@ def fit_sheet(
     placed = _side(profile, region, candidate, options)
     if placed is None:
         return None
-    rise = _rise(mesh, placed, options.tolerance)
+    rise = _rise(link.mesh, placed, options.tolerance)
     if rise:
         placed = placed.parallel(rise)
-    return _checked(profile, region, placed, hull, worth, options, rise, number)
+    return _checked(profile, region, placed, link.counted, worth, options, rise, number)
 
 
 def _side(
@@ -324,7 +323,7 @@ def _checked(
     rim = placed.locate_all(rims.reshape(-1, 3))[2].reshape(shape) if hole.any() else off
     within = np.where(hole, rim, off)
     good = np.asarray((np.abs(within) <= options.tolerance).all(axis=1))
-    run = _longest(good)
+    run = longest_run(good)
     if run[1] - run[0] < 2:
         return None
     ends = _span(placed, profile, float(profile.z[rows[run[0]]]), float(profile.z[rows[run[1] - 1]]))
@@ -351,16 +350,7 @@ def _checked(
         axis=number,
         touch_share=float(worth[covers].sum() / worth.sum()),
     )
-    return FoundSheet(placed, sheet, covers)
-
-
-def _longest(good: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return the first and the end of the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
-    if len(edges) == 0:
-        return 0, 0
-    longest = int((edges[1::2] - edges[::2]).argmax())
-    return int(edges[2 * longest]), int(edges[2 * longest + 1])
+    return FoundSheet(sheet, covers)
 
 
 def _span(placed: PlacedDevelopable, profile: RadialProfile, low: float, high: float) -> tuple[float, float]:

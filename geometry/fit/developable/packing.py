@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.geometry.fit.bare_areas import BareArea, BareTally, flat_samples, hull_note, sheet_more
-from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, SampledLink, fit_cones, sample_link
+from coneskin.geometry.fit.candidates import SampledLink, sample_link
+from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.profile import RadialProfile
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.ray_casting import RayCaster
 
 from .found_sheet import (
     FoundSheet,
@@ -96,37 +96,32 @@ def with_developables(
         return cones
     most, tolerance = options.most_sheets, options.tolerance
     say("looking for rulings")
-    mesh, rays, hull, weights = link.mesh, link.rays, link.counted, link.weights
-    worth = np.ones(len(hull)) if weights is None else weights.at(hull.points)
-    taken = covered_by(cones.sheets, hull, 1.5 * tolerance)
-    least = LEAST_GAIN
-    if float(worth[~taken].sum()) < least * float(worth.sum()):
+    worth = np.ones(len(link.counted)) if link.worth is None else link.worth
+    taken = covered_by(cones.sheets, link.counted, 1.5 * tolerance)
+    if float(worth[~taken].sum()) < LEAST_GAIN * float(worth.sum()):
         return cones
     candidates = find_ruling_candidates(link.hull, link.axes)
-    coarse = [(one, ruled_profile(mesh, rays, one, _COARSE_GRID, options)) for one in candidates]
+    ruled = _RuledLink(link, options, worth, [(c, ruled_profile(link, c, _COARSE_GRID, options)) for c in candidates])
     say("measuring rulings")
     # where the widest region is that of a cone which is there already, other sheets only go beside the cones
-    regions = _regions(coarse, options, [])
+    regions = ruled.regions([])
     known = bool(regions) and any(
-        _lies_on(sheet.placed, coarse[regions[0][1]][1], regions[0][2], tolerance) for sheet in cones.sheets
+        _lies_on(sheet.placed, ruled.coarse[regions[0][1]][1], regions[0][2], tolerance) for sheet in cones.sheets
     )
-    alone = [] if known else _pack(mesh, rays, hull, worth, coarse, options, [], most, least)
-    spare = most - len(cones.sheets) if cones.sheets else 0
-    beside = _pack(mesh, rays, hull, worth, coarse, options, list(cones.sheets), spare, least)
-    before = sum(sheet.touch_share - least for sheet in cones.sheets)
+    alone = [] if known else ruled.packed([], most)
+    beside = ruled.packed(cones.sheets, most - len(cones.sheets) if cones.sheets else 0)
     packings = [alone, [*cones.sheets, *beside]] if beside else [alone]
-    best = max(packings, key=lambda sheets: sum(sheet.touch_share - least for sheet in sheets))
-    gain = sum(sheet.touch_share - least for sheet in best) - before
-    if not best or gain < (least if best is alone else 0.0):
+    best = max(packings, key=_score)
+    if not best or _score(best) - _score(cones.sheets) < (LEAST_GAIN if best is alone else 0.0):
         return cones
     # a bare convex hull has rulings of its own that the link has not
     scarce = sum(sheet.area_share for sheet in best) < _CONVEX_SHARE
-    if scarce and not options.allow_hull and hull_note(mesh, link.hull):
+    if scarce and not options.allow_hull and hull_note(link.mesh, link.hull):
         return cones
     shares = [f"{sum(sheet.area_share for sheet in sheets):.0%}" for sheets in (cones.sheets, best)]
     kinds = " and ".join(sorted({f"a {sheet.placed.kind}" for sheet in best if sheet.placed.bends}))
     say("looking at what stays bare")
-    more = _pack(mesh, rays, hull, worth, coarse, options, list(best), 1, least) if len(best) == most else []
+    more = ruled.packed(best, 1) if len(best) == most else []
     bare = _bare_beside(best, more, () if best is alone else cones.bare_areas, link.hull, options)
     note = f"the link is not round: cones cover {shares[0]} of its hull, with {kinds} it is {shares[1]}"
     return replace(
@@ -142,55 +137,56 @@ def with_developables(
     )
 
 
-def _pack(
-    mesh: Mesh,
-    rays: RayCaster,
-    hull: SurfaceSamples,
-    worth: Floats,
-    coarse: list[tuple[RulingCandidate, RadialProfile]],
-    options: FitOptions,
-    others: list[FittedSheet],
-    most: int,
-    least: float,
-) -> list[FittedSheet]:
-    """Return the sheets that add most, one after another, each clear of the others and of those that are there."""
-    done: list[FittedSheet] = []
-    while len(done) < most:
-        there = [*others, *done]
-        regions = _regions(coarse, options, there)
-        taken = covered_by(there, hull, 1.5 * options.tolerance)
-        best: FoundSheet | None = None
-        tried = 0
-        for area, number, region in regions:
-            if tried == _REFINED_REGIONS or area < least * len(hull) * hull.area:
+def _score(sheets: Sequence[FittedSheet]) -> float:
+    """Return the share of the hull that sheets cover, by the weights, less what each has to add."""
+    return sum(sheet.touch_share - LEAST_GAIN for sheet in sheets)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _RuledLink:
+    """A link with the lines about which its rulings may lie, and what each counted sample is worth."""
+
+    link: SampledLink
+    options: FitOptions
+    worth: Floats
+    coarse: list[tuple[RulingCandidate, RadialProfile]]
+
+    def packed(self, others: Sequence[FittedSheet], most: int) -> list[FittedSheet]:
+        """Return the sheets that add most, one after another, each clear of the others and of those that are there."""
+        options, hull, worth = self.options, self.link.counted, self.worth
+        done: list[FittedSheet] = []
+        while len(done) < most:
+            there = [*others, *done]
+            taken = covered_by(there, hull, 1.5 * options.tolerance)
+            best: FoundSheet | None = None
+            tried = 0
+            for area, number, region in self.regions(there):
+                if tried == _REFINED_REGIONS or area < LEAST_GAIN * len(hull) * hull.area:
+                    break
+                candidate, profile = self.coarse[number]
+                if best is not None and _lies_on(best.sheet.placed, profile, region, options.tolerance):
+                    continue
+                tried += 1
+                fine = _kept_clear(ruled_profile(self.link, candidate, _FINE_GRID, options), there, options)
+                found = fit_sheet(self.link, fine, worth, candidate, options, len(there))
+                if found is None or float(worth[found.covers & ~taken].sum()) < LEAST_GAIN * float(worth.sum()):
+                    continue
+                if best is None or found.sheet.touch_share > 1.02 * best.sheet.touch_share:
+                    best = found
+            if best is None:
                 break
-            if best is not None and _lies_on(best.placed, coarse[number][1], region, options.tolerance):
-                continue
-            tried += 1
-            candidate = coarse[number][0]
-            fine = _kept_clear(ruled_profile(mesh, rays, candidate, _FINE_GRID, options), there, options)
-            found = fit_sheet(mesh, fine, hull, worth, candidate, options, len(there))
-            if found is None or float(worth[found.covers & ~taken].sum()) < least * float(worth.sum()):
-                continue
-            if best is None or found.sheet.touch_share > 1.02 * best.sheet.touch_share:
-                best = found
-        if best is None:
-            break
-        done.append(best.sheet)
-    return done
+            done.append(best.sheet)
+        return done
 
-
-def _regions(
-    coarse: list[tuple[RulingCandidate, RadialProfile]], options: FitOptions, there: list[FittedSheet]
-) -> list[tuple[float, int, RuledRegion]]:
-    """Return the widest region clear of sheets of each profile: area [m2], number, region; the largest first."""
-    regions = []
-    for number, (candidate, profile) in enumerate(coarse):
-        free = _kept_clear(profile, there, options)
-        region = widest_region(free, candidate, options)
-        if region is not None:
-            regions.append((_area(free, region), number, region))
-    return sorted(regions, key=lambda item: -item[0])
+    def regions(self, there: Sequence[FittedSheet]) -> list[tuple[float, int, RuledRegion]]:
+        """Return the widest region of each profile clear of sheets: area [m2], number, region; the largest first."""
+        regions = []
+        for number, (candidate, profile) in enumerate(self.coarse):
+            free = _kept_clear(profile, there, self.options)
+            region = widest_region(free, candidate, self.options)
+            if region is not None:
+                regions.append((_area(free, region), number, region))
+        return sorted(regions, key=lambda item: -item[0])
 
 
 def _area(profile: RadialProfile, region: RuledRegion) -> float:
@@ -210,7 +206,7 @@ def _lies_on(placed: PlacedFrustum, profile: RadialProfile, region: RuledRegion,
     return float((on & (phi >= 0.0) & (phi <= placed.frustum.wrap)).mean()) > _SAME_SHARE
 
 
-def _kept_clear(profile: RadialProfile, sheets: list[FittedSheet], options: FitOptions) -> RadialProfile:
+def _kept_clear(profile: RadialProfile, sheets: Sequence[FittedSheet], options: FitOptions) -> RadialProfile:
     """Return a profile on which no sheet may lie where it would run into another."""
     if not sheets:
         return profile
