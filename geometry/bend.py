@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.core.errors import GeometryError
 
+from .frustum import sinc
 from .pose import Vector
 
 if TYPE_CHECKING:
@@ -121,8 +122,8 @@ class BentStrip:
         (x, y, z), (tx, ty, tz), (ux, uy, uz), (nx, ny, nz) = self.first
         vx, vy, vz = -k * nx - g * ux, -k * ny - g * uy, -k * nz - g * uz  # T'
         angle = math.hypot(g, k) * along
-        first = along * _sinc(angle)
-        second = 0.5 * (along * _sinc(0.5 * angle)) ** 2
+        first = along * sinc(angle)
+        second = 0.5 * (along * sinc(0.5 * angle)) ** 2
         dx, dy, dz = first * tx + second * vx, first * ty + second * vy, first * tz + second * vz
         cosine = math.cos(angle)
         return RulingFrame(
@@ -187,7 +188,3 @@ def frames_along(
     second = 0.5 * (along * np.sinc(0.5 * angle / np.pi)) ** 2
     step = first * t - second * (k * n + g * u)
     return at + step, u + g * step, n + k * step
-
-
-def _sinc(x: float) -> float:
-    return math.sin(x) / x if x else 1.0

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Frustum"]
+__all__ = ["Frustum", "sinc"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +143,7 @@ class Frustum:
         sa = self.sin_half_angle
         rho = self.radius_at(u)
         half = 0.5 * phi * sa
-        return rho * phi * _sinc(phi * sa), u - rho * phi * math.sin(half) * _sinc(half)
+        return rho * phi * sinc(phi * sa), u - rho * phi * math.sin(half) * sinc(half)
 
     def locate_flat(self, x: float, y: float) -> tuple[float, float]:
         """Return the surface coordinates (u [m], phi [rad]) of a point of the flat pattern.
@@ -202,5 +202,6 @@ class Frustum:
         return np.stack([x, y], axis=-1)
 
 
-def _sinc(x: float) -> float:
+def sinc(x: float) -> float:
+    """Return sin(x) / x [x in rad], 1 at 0."""
     return math.sin(x) / x if x else 1.0

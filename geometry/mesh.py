@@ -23,19 +23,15 @@ from coneskin.core.files import read_file
 from .pose import Pose
 
 __all__ = [
-    "TO_Z_UP",
     "UNITS",
-    "ColladaAsset",
     "Mesh",
     "load_mesh",
     "make_mesh",
-    "outermost_points",
-    "read_collada_asset",
     "refuse_entities",
 ]
 
 
-def outermost_points(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _outermost_points(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return those of points [m], shape (n, 3), that are corners of their hull: as far as all reach, these reach.
 
     All are returned where the hull has no volume.
@@ -49,7 +45,7 @@ def outermost_points(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 #: rotations that bring the named up axis to z, as COLLADA 1.4.1 describes the three frames
-TO_Z_UP = {
+_TO_Z_UP = {
     "X_UP": ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
     "Y_UP": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
     "Z_UP": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -59,13 +55,13 @@ _MAX_UNIT_DEPTH = 3  # elements within each other down to the unit: COLLADA, ass
 
 
 @dataclass(frozen=True, slots=True)
-class ColladaAsset:
+class _ColladaAsset:
     """The asset element of a COLLADA document.
 
     Attributes:
         unit: name of the unit.
         metres: length of the unit [m].
-        up_axis: a key of ``TO_Z_UP``.
+        up_axis: a key of ``_TO_Z_UP``.
     """
 
     unit: str = "m"  # COLLADA's own defaults for missing elements
@@ -73,7 +69,7 @@ class ColladaAsset:
     up_axis: str = "Y_UP"
 
 
-def read_collada_asset(path: Path, data: bytes) -> ColladaAsset:
+def _read_collada_asset(path: Path, data: bytes) -> _ColladaAsset:
     """Read unit and up axis of a COLLADA file, whose entities are known to be harmless.
 
     Args:
@@ -83,7 +79,7 @@ def read_collada_asset(path: Path, data: bytes) -> ColladaAsset:
     Raises:
         MeshError: malformed XML, a unit that is no length, an unknown axis.
     """
-    asset = ColladaAsset()
+    asset = _ColladaAsset()
     within: list[str] = []
     try:
         for event, element in ElementTree.iterparse(io.BytesIO(data), ("start", "end")):
@@ -91,9 +87,8 @@ def read_collada_asset(path: Path, data: bytes) -> ColladaAsset:
                 within.append(element.tag.rpartition("}")[2])
                 continue
             # a tool's own unit may stand in an extra inside, and parts of the document have assets of their own
-            inside = (
-                within[1:] if len(within) <= _MAX_UNIT_DEPTH else []
-            )  # a deep document would be copied at each of its ends
+            # a deep document would be copied at each of its ends
+            inside = within[1:] if len(within) <= _MAX_UNIT_DEPTH else []
             within.pop()
             if inside == ["asset", "unit"]:
                 asset = replace(asset, unit=element.get("name", "unit"), metres=float(element.get("meter", "1")))
@@ -107,7 +102,7 @@ def read_collada_asset(path: Path, data: bytes) -> ColladaAsset:
         raise MeshError(f"{path}: the unit tag must hold a number of metres: {error}") from error
     if not (math.isfinite(asset.metres) and asset.metres > 0.0):
         raise MeshError(f"{path}: the unit tag must hold metres above 0, got {asset.metres}")
-    if asset.up_axis not in TO_Z_UP:
+    if asset.up_axis not in _TO_Z_UP:
         raise MeshError(f"{path}: up_axis must be X_UP, Y_UP or Z_UP, got {asset.up_axis!r}")
     return asset
 
@@ -171,7 +166,7 @@ class Mesh:
     def outermost(self) -> Floats:
         """Corners of the convex hull [m], shape (k, 3): how far a link reaches in any direction, they reach."""
         if "outermost" not in self._kept:
-            self._kept["outermost"] = frozen(outermost_points(self.vertices), (None, 3), "outermost")
+            self._kept["outermost"] = frozen(_outermost_points(self.vertices), (None, 3), "outermost")
         outermost: Floats = self._kept["outermost"]
         return outermost
 
@@ -249,9 +244,9 @@ def load_mesh(
     asset = turn = None
     if path.suffix.lower() == ".dae":
         refuse_entities(data, path)
-        asset = read_collada_asset(path, data)
+        asset = _read_collada_asset(path, data)
         if asset.up_axis != "Z_UP" and up_axis == "apply":
-            turn = np.array(TO_Z_UP[asset.up_axis])
+            turn = np.array(_TO_Z_UP[asset.up_axis])
             notes.append(f"rotated from {asset.up_axis} to z up")
         elif asset.up_axis != "Z_UP":
             notes.append(f"the file declares {asset.up_axis}; its axes are kept, as in RViz and MoveIt")
@@ -268,7 +263,7 @@ def load_mesh(
     return make_mesh(vertices * (metres * np.asarray(scale, float)), faces, str(path), unit or "m", notes)
 
 
-def _unit(extent: float, asset: ColladaAsset | None) -> tuple[str, float, str]:
+def _unit(extent: float, asset: _ColladaAsset | None) -> tuple[str, float, str]:
     """Return the unit of a file from its largest extent: its name, its length in metres, and a note that says why.
 
     Makers ship COLLADA files whose numbers are millimetres and whose tag says metres; a tag that makes the link longer
@@ -278,14 +273,8 @@ def _unit(extent: float, asset: ColladaAsset | None) -> tuple[str, float, str]:
         name, metres = asset.unit, asset.metres
         if not (extent * metres > MAX_LENGTH and MIN_LENGTH <= extent * 1e-3 <= MAX_LENGTH):
             return name, metres, f"unit {name} ({metres:g} m), from the COLLADA file"
-        return (
-            "mm",
-            0.001,
-            (
-                f"the COLLADA file declares its unit as {name}, which makes a link of {extent * metres:.4g} m: "
-                f"taken as mm, {extent:.4g} mm; name the unit if that is wrong"
-            ),
-        )
+        note = f"the COLLADA file declares its unit as {name}, which makes a link of {extent * metres:.4g} m: "
+        return "mm", 0.001, f"{note}taken as mm, {extent:.4g} mm; name the unit if that is wrong"
     unit, metres = ("m", 1.0) if extent < MAX_LENGTH else ("mm", 0.001)
     return unit, metres, f"unit {unit} guessed from the largest extent, {extent:g}"
 

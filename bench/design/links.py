@@ -34,7 +34,7 @@ from bench.report import head
 from coneskin.core.errors import MeshError
 from coneskin.geometry.fit import candidates as hypotheses
 from coneskin.geometry.fit.axis_plan import SheetRequirements, plan_sheets
-from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink, find_revolution_axis
+from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink, _find_revolution_axis
 from coneskin.geometry.fit.coarse_packing import Choice, grown, survey_axes
 from coneskin.geometry.fit.cone_fit import fit_cone
 from coneskin.geometry.fit.cones import LEAST_GAIN, find_cones
@@ -70,8 +70,8 @@ def brute_axes(samples: SurfaceSamples) -> list[AxisCandidate]:
     size = float(np.ptp(samples.points, axis=0).max())
     for seed in range(10, 10 + SEARCH_SEEDS):
         for distance in (0.001, max(0.0015, 0.004 * size)):
-            for start in hypotheses.cone_hypotheses(samples, distance, 20, seed):
-                line = find_revolution_axis(samples, (start.origin, start.axis))
+            for start in hypotheses._cone_hypotheses(samples, distance, 20, seed):
+                line = _find_revolution_axis(samples, (start.origin, start.axis))
                 if line is not None:
                     add(*line, ())
                 wide = max(0.006, 0.06 * start.radius)

@@ -25,10 +25,9 @@ from scipy.spatial import KDTree
 
 import coneskin as cs
 from bench.report import head
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, blind_angle, cover_seams, design_sheets
-from coneskin.design.workshop.jig import Collar, jig_collars, with_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, _blind_angle, cover_seams, design_sheets
+from coneskin.design.workshop.jig import Collar, _with_sheets, jig_collars
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
-from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -102,7 +101,7 @@ def _blind(sheets: tuple[SheetDesign, ...], steps: int = 36_000) -> float:
         local = (phi - math.atan2(y, x)) % (2.0 * math.pi)
         box = sheet.layout.active
         seen |= (local >= box.phi1 - 1e-9) & (local <= box.phi2 + 1e-9)
-    assert len(sheets) > 1 or abs(float((~seen).mean()) * 2.0 * math.pi - blind_angle(sheets[0])) < 1e-3
+    assert len(sheets) > 1 or abs(float((~seen).mean()) * 2.0 * math.pi - _blind_angle(sheets[0])) < 1e-3
     return float((~seen).mean()) * 2.0 * math.pi
 
 
@@ -133,7 +132,7 @@ def step() -> None:
                 worst = max(worst, float(_off(side, 2.5e-3, pose.inverse().apply_all(points)).max()))
             volume = gmsh.model.occ.getMass(3, gmsh.model.getEntities(3)[0][1])
             gmsh.finalize()
-        outer = parallel_frustum(side, 2.5e-3)
+        outer = PlacedFrustum(side).parallel(2.5e-3).frustum
         exact = (
             0.5 * side.wrap * side.slant * 2.5e-3 * 0.5 * (side.radius1 + side.radius2 + outer.radius1 + outer.radius2)
         )
@@ -164,7 +163,7 @@ def jig(path: Path) -> Iterator[str]:
     assert design.mesh is not None
     for index, sheet in enumerate(design.sheets):
         collars, without = jig_collars(sheet, design.mesh, design.sheets[:index])
-        body = with_sheets(design.mesh, design.sheets[:index])
+        body = _with_sheets(design.mesh, design.sheets[:index])
         for collar in collars:
             gaps = [_gap(sheet, collar, part.surface, body) for part in collar.parts]
             turns = "" if collar.play is None else f", turns {math.degrees(collar.play):.0f} deg"

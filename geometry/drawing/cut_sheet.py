@@ -20,7 +20,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 
 from .electrode_layout import SheetLayout, SurfaceRectangle, edge_room
 from .layer_stack import LayerStack, snap_to_cylinder
-from .outline import Outline, PathSegment
+from .outline import Outline, PathSegment, joint_bounds
 from .part_labels import PartLabel, ascii_text, part_labels, strip_label
 from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
 from .touch_marks import CoverMarks
@@ -153,9 +153,7 @@ class CutSheet:
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest x, smallest y, largest x, largest y of all strokes [m]."""
-        boxes = [stroke.outline.bounds for part in self.parts for stroke in part.strokes]
-        lows, highs = [box[:2] for box in boxes], [box[2:] for box in boxes]
-        return min(x for x, _ in lows), min(y for _, y in lows), max(x for x, _ in highs), max(y for _, y in highs)
+        return joint_bounds(stroke.outline.bounds for part in self.parts for stroke in part.strokes)
 
     def moved(self, dx: float, dy: float) -> CutSheet:
         """Return the cut sheet, shifted by dx and dy [m]."""

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from coneskin.core.errors import GeometryError, MissingExtra
 
 from .cut_sheet import CutSheet
-from .outline import Outline, PathSegment
+from .outline import Outline, PathSegment, joint_bounds
 
 __all__ = ["ArcStyle", "to_dxf"]
 
@@ -67,9 +67,8 @@ def to_dxf(sheets: Sequence[CutSheet], arcs: ArcStyle = "bulge", tolerance: floa
                     dxfattribs=layer(sheet, "label"),
                 )
                 text.set_placement((label.x * 1e3, label.y * 1e3), align=TextEntityAlignment.MIDDLE_CENTER)
-    boxes = [sheet.bounds for sheet in sheets]
-    low = min(box[0] for box in boxes) * 1e3, min(box[1] for box in boxes) * 1e3, 0.0
-    high = max(box[2] for box in boxes) * 1e3, max(box[3] for box in boxes) * 1e3, 0.0
+    x0, y0, x1, y1 = joint_bounds(sheet.bounds for sheet in sheets)
+    low, high = (x0 * 1e3, y0 * 1e3, 0.0), (x1 * 1e3, y1 * 1e3, 0.0)
     space.reset_extents(low, high)  # what a reader shows first, and some cutters check against their bed
     document.header["$EXTMIN"], document.header["$EXTMAX"] = low, high  # ezdxf leaves a corner at the origin out
     stream = io.StringIO()

@@ -26,7 +26,6 @@ from coneskin.geometry.frustum import Frustum
 from .surface_shape import ShapeCorner, ShapeTab, SheetSide, SurfaceShape
 
 __all__ = [
-    "AdConverter",
     "ElectrodePlan",
     "ResolutionForecast",
     "SheetLayout",
@@ -155,6 +154,17 @@ class SheetLayout:
     def active_share(self) -> float:
         """Share of the sheet on which a touch is located."""
         return self.active.area(self.sheet) / self.sheet.area
+
+    def electrode_middle(self, name: str, u: float, phi: float) -> tuple[float, float]:
+        """Return the point of an electrode's middle line at slant distance u [m] (C, D) or azimuth phi [rad] (A, B)."""
+        half, field = 0.5 * self.plan.electrode, self.field
+        turn = half / min(self.sheet.radius1, self.sheet.radius2)
+        return {
+            "A": (field.u2 + half, phi),
+            "B": (field.u1 - half, phi),
+            "C": (u, field.phi2 + turn),
+            "D": (u, field.phi1 - turn),
+        }[name]
 
 
 def lay_out_sheet(sheet: Frustum, plan: ElectrodePlan | None = None) -> SheetLayout:
@@ -285,37 +295,6 @@ def _patch(a: ShapeCorner, b: ShapeCorner) -> SurfaceRectangle:
 
 
 @dataclass(frozen=True, slots=True)
-class AdConverter:
-    """A/D converter that reads the potentials.
-
-    Attributes:
-        bits: resolution.
-        range_volts: potential of the highest count [V].
-        supply_volts: potential of the positive electrode, U0 [V].
-
-    Raises:
-        GeometryError: a value is out of range.
-    """
-
-    bits: int = 12
-    range_volts: float = 3.3
-    supply_volts: float = 2.5
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.bits <= 32:
-            raise GeometryError(f"bits of the converter must be from 1 to 32, got {self.bits!r}")
-        for name in ("range_volts", "supply_volts"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise GeometryError(f"{name} must be finite and above 0 V, got {value!r} V")
-
-    @property
-    def step(self) -> float:
-        """One count as a fraction of U0."""
-        return self.range_volts / ((1 << self.bits) - 1) / self.supply_volts
-
-
-@dataclass(frozen=True, slots=True)
 class ResolutionForecast:
     """Change of the location for one count of the A/D converter, at one slant distance.
 
@@ -334,7 +313,7 @@ class ResolutionForecast:
     theta: float
 
 
-def forecast_resolution(active: Frustum, converter: AdConverter, u: float) -> ResolutionForecast:
+def forecast_resolution(active: Frustum, step: float, u: float) -> ResolutionForecast:
     """Forecast the resolution at a slant distance on the active area; it is the same for all azimuths.
 
     Eq. 25 of the paper, dU/dr = U0 / (r ln(r1/r2)), is regular in the link's radii, because r is proportional to rho
@@ -344,7 +323,7 @@ def forecast_resolution(active: Frustum, converter: AdConverter, u: float) -> Re
 
     Args:
         active: the cone between the inner edges of the four electrodes, on the conductive sheet.
-        converter: A/D converter that reads the potentials.
+        step: one count of the A/D converter that reads the potentials, as a fraction of U0.
         u: slant distance from end 1 of the active cone [m].
 
     Raises:
@@ -352,7 +331,7 @@ def forecast_resolution(active: Frustum, converter: AdConverter, u: float) -> Re
     """
     if min(active.radius1, active.radius2) <= 0.0:
         raise GeometryError("a forecast needs both radii above 0 m: no current flows to an apex")
-    rho, step = active.radius_at(u), converter.step
+    rho = active.radius_at(u)
     growth = (active.radius2 - active.radius1) / active.radius1
     stretch = math.log1p(growth) / growth if growth else 1.0
     along = rho / active.radius1 * active.slant * stretch * step

@@ -16,7 +16,7 @@ from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-__all__ = ["PAPER_STACK", "AssemblyMode", "LayerStack", "SheetLayer", "parallel_frustum", "snap_to_cylinder"]
+__all__ = ["PAPER_STACK", "AssemblyMode", "LayerStack", "SheetLayer", "snap_to_cylinder"]
 
 AssemblyMode = Literal["loose", "pairs", "bonded"]
 _MAX_LAYER_THICKNESS = 0.02  # m; of a layer: what is thicker is no sheet that can be wrapped
@@ -138,14 +138,6 @@ class LayerStack:
         faces = (self.face_offset(index), self.face_offset(index + 1))
         inner, outer = ((t - self.offset(index)) * bend / length for t in faces)
         return inner, outer
-
-
-def parallel_frustum(frustum: Frustum, distance: float) -> Frustum:
-    """Return the parallel cone at a distance along the outward normal [m]: same half angle, slant and theta0.
-
-    Its end 1 lies at z = -distance * sin(half angle) of the frustum's frame.
-    """
-    return PlacedFrustum(frustum).parallel(distance).frustum
 
 
 def snap_to_cylinder(frustum: Frustum, tolerance: float) -> Frustum:

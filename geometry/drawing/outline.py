@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from coneskin.core.errors import GeometryError
 
-__all__ = ["FlatPoint", "Outline", "PathSegment", "circle_outline"]
+__all__ = ["FlatPoint", "Outline", "PathSegment", "circle_outline", "joint_bounds"]
 
 FlatPoint = tuple[float, float]
 
@@ -221,6 +221,12 @@ class Outline:
                 )
             grown.append(PathSegment(start, end, math.tan(0.5 * math.asin(half_sine))))
         return Outline.from_segments(grown)
+
+
+def joint_bounds(boxes: Iterable[tuple[float, float, float, float]]) -> tuple[float, float, float, float]:
+    """Return the box around boxes: smallest x, smallest y, largest x, largest y [m]."""
+    x0, y0, x1, y1 = zip(*boxes, strict=True)
+    return min(x0), min(y0), max(x1), max(y1)
 
 
 def circle_outline(x: float, y: float, radius: float) -> Outline:

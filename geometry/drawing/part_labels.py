@@ -116,12 +116,7 @@ def strip_label(layout: SheetLayout, surface: Frustum, which: str, face: str, ti
     plan, field = layout.plan, layout.field
     half = 0.5 * plan.electrode
     narrow = min(layout.sheet.radius1, layout.sheet.radius2)
-    u, phi = {
-        "A": (field.u2 + half, 0.5 * (field.phi1 + field.phi2)),
-        "B": (field.u1 - half, 0.5 * (field.phi1 + field.phi2)),
-        "C": (0.5 * (field.u1 + field.u2), field.phi2 + half / narrow),
-        "D": (0.5 * (field.u1 + field.u2), field.phi1 - half / narrow),
-    }[which]
+    u, phi = layout.electrode_middle(which, 0.5 * (field.u1 + field.u2), 0.5 * (field.phi1 + field.phi2))
     pad = 0.08 * plan.electrode
     turn = pad / narrow
     # along its strip a foil ends before the rim, and before the lead of its neighbour

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from coneskin.core.errors import GeometryError
 
 from .cut_sheet import LINE_COLOURS, CutSheet
-from .outline import Outline
+from .outline import Outline, joint_bounds
 from .part_labels import CAP_HEIGHT, PartLabel
 
 __all__ = ["PageSize", "to_pdf"]
@@ -28,6 +28,10 @@ def _pdf_number(value: float) -> str:
     """Return a number to five decimals without an exponent, which PDF does not allow."""
     text = f"{value:.5f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
+
+
+def _escaped(text: str) -> str:
+    return text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
 
 
 class _PdfWriter:
@@ -52,8 +56,7 @@ class _PdfWriter:
 
     def finish(self, entries: str, title: str) -> bytes:
         """Return the bytes of the file, with further entries for the catalogue and a title."""
-        escaped = title.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
-        info = self.add(f"<< /Title ({escaped}) /Producer (coneskin) >>")
+        info = self.add(f"<< /Title ({_escaped(title)}) /Producer (coneskin) >>")
         kids = " ".join(f"{page} 0 R" for page in self._pages)
         self._objects[0] = f"<< /Type /Catalog /Pages 2 0 R {entries} >>"
         self._objects[1] = f"<< /Type /Pages /Kids [{kids}] /Count {len(self._pages)} >>"
@@ -108,13 +111,8 @@ class _PageTiling:
 
 def _tile_pages(sheets: Sequence[CutSheet], width: float, height: float) -> _PageTiling:
     """Spread sheets over pages of a size [mm], in portrait or landscape, whichever needs fewer pages."""
-    boxes = [sheet.bounds for sheet in sheets]
-    extent = (
-        min(box[0] for box in boxes) * 1e3,
-        min(box[1] for box in boxes) * 1e3,
-        max(box[2] for box in boxes) * 1e3,
-        max(box[3] for box in boxes) * 1e3,
-    )
+    x0, y0, x1, y1 = joint_bounds(sheet.bounds for sheet in sheets)
+    extent = (x0 * 1e3, y0 * 1e3, x1 * 1e3, y1 * 1e3)
     strokes = (stroke for sheet in sheets for part in sheet.parts for stroke in part.strokes)
     segments = (segment for stroke in strokes for segment in stroke.outline.segments())
     points = 1e3 * np.concatenate([one.along(math.ceil(one.length / _SAMPLE_STEP)) for one in segments])
@@ -229,9 +227,8 @@ def _label(label: PartLabel) -> str:
 
 
 def _text(text: str, x: float, y: float, height: float, c: float = 1.0, s: float = 0.0) -> str:
-    escaped = text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
     turn = " ".join(_pdf_number(value) for value in (c, s, -s, c, x, y))
-    return f"BT /F {_pdf_number(height / CAP_HEIGHT)} Tf {turn} Tm ({escaped}) Tj ET"
+    return f"BT /F {_pdf_number(height / CAP_HEIGHT)} Tf {turn} Tm ({_escaped(text)}) Tj ET"
 
 
 def _rgb(colour: tuple[int, int, int], operator: str) -> str:
@@ -257,13 +254,9 @@ def _tiles(tiling: _PageTiling, title: str) -> Iterator[list[str]]:
     for page, (column, row) in enumerate(tiling.cells, start=1):
         left, bottom = tiling.corner
         x, y = tiling.origin[0] + column * width, tiling.origin[1] + row * height
-        content = [
-            "q",
-            f"{_pdf_number(left - _BLEED_WIDTH)} {_pdf_number(bottom - _BLEED_WIDTH)} "
-            f"{_pdf_number(width + 2 * _BLEED_WIDTH)} ",
-        ]
-        content[-1] += f"{_pdf_number(height + 2 * _BLEED_WIDTH)} re W n"
-        content += [f"1 0 0 1 {_pdf_number(left - x)} {_pdf_number(bottom - y)} cm /D Do", "Q"]
+        bleed = _BLEED_WIDTH
+        clip = " ".join(map(_pdf_number, (left - bleed, bottom - bleed, width + 2 * bleed, height + 2 * bleed)))
+        content = ["q", f"{clip} re W n", f"1 0 0 1 {_pdf_number(left - x)} {_pdf_number(bottom - y)} cm /D Do", "Q"]
         content += _crop_marks(left, bottom, width, height)
         for dx, dy, mid_x, mid_y in (
             (-1, 0, left, bottom + 0.5 * height),
@@ -275,13 +268,8 @@ def _tiles(tiling: _PageTiling, title: str) -> Iterator[list[str]]:
                 content += _registration(mid_x, mid_y)
                 neighbour = tiling.cells.index((column + dx, row + dy)) + 1
                 content.append(_neighbour(neighbour, mid_x, mid_y, dx, dy))
-        content += _scale_bar(left, 8.0)
-        content.append(
-            _text(
-                f"{title} - page {page} of {count}, column {column + 1}, row {tiling.counts[1] - row}", left, 4.0, 2.2
-            )
-        )
-        yield content
+        where = f"page {page} of {count}, column {column + 1}, row {tiling.counts[1] - row}"
+        yield [*content, *_scale_bar(left, 8.0), _text(f"{title} - {where}", left, 4.0, 2.2)]
 
 
 def _neighbour(page: int, x: float, y: float, dx: int, dy: int) -> str:
@@ -332,13 +320,8 @@ def _map_page(tiling: _PageTiling, sheets: Sequence[CutSheet], title: str) -> li
     scale = min(width / (columns * tiling.window[0]), (y - bottom) / (rows * tiling.window[1]))
     x, y = left, y - scale * rows * tiling.window[1]
     shift_x, shift_y = x - scale * tiling.origin[0], y - scale * tiling.origin[1]
-    content += [
-        "q",
-        f"{scale:.6f} 0 0 {scale:.6f} {_pdf_number(shift_x)} {_pdf_number(shift_y)} cm",
-        "/D Do",
-        "Q",
-        "0.5 0.5 0.5 RG 0.2 w",
-    ]
+    move = f"{scale:.6f} 0 0 {scale:.6f} {_pdf_number(shift_x)} {_pdf_number(shift_y)} cm"
+    content += ["q", move, "/D Do", "Q", "0.5 0.5 0.5 RG 0.2 w"]
     for page, (column, row) in enumerate(tiling.cells, start=1):
         cell_x, cell_y = x + scale * column * width, y + scale * row * height
         content.append(" ".join(map(_pdf_number, (cell_x, cell_y, scale * width, scale * height))) + " re S")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 from .cut_sheet import LINE_COLOURS, CutSheet
-from .outline import Outline
+from .outline import Outline, joint_bounds
 from .part_labels import CAP_HEIGHT, PartLabel
 
 __all__ = ["to_svg"]
@@ -26,10 +26,9 @@ def to_svg(sheets: Sequence[CutSheet], title: str = "coneskin", border: float = 
     Returns:
         the text of the file.
     """
-    boxes = [sheet.bounds for sheet in sheets]
-    left, top = min(box[0] for box in boxes) - border, max(box[3] for box in boxes) + border
-    width = (max(box[2] for box in boxes) + border - left) * 1e3
-    height = (top - min(box[1] for box in boxes) + border) * 1e3
+    x0, y0, x1, y1 = joint_bounds(sheet.bounds for sheet in sheets)
+    left, top = x0 - border, y1 + border
+    width, height = (x1 + border - left) * 1e3, (top - y0 + border) * 1e3
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '
@@ -44,11 +43,8 @@ def to_svg(sheets: Sequence[CutSheet], title: str = "coneskin", border: float = 
         for kind, colour in LINE_COLOURS.items():
             marks = list(_marks(sheet, kind, left, top))
             if marks:
-                paint = (
-                    f'fill="{_hex(colour)}" stroke="none"'
-                    if kind == "label"
-                    else f'fill="none" stroke="{_hex(colour)}"'
-                )
+                fill, stroke = (_hex(colour), "none") if kind == "label" else ("none", _hex(colour))
+                paint = f'fill="{fill}" stroke="{stroke}"'
                 lines.append(f'<g id="{sheet.slug}_{kind}" {paint} stroke-width="0.1">')
                 lines.extend(marks)
                 lines.append("</g>")

@@ -18,10 +18,8 @@ __all__ = ["CoverMarks", "mark_parts", "marks_on_link", "touch_marks"]
 
 _FIRST_SHARE, _LAST_SHARE = 0.1, 0.9  # of the slant and of the wrap; beyond, a touch is cut off by the rim
 _MARKS_PER_SIDE = 3  # marks along and around
-_READ_LAYER, _COVER_LAYER = (
-    3,
-    4,
-)  # layers: the upper conductive one, on which touches are located, and the one that is drawn on
+_READ_LAYER = 3  # the upper conductive one, on which touches are located
+_COVER_LAYER = 4  # the one that is drawn on
 _ARM_LENGTH = 2e-3  # m; half of a line of the cross
 _NUMBER_HEIGHT = 2e-3  # m; height of a mark's number
 

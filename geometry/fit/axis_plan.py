@@ -25,7 +25,6 @@ __all__ = [
     "SideLine",
     "kept_clear",
     "largest_partial_wrap",
-    "largest_region",
     "plan_sheets",
     "side_lines",
 ]
@@ -33,12 +32,8 @@ __all__ = [
 Region = tuple[int, int, int, int]  #: first row, end row, first column, columns
 
 
-def largest_region(
-    good: NDArray[np.bool_],
-    rows: int = 1,
-    columns: int = 1,
-    exact: bool = False,
-    worth: NDArray[np.float64] | None = None,
+def _largest_region(
+    good: NDArray[np.bool_], rows: int, columns: int, exact: bool, worth: NDArray[np.float64] | None = None
 ) -> Region | None:
     """Return the largest rectangle of good cells on a grid whose columns go round.
 
@@ -139,7 +134,7 @@ SideLine = tuple[float, float]  #: radius at z = 0 of the profile's frame [m], a
 _RADIUS_BIN = 0.0005  # m; of the histogram of radii
 _MAX_PEAKS = 3  # radii tried for each slope
 _MIN_CELL_SHARE = 0.97  # of the largest side so far: fewer cells near a line hold no larger one
-_MIN_LINE_DISTANCE = 0.002  # m; least distance between two of them
+_LINE_BINS = 4  # least distance between two of them: 2 mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,11 +211,7 @@ def side_lines(profile: RadialProfile, cones: tuple[InfiniteCone, ...]) -> list[
             line = (float(np.median(near)), slope)
             if all(abs(line[0] - r) > 0.5 * _RADIUS_BIN or s != slope for r, s in lines):
                 lines.append(line)
-            counts[
-                max(0, top - round(_MIN_LINE_DISTANCE / _RADIUS_BIN)) : top
-                + round(_MIN_LINE_DISTANCE / _RADIUS_BIN)
-                + 1
-            ] = 0.0
+            counts[max(0, top - _LINE_BINS) : top + _LINE_BINS + 1] = 0.0
     return lines
 
 
@@ -263,11 +254,7 @@ def plan_sheets(
             if part is None:
                 break
             sides = [*sides, part]
-    plans: list[AxisPlan] = []
-    for number in range(1, count + 1):
-        if number in best:
-            plans.append(best[number])
-    return plans
+    return [best[number] for number in range(1, count + 1) if number in best]
 
 
 def _full_wraps(
@@ -317,7 +304,7 @@ def largest_partial_wrap(
         if requirements.weights is None and most < _MIN_CELL_SHARE * area:
             continue
         worth = None if requirements.weights is None else profile.weight
-        region = largest_region(good, rows, columns, exact, worth)
+        region = _largest_region(good, rows, columns, exact, worth)
         if region is None:
             continue
         side = fit_side(profile, *region, requirements.tolerance, rise)

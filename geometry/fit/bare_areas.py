@@ -273,7 +273,12 @@ def _further_plans(
     """Return the largest sheet that there is room for, and the largest one if the others took no room."""
     further: AxisPlan | None = None
     hindered: AxisPlan | None = None
-    least = replace(requirements, least_gain=0.0)
+    least, axes = replace(requirements, least_gain=0.0), list(plan.axes)
+
+    def larger(profile: RadialProfile, survey: AxisSurvey, known: AxisPlan | None) -> AxisPlan | None:
+        found = [*([known] if known else []), *plan_sheets(profile, survey.lines, least, 1)]
+        return max(found, key=lambda about: about.area, default=None)
+
     hopes = [
         (max((about.area for about in plan_sheets(survey.profile, survey.lines, least, 1)), default=0.0), number)
         for number, survey in enumerate(surveys)
@@ -283,16 +288,9 @@ def _further_plans(
         if hope <= min(about.area if about is not None else 0.0 for about in (further, hindered)):
             break
         survey = surveys[number]
-        clear = kept_clear(survey.profile, list(plan.axes), requirements)
-        taken = kept_clear(survey.profile, list(plan.axes), replace(requirements, thickness=0.0, gap=0.0))
-        for profile, known in ((clear, further), (taken, hindered)):
-            for about in plan_sheets(profile, survey.lines, least, 1):
-                if known is None or about.area > known.area:
-                    known = about
-            if profile is clear:
-                further = known
-            else:
-                hindered = known
+        taken = replace(requirements, thickness=0.0, gap=0.0)
+        further = larger(kept_clear(survey.profile, axes, requirements), survey, further)
+        hindered = larger(kept_clear(survey.profile, axes, taken), survey, hindered)
     return further, hindered
 
 

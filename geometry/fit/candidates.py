@@ -29,9 +29,7 @@ from .touch_weights import TouchWeights, exposure_weights
 __all__ = [
     "AxisCandidate",
     "SampledLink",
-    "cone_hypotheses",
     "find_axis_candidates",
-    "find_revolution_axis",
     "sample_link",
 ]
 
@@ -40,7 +38,7 @@ Floats = NDArray[np.float64]
 _FIT_ROUNDS = 30  # reweighted solutions
 
 
-def find_revolution_axis(
+def _find_revolution_axis(
     samples: SurfaceSamples, start: tuple[Floats, Floats] | None = None, spread: float = 0.0005
 ) -> tuple[Floats, Floats] | None:
     """Find the axis that most normals meet.
@@ -97,7 +95,9 @@ _MIN_HALF_ANGLE = math.radians(8.0)  # rad; a slighter cone is found as a cylind
 _MAX_HALF_ANGLE = math.radians(75.0)  # rad; a flatter ring is a flange
 
 
-def cone_hypotheses(samples: SurfaceSamples, distance: float, max_count: int = 14, seed: int = 2) -> list[InfiniteCone]:
+def _cone_hypotheses(
+    samples: SurfaceSamples, distance: float, max_count: int = 14, seed: int = 2
+) -> list[InfiniteCone]:
     """Return rough cones, each of which explains a part of the hull that those before it do not.
 
     Two points with normals give a cylinder, three a cone. A slight cone is close enough to a cylinder as a first guess,
@@ -256,7 +256,7 @@ def find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
 
     thinned = samples.subset(np.arange(len(samples)) % max(1, len(samples) // 2000) == 0)
     for seed, distance in enumerate((max(0.0015, 0.004 * size), 0.001), 2):
-        for start in cone_hypotheses(samples, distance, seed=seed):
+        for start in _cone_hypotheses(samples, distance, seed=seed):
             rough = fit_cone(thinned, start, (max(0.006, 0.06 * start.radius),), 0.4, 1e-2)
             for gates in _DISTANCE_GATES if rough is not None else ():
                 cone = rough
@@ -269,7 +269,7 @@ def find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
     begins: list[tuple[Floats, Floats] | None] = [None, (samples.points.mean(axis=0), principal[2])]
     begins += [(c.origin, c.axis) for c in found[:3]]
     for begin in begins:
-        line = find_revolution_axis(samples, begin)
+        line = _find_revolution_axis(samples, begin)
         if line is not None:
             add(*line, None)
     return found

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .surface_samples import SurfaceSamples
 
-__all__ = ["InfiniteCone", "distance_jacobian", "fit_cone", "perpendicular_vectors"]
+__all__ = ["InfiniteCone", "fit_cone", "perpendicular_vectors"]
 
 Floats = NDArray[np.float64]
 
@@ -70,20 +70,12 @@ def perpendicular_vectors(axis: Floats) -> tuple[Floats, Floats]:
     return np.array([a, b, c]), np.array([y * c - z * b, z * a - x * c, x * b - y * a])
 
 
-def distance_jacobian(cone: InfiniteCone, points: Floats) -> Floats:
-    """Return the derivatives of ``InfiniteCone.distances``, shape (n, 6).
-
-    The columns are tilt 1, tilt 2, shift 1, shift 2, c and the half angle.
-
-    Tilt i turns the axis towards the i-th vector of ``perpendicular_vectors`` [m/rad]; shift i moves the origin
-    along it [m/m]; c is radius * cos(half_angle) [m/m].
-    """
-    x, y, z = (points @ way - cone.origin @ way for way in (*perpendicular_vectors(cone.axis), cone.axis))
-    return _slopes(x, y, z, np.sqrt(x * x + y * y), cone.half_angle).T
-
-
 def _slopes(x: Floats, y: Floats, z: Floats, rho: Floats, half_angle: float) -> Floats:
-    """Return ``distance_jacobian`` turned over: numpy is slow with arrays of few columns."""
+    """Return the derivatives of ``InfiniteCone.distances``, shape (6, n): numpy is slow with arrays of few columns.
+
+    The rows are tilt 1, tilt 2, shift 1, shift 2, c = radius cos(half angle) and the half angle. Tilt i turns the axis
+    towards the i-th vector of ``perpendicular_vectors`` [m/rad]; shift i moves the origin along it [m/m].
+    """
     rho = np.maximum(rho, 1e-12)
     ca, sa = math.cos(half_angle), math.sin(half_angle)
     lever = -(z * ca / rho + sa)

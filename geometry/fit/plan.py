@@ -112,9 +112,7 @@ def best_plan(stage: FineStage, surveys: list[AxisSurvey]) -> SheetPlan | None:
     """
     wanted = stage.requirements
     best: SheetPlan | None = None
-    for number, packing in enumerate(packings(surveys, stage.alone(surveys), stage.loose)):
-        if number >= _FINE_PACKINGS:
-            break
+    for packing in packings(surveys, stage.alone(surveys), stage.loose)[:_FINE_PACKINGS]:
         plan = stage.made(packing)
         if plan is not None and (best is None or plan.score(wanted) > 1.002 * best.score(wanted)):
             best = plan

@@ -158,14 +158,14 @@ def test_no_share_is_said_that_prints_as_none(
 ) -> None:
     """Beside holes over 0.02 % of a sheet each."""
     write_stl(tmp_path / "tube.stl", list(turned([(0.0, 0.05), (0.2, 0.05)])))
-    found = link_design.fit_link
+    found = link_design._fit_link
 
     def with_holes(*args: Any, **search: Any) -> tuple[LinkMesh, LinkFit]:
         source, fit = found(*args, **search)
         sheets = (replace(sheet, bridged_share=0.0002 * holes, bridged_depth=0.05) for sheet in fit.sheets)
         return source, replace(fit, sheets=tuple(sheets))
 
-    monkeypatch.setattr(link_design, "fit_link", with_holes)
+    monkeypatch.setattr(link_design, "_fit_link", with_holes)
     assert design(str(tmp_path / "tube.stl"), "-o", str(tmp_path / "out")) == 0
     assert ("spans holes" in capsys.readouterr().out) == said
 

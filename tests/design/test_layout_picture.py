@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.design.sheet_pictures import draw_layout
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
-from coneskin.design.workshop.build_figures import cable_exit
+from coneskin.design.workshop.build_figures import _cable_exit
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
@@ -16,7 +16,7 @@ def test_dimensions_have_units_and_lines_a_legend() -> None:
     module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
     figure = module.Figure()
     (design,) = design_sheets((PlacedFrustum(Frustum(0.04, 0.07, 0.15, math.radians(270.0))),), DesignOptions())
-    draw_layout(figure, design, cable_exit(design.layout, design.options.connector))
+    draw_layout(figure, design, _cable_exit(design.layout, design.options.connector))
     (axes,) = figure.axes
     words = "\n".join(text.get_text() for text in axes.texts)
     numbers = re.findall(r"\d+\.\d+(?! *(?:mm|cm2|deg))\b(?!\d)", words)
@@ -38,7 +38,7 @@ def test_wires_are_drawn_from_the_tabs_past_the_tie_to_the_connector(wires: str,
     figure = module.Figure()
     frustum = Frustum(0.05, 0.06, 0.1, math.radians(wrap_deg))
     (design,) = design_sheets((PlacedFrustum(frustum),), DesignOptions(wires=wires))  # type: ignore[arg-type]
-    draw_layout(figure, design, cable_exit(design.layout, 0.06))
+    draw_layout(figure, design, _cable_exit(design.layout, 0.06))
     (axes,) = figure.axes
     marks = [line for line in axes.lines if line.get_marker() in "sD" and len(line.get_xdata()) == 1]
     assert [line.get_marker() for line in marks] == ["s", "D"]
@@ -60,7 +60,7 @@ def test_tie_and_connector_are_named_beside_their_marks(length: float) -> None:
     module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
     figure = module.Figure((9.0, 8.0))
     (design,) = design_sheets((PlacedFrustum(Frustum(0.05, 0.05, length)),), DesignOptions())
-    draw_layout(figure, design, cable_exit(design.layout, design.options.connector))
+    draw_layout(figure, design, _cable_exit(design.layout, design.options.connector))
     (axes,) = figure.axes
     figure.draw_without_rendering()
     marks = [line for line in axes.lines if line.get_marker() in "sD" and len(line.get_xdata()) == 1]

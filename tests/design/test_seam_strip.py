@@ -8,7 +8,7 @@ import pytest
 
 import coneskin as cs
 from coneskin.core.errors import GeometryError
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, blind_angle, cover_seams, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, _blind_angle, cover_seams, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
 from coneskin.design.workshop.build_guide import guide_lines
 from coneskin.geometry.drawing.surface_shape import SheetSide
@@ -45,8 +45,8 @@ def test_sheet_and_strip_together_close_the_turn(name: str, side: SheetSide, gap
     strip_begin, strip_end = active_azimuths(strip, POSE)
     assert math.remainder(strip_begin - end, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
     assert math.remainder(strip_end - begin, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
-    assert math.radians(10) < blind_angle(sheet) < math.radians(45)
-    assert blind_angle(sheet) == pytest.approx(2 * math.pi - blind_angle(strip))
+    assert math.radians(10) < _blind_angle(sheet) < math.radians(45)
+    assert _blind_angle(sheet) == pytest.approx(2 * math.pi - _blind_angle(strip))
     outer = sheet.options.stack.thickness
     for u in (0.0, 0.1):  # it lies on the outer face, its ends flush
         point = POSE.inverse().apply(strip.place.link_frustum.apply(strip.place.frustum.point(u, 0.3)))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import MeshError, MissingExtra
-from coneskin.geometry.mesh import TO_Z_UP, ColladaAsset, Mesh, load_mesh, make_mesh, read_collada_asset
+from coneskin.geometry.mesh import _TO_Z_UP, Mesh, _ColladaAsset, _read_collada_asset, load_mesh, make_mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.urdf import urdf_links
 
@@ -122,9 +122,9 @@ def test_only_the_asset_of_the_document_says_the_unit_of_a_collada_file() -> Non
     for inside in (extra + own, own + extra):  # COLLADA puts the extra last, and some exporters do not
         for text in (f"<asset>{inside}</asset>", f"<asset>{inside}</asset>{part}", f"{part}<asset>{inside}</asset>"):
             data = f'<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">{text}</COLLADA>'.encode()
-            assert read_collada_asset(Path("a.dae"), data) == ColladaAsset("millimeter", 0.001, "Z_UP")
+            assert _read_collada_asset(Path("a.dae"), data) == _ColladaAsset("millimeter", 0.001, "Z_UP")
     data = f"<COLLADA><asset>{extra}</asset></COLLADA>".encode()
-    assert read_collada_asset(Path("a.dae"), data) == ColladaAsset("m", 1.0, "Y_UP")  # COLLADA's own defaults
+    assert _read_collada_asset(Path("a.dae"), data) == _ColladaAsset("m", 1.0, "Y_UP")  # COLLADA's own defaults
 
 
 def test_a_collada_tag_of_metres_on_millimetres_is_not_believed(tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ def test_collada_up_axis_is_kept_and_said_or_applied(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("axis", ["X_UP", "Y_UP", "Z_UP"])
 def test_up_axes_turn_up_to_z_without_mirroring(axis: str) -> None:
-    turn = np.array(TO_Z_UP[axis])
+    turn = np.array(_TO_Z_UP[axis])
     assert np.linalg.det(turn) == pytest.approx(1.0)
     np.testing.assert_array_equal(turn @ np.eye(3)["XYZ".index(axis[0])], [0.0, 0.0, 1.0])
 
@@ -297,7 +297,7 @@ def test_options_out_of_range(tmp_path: Path) -> None:
 def test_a_document_as_deep_as_it_is_long_is_read_once(tmp_path: Path) -> None:
     """Each end of an element copied the names of all around it: a minute for a megabyte, the square of it for more."""
     deep = b"<COLLADA>" + b"<a>" * 150_000 + b"<unit meter='3'/>" + b"</a>" * 150_000 + b"</COLLADA>"
-    assert read_collada_asset(tmp_path / "a.dae", deep) == ColladaAsset()
+    assert _read_collada_asset(tmp_path / "a.dae", deep) == _ColladaAsset()
 
 
 def test_bad_collada_tags(tmp_path: Path) -> None:

@@ -3,13 +3,13 @@
 import numpy as np
 import trimesh
 
-from coneskin.geometry.mesh import make_mesh, outermost_points
+from coneskin.geometry.mesh import _outermost_points, make_mesh
 
 
 def test_they_reach_as_far_as_all_and_none_is_inside() -> None:
     rng = np.random.default_rng(3)
     points = rng.normal(size=(4000, 3)) * [0.05, 0.02, 0.1]
-    few = outermost_points(points)
+    few = _outermost_points(points)
     assert 4 <= len(few) < 200
     for way in rng.normal(size=(50, 3)):
         np.testing.assert_allclose((few @ way).max(), (points @ way).max(), rtol=1e-12)
@@ -20,7 +20,7 @@ def test_they_reach_as_far_as_all_and_none_is_inside() -> None:
 
 def test_all_points_of_a_plane_are_returned() -> None:
     flat = np.random.default_rng(4).random((30, 3)) * [1.0, 1.0, 0.0]
-    assert outermost_points(flat) is flat
+    assert _outermost_points(flat) is flat
 
 
 def test_a_mesh_keeps_them_where_nobody_can_change_them() -> None:

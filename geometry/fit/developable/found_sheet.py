@@ -36,7 +36,6 @@ __all__ = [
     "fit_sheet",
     "hull_points",
     "ruled_profile",
-    "ruled_region",
     "widest_region",
 ]
 
@@ -58,7 +57,7 @@ def columns_of(region: RuledRegion, around: int) -> NDArray[np.int64]:
     return np.arange(region.column, region.column + region.columns) % around
 
 
-def ruled_region(
+def _ruled_region(
     profile: RadialProfile,
     apex: float | None,
     tolerance: float,
@@ -194,7 +193,7 @@ def widest_region(profile: RadialProfile, candidate: RulingCandidate, options: F
     rows = max(3, math.ceil(options.min_length / profile.step))
     least = np.full(len(profile.z), 0.25 * options.min_radius)
     apex = _apex_height(profile, candidate)
-    return ruled_region(profile, apex, options.tolerance, rows, least, columns, options.wrap == math.tau)
+    return _ruled_region(profile, apex, options.tolerance, rows, least, columns, options.wrap == math.tau)
 
 
 def hull_points(profile: RadialProfile, rows: slice = slice(None), columns: NDArray[np.int64] | None = None) -> Floats:

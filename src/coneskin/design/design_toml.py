@@ -21,7 +21,7 @@ from coneskin.core.keys import Key, check, with_meanings
 from coneskin.geometry.drawing.cut_sheet import FaceUp
 from coneskin.geometry.drawing.dxf import ArcStyle
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
-from coneskin.geometry.drawing.layer_stack import PAPER_STACK, AssemblyMode, LayerStack, SheetLayer
+from coneskin.geometry.drawing.layer_stack import PAPER_STACK, AssemblyMode, LayerStack
 from coneskin.geometry.drawing.pdf import PageSize
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.scene.tables.keys import MAX_SIZE
@@ -31,7 +31,7 @@ from coneskin.skin.electronics import GivenElectronics
 from .folder import FileOptions
 from .sheets.sheet_design import DesignOptions, JigPlan, JigSurface
 
-__all__ = ["DESIGN_TABLES", "DesignSettings", "read_settings", "settings_text"]
+__all__ = ["DESIGN_TABLES", "read_settings", "settings_text"]
 
 _DEFAULT_OPTIONS, _DEFAULT_FILES, _PAPER_LAYERS = DesignOptions(), FileOptions(), PAPER_STACK.layers
 _GIVEN_ELECTRONICS = ("supply_v", "adc_v", "adc_bits", "pulldown_ohm", "current_full_scale_ma")
@@ -208,7 +208,7 @@ _EXAMPLE = "write TABLE.KEY=VALUE, as in --set drawings.kerf_mm=0.2"
 
 
 @dataclass(frozen=True, slots=True)
-class DesignSettings:
+class _DesignSettings:
     """Options of a design, as ``design_link`` takes them.
 
     Attributes:
@@ -222,7 +222,7 @@ class DesignSettings:
     search: Mapping[str, Any]
 
 
-def read_settings(path: Path | None = None, words: Sequence[str] = ()) -> DesignSettings:
+def read_settings(path: Path | None = None, words: Sequence[str] = ()) -> _DesignSettings:
     """Read the options of a design.
 
     Args:
@@ -290,12 +290,12 @@ def _add(
                 values[name]["weights"] = folder / table["weights"]
 
 
-def _settings(values: Mapping[str, Mapping[str, Any]]) -> DesignSettings:
+def _settings(values: Mapping[str, Mapping[str, Any]]) -> _DesignSettings:
     """Return the options that checked values describe; those that are missing have the defaults of their fields."""
     layers = dict(values["layers"])
     mode = layers.pop("assembly", PAPER_STACK.assembly)
     one, two, three, four, five = (
-        _layer(layer, {name: five[i] for name, five in layers.items()}) for i, layer in enumerate(PAPER_STACK.layers)
+        replace(layer, **{name: five[i] for name, five in layers.items()}) for i, layer in enumerate(PAPER_STACK.layers)
     )
     drawings = dict(values["drawings"])
     tolerance = drawings.get("tolerance", _DEFAULT_FILES.tolerance)
@@ -313,11 +313,7 @@ def _settings(values: Mapping[str, Mapping[str, Any]]) -> DesignSettings:
         **of_options,
         **ohms,
     )
-    return DesignSettings(options, FileOptions(**drawings), _search(values["search"]))
-
-
-def _layer(layer: SheetLayer, changes: Mapping[str, Any]) -> SheetLayer:
-    return replace(layer, **changes)
+    return _DesignSettings(options, FileOptions(**drawings), _search(values["search"]))
 
 
 def _search(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -21,11 +21,9 @@ from coneskin.core.errors import GeometryError
 from coneskin.core.text import printable
 from coneskin.geometry.drawing.cut_sheet import CutSheet, make_test_piece, nest_sheets
 from coneskin.geometry.drawing.dxf import ArcStyle, to_dxf
-from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.nesting import MaterialBed, nest_on_beds
 from coneskin.geometry.drawing.pdf import PageSize, to_pdf
 from coneskin.geometry.drawing.svg import to_svg
-from coneskin.geometry.pose import Pose
 from coneskin.geometry.solid import WrappedLayer, require_step_writer, to_stl, write_step
 
 from .report import report_text
@@ -341,13 +339,11 @@ def _write_wrapped(draft: Path, place: Path, design: SheetDesign) -> str:
     Raises:
         GeometryError: the CAD kernel refuses a layer.
     """
-    stack, side = design.options.stack, design.place.frustum
+    stack = design.options.stack
     layers = []
     for index, layer in enumerate(stack.layers):
-        height = stack.face_offset(index)
-        pose = design.place.link_frustum @ Pose(translation=(0.0, 0.0, -height * side.sin_half_angle))
-        name = f"{design.name} {layer.name}"
-        layers.append(WrappedLayer(name, parallel_frustum(side, height), layer.thickness, pose))
+        inner = design.place.parallel(stack.face_offset(index))
+        layers.append(WrappedLayer(f"{design.name} {layer.name}", inner.frustum, layer.thickness, inner.link_frustum))
     (draft / place).mkdir(parents=True, exist_ok=True)
     write_step(draft / place / "wrapped.step", layers)
     return (place / "wrapped.step").as_posix()

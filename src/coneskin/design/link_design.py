@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError, MeshError
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.mesh import Mesh, load_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import require_step_writer
 
@@ -31,7 +31,6 @@ __all__ = [
     "NothingFits",
     "design_link",
     "find_link_sheets",
-    "fit_link",
     "load_link",
     "with_seams",
 ]
@@ -61,7 +60,7 @@ class LinkMesh:
 
 
 def load_link(
-    link: str,
+    link: str | Mesh,
     unit: str | None = None,
     up_axis: str = "ignore",
     packages: Mapping[str, str | Path] | None = None,
@@ -70,7 +69,7 @@ def load_link(
     """Load the meshes of a LINK.
 
     Args:
-        link: a mesh file, or FILE.urdf#LINK; a xacro file is expanded.
+        link: a mesh file, FILE.urdf#LINK, or a mesh; a xacro file is expanded.
         unit: of a mesh file; None to guess.
         up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
         packages: folders of the ROS packages in a URDF's package:// paths (``load_urdf_link``).
@@ -83,13 +82,12 @@ def load_link(
     Raises:
         MeshError: the file, the link or its mesh cannot be found or read.
     """
-    from coneskin.geometry.mesh import load_mesh
-
+    if isinstance(link, Mesh):
+        yield _named(link, Path(link.source).stem)
+        return
     path, hash_sign, name = link.partition("#")
     if not hash_sign and not path.lower().endswith((".urdf", ".xacro")):
-        mesh = load_mesh(path, unit, up_axis)
-        frame = f"the mesh's coordinates in {Path(path).name}"
-        yield LinkMesh(Path(path).stem, mesh, frame, (*_terms(path), *mesh.notes), _called_visual(path))
+        yield _named(load_mesh(path, unit, up_axis), Path(path).name)
         return
     from coneskin.geometry.urdf import load_urdf_link, urdf_links
 
@@ -110,55 +108,43 @@ def load_link(
         raise errors[0]
 
 
-def fit_link(
-    link: str,
-    unit: str | None = None,
-    up_axis: str = "ignore",
-    packages: Mapping[str, str | Path] | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-    arguments: Mapping[str, str] | None = None,
+def _named(mesh: Mesh, file: str) -> LinkMesh:
+    """Return a mesh as the link that its source names."""
+    notes = (*_terms(mesh.source), *mesh.notes)
+    return LinkMesh(
+        Path(mesh.source).stem, mesh, f"the mesh's coordinates in {file}", notes, _called_visual(mesh.source)
+    )
+
+
+def _fit_link(
+    link: str | Mesh,
+    unit: str | None,
+    up_axis: str,
+    packages: Mapping[str, str | Path] | None,
+    progress: Callable[[str], None],
+    arguments: Mapping[str, str] | None,
     **search: Any,
 ) -> tuple[LinkMesh, LinkFit]:
     """Return the first mesh of a link in which sheets are found, with its fit; else the first mesh.
 
-    Args:
-        link: a mesh file, or FILE.urdf#LINK; a xacro file is expanded.
-        unit: of a mesh file; None to guess.
-        up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
-        packages: folders of the ROS packages in a URDF's package:// paths.
-        progress: called with the name of each step.
-        arguments: of a xacro file.
-        search: fields of ``FitOptions``, and ``round_only``. Without ``seam_direction`` the seams are where the link
-            shields them most (``place_seams``).
-
-    Raises:
-        MeshError: the file, the link or its mesh cannot be found or read.
-        GeometryError: an argument of the search is out of range.
+    Arguments as those of ``design_link``. Without ``seam_direction`` the seams are where the link shields them most
+    (``place_seams``).
     """
     facing = search.get("seam_direction")
     search = {name: value for name, value in search.items() if name != "seam_direction" or facing}
     tries: list[tuple[LinkMesh, LinkFit]] = []
-    progress(f"reading {link}")
+    if isinstance(link, str):
+        progress(f"reading {link}")
     for source in load_link(link, unit, up_axis, packages, arguments):
         progress(f"{source.name}: {len(source.mesh.faces)} faces")
         fit = find_link_sheets(source, progress, **search)
-        source = _with_notes(source, fit)
+        # what the search noted goes beside the notes on the mesh
+        more = (note for note in fit.notes if note not in source.mesh.notes)
+        source = replace(source, notes=(*source.notes, *more))
         if fit.sheets:
             return (source, fit) if facing else with_seams(source, fit, progress, search.get("weights"))
         tries.append((source, fit))
     return tries[0]
-
-
-def _fit_mesh(mesh: Mesh, progress: Callable[[str], None] = lambda _: None, **search: Any) -> tuple[LinkMesh, LinkFit]:
-    """Return a mesh with its fit, named by its source; arguments as in ``fit_link``."""
-    name = Path(mesh.source).stem
-    notes = (*_terms(mesh.source), *mesh.notes)
-    source = LinkMesh(name, mesh, f"the mesh's coordinates in {name}", notes, _called_visual(mesh.source))
-    facing = search.get("seam_direction")
-    search = {name: value for name, value in search.items() if name != "seam_direction" or facing}
-    fit = find_link_sheets(source, progress, **search)
-    source = _with_notes(source, fit)
-    return (source, fit) if facing or not fit.sheets else with_seams(source, fit, progress, search.get("weights"))
 
 
 def find_link_sheets(source: LinkMesh, progress: Callable[[str], None], **search: Any) -> LinkFit:
@@ -194,11 +180,6 @@ def _called_visual(path: str) -> bool:
         if words & _VISUAL_WORDS:
             return True
     return False
-
-
-def _with_notes(source: LinkMesh, fit: LinkFit) -> LinkMesh:
-    """Return a source with what the search noted beside the notes on its mesh."""
-    return replace(source, notes=(*source.notes, *(note for note in fit.notes if note not in source.mesh.notes)))
 
 
 def with_seams(
@@ -326,11 +307,11 @@ def design_link(
     places: LinkFit | Sequence[PlacedFrustum]
     if isinstance(link, Frustum):
         places = (PlacedFrustum(link),)
-    elif isinstance(link, str | Path):
-        source, fit = fit_link(str(link), unit, up_axis, packages, say, arguments, **search)
-        places, origin = fit, str(link)
-    elif isinstance(link, Mesh):
-        source, fit = _fit_mesh(link, say, **search)
+    elif isinstance(link, str | Path | Mesh):
+        origin = "" if isinstance(link, Mesh) else str(link)
+        source, fit = _fit_link(
+            link if isinstance(link, Mesh) else origin, unit, up_axis, packages, say, arguments, **search
+        )
         places = fit
     else:
         places = link

@@ -48,8 +48,6 @@ def draw_link(
         areas: what no sheet covers, by reason; each has a colour of its own.
         faces: flat faces of the link, drawn as outlines with their names.
     """
-    import numpy as np
-
     first = designs[0].place.link_frustum
     triangles, owner = _triangles(designs, mesh, areas)
     rays = None if mesh is None else RayCaster(mesh)
@@ -73,8 +71,6 @@ def draw_link(
 
 def _triangles(designs: Sequence[SheetDesign], mesh: Mesh | None, areas: Sequence[BareArea]) -> tuple[Any, list[str]]:
     """Return what is drawn: triangles [mm], shape (n, 3, 3), and the colour of each."""
-    import numpy as np
-
     shown, colours = [], []
 
     def add(triangles: Any, colour: str) -> None:
@@ -97,7 +93,6 @@ def _triangles(designs: Sequence[SheetDesign], mesh: Mesh | None, areas: Sequenc
 
 def _draw_side(axes: Any, triangles: Any, colours: Sequence[str], view: Any, light: Any) -> None:
     """Draw triangles [mm] as they are seen from a direction, with the axes of their frame."""
-    import numpy as np
     from matplotlib.colors import to_rgb
     from matplotlib.ticker import MaxNLocator
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
@@ -133,8 +128,6 @@ class _Sight(NamedTuple):
 
     def sees(self, points: Any, normals: Any) -> Any:
         """Return which points [mm] face the viewer with nothing of the link before them, shape (n,)."""
-        import numpy as np
-
         seen = normals @ self.view > 0.02
         if self.rays is not None and seen.any():
             # off the mesh, which lies up to the tolerance above a sheet's side
@@ -145,8 +138,6 @@ class _Sight(NamedTuple):
 
 def _draw_face(axes: Any, face: DatumFace, sight: _Sight) -> None:
     """Draw the outline of a flat face of the link, with its name."""
-    import numpy as np
-
     if np.dot(face.normal, sight.view) < 0.05:
         return
     outline = 1e3 * (face.outline + 5e-4 * np.array(face.normal))
@@ -156,8 +147,6 @@ def _draw_face(axes: Any, face: DatumFace, sight: _Sight) -> None:
 
 def _name_ends(axes: Any, design: SheetDesign, sight: _Sight, colour: str) -> None:
     """Write the name of the sheet and of its end beside each end, where the viewer sees it best."""
-    import numpy as np
-
     phi = np.linspace(0.0, 1.0, 121)
     axis = np.array(design.place.link_frustum.rotate((0.0, 0.0, 1.0)))
     for end, u in ((1, 0.0), (2, 1.0)):
@@ -176,7 +165,6 @@ def _by_reason(triangles: Any, areas: Sequence[BareArea]) -> list[tuple[str, Any
     """Return colours, each with the bare triangles [m] that have it: those nearest to the samples of one reason."""
     if not areas or len(triangles) == 0:
         return [("#c4c8ce", triangles)]
-    import numpy as np
     from scipy.spatial import cKDTree
 
     points = np.concatenate([area.points for area in areas])
@@ -187,8 +175,6 @@ def _by_reason(triangles: Any, areas: Sequence[BareArea]) -> list[tuple[str, Any
 
 def _outer_face(design: SheetDesign, u: Any, phi: Any) -> Any:
     """Return points of the outer face [mm] at fractions of slant and wrap, shape (k, p, 3)."""
-    import numpy as np
-
     thickness, place = design.options.stack.thickness, design.place
     side = place.frustum
     points, normals = place.place(np.asarray(u)[:, None] * side.slant, np.asarray(phi)[None, :] * side.wrap)
@@ -197,25 +183,18 @@ def _outer_face(design: SheetDesign, u: Any, phi: Any) -> Any:
 
 def _draw_electrodes(axes: Any, design: SheetDesign, sight: _Sight) -> None:
     """Draw the middle lines of the electrodes and the two edges where the viewer sees them."""
-    import numpy as np
-
-    side, box, plan = design.place.frustum, design.layout.field, design.layout.plan
-    half = 0.5 * plan.electrode
-    turn = half / min(side.radius1, side.radius2)
+    side = design.place.frustum
     along, around = np.linspace(0.0, 1.0, 21), np.linspace(0.0, 1.0, 121)
-    for name, u, phi, colour in (
-        ("B", [(box.u1 - half) / side.slant], around, FOIL_COLOUR),
-        ("A", [(box.u2 + half) / side.slant], around, FOIL_COLOUR),
-        ("D", along, [(box.phi1 - turn) / side.wrap], FOIL_COLOUR),
-        ("C", along, [(box.phi2 + turn) / side.wrap], FOIL_COLOUR),
-        ("", along, [0.0], INK_COLOUR),
-        ("", along, [1.0], INK_COLOUR),
-    ):
-        points = _outer_face(design, u, phi).reshape(-1, 3)
-        azimuths = np.broadcast_to(phi, points.shape[:1]) * side.wrap
+    lines: list[tuple[str, Any, Any]] = []
+    for name in "BADC":
+        u, phi = design.layout.electrode_middle(name, 0.0, 0.0)
+        lines.append((name, [u / side.slant], around) if name in "AB" else (name, along, [phi / side.wrap]))
+    for name, share, turn in (*lines, ("", along, [0.0]), ("", along, [1.0])):
+        points = _outer_face(design, share, turn).reshape(-1, 3)
+        azimuths = np.broadcast_to(turn, points.shape[:1]) * side.wrap
         seen = sight.sees(points, design.place.place(np.zeros(len(azimuths)), azimuths)[1])
         points[~seen] = np.nan
-        axes.plot(*points.T, color=colour, lw=2.0 if name else 1.0)
+        axes.plot(*points.T, color=FOIL_COLOUR if name else INK_COLOUR, lw=2.0 if name else 1.0)
         if name and seen.sum() >= 0.1 * len(seen):
             middle = points[seen][seen.sum() // 3 if name in "AB" else seen.sum() // 2]
             axes.text(*middle, name, color="white", fontweight="bold", ha="center", va="center")
@@ -223,8 +202,6 @@ def _draw_electrodes(axes: Any, design: SheetDesign, sight: _Sight) -> None:
 
 def drawn_triangles(mesh: Mesh) -> Any:
     """Return the triangles of a mesh [m], merged in cells if there are too many to draw."""
-    import numpy as np
-
     faces, vertices = mesh.faces, mesh.vertices
     size = float(np.ptp(vertices, axis=0).max())
     cell = size / 120.0
@@ -251,8 +228,6 @@ def drawn_triangles(mesh: Mesh) -> Any:
 
 def _covered(design: SheetDesign, triangles: Any) -> Any:
     """Return whether a sheet covers each triangle [m], shape (n,)."""
-    import numpy as np
-
     side = design.place.frustum
     u, phi, height = design.place.locate_all(triangles)
     covered = (u >= 0.0) & (u <= side.slant) & (np.abs(height) < design.options.stack.thickness)
@@ -273,7 +248,6 @@ def draw_weights(figure: Any, triangles: Any, designs: Sequence[SheetDesign], we
         designs: the sheets, of which the outlines are drawn.
         weights: what an area counts.
     """
-    import numpy as np
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -310,8 +284,6 @@ def draw_weights(figure: Any, triangles: Any, designs: Sequence[SheetDesign], we
 
 def _outlines(design: SheetDesign) -> list[tuple[Any, Any]]:
     """Return points [mm] and normals of the ends and edges of a sheet's outer face."""
-    import numpy as np
-
     side, height = design.place.frustum, design.options.stack.thickness + _OUTLINE_LIFT
     along, around = np.linspace(0.0, side.slant, 40), np.linspace(0.0, side.wrap, 180)
     found = []

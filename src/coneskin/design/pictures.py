@@ -7,7 +7,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from coneskin.core.errors import MissingExtra
+from coneskin.geometry.displacement_map import heights_by_ray
+from coneskin.geometry.ray_casting import RayCaster
 
 from .link_picture import draw_jig, draw_link, draw_weights, drawn_triangles
 from .sheet_pictures import draw_layout, draw_parts, draw_seam, draw_stack
@@ -57,74 +61,55 @@ def draw_pictures(
     (folder / "pictures").mkdir()
     done: list[tuple[str, str]] = []
 
-    def save(figure: Any, name: str, caption: str) -> None:
-        figure.savefig(folder / "pictures" / name, dpi=130, bbox_inches="tight", pad_inches=0.15)
-        done.append((caption, f"pictures/{name}"))
+    def picture(name: str, size: tuple[float, float], caption: str, draw: Callable[..., None], *args: Any) -> None:
+        """Draw a picture on a figure of a size [inch]."""
+        figure = Figure(figsize=size, layout=None if draw is draw_link else "constrained")
+        draw(figure, *args)
+        figure.savefig(folder / "pictures" / f"{name}.png", dpi=130, bbox_inches="tight", pad_inches=0.15)
+        done.append((caption, f"pictures/{name}.png"))
 
     progress("drawing the link")
-    figure = Figure(figsize=(13, 7.5))
     faces = {face.name: face for item in figures for face in item.placement.faces}
-    draw_link(figure, designs, mesh, bare, tuple(faces.values()))
-    save(
-        figure,
-        "link.png",
+    caption = (
         "The link with its sheets from two sides: outer faces in colour, middle lines of the electrodes in orange, "
         "edges black."
         + (" The flat faces F1 and so on, from which places are measured, are outlined." if faces else "")
-        + (" What is bare is tinted by its reason." if bare else ""),
+        + (" What is bare is tinted by its reason." if bare else "")
     )
+    picture("link", (13, 7.5), caption, draw_link, designs, mesh, bare, tuple(faces.values()))
     if weights is not None and mesh is not None:
         progress("drawing what counts")
-        figure = Figure(figsize=(10, 6), layout="constrained")
-        draw_weights(figure, drawn_triangles(mesh), designs, weights)
-        save(figure, "weights.png", f"What counts on the link, by {weights.name}, from two sides.")
+        caption = f"What counts on the link, by {weights.name}, from two sides."
+        picture("weights", (10, 6), caption, draw_weights, drawn_triangles(mesh), designs, weights)
     for design, item in zip(designs, figures, strict=True):
+        name, title = design.name.replace(" ", "-"), design.name.capitalize()
         progress(f"{design.name}: drawing the layout")
-        figure = Figure(figsize=(9, 7), layout="constrained")
-        draw_layout(figure, design, item.cable)
-        name = design.name.replace(" ", "-")
-        save(
-            figure,
-            f"{name}-layout.png",
-            f"{design.name.capitalize()}, flat, seen from outside, and the way of its wires; dimensions in mm.",
-        )
-        title = design.name.capitalize()
+        caption = f"{title}, flat, seen from outside, and the way of its wires; dimensions in mm."
+        picture(f"{name}-layout", (9, 7), caption, draw_layout, design, item.cable)
         progress(f"{design.name}: drawing how it is built")
-        figure = Figure(figsize=(9, 7), layout="constrained")
-        draw_stack(figure, design)
-        save(figure, f"{name}-stack.png", f"{title}: its seven parts in the order of assembly, each seen from outside.")
-        figure = Figure(figsize=(9, 4.5), layout="constrained")
-        draw_seam(figure, design, item)
+        caption = f"{title}: its seven parts in the order of assembly, each seen from outside."
+        picture(f"{name}-stack", (9, 7), caption, draw_stack, design)
         where = "seam" if design.has_seam else "two edges, which do not meet"
-        save(figure, f"{name}-seam.png", f"{title}: section across its {where}.")
-        figure = Figure(figsize=(9, 11), layout="constrained")
-        draw_parts(figure, design)
-        save(figure, f"{name}-parts.png", f"{title}: its parts as they are cut, dimensions in mm.")
+        picture(f"{name}-seam", (9, 4.5), f"{title}: section across its {where}.", draw_seam, design, item)
+        caption = f"{title}: its parts as they are cut, dimensions in mm."
+        picture(f"{name}-parts", (9, 11), caption, draw_parts, design)
         if item.collars:
             progress(f"{design.name}: drawing the jig")
-            figure = Figure(figsize=(10, 4.5), layout="constrained")
-            draw_jig(figure, item.collars)
-            save(figure, f"{name}-jig.png", f"{title}: parts of its jig as they are printed, a little apart.")
+            caption = f"{title}: parts of its jig as they are printed, a little apart."
+            picture(f"{name}-jig", (10, 4.5), caption, draw_jig, item.collars)
         if mesh is not None and not design.above:
             progress(f"{design.name}: measuring deviations")
-            figure = Figure(figsize=(8, 4.2), layout="constrained")
-            _draw_deviation(figure, design, mesh, tolerance)
-            save(
-                figure,
-                f"{name}-deviation.png",
-                f"{design.name.capitalize()}: height of the mesh above the {design.place.kind}. Grey: holes and "
-                "grooves deeper than the tolerance, which the sheet bridges.",
+            caption = (
+                f"{title}: height of the mesh above the {design.place.kind}. Grey: holes and grooves deeper than the "
+                "tolerance, which the sheet bridges."
             )
+            picture(f"{name}-deviation", (8, 4.2), caption, _draw_deviation, design, mesh, tolerance)
     return done
 
 
 def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: float) -> None:
     """Draw the height of the mesh above the side of a sheet over azimuth and slant distance."""
-    import numpy as np
     from matplotlib import colormaps
-
-    from coneskin.geometry.displacement_map import heights_by_ray
-    from coneskin.geometry.ray_casting import RayCaster
 
     side = design.place.frustum
     u = np.asarray(side.slant * (np.arange(180) + 0.5) / 180.0, np.float64)

@@ -6,16 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from coneskin.design.sheets.summary import sheet_folder
-from coneskin.design.workshop.build_figures import side_name
 from coneskin.geometry.drawing.nesting import MaterialBed
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.skin.electronics import SENSE_GAIN, shunt_ohms
 
 from .sheets.sheet_design import SheetDesign
-from .sheets.summary import design_summary, material_rows, sector_text, small_active_area
+from .sheets.summary import design_summary, material_rows, sector_text, sheet_folder, small_active_area
 from .workshop.bill_of_materials import bill_of_materials
-from .workshop.build_figures import BuildFigures
+from .workshop.build_figures import BuildFigures, section_head, side_name, table_head
 from .workshop.build_guide import guide_lines
 
 if TYPE_CHECKING:
@@ -102,6 +100,7 @@ def _coverage(fit: LinkFit) -> Iterator[str]:
 def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     data, stack = design_summary(design), design.options.stack
     side, active = design.place.frustum, design.active.frustum
+    sensor = "sensor.toml" if folder == "." else f"{folder}/sensor.toml"
     yield f"## {design.name.capitalize()}"
     yield ""
     rows = [
@@ -136,9 +135,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         gap = data["gap_to_next_mm"]
         rows.append(["gap to the next sheet", f"{gap['inner']:.2f} mm on the link, {gap['outer']:.2f} mm outside"])
     yield from _table(("quantity", "value"), rows)
-    yield ""
-    yield "### Layers"
-    yield ""
+    yield from section_head("Layers")
     assembly = f"Assembly: {stack.assembly}. {_ASSEMBLY_WORDS[stack.assembly]}"
     yield f"{assembly} The patterns differ in radius, but not in theta0."
     yield ""
@@ -168,9 +165,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         "strain of inner, outer face",
     )
     yield from _table(head, table)
-    yield ""
-    yield "### Electrodes"
-    yield ""
+    yield from section_head("Electrodes")
     plan, patch = design.layout.plan, data["active_patch"]
     share = f"{data['active_area_cm2']:.1f} cm2, {data['active_share']:.1%} of the sheet"
     width = f"{plan.electrode * 1e3:g} mm wide"
@@ -188,7 +183,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     )
     yield (
         f"* The decoder uses radius {active.radius1 * 1e3:.3f} to {active.radius2 * 1e3:.3f} mm, slant "
-        f"{active.slant * 1e3:.3f} mm, wrap {math.degrees(active.wrap):.3f} deg (`{_join(folder, 'sensor.toml')}`)."
+        f"{active.slant * 1e3:.3f} mm, wrap {math.degrees(active.wrap):.3f} deg (`{sensor}`)."
     )
     yield ""
     parts = design.electronics
@@ -214,9 +209,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
             ["pull-downs of C and D", f"{parts.pulldown_ohms / 1e3:g} kohm"],
         ],
     )
-    yield ""
-    yield "### Accuracy forecast"
-    yield ""
+    yield from section_head("Accuracy forecast")
     yield (
         f"One count of {parts.adc_bits} bits over {parts.adc_volts:g} V at a supply of "
         f"{parts.supply_volts:g} V (eq. 25, 26). This is the limit of the A/D converter; noise, the area of the "
@@ -239,15 +232,10 @@ def _vector(values: list[float], unit: str) -> str:
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    yield "| " + " | ".join(head) + " |"
-    yield "|" + "---|" * len(head)
+    yield from table_head(*head)
     for row in rows:
         yield "| " + " | ".join(row) + " |"
 
 
 def _text(value: object) -> str:
     return f"{value:.1f}" if isinstance(value, float) else str(value)
-
-
-def _join(folder: str, name: str) -> str:
-    return name if folder == "." else f"{folder}/{name}"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from coneskin.design.workshop.build_figures import side_name
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS
 from coneskin.geometry.drawing.outline import Outline
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw_shape, drawing_point
@@ -17,7 +16,7 @@ from coneskin.geometry.sector import unroll
 
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import polar_text
-from .workshop.build_figures import BuildFigures, CableExit
+from .workshop.build_figures import WIRE_COLOURS, BuildFigures, CableExit, side_name
 
 __all__ = ["FOIL_COLOUR", "INK_COLOUR", "draw_layout", "draw_parts", "draw_seam", "draw_stack"]
 
@@ -26,9 +25,9 @@ FOIL_COLOUR = "#c27c0e"
 _ACTIVE_COLOUR = "#9fd3c7"
 
 
-def _xy(outline: Outline) -> tuple[list[float], list[float]]:
-    """Return the coordinates of an outline [mm]; the first point is repeated if it is closed."""
-    flat = outline.flattened(5e-5)
+def _xy(outline: Outline, tolerance: float = 5e-5) -> tuple[list[float], list[float]]:
+    """Return the coordinates of an outline [mm], in lines within a tolerance [m]; a closed one ends where it begins."""
+    flat = outline.flattened(tolerance)
     points = [(x * 1e3, y * 1e3) for x, y, _ in flat.vertices]
     points += points[:1] if outline.closed else []
     return [x for x, _ in points], [y for _, y in points]
@@ -75,8 +74,6 @@ def draw_layout(figure: Any, design: SheetDesign, cable: CableExit) -> None:
 
 def _draw_cable(axes: Any, design: SheetDesign, cone: Any, cable: CableExit) -> None:
     """Draw the wires as they would lie if the link were flat too; one that crosses the seam ends at the edge."""
-    from coneskin.design.workshop.build_figures import WIRE_COLOURS
-
     out = -1.0 if cable.side == "end1" else 1.0
 
     def at(away: float, phi: float) -> tuple[float, float]:
@@ -137,21 +134,13 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
         f"{design.name}, upper conductive layer",
         f"slant {slant * 1e3:.3f} mm",
         f"arcs {flat.arc1 * 1e3:.3f} mm (end 1), {flat.arc2 * 1e3:.3f} mm (end 2)",
+        polar_text(flat),
+        f"active area {1e4 * layout.active.area(layout.sheet):.1f} cm2 ({layout.active_share:.0%})",
     ]
-    lines.append(polar_text(flat))
-    lines.append(f"active area {1e4 * layout.active.area(layout.sheet):.1f} cm2 ({layout.active_share:.0%})")
     tabs = design.options.connector if layout.plan.wires == "end2" else 0.0
     axes.text(500.0 * (x0 + x1), 1e3 * (y1 + tabs) + 4.0, "\n".join(lines), **{**style, "va": "bottom"})
-    half = 0.5 * layout.plan.electrode
-    narrow = min(layout.sheet.radius1, layout.sheet.radius2)
-    field = layout.field
-    for name, u, phi in (
-        ("A", field.u2 + half, 0.42 * wrap),
-        ("B", field.u1 - half, 0.42 * wrap),
-        ("C", 0.5 * slant, field.phi2 + half / narrow),
-        ("D", 0.5 * slant, field.phi1 - half / narrow),
-    ):
-        axes.text(*at(u, phi), name, **{**style, "fontweight": "bold"})
+    for name in "ABCD":
+        axes.text(*at(*layout.electrode_middle(name, 0.5 * slant, 0.42 * wrap)), name, **style, fontweight="bold")
 
 
 def draw_parts(figure: Any, design: SheetDesign) -> None:
@@ -165,11 +154,8 @@ def draw_parts(figure: Any, design: SheetDesign) -> None:
     for axes, cut in zip(grid.flat, design.cuts, strict=False):
         for part in cut.parts:
             for stroke in part.strokes:
-                flat = stroke.outline.flattened(1e-4)
-                xy = [(1e3 * x, 1e3 * y) for x, y, _ in flat.vertices]
-                xy += xy[:1] if stroke.outline.closed else []
                 colour = tuple(value / 255.0 for value in LINE_COLOURS[stroke.kind])
-                axes.plot([x for x, _ in xy], [y for _, y in xy], color=colour, lw=0.7)
+                axes.plot(*_xy(stroke.outline, 1e-4), color=colour, lw=0.7)
         x0, y0, x1, y1 = (1e3 * value for value in cut.bounds)
         off = 0.05 * max(x1 - x0, y1 - y0)
         arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.6, "shrinkA": 0, "shrinkB": 0}
@@ -227,11 +213,9 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
     for level, cut in enumerate(stacked):
         lift = level * pitch
 
-        def slanted(outline: Outline, lift: float = lift, mirrored: bool = cut.face == "inside") -> Any:
-            flat = outline.flattened(2e-4)
-            points = [((-x if mirrored else x) * 1e3, y * 1e3) for x, y, _ in flat.vertices]
-            points += points[:1] if outline.closed else []
-            return [x + lean * y for x, y in points], [squeeze * y + lift for _, y in points]
+        def slanted(outline: Outline, lift: float = lift, way: float = -1.0 if cut.face == "inside" else 1.0) -> Any:
+            points = list(zip(*_xy(outline, 2e-4), strict=True))
+            return [way * x + lean * y for x, y in points], [squeeze * y + lift for _, y in points]
 
         for part in cut.parts:
             for stroke in part.strokes:
@@ -280,26 +264,20 @@ def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
     axes.fill_between([-reach - shown_gap, reach], -0.12 * reach, 0.0, color="#c4c8ce")
     axes.text(0.0, -0.06 * reach, "link", ha="center", va="center", fontsize=9)
     arc = 1e3 * radius
-    set_lower = 1e3 * plan.setback
-    spans = {  # from the edge inwards [mm]: lower conductive, then upper conductive near D and near C
-        0: (0.0, 0.0),
-        1: _insets(layout.lower, layout.sheet.wrap, u, arc),
-        2: (0.0, 0.0),
-        3: _insets(layout.upper, layout.sheet.wrap, u, arc),
-        4: (0.0, 0.0),
-    }
+    whole = (0.0, 0.0)
+    lower, upper = (_insets(shape, layout.sheet.wrap, u, arc) for shape in (layout.lower, layout.upper))
+    spans = (whole, lower, whole, upper, whole)  # from edge 0 and from the other edge inwards [mm]
     for index in range(5):
         first, last = spans[index]
         low, high = heights[index], heights[index + 1]
         high = max(high, low + 0.02 * reach)  # a thin sheet stays visible
-        axes.fill_between([first, reach], low, high, facecolor=colours[index], edgecolor=INK_COLOUR, lw=0.5)
-        axes.fill_between(
-            [-reach - shown_gap, -shown_gap - last], low, high, facecolor=colours[index], edgecolor=INK_COLOUR, lw=0.5
-        )
+        for span in ([first, reach], [-reach - shown_gap, -shown_gap - last]):
+            axes.fill_between(span, low, high, facecolor=colours[index], edgecolor=INK_COLOUR, lw=0.5)
         at = 0.5 * (low + high) + {1: -0.02, 3: 0.02}.get(index, 0.0) * reach  # names of thin layers beside each other
-        axes.text(reach * 1.03, at, _layer_name(design, index), fontsize=8, va="center")
-    margin = (layout.field.phi1 - _turn(plan.electrode, side)) * arc
-    width = _turn(plan.electrode, side) * arc
+        layer = stack.layers[index]
+        axes.text(reach * 1.03, at, f"{layer.name}, {layer.thickness * 1e3:g} mm", fontsize=8, va="center")
+    turn = plan.electrode / min(side.radius1, side.radius2)
+    margin, width = (layout.field.phi1 - turn) * arc, turn * arc
     thick = 0.012 * reach
     foils = [("D", margin, width, 1.0), ("C", -shown_gap - margin - width, width, 1.0)]
     if plan.wires.startswith("end"):  # of the electrode at the other end, on its way to the wires
@@ -333,20 +311,14 @@ def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
     note = f"seen from end 1, at the middle of the slant; thickness enlarged {scale:.1f} times"
     if open_gap > shown_gap:
         note += f"; {open_gap:.0f} mm of the link between the edges are left out"
-    cable = f"setback {set_lower:g} mm, wires leave at {side_name(figures.cable.side)}"
+    cable = f"setback {1e3 * plan.setback:g} mm, wires leave at {side_name(figures.cable.side)}"
     what = "its two edges, between which the link is bare" if not design.has_seam else "the seam"
     axes.set_title(f"{design.name}: section of {what}\n{note}; {cable}", fontsize=9)
     axes.axis("off")
 
 
-def _turn(width: float, side: Any) -> float:
-    return width / float(min(side.radius1, side.radius2))
-
-
 def _insets(shape: Any, wrap: float, u: float, arc: float) -> tuple[float, float]:
     """Return how far a conductive sheet ends before edge 0 and before the other edge at a slant distance [mm]."""
-    from coneskin.geometry.drawing.surface_shape import ShapeCorner
-
     corners = [corner for corner in shape if isinstance(corner, ShapeCorner)]
     at = [
         a.phi
@@ -358,13 +330,6 @@ def _insets(shape: Any, wrap: float, u: float, arc: float) -> tuple[float, float
 
 def _lead(layout: Any, arc: float) -> tuple[float, float]:
     """Return where the lead along edge 0 begins, and its width [mm]."""
-    from coneskin.geometry.drawing.surface_shape import ShapeCorner
-
     foil = layout.foils[layout.plan.led_across]
     start, end, *_ = sorted({round(corner.phi, 9) for corner in foil if isinstance(corner, ShapeCorner)})
     return start * arc, (end - start) * arc
-
-
-def _layer_name(design: SheetDesign, index: int) -> str:
-    layer = design.options.stack.layers[index]
-    return f"{layer.name}, {layer.thickness * 1e3:g} mm"

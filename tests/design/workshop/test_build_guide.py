@@ -10,7 +10,7 @@ import pytest
 from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.bill_of_materials import bill_of_materials
-from coneskin.design.workshop.build_figures import LOOP, BuildFigures, cable_exit, measure_build
+from coneskin.design.workshop.build_figures import LOOP, BuildFigures, _cable_exit, measure_build
 from coneskin.design.workshop.build_guide import guide_lines
 from coneskin.design.workshop.placement import find_placement, sharpest_bends
 from coneskin.geometry.developable import Bend
@@ -90,7 +90,7 @@ def test_a_sheet_reads_what_its_conductive_layers_measure_between_their_electrod
 @pytest.mark.parametrize("tab", [0.0, 0.012])
 def test_wires_reach_one_connector_by_the_shorter_way(side: SheetSide, tab: float) -> None:
     layout = lay_out_sheet(Frustum(0.054, 0.054, 0.2), ElectrodePlan(wires=side, tab=tab))
-    cable = cable_exit(layout, 0.06)
+    cable = _cable_exit(layout, 0.06)
     assert [wire.electrode for wire in cable.wires] == ["A", "B", "C", "D"]
     assert [wire.pin for wire in cable.wires] == [1, 2, 3, 4]
     for wire in cable.wires:
@@ -101,7 +101,7 @@ def test_wires_reach_one_connector_by_the_shorter_way(side: SheetSide, tab: floa
             across = abs(wire.u - cable.u)
         assert 0.0 < wire.length - (across + 0.06 + LOOP) < 0.02
     with pytest.raises(GeometryError, match="the connector must be 30 to 2000 mm from the rim, got 1 mm"):
-        cable_exit(layout, 1e-3)
+        _cable_exit(layout, 1e-3)
 
 
 def bumped(azimuth: float | None) -> Mesh:

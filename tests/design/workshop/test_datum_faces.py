@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from scipy.optimize import least_squares
 
-from coneskin.design.workshop.placement import datum_heights, find_datum_faces, find_placement, measured_faces
+from coneskin.design.workshop.placement import _datum_heights, _measured_faces, find_datum_faces, find_placement
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -74,7 +74,7 @@ def test_a_face_under_a_sheet_is_not_measured_from() -> None:
     faces = find_datum_faces(elbow(Pose()))
     for beyond, covered in ((0.01, False), (0.0, True)):  # nearly flat over the side at y = 50 mm, or 10 mm above it
         pose = Pose.from_xyz_rpy((0.0, beyond - 1.95, -0.25), (0.0, 0.0, 0.5 * math.pi - 0.1))
-        kept = measured_faces(PlacedFrustum(Frustum(2.0, 2.0, 0.2, 0.2), pose), faces)
+        kept = _measured_faces(PlacedFrustum(Frustum(2.0, 2.0, 0.2, 0.2), pose), faces)
         assert {face.normal[1] > 0.99 for face in kept} == ({False} if covered else {False, True})
         assert len(kept) == len(faces) - covered
 
@@ -108,8 +108,8 @@ def test_the_distances_alone_put_a_tilted_sheet_back(wrap: float) -> None:
 
 def test_bold_distances_are_those_that_turning_changes() -> None:
     placed = PlacedFrustum(Frustum(0.04, 0.04, 0.1), Pose.from_xyz_rpy((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
-    faces = measured_faces(placed, find_datum_faces(elbow(Pose())))
-    for row in datum_heights(placed, faces):
+    faces = _measured_faces(placed, find_datum_faces(elbow(Pose())))
+    for row in _datum_heights(placed, faces):
         turned = placed.place(row.u, row.phi + 1e-4)[0].reshape(3)
         for face, height, steep in zip(faces, row.heights, row.steep, strict=True):
             change = abs(float(face.height(turned)) - height) / (1e-4 * 0.04)

@@ -11,7 +11,7 @@ import trimesh
 from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
-from coneskin.design.workshop.jig import Collar, CollarPart, jig_collars, lip_play
+from coneskin.design.workshop.jig import Collar, _CollarPart, _lip_play, jig_collars
 from coneskin.design.workshop.link_excess import LinkExcess
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
@@ -27,7 +27,7 @@ def sheet(frustum: Frustum, pose: Pose | None = None, **options: object) -> Shee
     return design
 
 
-def read_back(part: CollarPart) -> trimesh.Trimesh:
+def read_back(part: _CollarPart) -> trimesh.Trimesh:
     """The part as a printing program reads it: from the bytes of its STL file, in millimetres."""
     return trimesh.load(io.BytesIO(to_stl(part.surface, "test")), file_type="stl")
 
@@ -201,8 +201,8 @@ def test_facets_of_a_mesh_do_not_show_where_a_collar_belongs() -> None:
     link = LinkExcess(side, 0.2, 1.0, 0.04, body, Pose())
     lips = [(turned, np.full(161, 0.015), np.zeros(161, bool))]
     facets = 0.05 * (1.0 - math.cos(math.pi / 12.0))
-    assert lip_play(link, lips, 0.015, 0.3e-3) is not None
-    assert lip_play(link, lips, 0.015, 0.3e-3, facets) is None
+    assert _lip_play(link, lips, 0.015, 0.3e-3) is not None
+    assert _lip_play(link, lips, 0.015, 0.3e-3, facets) is None
 
 
 def test_no_part_has_an_undercut() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from coneskin.geometry.fit.axis_plan import Region, largest_region
+from coneskin.geometry.fit.axis_plan import Region, _largest_region
 
 Grid = NDArray[np.bool_]
 GRIDS = arrays(bool, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=7), elements=st.booleans())
@@ -57,7 +57,7 @@ def test_the_weighed_region_counts_most(good: Grid, rows: int, columns: int, exa
         ),
         default=0.0,
     )
-    region = largest_region(good, rows, columns, exact, worth)
+    region = _largest_region(good, rows, columns, exact, worth)
     assert (value(region) if region else 0.0) == most
     if region:
         assert holds(good, region)
@@ -67,7 +67,7 @@ def test_the_weighed_region_counts_most(good: Grid, rows: int, columns: int, exa
 @settings(max_examples=150)
 @given(GRIDS, st.integers(1, 3), st.integers(1, 3), st.booleans())
 def test_largest_region_is_the_largest(good: Grid, rows: int, columns: int, exact: bool) -> None:
-    region = largest_region(good, rows, columns, exact)
+    region = _largest_region(good, rows, columns, exact)
     best = brute(good, rows, columns, exact)
     if region is None:
         assert best == 0
@@ -83,13 +83,13 @@ def test_largest_region_is_the_largest(good: Grid, rows: int, columns: int, exac
 def test_a_region_goes_round_the_seam() -> None:
     good = np.zeros((6, 10), bool)
     good[1:5, [8, 9, 0, 1]] = True
-    assert largest_region(good) == (1, 5, 8, 4)
+    assert _largest_region(good) == (1, 5, 8, 4)
 
 
 def test_a_full_turn_is_one_region() -> None:
     good = np.ones((6, 10), bool)
     good[0, ::2] = False
-    region = largest_region(good)
+    region = _largest_region(good)
     assert region is not None
     assert region[:2] == (1, 6)
     assert region[3] == 10
@@ -97,4 +97,4 @@ def test_a_full_turn_is_one_region() -> None:
 
 @pytest.mark.parametrize(("rows", "columns"), [(7, 1), (1, 11)])
 def test_more_than_the_grid_is_none(rows: int, columns: int) -> None:
-    assert largest_region(np.ones((6, 10), bool), rows, columns) is None
+    assert _largest_region(np.ones((6, 10), bool), rows, columns) is None

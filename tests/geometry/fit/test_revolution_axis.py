@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coneskin.geometry.fit.candidates import find_revolution_axis
+from coneskin.geometry.fit.candidates import _find_revolution_axis
 from coneskin.geometry.pose import Pose
 
 from ..synthetic import TILTED, Floats, Indices, barrel, joined, moved, noisy, revolve, rugby
@@ -24,7 +24,7 @@ from .axis_cases import AXIS, BASE, hull, off
     ],
 )
 def test_the_revolution_axis_needs_no_profile(body: tuple[Floats, Indices], tilt: float, shift: float) -> None:
-    line = find_revolution_axis(hull(body))
+    line = _find_revolution_axis(hull(body))
     assert line is not None
     found = off(*line)
     assert found[0] < tilt
@@ -36,7 +36,7 @@ def test_the_revolution_axis_bears_a_housing() -> None:
     lump = moved(
         revolve([(-0.02, 0.03), (0.02, 0.03)], segments=4), Pose.from_xyz_rpy((0.06, 0.02, 0.2), (0.3, 0.2, 0.1))
     )
-    line = find_revolution_axis(hull(joined(rugby(), lump)))
+    line = _find_revolution_axis(hull(joined(rugby(), lump)))
     assert line is not None
     tilt, shift = off(*line)
     assert tilt < 0.02
@@ -46,12 +46,12 @@ def test_the_revolution_axis_bears_a_housing() -> None:
 def test_one_point_has_no_axis() -> None:
     """What is left of a mesh most of whose faces hide each other: a polygon of 50 000 corners over a tube."""
     tube = hull(rugby())
-    assert find_revolution_axis(replace(tube, points=np.broadcast_to(tube.points[:1], tube.points.shape))) is None
+    assert _find_revolution_axis(replace(tube, points=np.broadcast_to(tube.points[:1], tube.points.shape))) is None
 
 
 def test_the_revolution_axis_from_a_start() -> None:
     points = hull(noisy(rugby(), 5e-5))
     far = AXIS + 0.1 * np.array(TILTED.rotation)[:, 0]
-    line = find_revolution_axis(points, (BASE + 0.01, far / np.linalg.norm(far)))
+    line = _find_revolution_axis(points, (BASE + 0.01, far / np.linalg.norm(far)))
     assert line is not None
     assert off(*line)[0] < 0.1

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Literal
 from coneskin.core.errors import GeometryError, SensorError
 from coneskin.geometry.drawing.cut_sheet import CutSheet, FaceUp, cut_sheets
 from coneskin.geometry.drawing.electrode_layout import (
-    AdConverter,
     ElectrodePlan,
     ResolutionForecast,
     SheetLayout,
@@ -39,8 +38,6 @@ __all__ = [
     "JigPlan",
     "JigSurface",
     "SheetDesign",
-    "SheetJoint",
-    "blind_angle",
     "cover_seams",
     "design_sheets",
 ]
@@ -87,7 +84,7 @@ class JigPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class SheetJoint:
+class _SheetJoint:
     """The joint between a sheet and the next one on the axis.
 
     Attributes:
@@ -111,7 +108,7 @@ def _adjoin(one: PlacedFrustum, two: PlacedFrustum) -> bool:
     return same and tilt < 1e-6 and math.hypot(x, y) < 1e-6 and z > 0.5 * one.frustum.height
 
 
-def _find_joint(one: PlacedFrustum, two: PlacedFrustum, stack: LayerStack, gap: float) -> SheetJoint:
+def _find_joint(one: PlacedFrustum, two: PlacedFrustum, stack: LayerStack, gap: float) -> _SheetJoint:
     """Return the joint of two neighbours, trimmed so that no layer of one runs into the other.
 
     A face at the height t above the link is shifted along the axis by -t sin(half angle): at a belt the outer faces
@@ -121,7 +118,7 @@ def _find_joint(one: PlacedFrustum, two: PlacedFrustum, stack: LayerStack, gap: 
     apart = one.link_frustum.inverse().apply(start)[2] - one.frustum.height
     opening = stack.thickness * (one.frustum.sin_half_angle - two.frustum.sin_half_angle)
     trimmed = max(0.0, gap - apart - min(0.0, opening))
-    return SheetJoint(apart + trimmed, apart + trimmed + opening, trimmed)
+    return _SheetJoint(apart + trimmed, apart + trimmed + opening, trimmed)
 
 
 _LOWER_CONDUCTIVE, _UPPER_CONDUCTIVE = 1, 3  # indices of the layers in the stack
@@ -200,7 +197,7 @@ class SheetDesign:
     options: DesignOptions
     conductive: tuple[SheetMaterial, SheetMaterial]
     electronics: Electronics
-    next_joint: SheetJoint | None = None
+    next_joint: _SheetJoint | None = None
     fit: FittedSheet | None = None
     above: str = ""
     seam_offset: float = 0.0
@@ -212,10 +209,9 @@ class SheetDesign:
 
     def forecasts(self, count: int = 5) -> list[ResolutionForecast]:
         """Return the resolution at evenly spaced places from end 1 to end 2 of the active area."""
-        slant = self.active.frustum.slant
-        parts = self.electronics
-        converter = AdConverter(parts.adc_bits, parts.adc_volts, parts.supply_volts)
-        return [forecast_resolution(self.active.frustum, converter, slant * i / (count - 1)) for i in range(count)]
+        active, parts = self.active.frustum, self.electronics
+        step = parts.adc_volts / parts.full_count / parts.supply_volts
+        return [forecast_resolution(active, step, active.slant * i / (count - 1)) for i in range(count)]
 
     @property
     def drive_currents(self) -> tuple[float, float]:
@@ -378,7 +374,7 @@ def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> Pla
 _SEAM_TURN_SHARE = 0.9  # of a turn; from there on a wrap has a seam rather than a side without a sheet
 
 
-def blind_angle(design: SheetDesign) -> float:
+def _blind_angle(design: SheetDesign) -> float:
     """Return the angle about the axis in which a sheet locates no touch: its seam, and what it does not wrap [rad]."""
     return math.tau - (design.layout.active.phi2 - design.layout.active.phi1)
 
@@ -431,7 +427,7 @@ def _strip_place(design: SheetDesign) -> tuple[PlacedFrustum, float]:
     trial = Frustum(outer.radius1, outer.radius2, outer.height, 0.5 * math.tau)
     inside = lay_out_sheet(trial, plan).active
     before, after = inside.phi1, trial.wrap - inside.phi2
-    wrap = before + blind_angle(design) + after
+    wrap = before + _blind_angle(design) + after
     if wrap > 0.5 * math.tau:
         raise GeometryError(
             f"{design.name}: a strip over its seam would have to wrap {math.degrees(wrap):.0f} deg, at most 180: make "

@@ -9,6 +9,8 @@ from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
@@ -17,7 +19,6 @@ from coneskin.geometry.drawing.svg import to_svg
 from coneskin.geometry.sector import unroll
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -74,8 +75,6 @@ def deviation_bands(rays: RayCaster, placed: PlacedFrustum, tolerance: float) ->
         placed: the sheet.
         tolerance: deviation of the strongest colours; what lies deeper is a hole [m].
     """
-    import numpy as np
-
     side = placed.frustum
     edges_u, edges_phi = np.linspace(0.0, side.slant, _GRID_ROWS + 1), np.linspace(0.0, side.wrap, _GRID_COLUMNS + 1)
     u, phi = 0.5 * (edges_u[:-1] + edges_u[1:]), 0.5 * (edges_phi[:-1] + edges_phi[1:])
@@ -125,8 +124,6 @@ class _ElectrodeMark(NamedTuple):
 
 def electrode_marks(design: SheetDesign) -> list[_ElectrodeMark]:
     """Return the marks of a sheet's electrodes, on the side that it covers."""
-    import numpy as np
-
     side, box, half = design.place.frustum, design.layout.field, 0.5 * design.layout.plan.electrode
     turn = half / min(side.radius1, side.radius2)
     found = []

@@ -14,6 +14,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from coneskin.core.errors import ConeSkinError
 from coneskin.design.link_design import LinkMesh, load_link
 from coneskin.geometry.pose import Vector
@@ -33,12 +35,11 @@ from .design_text import (
 from .workbench import Handles, Workbench
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from coneskin.design.sheets.sheet_design import SheetDesign
 
-__all__ = ["StudioPage", "first_view", "seen_shares"]
+__all__ = ["StudioPage"]
 
 _AZIMUTH_COUNT = 24  # directions at each height
 _VIEW_HEIGHTS = (20.0, 45.0, -15.0)  # deg above the horizon, the preferred one first
@@ -51,7 +52,7 @@ _HEIGHT_PREFERENCE = 0.1  # by which another height has to be better
 _VIEW_DISTANCE = 1.55  # of the link's largest side
 
 
-def first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArray[np.float64]) -> tuple[Vector, Vector]:
+def _first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArray[np.float64]) -> tuple[Vector, Vector]:
     """Return from where to look, and at what [m].
 
     Args:
@@ -59,14 +60,12 @@ def first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArray
         rays: of the link's mesh.
         corners: vertices of the mesh [m], shape (n, 3).
     """
-    import numpy as np
-
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, size = 0.5 * (low + high), float((high - low).max())
     ways = _directions()
     worth = np.array([-_HEIGHT_PREFERENCE * (row // _AZIMUTH_COUNT > 0) for row in range(len(ways))])
     for design in designs:
-        sheet, seam = seen_shares(design, rays, ways)
+        sheet, seam = _seen_shares(design, rays, ways)
         worth += sheet + _SEAM_WORTH * seam
     way = ways[int(np.argmax(worth))]  # the first of several that are as good
     x, y, z = (middle + _VIEW_DISTANCE * size * way).tolist()
@@ -74,7 +73,7 @@ def first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArray
     return (x, y, z), (at_x, at_y, at_z)
 
 
-def seen_shares(
+def _seen_shares(
     design: SheetDesign, rays: RayCaster, ways: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return how much of a sheet, and of its two edges along the seam, is seen from far off.
@@ -89,8 +88,6 @@ def seen_shares(
     Returns:
         of the sheet and of its seam, each of shape (n,).
     """
-    import numpy as np
-
     box = design.layout.field
     u = np.linspace(box.u1, box.u2, _PLACE_ROWS)
     rows, columns = np.meshgrid(u, np.linspace(box.phi1, box.phi2, _PLACE_COLUMNS), indexing="ij")
@@ -105,8 +102,6 @@ def seen_shares(
 
 
 def _directions() -> NDArray[np.float64]:
-    import numpy as np
-
     found = []
     for height in map(math.radians, _VIEW_HEIGHTS):
         for step in range(_AZIMUTH_COUNT):
@@ -168,7 +163,7 @@ class StudioPage:
         light_plainly(scene)
         vertices = bench.link.mesh.vertices
         self._rays = RayCaster(bench.link.mesh)
-        self._server.look_from(*first_view(bench.designs, self._rays, vertices))
+        self._server.look_from(*_first_view(bench.designs, self._rays, vertices))
         self._legend.content = legend(bench.fit.tolerance)
         scene.add_mesh_simple(
             "/link",

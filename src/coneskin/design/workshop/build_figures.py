@@ -36,11 +36,12 @@ __all__ = [
     "WIRE_COLOURS",
     "BuildFigures",
     "CableExit",
-    "cable_exit",
     "in_mm",
     "in_ohms",
     "measure_build",
+    "section_head",
     "side_name",
+    "table_head",
     "tie_place",
 ]
 
@@ -91,7 +92,7 @@ class CableExit:
     wires: tuple[_SheetWire, ...]
 
 
-def cable_exit(layout: SheetLayout, connector: float = 0.06) -> CableExit:
+def _cable_exit(layout: SheetLayout, connector: float = 0.06) -> CableExit:
     """Lead the wires of a sheet to one connector.
 
     Args:
@@ -202,9 +203,7 @@ def _expected_frame(design: SheetDesign, index: int, frame: str = "mesh") -> dic
 
 def _part(design: SheetDesign, index: int, box: SurfaceRectangle) -> Frustum:
     """Return a part of a layer as a cone of its own, on the middle surface of the wrapped layer."""
-    stack = design.options.stack
-    height = stack.face_offset(index) + 0.5 * stack.layers[index].thickness
-    side = design.place.parallel(height).frustum
+    side = design.place.parallel(design.options.stack.middle(index)).frustum
     rise = (box.u2 - box.u1) * side.cos_half_angle
     return Frustum(side.radius_at(box.u1), side.radius_at(box.u2), rise, box.phi2 - box.phi1)
 
@@ -343,7 +342,7 @@ def measure_build(
         GeometryError: a scene would refuse its sensor, or the connector is out of range.
     """
     return BuildFigures(
-        cable_exit(design.layout, design.options.connector),
+        _cable_exit(design.layout, design.options.connector),
         _pair_readings(design),
         _expected_frame(design, index, frame),
         find_placement(design.place, mesh, () if design.above else faces),
@@ -390,6 +389,16 @@ ROLLING = (
 
 #: makers of silicone adhesives test their bonds after three days; their strength grows until then
 SETTING = "Leave it for 72 hours at room temperature (18 to 25 degrees Celsius) before anybody presses it hard."
+
+
+def table_head(*names: str) -> tuple[str, str]:
+    """Return the head of a table in Markdown."""
+    return f"| {' | '.join(names)} |", "|" + "---|" * len(names)
+
+
+def section_head(title: str) -> tuple[str, str, str]:
+    """Return the head of a section in Markdown, after the one before."""
+    return "", f"### {title}", ""
 
 
 def in_ohms(ohms: float) -> str:

@@ -10,22 +10,25 @@ import math
 from collections.abc import Iterator
 
 from coneskin.design.sheets.sheet_design import SheetDesign
-from coneskin.design.workshop.build_figures import (
-    ROLLING,
-    SETTING,
-    SPREAD,
-    TAPE,
-    WIRE_COLOURS,
-    in_mm,
-    in_ohms,
-    side_name,
-    tie_place,
-)
 from coneskin.geometry.drawing.cut_sheet import TEST_HOLE, TEST_SQUARE, CutSheet
 from coneskin.geometry.drawing.touch_marks import marks_on_link
 
 from .bill_of_materials import ADHESIVE
-from .build_figures import STRIPPED, BuildFigures
+from .build_figures import (
+    ROLLING,
+    SETTING,
+    SPREAD,
+    STRIPPED,
+    TAPE,
+    WIRE_COLOURS,
+    BuildFigures,
+    in_mm,
+    in_ohms,
+    section_head,
+    side_name,
+    table_head,
+    tie_place,
+)
 from .placement_text import placement_lines
 
 __all__ = ["guide_lines"]
@@ -307,16 +310,14 @@ def _test_steps(figures: BuildFigures, folder: str) -> Iterator[str]:
 
 def _reading_lines(figures: BuildFigures) -> Iterator[str]:
     """Yield the tables of what a multimeter and ``coneskin monitor`` should read."""
-    yield "| between | multimeter | for a material of |"
-    yield "|---|---|---|"
+    yield from table_head("between", "multimeter", "for a material of")
     for pair in figures.pairs:
         yield f"| {pair.pair} | {in_ohms(pair.ohms)} | {pair.sheet_ohms:g} ohm per square |"
     yield "| A or B to C or D | above 10 Mohm, untouched | |"
     yield ""
     yield "Untouched frame, in counts, as `coneskin monitor` shows it with the sensor file of this design:"
     yield ""
-    yield "| phase | " + " | ".join(name for name in figures.frame) + " |"
-    yield "|---" * (len(figures.frame) + 1) + "|"
+    yield from table_head("phase", *figures.frame)
     yield "| counts | " + " | ".join(str(count) for count in figures.frame.values()) + " |"
     ab, cd = figures.pairs
     radial, angular = ab.ohms / (ab.squares * ab.sheet_ohms), cd.ohms / (cd.squares * cd.sheet_ohms)
@@ -348,8 +349,7 @@ def _jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Itera
             f"link; the gap to both is {in_mm(plan.clearance)} (`jig.clearance_mm`)."
         )
         yield ""
-        yield "| file | for | printed size [mm] | volume |"
-        yield "|---|---|---|---|"
+        yield from table_head("file", "for", "printed size [mm]", "volume")
         place = "jig/" if folder == "." else f"{folder}/jig/"
         for collar in figures.collars:
             for part in collar.parts:
@@ -402,39 +402,27 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
     steps += _test_steps(figures, folder)
     yield ""
     yield from (f"{number}. {step}" for number, step in enumerate(steps, 1))
-    yield ""
-    yield f"### Place of {design.name} on the link"
-    yield ""
+    yield from section_head(f"Place of {design.name} on the link")
     yield from placement_lines(design, figures)
-    yield ""
-    yield f"### Jig of {design.name}"
-    yield ""
+    yield from section_head(f"Jig of {design.name}")
     yield from _jig_lines(design, figures, folder)
-    yield ""
-    yield f"### Wires of {design.name}"
-    yield ""
-    yield "| pin | electrode | wire | tab at u | tab at phi | cut to |"
-    yield "|---|---|---|---|---|---|"
+    yield from section_head(f"Wires of {design.name}")
+    yield from table_head("pin", "electrode", "wire", "tab at u", "tab at phi", "cut to")
     for wire in figures.cable.wires:
         yield (
             f"| {wire.pin} | {wire.electrode} | {WIRE_COLOURS[wire.electrode]} | {in_mm(wire.u)} | "
             f"{math.degrees(wire.phi):.2f} deg | {1e3 * wire.length:.0f} mm |"
         )
-    yield ""
-    yield f"### Readings of {design.name} that is built"
-    yield ""
+    yield from section_head(f"Readings of {design.name} that is built")
     yield from _reading_lines(figures)
-    yield ""
-    yield f"### Coordinates of {design.name}"
-    yield ""
+    yield from section_head(f"Coordinates of {design.name}")
     yield (
         "u runs along the slant from end 1, phi around from edge 0. x and y are those of the drawing seen from "
         "outside; "
         "where the inside is up, x changes its sign. `design.json` has every corner of every electrode."
     )
     yield ""
-    yield "| what | u [mm] | phi [deg] |"
-    yield "|---|---|---|"
+    yield from table_head("what", "u [mm]", "phi [deg]")
     for number, (u, phi) in enumerate(design.layout.holes, 1):
         yield f"| hole {number}, diameter {in_mm(design.layout.plan.hole)} | {1e3 * u:.2f} | {math.degrees(phi):.3f} |"
     box, width = design.layout.field, design.layout.plan.electrode

@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.design.sheets.sheet_design import SheetDesign
-from coneskin.geometry.drawing.layer_stack import parallel_frustum
 from coneskin.geometry.drawing.surface_shape import ShapeTab
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import ClosedSurface, shell_surface, widest_nearby, without_undercut
 
 from .link_excess import LinkExcess
 
-__all__ = ["Collar", "CollarPart", "jig_collars", "lip_play", "with_sheets"]
+__all__ = ["Collar", "jig_collars"]
 
 Floats = NDArray[np.float64]
 
@@ -33,11 +33,11 @@ _BORDER_COLUMN = math.radians(2.0)  # step around the axis
 _SHEET_RINGS = 9  # along a sheet
 
 
-def with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
+def _with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
     """Return the mesh of the link with the outer faces of the sheets that it bears already."""
     corners, faces = [mesh.vertices], [mesh.faces]
     for other in others:
-        outer = parallel_frustum(other.place.frustum, other.options.stack.thickness)
+        outer = PlacedFrustum(other.place.frustum).parallel(other.options.stack.thickness).frustum
         shift = -other.options.stack.thickness * outer.sin_half_angle
         phi = np.linspace(0.0, outer.wrap, max(8, math.ceil(outer.wrap / _BORDER_COLUMN)) + 1)
         rings = [_ring(outer, u, phi, shift) for u in np.linspace(0.0, outer.slant, _SHEET_RINGS)]
@@ -75,7 +75,7 @@ _LIP_ROWS = 61  # along the lip
 _MAX_PLAY = 12  # columns of a degree; a collar that can be turned further does not show its azimuth
 
 
-def lip_play(
+def _lip_play(
     link: LinkExcess,
     lips: Sequence[tuple[Floats, Floats, NDArray[np.bool_]]],
     wanted: float,
@@ -128,7 +128,7 @@ _MIN_CONE_COSINE = 0.5  # cosine of the half angle; a collar around a flatter co
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CollarPart:
+class _CollarPart:
     """One printed part of a collar.
 
     Attributes:
@@ -160,14 +160,14 @@ class Collar:
     """
 
     end: int
-    parts: tuple[CollarPart, ...]
+    parts: tuple[_CollarPart, ...]
     lip: float
     flush: bool
     stopped: bool
     play: float | None
     before: float | None
 
-    def slug(self, part: CollarPart) -> str:
+    def slug(self, part: _CollarPart) -> str:
         """Return the name of the file of a part."""
         return f"end-{self.end}-part-{part.number}"
 
@@ -196,7 +196,7 @@ def jig_collars(
         return (), (f"{design.name} is too flat for collars: weigh it down with a board of its shape",)
     collars: list[Collar] = []
     without: list[str] = []
-    body = None if mesh is None or plan.surface == "cone" else with_sheets(mesh, others)
+    body = None if mesh is None or plan.surface == "cone" else _with_sheets(mesh, others)
     for end in (1, 2):
         if _meets_neighbour(design, others, end):
             without.append(f"at end {end} it meets the sheet beside it: push it against that")
@@ -219,7 +219,7 @@ class _Builder:
         self.design, self.plan, self.end = design, design.options.jig, end
         self.side = design.place.frustum
         thickness = design.options.stack.thickness
-        self.outer = parallel_frustum(self.side, thickness)
+        self.outer = design.place.parallel(thickness).frustum
         lift = thickness * self.side.sin_half_angle  # the outer face is moved by it towards end 1
         self.sign = -1.0 if end == 1 else 1.0
         sheet_end = min(0.0, -lift) if end == 1 else self.side.height + max(0.0, -lift)
@@ -257,10 +257,10 @@ class _Builder:
         parts, lips = [], []
         for number, ((start, stop, _), lengths) in enumerate(zip(spans, free, strict=True), 1):
             phi = np.linspace(start, stop, len(lengths))
-            parts.append(CollarPart(number, start, stop, self._part(phi, lengths, number)))
+            parts.append(_CollarPart(number, start, stop, self._part(phi, lengths, number)))
             lips.append((phi, lengths, self._above_tabs(phi)))
         facets = 0.0 if self.design.fit is None else self.design.fit.facet_height
-        play = lip_play(self.link, lips, wanted, self.plan.clearance, facets)
+        play = _lip_play(self.link, lips, wanted, self.plan.clearance, facets)
         reached = self.flush and longest > wanted - 1e-9
         before = None if self.room is None else self.room - longest
         return Collar(self.end, tuple(parts), longest, reached, stopped, play, before)
@@ -305,16 +305,8 @@ class _Builder:
         lip = cone + widest_nearby(excess, 1, 1) + plan.clearance
         lip = np.minimum(lip, cone + _MAX_RISE + plan.wall)  # where there is no lip, no wall either
         lip = np.where(self._above_tabs(phi), np.maximum(lip, cone + _CHANNEL_HEIGHT), lip)
-        into = np.array(
-            [
-                0.0,
-                _SEAT_RIM_WIDTH,
-                _SEAT_RIM_WIDTH,
-                plan.reach - _SEAT_RIM_WIDTH,
-                plan.reach - _SEAT_RIM_WIDTH,
-                plan.reach,
-            ]
-        )
+        rim = _SEAT_RIM_WIDTH
+        into = np.array([0.0, rim, rim, plan.reach - rim, plan.reach - rim, plan.reach])
         sleeve_z = self.step - self.sign * np.maximum(into[:, None], start)
         slope = (self.outer.radius2 - self.outer.radius1) / self.outer.height
         lifted = sleeve_z + self.design.options.stack.thickness * self.side.sin_half_angle
@@ -324,9 +316,8 @@ class _Builder:
         inside[:count] = np.where(lengths > 0.0, inside[:count], inside[count])  # no lip: the step is the end there
         near = np.abs(z[:, None] - z[None]) <= plan.wall
         outside = np.where(near, inside[None], 0.0).max(axis=1)
-        outside = (
-            widest_nearby(outside, 0, max(1, math.ceil(plan.wall / (float(inside.min()) * _COLUMN_STEP)))) + plan.wall
-        )
+        beside = max(1, math.ceil(plan.wall / (float(inside.min()) * _COLUMN_STEP)))
+        outside = widest_nearby(outside, 0, beside) + plan.wall
         seat = max(float(outside[-6:].max()), float((sleeve + plan.wall).max()))
         outside[-6:] = seat
         outside[[-6, -5, -2, -1]] += _SEAT_RIM_HEIGHT

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.ray_casting import RayCaster
 
 if TYPE_CHECKING:
     from coneskin.geometry.mesh import Mesh
@@ -22,10 +23,8 @@ __all__ = [
     "DatumFace",
     "LinkFeature",
     "SheetPlacement",
-    "datum_heights",
     "find_datum_faces",
     "find_placement",
-    "measured_faces",
     "sharpest_bends",
 ]
 
@@ -129,7 +128,7 @@ def find_datum_faces(mesh: Mesh) -> tuple[DatumFace, ...]:
     return tuple(kept)
 
 
-def measured_faces(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[DatumFace, ...]:
+def _measured_faces(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[DatumFace, ...]:
     """Return the faces from which the place of a sheet is measured: those that it does not cover itself.
 
     Args:
@@ -148,7 +147,7 @@ def measured_faces(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[Da
     return tuple(kept)
 
 
-def datum_heights(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[_DatumHeight, ...]:
+def _datum_heights(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[_DatumHeight, ...]:
     """Return distances from faces for places of a sheet: its corners, and where a height fixes edge 0 best.
 
     Args:
@@ -284,8 +283,6 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
     seam, axis = pose.rotate((1.0, 0.0, 0.0)), pose.rotate((0.0, 0.0, 1.0))
     if mesh is None:
         return SheetPlacement(*around, None, None, seam, None)
-    import numpy as np
-
     x, y, z = pose.inverse().apply_all(mesh.vertices).T
     radius = np.sqrt(x * x + y * y)
     feature = None
@@ -301,7 +298,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
             end = 1 if height < 0.5 * side.height else 2
             arc = azimuth * (side.radius1 if end == 1 else side.radius2)
             feature = LinkFeature(float(radius[furthest]), azimuth, height, arc, end)
-    usable = measured_faces(place, faces)
+    usable = _measured_faces(place, faces)
     along = [abs(math.fsum(a * b for a, b in zip(face.normal, axis, strict=True))) for face in usable]
     held = any(cosine < _SQUARE_SINE or cosine > math.sqrt(1.0 - _SQUARE_SINE**2) for cosine in along)
     return SheetPlacement(
@@ -311,7 +308,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
         seam,
         feature,
         usable,
-        datum_heights(place, usable) if usable else (),
+        _datum_heights(place, usable) if usable else (),
         max(along, default=0.0) >= _MIN_AXIS_SLOPE and not held,
         _free_ways(place, mesh),
     )
@@ -319,10 +316,6 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
 
 def _free_ways(place: PlacedFrustum, mesh: Mesh) -> tuple[float, float]:
     """Return how far a cable at edge 0 can go on beyond end 1 and end 2 before it meets the link [m]."""
-    import numpy as np
-
-    from coneskin.geometry.ray_casting import RayCaster
-
     side = place.frustum
     u = np.array([0.0, side.slant])
     points, normals = place.place(u, np.zeros(2))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from coneskin.design.sheets.sheet_design import SheetDesign
-from coneskin.design.workshop.build_figures import in_mm
+import numpy as np
 
-from .build_figures import BuildFigures
+from coneskin.design.sheets.sheet_design import SheetDesign
+
+from .build_figures import BuildFigures, in_mm, table_head
 from .placement import LinkFeature, SheetPlacement, sharpest_bends
 
 __all__ = ["placement_lines"]
@@ -31,8 +32,7 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
         "frame above. Anticlockwise, the direction of the wrap, is as seen from end 2."
     )
     yield ""
-    yield "| from | to | distance |"
-    yield "|---|---|---|"
+    yield from table_head("from", "to", "distance")
     if place.before is not None and place.beyond is not None:
         if not place.tilted or place.before < _AT_END:
             yield (
@@ -118,8 +118,7 @@ def _height_lines(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
         f"a straight bar that is held against it.{bold}{ends} *Check:* every distance within 1 mm."
     )
     yield ""
-    yield "| place of the sheet | " + " | ".join(f"from {face.name}" for face in place.faces) + " |"
-    yield "|---|" + "---|" * len(place.faces)
+    yield from table_head("place of the sheet", *(f"from {face.name}" for face in place.faces))
     for row in place.heights:
         end = 1 if row.u < 0.5 * side.slant else 2
         arc = row.phi * side.radius_at(row.u)
@@ -139,8 +138,9 @@ def _facing(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
     facing = list(_axes_around(design))
     if not facing:
         return
-    yield "| place that faces along an axis of the frame | from edge 0, around end 1, in the direction of the wrap |"
-    yield "|---|---|"
+    yield from table_head(
+        "place that faces along an axis of the frame", "from edge 0, around end 1, in the direction of the wrap"
+    )
     for name, phi in facing:
         yield f"| {name} | {in_mm(phi * design.place.frustum.radius1)} ({math.degrees(phi):.1f} deg) |"
     yield ""
@@ -153,8 +153,9 @@ def _bend_lines(design: SheetDesign) -> Iterator[str]:
         "marked at these places must lie with each mark in the middle of its bend:"
     )
     yield ""
-    yield "| bend | radius of the link there, at end 1 | from edge 0, around end 1, in the direction of the wrap |"
-    yield "|---|---|---|"
+    yield from table_head(
+        "bend", "radius of the link there, at end 1", "from edge 0, around end 1, in the direction of the wrap"
+    )
     for number, (radius, arc) in enumerate(sharpest_bends(design.place), 1):
         yield f"| {number} | {in_mm(radius)} | {in_mm(arc)} |"
     yield ""
@@ -162,8 +163,6 @@ def _bend_lines(design: SheetDesign) -> Iterator[str]:
 
 def _axes_around(design: SheetDesign) -> Iterator[tuple[str, float]]:
     """Yield the axes of the link's frame along which a place of the sheet faces, with its azimuth [rad]."""
-    import numpy as np
-
     wrap, back = design.place.frustum.wrap, design.place.link_frustum.inverse()
     phi = np.linspace(0.0, wrap, 3601)
     _, normals = design.place.place(0.0, phi)
@@ -193,8 +192,7 @@ def _strip_placement(design: SheetDesign) -> Iterator[str]:
     )
     middle, seam = 0.5 * side.wrap, design.seam_offset
     yield ""
-    yield "| from | to | distance |"
-    yield "|---|---|---|"
+    yield from table_head("from", "to", "distance")
     yield f"| edge 0 of the strip | its other edge | {in_mm(2.0 * half1)} at end 1, {in_mm(2.0 * half2)} at end 2 |"
     yield (
         f"| seam of {design.above} | edge 0 of the strip, against the direction of the wrap | "
