@@ -72,10 +72,6 @@ class _ColladaAsset:
 def _read_collada_asset(path: Path, data: bytes) -> _ColladaAsset:
     """Read unit and up axis of a COLLADA file, whose entities are known to be harmless.
 
-    Args:
-        path: its name, for messages.
-        data: its bytes.
-
     Raises:
         MeshError: malformed XML, a unit that is no length, an unknown axis.
     """

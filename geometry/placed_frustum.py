@@ -178,7 +178,6 @@ def double_cone(
     height1: float,
     height2: float,
     wrap: float = 2.0 * math.pi,
-    link_body: Pose | None = None,
 ) -> tuple[PlacedFrustum, PlacedFrustum]:
     """Return two frusta on one axis that share a belt, the rugby ball of the paper's figure 14.
 
@@ -189,7 +188,6 @@ def double_cone(
         height1: axial length of the first frustum [m].
         height2: axial length of the second [m].
         wrap: angle covered, the same for both [rad].
-        link_body: pose in the link's frame of the body, whose z axis runs from the first end to the far one.
 
     Returns:
         the frustum from the first end to the belt, and the one from the belt to the far end.
@@ -197,9 +195,8 @@ def double_cone(
     Raises:
         GeometryError: a length is negative or not finite.
     """
-    body = link_body or Pose()
     if not belt_radius > 0.0:
         raise GeometryError(f"belt_radius must be above 0 m, got {belt_radius!r} m")
     first = Frustum(radius1, belt_radius, height1, wrap)
     second = Frustum(belt_radius, radius2, height2, wrap)
-    return PlacedFrustum(first, body), PlacedFrustum(second, body @ Pose(translation=(0.0, 0.0, height1)))
+    return PlacedFrustum(first), PlacedFrustum(second, Pose(translation=(0.0, 0.0, height1)))

@@ -28,11 +28,6 @@ def _expand_xacro(
 ) -> bytes:
     """Return the URDF that a xacro file describes, in UTF-8; paths of meshes beside it become absolute.
 
-    Args:
-        path: the xacro file.
-        arguments: values of its ``<xacro:arg>``, as ``name:=value`` of the ROS program.
-        packages: folders of the ROS packages that ``$(find ...)`` names; others are searched for above the file.
-
     Raises:
         MeshError: the file cannot be read, or xacro cannot expand it; the message has xacro's words.
         MissingExtra: xacrodoc is not installed.

@@ -17,8 +17,7 @@ from .cut_sheet import CutPart, CutSheet, Stroke
 __all__ = ["MaterialBed", "nest_on_beds"]
 
 _GRID_STEP = 1e-3  # m; boxes are packed in whole millimetres
-_MIN_BED_SIDE = 0.05  # m; side of a bed
-_MAX_BED_SIDE = 10.0  # m; side of a bed
+_MIN_BED_SIDE, _MAX_BED_SIDE = 0.05, 10.0  # m; side of a bed
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,16 +28,12 @@ class MaterialBed:
         material: its name.
         number: of the piece among those of its material, from 1.
         sheets: the parts at their places; the lower left corner of the bed is (0, 0).
-        width: of the bed [m].
-        depth: of the bed [m].
         used: width and depth of the corner of the bed that holds all parts [m].
     """
 
     material: str
     number: int
     sheets: tuple[CutSheet, ...]
-    width: float
-    depth: float
     used: tuple[float, float]
 
     @property
@@ -129,9 +124,11 @@ def nest_on_beds(
                 moved = replace(piece.sheet, parts=(piece.part,)).moved(x * _GRID_STEP + gap, y * _GRID_STEP + gap)
                 known = merged.get(moved.slug)
                 merged[moved.slug] = moved if known is None else replace(known, parts=known.parts + moved.parts)
-            right = max(x + piece.size[0] for piece, (x, _) in zip(on_bed, places, strict=True)) * _GRID_STEP + gap
-            top = max(y + piece.size[1] for piece, (_, y) in zip(on_bed, places, strict=True)) * _GRID_STEP + gap
-            beds.append(MaterialBed(material, number, tuple(merged.values()), width, depth, (right, top)))
+            right, top = (
+                max(at[i] + piece.size[i] for piece, at in zip(on_bed, places, strict=True)) * _GRID_STEP + gap
+                for i in (0, 1)
+            )
+            beds.append(MaterialBed(material, number, tuple(merged.values()), (right, top)))
     return tuple(beds), tuple(larger)
 
 

@@ -29,11 +29,12 @@ __all__ = [
     "side_lines",
 ]
 
+Floats = NDArray[np.float64]
 Region = tuple[int, int, int, int]  #: first row, end row, first column, columns
 
 
 def _largest_region(
-    good: NDArray[np.bool_], rows: int, columns: int, exact: bool, worth: NDArray[np.float64] | None = None
+    good: NDArray[np.bool_], rows: int = 1, columns: int = 1, exact: bool = False, worth: Floats | None = None
 ) -> Region | None:
     """Return the largest rectangle of good cells on a grid whose columns go round.
 
@@ -128,7 +129,6 @@ def _worthiest(
     return best
 
 
-Floats = NDArray[np.float64]
 SideLine = tuple[float, float]  #: radius at z = 0 of the profile's frame [m], and dr/dz
 
 _RADIUS_BIN = 0.0005  # m; of the histogram of radii
@@ -331,14 +331,9 @@ _TESTED_HEIGHTS = 4  # heights at which the space above a cell is tested
 def _clashing_cells(
     profile: RadialProfile, other: RadialProfile, side: StraightSide, thickness: float, gap: float
 ) -> NDArray[np.bool_]:
-    """Return the cells above which the space of a sheet meets that of another sheet, shape (k, p).
+    """Return the cells above which the space of a sheet to come meets that of a side which is there, shape (k, p).
 
-    Args:
-        profile: the hull about the axis of the sheet to come.
-        other: the profile of the sheet that is there.
-        side: of the sheet that is there.
-        thickness: of both sheets, from the link outwards [m].
-        gap: smallest distance between two sheets [m].
+    The side lies on the profile ``other``; thickness of both sheets and least gap between them [m].
     """
     turned = profile.frame.columns.T @ other.frame.columns
     out = np.stack([np.cos(profile.phi), np.sin(profile.phi)], axis=1) @ turned[:2]

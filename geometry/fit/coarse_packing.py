@@ -35,12 +35,6 @@ def _search_axis(
 
     The axis is shifted and tilted in steps that become smaller. A small shift s and tilt t change the radii by
     (s + t (z + r dr/dz)) cos(phi) (``refine_axis``), so no ray is cast.
-
-    Args:
-        profile: the hull about the axis so far.
-        side: the largest sheet about it within a looser tolerance.
-        lines: straight sides near which partial wraps are looked for.
-        requirements: on the sheet.
     """
     middle = 0.5 * float(profile.z[side.first] + profile.z[side.end - 1])
     reach = max(0.5 * float(profile.z[side.end - 1] - profile.z[side.first]), requirements.min_length)

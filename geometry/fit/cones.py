@@ -43,7 +43,6 @@ class LinkFit:
         notes: notes on the mesh, one sentence each.
         reason: why nothing fits; empty where a sheet does.
         candidates: number of axes tried.
-        ray_engine: the engine that cast the rays, "embree" or "grid".
         needed_tolerance: where nothing fits, a tolerance with which something does, tried [m]; infinite without one.
         bare_areas: what no sheet covers, by reason, the largest first; empty where no sheet fits.
         touch_weights: map by which areas were weighed; None where all count the same.
@@ -58,7 +57,6 @@ class LinkFit:
     notes: tuple[str, ...]
     reason: str
     candidates: int
-    ray_engine: str
     needed_tolerance: float = math.inf
     bare_areas: tuple[BareArea, ...] = ()
     touch_weights: TouchWeights | None = None
@@ -131,7 +129,6 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         notes=link.mesh.notes,
         reason="",
         candidates=len(link.axes),
-        ray_engine=link.rays.engine,
         needed_tolerance=tolerance,
         touch_weights=link.weights,
     )

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.sector import Sector, unroll
 
 from .axis_plan import AxisPlan
 from .side import StraightSide, azimuth_columns, covered_points
@@ -27,7 +26,6 @@ class FittedSheet:
 
     Attributes:
         placed: the frustum and its pose in the link's frame; the wrap begins at phi = 0.
-        start_azimuth: angle from the requested seam direction to the start of the wrap [rad], in [0, 2 pi).
         max_deviation: largest distance between sheet and hull, bridged holes left out [m].
         rms_deviation: root mean square of that distance [m].
         bridged_share: share of the sheet that spans holes and grooves, deeper below their rims than the tolerance.
@@ -41,7 +39,6 @@ class FittedSheet:
     """
 
     placed: PlacedFrustum
-    start_azimuth: float
     max_deviation: float
     rms_deviation: float
     bridged_share: float
@@ -64,16 +61,6 @@ class FittedSheet:
     def frustum(self) -> Frustum:
         """Side of the sheet."""
         return self.placed.frustum
-
-    @property
-    def half_angle(self) -> float:
-        """Signed half angle [rad]; positive where the sheet widens along its axis."""
-        return self.placed.frustum.half_angle
-
-    @property
-    def sector(self) -> Sector:
-        """Flat pattern of the sheet: r1, r2 and theta0."""
-        return unroll(self.placed.frustum)
 
 
 def fitted_sheet(
@@ -115,7 +102,6 @@ def fitted_sheet(
     below = covered_points(profile, side, hull, tolerance)
     return FittedSheet(
         placed=PlacedFrustum(Frustum(max(radii[0], 0.0), max(radii[1], 0.0), end - start, wrap), pose),
-        start_azimuth=turn,
         max_deviation=float(np.abs(seen).max()) if seen.size else math.inf,
         rms_deviation=math.sqrt(float((seen**2).mean())) if seen.size else math.inf,
         bridged_share=float(hole.mean()),

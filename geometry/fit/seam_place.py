@@ -36,7 +36,6 @@ _MIN_SHIELDED_SHARE = 0.005  # of the half-space; a smaller difference between t
 class _ChosenSeam(NamedTuple):
     """Where the seam about one axis was put."""
 
-    axis: int  #: number of the axis
     direction: tuple[float, float, float]  #: in which it faces, in the frame of the link
     shielded: float  #: share of the half-space above it that the link shields
     least: float  #: the same on the most exposed side
@@ -78,24 +77,12 @@ def place_seams(
             shielded = 1.0 - float(wide[best])
         turn = best * math.tau / _AZIMUTH_COUNT
         for i in full:
-            placed = sheets[i].placed
-            sheets[i] = replace(
-                sheets[i],
-                placed=placed.turned(turn),
-                start_azimuth=(sheets[i].start_azimuth + turn) % math.tau,
-            )
+            sheets[i] = replace(sheets[i], placed=sheets[i].placed.turned(turn))
         direction = sheets[full[0]].placed.link_frustum.rotate((1.0, 0.0, 0.0))
         numbers = [str(i + 1) for i in full]
         names = f"{', '.join(numbers[:-1])} and {numbers[-1]}" if len(numbers) > 1 else numbers[0]
-        places.append(
-            _ChosenSeam(
-                axis,
-                direction,
-                shielded,
-                least,
-                _reason(names, direction, shielded, least, weights, even and flat is not None),
-            )
-        )
+        reason = _reason(names, direction, shielded, least, weights, even and flat is not None)
+        places.append(_ChosenSeam(direction, shielded, least, reason))
     return replace(fit, sheets=tuple(sheets)), tuple(places)
 
 

@@ -71,7 +71,7 @@ def test_a_cylinder_has_no_polar_coordinates() -> None:
 
 def test_double_cone_shares_its_belt() -> None:
     body = Pose.from_xyz_rpy((0.1, 0.2, 0.3), (0.4, -0.5, 0.6))
-    first, second = double_cone(0.04, 0.07, 0.05, 0.15, 0.12, link_body=body)
+    first, second = (part.moved(body) for part in double_cone(0.04, 0.07, 0.05, 0.15, 0.12))
     for phi in (0.0, 1.0, 5.0):
         np.testing.assert_allclose(first.point(first.frustum.slant, phi), second.point(0.0, phi), rtol=0, atol=1e-14)
     u, phi, distance = second.locate(second.point(0.05, 2.0))

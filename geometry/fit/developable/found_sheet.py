@@ -335,10 +335,8 @@ def _checked(
     kept = slice(run[0], run[1])
     seen = off[kept][~hole[kept]]
     covers = _covered_samples(placed, hull, 1.5 * options.tolerance)
-    full = region.columns == len(profile.phi)
     sheet = FittedSheet(
         placed=placed,
-        start_azimuth=0.0 if full else float(profile.phi[region.column]),
         max_deviation=float(np.abs(seen).max()) if seen.size else math.inf,
         rms_deviation=math.sqrt(float((seen**2).mean())) if seen.size else math.inf,
         bridged_share=float(hole[kept].mean()),

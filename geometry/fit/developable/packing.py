@@ -44,12 +44,7 @@ def _bare_beside(
 ) -> tuple[BareArea, ...]:
     """Return what sheets leave bare, by reason, the largest area first.
 
-    Args:
-        sheets: the sheets.
-        more: what could be added if one more were allowed.
-        earlier: bare areas of the same samples before the last of the sheets were found; their reasons still hold.
-        hull: samples of the link.
-        options: of the search.
+    ``more`` could be added if one more were allowed; the reasons of ``earlier``, found before the last sheets, hold.
     """
     tally = BareTally(hull, covered_by(sheets, hull, options.tolerance))
     take = tally.take

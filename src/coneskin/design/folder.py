@@ -99,13 +99,6 @@ def check_target(target: Path, replace: bool = False) -> None:
 def _new_folder(target: Path, replace: bool = False) -> Iterator[Path]:
     """Open a temporary folder that becomes the target if the block succeeds, and is removed if it fails.
 
-    Args:
-        target: the folder to write.
-        replace: True to allow an earlier design there.
-
-    Yields:
-        the temporary folder.
-
     Raises:
         GeometryError: the target exists already, or cannot be made; or a file of a person's there has the name of a new
             one.
@@ -165,22 +158,12 @@ def _write_sheets(
     data: dict[str, Any],
     options: FileOptions,
     progress: Callable[[str], None],
-    beds: Iterable[MaterialBed] = (),
-    others: Iterable[str] = (),
-) -> list[str]:
+    beds: Iterable[MaterialBed],
+    others: Iterable[str],
+) -> None:
     """Write drawings, sensor files, the table of materials and design.json.
 
-    Args:
-        folder: an empty folder.
-        designs: the sheets.
-        data: content of design.json; its "frame" names the frame of the poses; the list of files is added.
-        options: of the drawings.
-        progress: called with the name of each step.
-        beds: parts of each material, nested.
-        others: files of the design that are in the folder already, as paths in it.
-
-    Returns:
-        the files of the design, as paths in the folder.
+    The list of files is added to ``data``, with those that are in the folder already.
     """
     files: list[str] = list(others)
 
@@ -213,7 +196,6 @@ def _write_sheets(
     files.append(DESIGN_FILE)
     data["files"] = files
     (folder / DESIGN_FILE).write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
-    return files
 
 
 def _write_drawing(
@@ -331,11 +313,6 @@ def _require_step(sheets: Sequence[SheetDesign]) -> None:
 def _write_wrapped(draft: Path, place: Path, design: SheetDesign) -> str:
     """Write the layers of a sheet as they lie on the link as a STEP file; return its path in the folder.
 
-    Args:
-        draft: the folder of the design.
-        place: folder of the sheet, in it.
-        design: the sheet.
-
     Raises:
         GeometryError: the CAD kernel refuses a layer.
     """
@@ -350,14 +327,7 @@ def _write_wrapped(draft: Path, place: Path, design: SheetDesign) -> str:
 
 
 def _write_jig(draft: Path, place: Path, design: SheetDesign, collars: Sequence[Collar]) -> list[str]:
-    """Write the parts of a jig as STL files; return their paths in the folder.
-
-    Args:
-        draft: the folder of the design.
-        place: folder of the sheet, in it.
-        design: the sheet.
-        collars: its jig.
-    """
+    """Write the parts of a jig as STL files; return their paths in the folder."""
     (draft / place / "jig").mkdir(parents=True)
     written = []
     for collar in collars:

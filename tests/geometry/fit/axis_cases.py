@@ -15,9 +15,9 @@ AXIS = np.array(TILTED.rotation)[:, 2]
 BASE = np.array(TILTED.translation)
 
 
-def hull(body: tuple[Floats, Indices]) -> SurfaceSamples:
+def hull(body: tuple[Floats, Indices], count: int = 6000) -> SurfaceSamples:
     mesh = placed(body)
-    return sample_surface(mesh, RayCaster(mesh))
+    return sample_surface(mesh, RayCaster(mesh), count)
 
 
 def off(origin: Floats, axis: Floats) -> tuple[float, float]:

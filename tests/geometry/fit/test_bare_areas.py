@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.geometry.fit.cones import find_cones
-
 from ..synthetic import frustum, placed, revolve, shoulder
+from .shared_fits import cones
 
 
 def shares(fit) -> dict[str, float]:  # type: ignore[no-untyped-def]
@@ -18,8 +17,8 @@ def shares(fit) -> dict[str, float]:  # type: ignore[no-untyped-def]
 
 @pytest.mark.long
 def test_a_sheet_too_few_is_told_and_what_it_would_cover() -> None:
-    told = shares(find_cones(placed(shoulder()), max_sheets=1))
-    two = find_cones(placed(shoulder()), max_sheets=2)
+    told = shares(cones(placed(shoulder()), max_sheets=1))
+    two = cones(placed(shoulder()), max_sheets=2)
     assert told["a sheet more would cover it: allow 2 sheets with 8 wires"] == pytest.approx(
         two.sheets[1].area_share, abs=0.02
     )
@@ -28,7 +27,7 @@ def test_a_sheet_too_few_is_told_and_what_it_would_cover() -> None:
 
 @pytest.mark.long
 def test_the_ends_of_a_tube_are_flat() -> None:
-    fit = find_cones(placed(frustum(0.05, 0.05, 0.2)))
+    fit = cones(placed(frustum(0.05, 0.05, 0.2)))
     assert shares(fit) == {"flat": pytest.approx(0.1 / 0.5, abs=0.02)}  # 2 r^2 of 2 r h + 2 r^2
     (area,) = fit.bare_areas
     ends = (area.points - np.array(fit.sheets[0].placed.link_frustum.translation)) @ np.array(
@@ -40,8 +39,8 @@ def test_the_ends_of_a_tube_are_flat() -> None:
 @pytest.mark.long
 def test_a_dome_is_curved_in_two_ways_and_a_short_ring_has_no_room() -> None:
     dome = [(0.06 + 0.04 * math.sin(t), 0.04 * math.cos(t)) for t in np.linspace(0.1, 1.4, 20)]
-    told = shares(find_cones(placed(revolve([(0.0, 0.04), (0.06, 0.04), *dome])), max_sheets=1))
+    told = shares(cones(placed(revolve([(0.0, 0.04), (0.06, 0.04), *dome])), max_sheets=1))
     assert told["curved in two ways, or in a corner"] > 0.15
     ring = [(0.0, 0.05), (0.1, 0.05), (0.1001, 0.03), (0.115, 0.03), (0.1151, 0.05), (0.2151, 0.05)]
-    told = shares(find_cones(placed(revolve(ring, rings=6)), max_sheets=3))
+    told = shares(cones(placed(revolve(ring, rings=6)), max_sheets=3))
     assert told["round, but without room for a sheet 25 mm long and 150 deg wide"] == pytest.approx(0.03, abs=0.012)

@@ -15,7 +15,7 @@ from .axis_cases import hull
 
 def test_candidates_are_told_apart() -> None:
     for body, cones in ((rugby(), 1), (frustum(0.05, 0.05, 0.3), 1), (shoulder(), 2)):
-        found = find_axis_candidates(hull(body))
+        found = find_axis_candidates(hull(body, 2000))
         with_cone = [c for c in found if c.cones]
         assert len(with_cone) >= cones
         for one in found:

@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 
 from coneskin.geometry.bend import Bend
-from coneskin.geometry.fit.cones import LinkFit, find_cones
+from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.seam_place import place_seams
 from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.mesh import Mesh, make_mesh
+from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.pose import Pose
 from tests.support.ruled_tube import RuledTube, stadium_section
 
 from ..synthetic import TILTED, frustum, joined, placed
+from .shared_fits import cones
 
 
 def tube_with_wing(azimuth: float | None) -> Mesh:
@@ -34,11 +35,11 @@ def tube_with_wing(azimuth: float | None) -> Mesh:
 
 
 def fitted(mesh: Mesh) -> LinkFit:
-    return find_cones(mesh, max_sheets=1, wrap=2 * math.pi)
+    return cones(mesh, max_sheets=1, wrap=2 * math.pi)
 
 
-@pytest.mark.parametrize("azimuth", [0.7, 3.0])
-def test_the_seam_lies_behind_what_stands_out(azimuth: float) -> None:
+def test_the_seam_lies_behind_what_stands_out() -> None:
+    azimuth = 3.0
     mesh = tube_with_wing(azimuth)
     before = fitted(mesh)
     after, (place,) = place_seams(before, mesh)
@@ -89,8 +90,8 @@ def test_the_seams_of_several_sheets_are_named_one_by_one() -> None:
 
 
 def test_partial_wraps_have_no_choice() -> None:
-    mesh = make_mesh(*frustum(0.05, 0.05, 0.2))
-    before = find_cones(mesh, max_sheets=1, wrap=math.pi)
+    mesh = tube_with_wing(None)
+    before = cones(mesh, max_sheets=1, wrap=math.pi)
     after, places = place_seams(before, mesh)
     assert places == ()
     assert after.sheets == before.sheets
@@ -105,9 +106,7 @@ def test_the_seam_of_a_stadium_lies_on_a_flat_of_it() -> None:
     radius = around / math.tau
     side = PlacedDevelopable(Frustum(radius, radius, 0.2), TILTED @ Pose(translation=(0.05 - radius, 0.0, 0.0)), bends)
     assert tube.distances(side.place(0.1, np.linspace(0.0, math.tau, 90))[0]).max() < 1e-6
-    before = LinkFit(
-        (FittedSheet(side, 0.0, 1e-4, 1e-4, 0.0, 0.0, 1.0, 1.0, 0.0),), None, (), 1e-3, 0.2, 0.05, (), "", 1, "grid"
-    )
+    before = LinkFit((FittedSheet(side, 1e-4, 1e-4, 0.0, 0.0, 1.0, 1.0, 0.0),), None, (), 1e-3, 0.2, 0.05, (), "", 1)
     after, (place,) = place_seams(before, tube.mesh())
     seam = after.sheets[0].placed
     one, two = (seam.normal(math.radians(angle)) for angle in (-14.0, 14.0))

@@ -17,6 +17,7 @@ from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 
 from ..synthetic import TILTED, frustum, joined, moved, placed, revolve, shoulder
+from .shared_fits import cones
 
 HEAD = "x_mm,y_mm,z_mm,weight\n"
 #: a thick tube and a thin one on one axis, with a groove between them that no sheet spans
@@ -107,18 +108,18 @@ def test_the_floor_of_a_right_angled_groove_sees_what_the_formula_says() -> None
 
 def test_the_sheet_goes_where_touches_count() -> None:
     mesh = placed(STEPPED)
-    (plain,) = find_cones(mesh, max_sheets=1).sheets
+    (plain,) = cones(mesh, max_sheets=1).sheets
     assert plain.frustum.radius1 == pytest.approx(0.05, abs=1e-4)
     assert plain.touch_share == plain.area_share
     places = TILTED.apply_all(np.array([[0.0, 0.0, 0.06], [0.0, 0.0, 0.21]]))
-    fit = find_cones(mesh, max_sheets=1, weights=TouchWeights(places, np.array([0.1, 1.0]), "a map"))
+    fit = cones(mesh, max_sheets=1, weights=TouchWeights(places, np.array([0.1, 1.0]), "a map"))
     (sheet,) = fit.sheets
     assert fit.weights == "a map"
     assert sheet.frustum.radius1 == pytest.approx(0.04, abs=1e-4)
     assert sheet.frustum.height > 0.09
     assert sheet.touch_share > 0.6 > 0.5 > sheet.area_share
     # two sheets are allowed, but the thick tube adds too little that counts
-    two = find_cones(mesh, weights=TouchWeights(places, np.array([0.0, 1.0])))
+    two = cones(mesh, weights=TouchWeights(places, np.array([0.0, 1.0])))
     assert len(two.sheets) == 1
     assert any("covers too little that counts" in area.reason for area in two.bare_areas)
 
@@ -131,7 +132,7 @@ def test_a_partial_wrap_turns_to_the_touched_side() -> None:
         out = np.array(TILTED.rotate((*side, 0.0)))
         base = TILTED.apply_all(np.array([[0.0, 0.0, 0.1]]))[0]
         weights = TouchWeights(np.array([base + 0.05 * out, base - 0.05 * out]), np.array([1.0, 0.2]))
-        (sheet,) = find_cones(mesh, max_sheets=1, wrap=math.pi, weights=weights).sheets
+        (sheet,) = cones(mesh, max_sheets=1, wrap=math.pi, weights=weights).sheets
         middle = np.array(sheet.placed.normal(0.5 * sheet.frustum.wrap))
         assert float(middle @ out) > math.cos(math.radians(5.0))
 
@@ -139,8 +140,8 @@ def test_a_partial_wrap_turns_to_the_touched_side() -> None:
 @pytest.mark.long
 def test_equal_weights_change_nothing() -> None:
     mesh = placed(shoulder())
-    plain = find_cones(mesh, max_sheets=1)
-    same = find_cones(mesh, max_sheets=1, weights=TouchWeights(np.zeros((1, 3)), np.array([3.0])))
+    plain = cones(mesh, max_sheets=1)
+    same = cones(mesh, max_sheets=1, weights=TouchWeights(np.zeros((1, 3)), np.array([3.0])))
     assert [sheet.placed for sheet in plain.sheets] == [sheet.placed for sheet in same.sheets]
 
 

@@ -207,11 +207,11 @@ class SheetDesign:
         """Whether its two edges meet, or nearly; otherwise the link is bare between them."""
         return self.place.frustum.wrap > 2.0 * math.pi - 0.5
 
-    def forecasts(self, count: int = 5) -> list[ResolutionForecast]:
-        """Return the resolution at evenly spaced places from end 1 to end 2 of the active area."""
+    def forecasts(self) -> list[ResolutionForecast]:
+        """Return the resolution at five evenly spaced places from end 1 to end 2 of the active area."""
         active, parts = self.active.frustum, self.electronics
         step = parts.adc_volts / parts.full_count / parts.supply_volts
-        return [forecast_resolution(active, step, active.slant * i / (count - 1)) for i in range(count)]
+        return [forecast_resolution(active, step, active.slant * i / 4) for i in range(5)]
 
     @property
     def drive_currents(self) -> tuple[float, float]:

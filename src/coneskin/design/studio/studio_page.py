@@ -53,13 +53,7 @@ _VIEW_DISTANCE = 1.55  # of the link's largest side
 
 
 def _first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArray[np.float64]) -> tuple[Vector, Vector]:
-    """Return from where to look, and at what [m].
-
-    Args:
-        designs: the sheets.
-        rays: of the link's mesh.
-        corners: vertices of the mesh [m], shape (n, 3).
-    """
+    """Return from where to look, and at what [m]."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, size = 0.5 * (low + high), float((high - low).max())
     ways = _directions()

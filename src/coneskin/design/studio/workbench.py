@@ -133,16 +133,8 @@ class Workbench:
             placed = adjusted(sheet.placed, handles)
             share = placed.frustum.height / sheet.frustum.height
             area = share * placed.frustum.wrap / sheet.frustum.wrap
-            azimuth = (sheet.start_azimuth + handles.seam) % math.tau
-            sheets.append(
-                replace(
-                    sheet,
-                    placed=placed,
-                    start_azimuth=azimuth,
-                    length_share=sheet.length_share * share,
-                    area_share=sheet.area_share * area,
-                )
-            )
+            shares = {"length_share": sheet.length_share * share, "area_share": sheet.area_share * area}
+            sheets.append(replace(sheet, placed=placed, **shares))
         return replace(self.fit, sheets=tuple(sheets))
 
     def handle(self, sheet: int, handles: Handles) -> None:

@@ -186,11 +186,6 @@ def _pair_readings(design: SheetDesign) -> tuple[_PairReading, _PairReading]:
 def _expected_frame(design: SheetDesign, index: int, frame: str = "mesh") -> dict[str, int]:
     """Return the counts of the untouched sensor, by field of a frame, as ``coneskin monitor`` expects them.
 
-    Args:
-        design: the sheet.
-        index: sensor number in the wire format.
-        frame: frame of the pose, in words.
-
     Raises:
         GeometryError: a scene would refuse the sensor.
     """

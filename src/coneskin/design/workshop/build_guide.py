@@ -276,12 +276,7 @@ def _short_of_room(figures: BuildFigures, rooms: dict[str, float]) -> Iterator[s
 
 
 def _test_steps(figures: BuildFigures, folder: str) -> Iterator[str]:
-    """Yield the steps that test the sheet that is built.
-
-    Args:
-        figures: for building it.
-        folder: of its files, as a path in the folder of the design; "." for that folder itself.
-    """
+    """Yield the steps that test the sheet that is built."""
     sensor = "sensor.toml" if folder == "." else f"{folder}/sensor.toml"
     ab, cd = figures.pairs
     yield (
@@ -329,13 +324,7 @@ def _reading_lines(figures: BuildFigures) -> Iterator[str]:
 
 
 def _jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iterator[str]:
-    """Yield the section.
-
-    Args:
-        design: the sheet.
-        figures: for building it.
-        folder: of its files, as a path in the folder of the design; "." for that folder itself.
-    """
+    """Yield the section about the collars; ``folder`` as in ``guide_lines``."""
     plan, wires = design.options.jig, design.layout.plan.wires
     if plan.surface == "none":
         yield "No jig was asked for (`jig.surface` is none)."

@@ -129,12 +129,7 @@ def find_datum_faces(mesh: Mesh) -> tuple[DatumFace, ...]:
 
 
 def _measured_faces(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[DatumFace, ...]:
-    """Return the faces from which the place of a sheet is measured: those that it does not cover itself.
-
-    Args:
-        place: the side of the link that the sheet covers.
-        faces: of the link.
-    """
+    """Return the faces from which the place of a sheet is measured: those that it does not cover itself."""
     side = place.frustum
     kept = []
     for face in faces:
@@ -148,12 +143,7 @@ def _measured_faces(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[D
 
 
 def _datum_heights(place: PlacedFrustum, faces: Sequence[DatumFace]) -> tuple[_DatumHeight, ...]:
-    """Return distances from faces for places of a sheet: its corners, and where a height fixes edge 0 best.
-
-    Args:
-        place: the side of the link that the sheet covers.
-        faces: at least one.
-    """
+    """Return distances from faces for places of a sheet: its corners, and where a height fixes edge 0 best."""
     side = place.frustum
     closed = side.wrap > 2.0 * math.pi - 1e-6
     turns = np.linspace(0.0, side.wrap, 721)
