@@ -133,8 +133,8 @@ class Workbench:
             placed = adjusted(sheet.placed, handles)
             share = placed.frustum.height / sheet.frustum.height
             area = share * placed.frustum.wrap / sheet.frustum.wrap
-            shares = {"length_share": sheet.length_share * share, "area_share": sheet.area_share * area}
-            sheets.append(replace(sheet, placed=placed, **shares))
+            length, covered = sheet.length_share * share, sheet.area_share * area
+            sheets.append(replace(sheet, placed=placed, length_share=length, area_share=covered))
         return replace(self.fit, sheets=tuple(sheets))
 
     def handle(self, sheet: int, handles: Handles) -> None:
