@@ -135,24 +135,11 @@ def measure(sensor: Sensor, sheets: Sequence[Matrix], wiring: WiringFaults | Non
     angular_at, angular_i, angular_own = _phase(sensor, sheets[2], wiring, ("input", "input", *angular))
     supply = sensor.electronics.supply_volts
     return ConverterInputs(
-        touch_at[_C],
-        touch_at[_D],
-        touch_i,
-        radial_at[_C],
-        radial_at[_D],
-        radial_i,
-        angular_at[_A],
-        angular_at[_B],
-        angular_i,
-        supply,
-        supply,
-        supply,
-        touch_own[_A],
-        touch_own[_B],
-        radial_own[_A],
-        radial_own[_B],
-        angular_own[_C],
-        angular_own[_D],
+        *(touch_at[_C], touch_at[_D], touch_i),
+        *(radial_at[_C], radial_at[_D], radial_i),
+        *(angular_at[_A], angular_at[_B], angular_i),
+        *(supply, supply, supply),
+        *(touch_own[_A], touch_own[_B], radial_own[_A], radial_own[_B], angular_own[_C], angular_own[_D]),
     )
 
 

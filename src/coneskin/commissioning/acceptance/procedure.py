@@ -147,18 +147,8 @@ class Procedure(TouchJudge["TouchReading"]):
             return [Notice("remark", f"{said}; touch the same mark once more")]
         u_mm, phi_deg = _in_file_units(mark.place)
         read_u, read_phi = (0.0, 0.0) if wrong else _in_file_units(read)
-        result = MarkResult(
-            item.sensor.name,
-            mark.where,
-            u_mm,
-            phi_deg,
-            read_u,
-            read_phi,
-            round(distance, 1),
-            round(level, 3),
-            self._attempts,
-            passed,
-        )
+        place = item.sensor.name, mark.where, u_mm, phi_deg, read_u, read_phi
+        result = MarkResult(*place, round(distance, 1), round(level, 3), self._attempts, passed)
         item.results.append(result)
         item.read.append(read)
         self._attempts, self.mark = 0, None
