@@ -114,7 +114,7 @@ def test_overlapping_contacts_conduct_as_one() -> None:
 
 def test_any_script_is_solved() -> None:
     sensor, rng = Sensor(LINK), np.random.default_rng(5)
-    for _ in range(15):
+    for _ in range(10):
         contacts = [
             LayerContact(rng.uniform(0, LINK.slant), rng.uniform(0, 6), 10 ** rng.uniform(-9, 0), reach * part, reach)
             for reach, part in zip(

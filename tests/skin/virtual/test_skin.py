@@ -44,7 +44,7 @@ def bytes_of(skin: VirtualSkin) -> bytes:
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
     def data(seed: int) -> bytes:
         faults = FaultInjection(corrupt_every=7, garbage_every=5, cut_after=9)
-        return bytes_of(VirtualSkin(SENSOR, [TOUCH], seed=seed, faults=faults, duration=0.1))
+        return bytes_of(VirtualSkin(SENSOR, [TOUCH], seed=seed, faults=faults, duration=0.05))
 
     assert data(1) == data(1)
     assert data(1) != data(2)
@@ -129,8 +129,8 @@ def test_a_touch_added_among_others_changes_only_the_frames_from_its_start():
     assert late[20] != frames_of(VirtualSkin(SENSOR, [slow], duration=0.06, seed=3))[20]
 
 
-@pytest.mark.parametrize("lower", [1000.0, 300.0])
-def test_every_count_is_that_of_the_full_field_model(lower):
+def test_every_count_is_that_of_the_full_field_model():
+    lower = 300.0
     sensor = Sensor(CONE, lower_sheet_ohms=lower)
     real = Imperfections(noise_counts=0.0, settling_time=0.0)
     touches = [ScriptedTouch(0.002, 0.03, 0.05, 2.0), ScriptedTouch(0.01, 0.05, 0.09, 2.6, radius=0.005)]
