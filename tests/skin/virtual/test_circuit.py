@@ -38,6 +38,16 @@ def test_no_contact_leaves_two_separate_resistors():
     assert y[0][2] == y[0][3] == y[1][2] == y[1][3] == 0.0
 
 
+def test_each_driven_electrode_is_a_lead_from_the_supply_or_from_ground():
+    leads = LeadOhms(1.0, 2.0, 3.0, 4.0)
+    sensor = Sensor(CONE, electronics=Electronics(lead_ohms=leads))
+    at = measure(sensor, [ResistorLadder().admittance(sensor, [])] * 3)
+    assert (at.touch_a, at.touch_b) == pytest.approx((2.5, 2.5), abs=1e-9)
+    radial, angular = sensor.radial_amperes, sensor.angular_amperes
+    assert (at.radial_a, at.radial_b) == pytest.approx((leads.a * radial, 2.5 - leads.b * radial))
+    assert (at.angular_c, at.angular_d) == pytest.approx((2.5 - leads.c * angular, leads.d * angular))
+
+
 def test_contacts_at_one_place_or_on_an_edge_add_up():
     places = [(0.05, 1.0), (0.0, 0.0), (CONE.slant, CONE.wrap)]
     for u, phi in places:
