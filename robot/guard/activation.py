@@ -12,7 +12,7 @@ __all__ = ["Activation", "ActivationStep", "ControllerNeeds"]
 
 @dataclass(frozen=True, slots=True)
 class ControllerNeeds:
-    """What a guard needs of the arm's controller, beside its states and a way to stop it; without an arm nothing.
+    """What a guard needs of the arm's controller, beside its states and a way to stop it. Nothing without an arm.
 
     Attributes:
         slider: the speed slider: a reaction, or the limit of the speed, may use it.
@@ -43,7 +43,7 @@ class ActivationStep(Enum):
 class Activation:
     """State of a guard on its way to being active.
 
-    Nothing may stand against it for a while; then a release goes out, and with its acknowledgement the guard is active.
+    Nothing may stand against it for a while. Then a release goes out, and with its acknowledgement the guard is active.
     Each release has a number, so that the acknowledgement of an older one does not count.
 
     Args:
@@ -77,7 +77,7 @@ class Activation:
         self._request, self._free_since, self._released_at, self._disturbed = request, now, None, False
 
     def poll(self, now: float, blockers: list[str], out: Outputs) -> ActivationStep:
-        """Return what is due. A first activation waits as long as there is a blocker; any refuses a reset.
+        """Return what is due. A first activation waits as long as there is a blocker. Any blocker refuses a reset.
 
         Args:
             now: host time [s].
@@ -106,7 +106,7 @@ class Activation:
         return self._released_at is not None and number == self.number
 
     def end(self) -> int:
-        """End the way to being active: the guard is. Return the number of the reset; 0 for the first activation."""
+        """End the way to being active: the guard is. Return the number of the reset, 0 for the first one."""
         request, self._request = self._request or 0, None
         self._free_since = self._released_at = None
         return request

@@ -26,7 +26,7 @@ class ArmStop:
         paths: the stop paths that there are, in the order of their use.
 
     Attributes:
-        number: counted from 1; a motion away and its end belong to the stop before.
+        number: counted from 1. A motion away and its end belong to the stop before.
         why: its cause, and what came of it.
         paths: those that are left.
         used: paths of the newest stop.
@@ -58,7 +58,7 @@ class ArmStop:
         return f"{self.why.partition('; then ')[0]}; then {what}"
 
     def send(self, command: StopProgram | EndReaction, out: Outputs) -> None:
-        """Send a stop by its first path; another path than the driver process has the command's deceleration."""
+        """Send a stop by its first path. Another path than the driver process has the command's deceleration."""
         paths = self.paths
         if self.watch.insists and StopPath.PROTECTIVE in paths:
             paths = (StopPath.PROTECTIVE, *(path for path in paths if path is not StopPath.PROTECTIVE))
@@ -71,7 +71,7 @@ class ArmStop:
 
         Args:
             now: host time [s].
-            speed: largest joint speed [rad/s]; None where it is not known.
+            speed: largest joint speed [rad/s]. None where it is not known.
             deceleration: of the stop [rad/s2].
         """
         limits = self._limits
@@ -101,7 +101,7 @@ class ArmStop:
         Args:
             now: host time [s].
             deceleration: of the stop [rad/s2].
-            state: the newest, for the report; None before the first.
+            state: the newest, for the report. None before the first.
             out: takes commands and events.
         """
         stop = self._monitor
@@ -120,7 +120,7 @@ class ArmStop:
             emit(out, EventName.STOP_FAILED, now, rounds=stop.rounds, speed=speed)
 
     def stands(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
-        """Take a state, measured at a host time [s]; return whether the arm stands, which begins the watch."""
+        """Take a state, measured at a host time [s]. Return whether the arm stands, which begins the watch."""
         stop = self._monitor
         if stop is None:
             return False

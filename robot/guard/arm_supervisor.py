@@ -51,12 +51,12 @@ class ArmSupervisor:
         driver: of the arm's controller.
         reaction: what the arm does when it is touched and no rule fits.
         limits: of the monitoring.
-        paths: the stop paths that there are; the first is used for every stop, the others where it does not work.
+        paths: the stop paths that there are. The first is used for every stop, the others where it does not work.
             Without DRIVER, what moves the arm is not known here.
         rules: reactions with conditions.
-        planner: of motions away from a touch; None where no reaction moves the arm.
-        heartbeat: supervision of the program that moves the arm; None where that is the driver process.
-        speed_limit: of the skins' surfaces; None where nothing limits them.
+        planner: of motions away from a touch. None where no reaction moves the arm.
+        heartbeat: supervision of the program that moves the arm. None where that is the driver process.
+        speed_limit: of the skins' surfaces. None where nothing limits them.
 
     Attributes:
         model: the arm.
@@ -64,9 +64,9 @@ class ArmSupervisor:
         state: newest measured state, or None before the first.
         driver: of the arm's controller.
         backup_ready: True once the process that stops the arm without this one is ready: driver process or watchdog.
-        heartbeat: supervision of the program that moves the arm; None where that is the driver process.
+        heartbeat: supervision of the program that moves the arm. None where that is the driver process.
         internal_control: True where the driver process moves the arm.
-        speed_reduction: of the slow reaction; it has to know where the controller's speed slider is.
+        speed_reduction: of the slow reaction. It has to know where the controller's speed slider is.
         state_age: of the controller's states.
 
     Raises:
@@ -108,7 +108,7 @@ class ArmSupervisor:
 
     @property
     def stop_number(self) -> int:
-        """Number of the newest stop, counted since the guard's start; 0 before the first."""
+        """Number of the newest stop, counted since the guard's start, 0 before the first."""
         return self._stop.number
 
     @property
@@ -120,7 +120,7 @@ class ArmSupervisor:
         return ControllerNeeds(self._needs_slider, by_slider, setpoints, heartbeat)
 
     def blockers(self, now: float) -> list[str]:
-        """Return why the arm must not be put under guard at a host time [s], one line each; empty where it may.
+        """Return why the arm must not be put under guard at a host time [s], one line each. Empty where it may.
 
         Whether a program runs does not matter: a guard may be there before the program is.
         """
@@ -149,7 +149,7 @@ class ArmSupervisor:
 
     @property
     def _speed(self) -> float:
-        """Newest speed of the leading joint [rad/s]; infinite before the first."""
+        """Newest speed of the leading joint [rad/s]. Infinite before the first."""
         return math.inf if self.state is None else self.state.speed
 
     @property
@@ -166,7 +166,7 @@ class ArmSupervisor:
             out.append(StopProgram(self._rules.default.deceleration))
 
     def activate(self, out: Outputs) -> None:
-        """React from now on; the program may move the arm."""
+        """React from now on. The program may move the arm."""
         self.phase, self._reaction = Phase.ACTIVE, self._rules.default
         self._stop.watch.forget()
         if self._speed_limit is not None:
@@ -174,12 +174,12 @@ class ArmSupervisor:
         self.speed_reduction.release(out)
 
     def stop_for_touch(self, link: int, level: float, out: Outputs) -> None:
-        """Send the stop for a touch that begins, before anything else is known of it; ``touch`` has to come next.
+        """Send the stop for a touch that begins, before anything else is known of it. ``touch`` has to come next.
 
         Args:
             link: index of the touched link's DH frame.
             level: how firm the touch is.
-            out: takes the stop; nothing where the reaction only slows the arm.
+            out: takes the stop. Nothing where the reaction only slows the arm.
         """
         reaction = self._rules.choose(link, level, self._speed) if self._rules.rules else self._rules.default
         if self.phase is Phase.ACTIVE and reaction.kind != "slow":
@@ -329,7 +329,7 @@ class ArmSupervisor:
             self._decide(state, out)
 
     def _decide(self, state: ControllerState, out: Outputs) -> None:
-        """Decide what the standing arm does; the place of a touch may need a while to become certain."""
+        """Decide what the standing arm does. The place of a touch may need a while to become certain."""
         stopping, enough = self.phase is Phase.STOPPING, self._stop.first_was_enough
         if stale := self.state_age.stale(state.time):
             self._away.bar(stale)

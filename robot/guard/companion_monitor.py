@@ -28,7 +28,7 @@ class _HeartbeatMonitor:
     So only the longest time counts, not the sum: a guard that is held up again and again reads in between.
 
     Args:
-        limits: longest silence of each process [s], by its name; one that is not named is not monitored.
+        limits: longest silence of each process [s], by its name. One that is not named is not monitored.
     """
 
     def __init__(self, limits: Mapping[str, float]) -> None:
@@ -57,7 +57,7 @@ class _HeartbeatMonitor:
         self._looked = now
 
     def silent(self, now: float) -> dict[str, str]:
-        """Return what is wrong with each process that is silent; empty where all are heard. To be asked continuously.
+        """Return what is wrong with each process that is silent. Empty where all are heard. To be asked continuously.
 
         Args:
             now: host time [s].
@@ -132,14 +132,14 @@ class CompanionMonitor:
     def restart(self, now: float, over: bool) -> None:
         """Note that the driver process ends its program and starts it again, or has done so.
 
-        Nothing moves while it does not run. A start that is not reported in time counts as an end; announced again and
-        again it has no more time.
+        Nothing moves while it does not run. A start that is not reported in time counts as an end. To announce
+        it again gives it no more time.
         """
         self._restart_end = math.inf if over else min(self._restart_end, now + _RESTART_TIMEOUT)
         self._ran = not over  # states from before the start may still come
 
     def program_ended(self, now: float, running: bool) -> str:
-        """Take whether a program runs on the controller, and return what is wrong; empty where nothing is.
+        """Take whether a program runs on the controller, and return what is wrong. Empty where nothing is.
 
         The end of the driver's program may be the only sign that the driver process hangs.
         """

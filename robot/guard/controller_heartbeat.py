@@ -16,7 +16,7 @@ _NO_HEARTBEAT = "the controller's program does not depend on the guard's heartbe
 
 
 def heartbeat_count(now: float) -> int:
-    """Return the count that is sent at a host time [s]; never 0."""
+    """Return the count that is sent at a host time [s], never 0."""
     return int(now / COUNT_PERIOD) & _COUNT_MASK or 1
 
 
@@ -47,11 +47,11 @@ class ControllerHeartbeat:
         self._running = running
 
     def blocker(self) -> str:
-        """Return why the guard must not become active; empty where it may."""
+        """Return why the guard must not become active. Empty where it may."""
         return _NO_HEARTBEAT if self.required and self._running and not self._depends() else ""
 
     def trouble(self, now: float) -> str:
-        """Return what is wrong with the program that runs, once for each program; empty where nothing is."""
+        """Return what is wrong with the program that runs, once for each program. Empty where nothing is."""
         if not self._running or self._reported or self._depends():
             return ""
         if self._began is not None and now - self._began < _REPORT_TIME:

@@ -45,11 +45,11 @@ class GuardCore:
     """Decisions of one guard.
 
     Args:
-        stream: decodes and detects; it knows the sensors.
+        stream: decodes and detects. It knows the sensors.
         sensors: where they are.
         limits: of the monitoring.
         arm: the arm under guard, or None.
-        not_commissioned: why the arm only stops where its scene lets it move away; empty where it does not.
+        not_commissioned: why the arm only stops where its scene lets it move away. Empty where it does not.
     """
 
     def __init__(
@@ -115,8 +115,8 @@ class GuardCore:
         """Take one input.
 
         Args:
-            block: of a kind in ``journal.INPUTS``; its time is the host's clock.
-            out: takes commands and events as soon as they are decided; a command comes before the event that explains
+            block: of a kind in ``journal.INPUTS``. Its time is the host's clock.
+            out: takes commands and events as soon as they are decided. A command comes before the event that explains
                 it, and before anything is computed that it does not need.
         """
         feeder = self._feeders.get(block.kind)
@@ -125,7 +125,7 @@ class GuardCore:
         self._poll(block.time, out)
 
     def blockers(self, now: float) -> list[str]:
-        """Return why the guard cannot become active, one line each; empty where it can."""
+        """Return why the guard cannot become active, one line each. Empty where it can."""
         blockers = list(dict.fromkeys([*self._lost.values(), *self._faults.values(), *self._companions.blockers]))
         others = self._stream.unknown
         if self._reopened and others:
@@ -183,7 +183,7 @@ class GuardCore:
             self._update_contacts(block.time, out)
 
     def _stop(self, out: Outputs, name: str, level: float) -> None:
-        """Stop the arm for a touch that begins; the event of the touch, which tells where it is, comes next."""
+        """Stop the arm for a touch that begins. The event of the touch, which tells where it is, comes next."""
         assert self._arm is not None
         self._arm.stop_for_touch(self._sensors[name].link, level, out)
 
@@ -221,7 +221,7 @@ class GuardCore:
             self._activation.disturb()
 
     def _update_contacts(self, now: float, out: Outputs) -> None:
-        """Give the arm what each touch's newest frame says; events come only where something changes."""
+        """Give the arm what each touch's newest frame says. Events come only where something changes."""
         contacts = self._contacts
         for detector in self._stream.detectors:
             name, reading = detector.sensor.name, detector.reading_now
@@ -231,7 +231,7 @@ class GuardCore:
             self._arm.feed_contacts(now, tuple(contacts.values()), out)
 
     def _stale(self, now: float) -> str:
-        """Return whose frames are too old to supervise a motion away by; empty where none are."""
+        """Return whose frames are too old to supervise a motion away by. Empty where none are."""
         for detector in self._stream.detectors:
             age = detector.timing.measured_age(now)
             if age > _MAX_SUPERVISION_AGE:
@@ -242,7 +242,7 @@ class GuardCore:
         return ""
 
     def _emit_touch(self, out: Outputs, name: EventName, event: TouchEvent, details: dict[str, Any]) -> None:
-        """Report a touch; one upon the other is counted where the program does not move an arm."""
+        """Report a touch. Repeated ones are counted where the program does not move an arm."""
         if self._arm is None or self._arm.phase in (Phase.STARTING, Phase.LATCHED):
             self._folding.emit(out, name, event.sensor, event.time, **details)
         else:
@@ -292,7 +292,7 @@ class GuardCore:
             arm.heartbeat.feed(count)
 
     def _decode(self, block: Block, what: str, decode: Callable[[bytes], _Decoded], out: Outputs) -> _Decoded | None:
-        """Return what the controller has sent; None, after a fault that says ``what``, where it is unreadable."""
+        """Return what the controller has sent. None, after a fault that says ``what``, where it is unreadable."""
         try:
             return decode(block.payload)
         except RobotConnectionError as exc:
@@ -346,7 +346,7 @@ class GuardCore:
         emit(out, EventName.MESSAGE, block.time, what=f"a stop path is missing, {what}: {why}")
 
     def _reopen(self, block: Block, out: Outputs) -> None:
-        """Take a skin that is open again; only the reset of a latched arm makes the guard active with it."""
+        """Take a skin that is open again. Only the reset of a latched arm makes the guard active with it."""
         latched = self._arm is not None and self._arm.phase is Phase.LATCHED
         if block.payload != b"skin" or "skin" not in self._lost or not latched:
             return

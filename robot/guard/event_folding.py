@@ -40,7 +40,7 @@ class EventFolding:
 
     @property
     def due(self) -> float:
-        """Host time from which on a count is reported [s]; inf where none is."""
+        """Host time from which on a count is reported [s]. Infinite where none is."""
         return self._due
 
     def emit(self, out: Outputs, name: EventName, about: str, now: float, **details: Any) -> None:
@@ -51,7 +51,7 @@ class EventFolding:
             name: of the event.
             about: what it is about: with the name, the kind.
             now: host time [s].
-            **details: of the event; the newest are reported.
+            **details: of the event. The newest are reported.
         """
         kind = self._kinds.get((name, about))
         if kind is None or (now - kind.newest >= _CLEAR_TIME and not kind.held):

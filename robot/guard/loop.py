@@ -35,7 +35,7 @@ __all__ = [
 
 @dataclass(slots=True)
 class GuardPorts:
-    """Connections of the loop; None for what the scene does not have.
+    """Connections of the loop. None for what the scene does not have.
 
     Attributes:
         session: the process that records and shows.
@@ -47,7 +47,7 @@ class GuardPorts:
         watchdog: the guard watchdog, where another program moves the arm.
         heartbeat: writer of the count that the controller's own watchdog waits for, open.
         setpoints: the reader once more, where it carries setpoints.
-        reopen: begins to open a source that is gone again; None where it is gone for good.
+        reopen: begins to open a source that is gone again. None where it is gone for good.
         absent: connection of a stop path that the guard does without -> why.
     """
 
@@ -168,7 +168,7 @@ class GuardLoop:
         self._quit = True
 
     def run(self) -> None:
-        """Serve until told to end, or until the session is gone; the arm is stopped before this returns."""
+        """Serve until told to end, or until the session is gone. The arm is stopped before this returns."""
         self._open()
         gc.collect()
         gc.freeze()
@@ -245,7 +245,7 @@ class GuardLoop:
         self._report()
 
     def _note_overrun(self) -> None:
-        """Report how late this round is; where it is so late that nobody has guarded, to the core as well."""
+        """Report how late this round is, to the core as well where nobody has guarded meanwhile."""
         (before, sleepless_before), now, sleepless = self._rounds_at, self._clock(), self._sleepless_clock()
         self._rounds_at = now, sleepless
         if now - before > _OVERRUN_TIME:
@@ -283,7 +283,7 @@ class GuardLoop:
         self._feed(BlockKind.SKIN, data)
 
     def _open_skin_again(self, source: Source) -> None:
-        """Open a skin that is gone, while the arm stands latched; a person's reset has to follow."""
+        """Open a skin that is gone, while the arm stands latched. A person's reset has to follow."""
         ports, reopening = self._ports, self._reopening
         if reopening is None:
             self._reopening = ports.reopen(source) if ports.reopen is not None else None
@@ -315,7 +315,7 @@ class GuardLoop:
             self._feed(BlockKind.LOST, encode_loss(name, why))
 
     def _feed(self, kind: BlockKind, payload: bytes) -> None:
-        """Feed the core, which sends its commands at once; then record all of it."""
+        """Feed the core, which sends its commands at once. Then record all of it."""
         self._fed = True
         block = Block(kind, self._clock(), payload)
         outbox = self._outbox

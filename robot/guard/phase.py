@@ -8,7 +8,7 @@ __all__ = ["Phase"]
 
 
 class Phase(Enum):
-    """Phase of a guard; the transitions are drawn in ``arm_supervisor``."""
+    """Phase of a guard. The transitions are drawn in ``arm_supervisor``."""
 
     STARTING = "starting"
     ACTIVE = "active"

@@ -45,7 +45,7 @@ def take_inputs(core: GuardCore, blocks: Sequence[Block], take: Callable[[Block]
 
     Args:
         core: the guard.
-        blocks: inputs in a row, best ``BATCH`` of them; numpy has to be there.
+        blocks: inputs in a row, best ``BATCH`` of them. Numpy has to be there.
         take: gives the guard one input, which may make something happen.
     """
     if not blocks:
@@ -92,7 +92,7 @@ class _Batch:
         return self._rough[found] if found < len(self._rough) else len(self._blocks)
 
     def give(self, at: int, stop: int) -> int:
-        """Give the guard calm inputs in a row; return the number of the first that it has not taken."""
+        """Give the guard calm inputs in a row. Return the number of the first that it has not taken."""
         stream, known = self._core.stream, self._bytes_before(at)
         if stream.decoder.rest != self._data[self._frame_starts[self._frames_before(at)] : known]:
             return at  # what came before was damaged
@@ -106,7 +106,7 @@ class _Batch:
         return at
 
     def _learn(self, first: int, behind: int) -> int:
-        """Let the detectors learn from frames; return the number of the first that is not quiet, or ``behind``."""
+        """Let the detectors learn from frames. Return the number of the first that is not quiet, or ``behind``."""
         parts = []
         for detector, numbers, frames in self._sensors:
             begin, end = bisect_left(numbers, first), bisect_left(numbers, behind)

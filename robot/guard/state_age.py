@@ -30,10 +30,10 @@ class _ControllerClock:
 
         Args:
             host: when it was read [s].
-            controller: its own time [s]; where it runs backwards the controller has started anew.
+            controller: its own time [s]. Where it runs backwards the controller has started anew.
 
         Returns:
-            host time at which it was measured [s]; never later than ``host``.
+            host time at which it was measured [s], never later than ``host``.
         """
         if controller < self._newest:
             self._before = self._now = math.inf
@@ -77,7 +77,7 @@ class StateAge:
         return measured_at
 
     def silent(self, now: float) -> bool:
-        """Tell whether the newest state is too old at a host time [s]; one whose time does not go on is."""
+        """Tell whether the newest state is too old at a host time [s]. One whose time does not go on is."""
         return now - self._fresh > self._limit
 
     def quiet_until(self) -> float:
@@ -85,7 +85,7 @@ class StateAge:
         return min(self._fresh, self._very_late_since) + self._limit
 
     def trouble(self, now: float) -> str:
-        """Return what is wrong with how the states come, at a host time [s]; empty where nothing is."""
+        """Return what is wrong with how the states come, at a host time [s]. Empty where nothing is."""
         limit = f"{1e3 * self._limit:g} ms"
         if self.silent(now):
             return f"the controller has sent no state for {limit}"
@@ -95,7 +95,7 @@ class StateAge:
         return ""
 
     def stale(self, now: float) -> str:
-        """Return why they cannot supervise a motion away at a host time [s]; empty where they can."""
+        """Return why they cannot supervise a motion away at a host time [s]. Empty where they can."""
         if now - self._late_since <= _LAG_TIME:
             return ""
         limit = f"{1e3 * _MAX_SUPERVISION_LAG:.0f} ms"

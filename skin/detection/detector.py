@@ -63,7 +63,7 @@ class Contradictions:
         """Tell whether a fault may be a contact that came or went between the phases of this one frame.
 
         The phases are measured one after the other, so such a frame contradicts itself. A few frames later the contact
-        rests, or has passed the threshold; if they go on, or come more often than now and then, it is a fault.
+        rests, or has passed the threshold. If they go on, or come more often than now and then, it is a fault.
 
         Args:
             fault: of the frame.
@@ -79,10 +79,10 @@ class Contradictions:
 
 
 class _StuckValues:
-    """How long each lively value of a sensor's frames has stood still; a stuck current would hide an open wire.
+    """How long each lively value of a sensor's frames has stood still. A stuck current would hide an open wire.
 
     Args:
-        most: frames in a row with the same value that are a fault; 0: none is.
+        most: frames in a row with the same value that are a fault. With 0 none is.
     """
 
     def __init__(self, most: int) -> None:
@@ -91,7 +91,7 @@ class _StuckValues:
         self._still = [0, 0, 0, 0, 0]
 
     def feed(self, frame: Frame) -> bool:
-        """Take a frame; tell whether one of its values is stuck."""
+        """Take a frame. Tell whether one of its values is stuck."""
         if not self._most:
             return False
         counts = (
@@ -105,7 +105,7 @@ class _StuckValues:
         return max(still) >= self._most
 
     def learn(self, frames: QuietFrames, begin: int, end: int) -> int:
-        """Take frames in a row; return how many are taken: none where a value may be stuck."""
+        """Take frames in a row. Return how many are taken: none where a value may be stuck."""
         if not self._most:
             return end - begin
         last, still = end - 1, []
@@ -134,7 +134,7 @@ class Detector:
         ready: a run of valid untouched frames was seen, and no fault since: silence now means "no touch".
         touched: a touch lasts.
         reading_now: the newest valid frame while the sensor is touched, else None.
-        timing: sequence and clocks; counts of what was missing.
+        timing: sequence and clocks, and counts of what was missing.
     """
 
     def __init__(self, sensor: Sensor, settings: DetectorSettings | None = None) -> None:
@@ -169,7 +169,7 @@ class Detector:
         self._lasting = False
 
     def age(self, now: float) -> float:
-        """Return the time since the newest valid frame [s]; infinite before the first."""
+        """Return the time since the newest valid frame [s]. Infinite before the first."""
         return self.timing.age(now)
 
     def feed(self, frame: Frame, now: float, alarm: TouchAlarm | None = None) -> list[SkinEvent]:
@@ -181,7 +181,7 @@ class Detector:
             alarm: called where a touch begins with this frame, and that is the first that happens in it.
 
         Returns:
-            what happened; mostly nothing.
+            what happened, mostly nothing.
         """
         events: list[SkinEvent] = []
         self._fed = now
@@ -239,7 +239,7 @@ class Detector:
 
     @property
     def fault(self) -> Fault | None:
-        """Why the sensor cannot be believed at present; None where it can."""
+        """Why the sensor cannot be believed at present. None where it can."""
         return self._fault
 
     @property
@@ -270,7 +270,7 @@ class Detector:
             final: False: only tell what would be returned.
 
         Returns:
-            ``end``; or the number of the first frame that is not quiet, or may not be. Then nothing was taken.
+            ``end``, or the number of the first frame that is not quiet, or may not be. Then nothing was taken.
         """
         from .quiet_frames import learn_quiet_frames
 
@@ -294,7 +294,7 @@ class Detector:
         return events
 
     def silence(self, now: float, longest: float) -> list[SkinEvent]:
-        """Report that no valid frame has come for too long; where others come, what is wrong with them is reported.
+        """Report that no valid frame has come for too long. Where others come, what is wrong with them is reported.
 
         Args:
             now: host clock [s].
@@ -345,7 +345,7 @@ class Detector:
         now: float,
         alarm: TouchAlarm | None,
     ) -> None:
-        """Take a frame above the threshold; a touch begins once there are enough of them."""
+        """Take a frame above the threshold. A touch begins once there are enough of them."""
         self._above += 1
         certain = self._above >= self.settings.confirm_frames
         if certain and alarm is not None and not events:
@@ -396,7 +396,7 @@ class Detector:
     def _put_fault(
         self, events: list[SkinEvent], fault: Fault, now: float, clock_us: int, sequence: int, detail: str
     ) -> None:
-        """Take a fault, and report it where it was not; the diagnosis in words counts as another one."""
+        """Take a fault, and report it where it was not. The diagnosis in words counts as another one."""
         self._quiet = self._above = 0
         self._currents.restart()
         self.ready = False

@@ -26,7 +26,7 @@ class SkinEvent:
     """An event of one sensor.
 
     Attributes:
-        sensor: name of the sensor; empty where it concerns the whole stream.
+        sensor: name of the sensor. Empty where it concerns the whole stream.
         time: host clock when the frame arrived [s].
         clock_us: device clock of the frame [us], modulo 2**32.
         sequence: sequence number of the frame.
@@ -46,16 +46,16 @@ class TouchEvent(SkinEvent):
         level: how firmly, 0..1, the drift of the untouched sensor taken off.
         u: slant distance from end 1 [m].
         phi: azimuth [rad].
-        location_valid: u and phi can be trusted; where they cannot, the touch is certain all the same.
+        location_valid: u and phi can be trusted. Where they cannot, the touch is certain all the same.
         doubt: why they cannot, for people.
-        covariance: of the place of one contact: (uu, us, ss) [m^2], s the distance around, along the circle; None where
+        covariance: of the place of one contact: (uu, us, ss) [m^2], s the distance around, along the circle. None where
             it is not known.
-        radius: of a round contact [m]; None where the frames do not tell.
-        radius_deviation: standard deviation of the radius' logarithm; None with it.
+        radius: of a round contact [m]. None where the frames do not tell.
+        radius_deviation: standard deviation of the radius' logarithm. None where the radius is.
         elongation: of what is not one disc: half the length [m] of the line on which contacts lie about the place, and
-            its direction from u towards growing phi [rad]; how unequal they are is not identifiable. None where it may
+            its direction from u towards growing phi [rad]. How unequal they are is not identifiable. None where it may
             be one disc.
-        velocity: along the side and around [m/s]; 0 where it rests, or where that is not known.
+        velocity: along the side and around [m/s]. It is 0 where it rests, or where that is not known.
     """
 
     level: float
@@ -132,7 +132,7 @@ class ReportedTouch:
         return TouchBegan(self._sensor.name, time, clock, sequence, level, u, phi, valid, doubt, *touch[8:])
 
     def move(self, touch: TouchReading) -> TouchMoved | None:
-        """Return the event that a frame of a touch makes due; None where it tells nothing new.
+        """Return the event that a frame of a touch makes due. None where it tells nothing new.
 
         Args:
             touch: the frame, above the release threshold.

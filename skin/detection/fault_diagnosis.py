@@ -57,7 +57,7 @@ class FaultDiagnosis:
 
     Attributes:
         active: a fault that may have a cause in the wiring lasts.
-        words: what is broken, for people, where that is known; else empty.
+        words: what is broken, for people, where that is known, else empty.
     """
 
     def __init__(self, sensor: Sensor, currents: UntouchedCurrents) -> None:
@@ -87,7 +87,7 @@ class FaultDiagnosis:
 
         Args:
             frame: whose supply is right.
-            fault: what the frame alone says; None where it shows nothing.
+            fault: what the frame alone says. None where it shows nothing.
 
         Returns:
             the name, in the frame in which it is found.
@@ -159,7 +159,7 @@ class _Fit:
         self.sum = self._total = math.inf
 
     def improve(self) -> bool:
-        """Make the next step; tell whether it was the last."""
+        """Make the next step. Tell whether it was the last."""
         self._round += 1
         if self._round == 1:
             return self._start()
@@ -200,7 +200,7 @@ class _Fit:
         return settled or hopeless or self._round >= _MAX_STEPS
 
     def _start(self) -> bool:
-        """Take the best of a few contacts; tell whether none is needed."""
+        """Take the best of a few contacts. Tell whether none is needed."""
         errors = self._compare(_NO_CONTACT)
         self.sum = _dot(errors, errors)
         if self.sum < _CONTACT_GAIN:
@@ -219,7 +219,7 @@ class _Fit:
 
     @staticmethod
     def _moves(contact: PointContact) -> tuple[tuple[PointContact, float], ...]:
-        """Return contacts beside one, and how far; the conductance in logarithms."""
+        """Return contacts beside one, and how far. The conductance counts in logarithms."""
         conductance, x, y = contact
         along, around = 1e-3 if x < 0.5 else -1e-3, 1e-3 if y < 0.5 else -1e-3
         return (

@@ -29,7 +29,7 @@ _CHECK_INTERVAL = 32  # frames, of which one is read as a live one
 
 
 class QuietFrames(NamedTuple):
-    """Frames of one sensor, one list for each quantity; what a frame shows that is not plain is never used.
+    """Frames of one sensor, one list for each quantity. What a frame shows that is not plain is never used.
 
     Attributes:
         plain: in which nothing shows.
@@ -145,7 +145,7 @@ def _repeats(values: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def learn_quiet_frames(parts: tuple[Any, ...], frames: QuietFrames, begin: int, end: int, final: bool) -> int:
-    """Let the parts of one detector learn from plain frames in a row; arguments and result as of ``Detector.learn``.
+    """Let the parts of one detector learn from plain frames in a row. Arguments and result as of ``Detector.learn``.
 
     Args:
         parts: timing, guides, currents, level, stuck values and leak of the detector.

@@ -46,7 +46,7 @@ class FrameSelfTest:
         self._count = 0
 
     def feed(self, matrix: ContactMatrix) -> bool:
-        """Take a frame of a touch; tell whether its guides contradict each other, and have for long.
+        """Take a frame of a touch. Tell whether its guides contradict each other, and have for long.
 
         Args:
             matrix: of a valid frame that is touched firmly enough for a place.

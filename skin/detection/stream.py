@@ -31,7 +31,7 @@ class TouchStream:
         settings: how their detectors decide.
 
     Attributes:
-        decoder: finds the frames; its counters tell what else was on the line.
+        decoder: finds the frames. Its counters tell what else was on the line.
         detectors: one for each sensor, in the order given.
         unknown: frames from unexpected devices or sensors: (device, sensor) -> count.
 
@@ -132,7 +132,7 @@ class TouchStream:
             self.unknown[key] += 1
 
     def _watch_bytes(self, events: list[SkinEvent], frames: int, now: float) -> None:
-        """Forgive a few bad bytes with time (a port opened in mid-frame); report many as a fault.
+        """Forgive a few bad bytes with time (a port opened in mid-frame). Report many as a fault.
 
         Before the sensors are ready, it is a fault of theirs that passes with the bad bytes, as every fault does then:
         many boards print a banner when they start.

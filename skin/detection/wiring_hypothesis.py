@@ -24,7 +24,7 @@ _EDGE_DISTANCE = 1e-3  # of a side; a tap is no nearer to an electrode
 
 
 class PointContact(NamedTuple):
-    """A point that joins the sheets; each part of 0..1, the conductance in siemens."""
+    """A point that joins the sheets: each part of 0..1, the conductance in siemens."""
 
     conductance: float
     x: float  #: along, from end 1
@@ -143,7 +143,7 @@ def _phases(sensor: Sensor, opened: str, joined: tuple[str, str] | None) -> tupl
 
 
 def _phase(sensor: Sensor, roles: str, opened: str, joined: tuple[str, str] | None) -> _Phase:
-    """Return the feeds of a phase; a role is + for the supply, g for ground, p for a pull-down, i for an input."""
+    """Return the feeds of a phase. A role is + for the supply, g for ground, p for a pull-down, i for an input."""
     parts = sensor.electronics
     loads = {"+": 0.0, "g": 0.0, "p": parts.pulldown_ohms, "i": parts.input_ohms}
     feeds, sources, measured, seen = [_OPEN_CONDUCTANCE] * 4, [0.0] * 4, [0.0] * 4, [0.0] * 4

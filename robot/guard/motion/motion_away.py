@@ -29,7 +29,7 @@ class _Decision(NamedTuple):
         reaction: to all touches, each as firm as it has been.
         begun: a motion has begun.
         waits: not decided yet: the place of a touch may become certain.
-        refusal: why there is none though one was wanted; empty where none was.
+        refusal: why there is none though one was wanted. Empty where none was.
     """
 
     reaction: Reaction
@@ -42,7 +42,7 @@ class MotionAway:
     """Motion away of one arm, from stop to stop.
 
     Args:
-        planner: of motions away from a touch; None where no reaction moves the arm.
+        planner: of motions away from a touch. None where no reaction moves the arm.
         internal_control: the driver process moves the arm.
 
     Attributes:
@@ -108,12 +108,12 @@ class MotionAway:
         touches: TouchRecord,
         out: Outputs,
     ) -> _Decision:
-        """Decide whether a standing arm moves away, and begin that; the place of a touch may need a while.
+        """Decide whether a standing arm moves away, and begin that. The place of a touch may need a while.
 
         Args:
             state: as measured.
             reaction: the one that is under way.
-            stopping: a touch or a fault has stopped the arm; else a motion away has ended.
+            stopping: a touch or a fault has stopped the arm. False where a motion away has ended.
             first_was_enough: the arm stands by the first stop path alone.
             touches: what it reacts to.
             out: takes commands and events.

@@ -92,7 +92,7 @@ class ReactionPlanner:
 
     Args:
         model: the arm.
-        watchdog_hz: of the setpoint program in the controller; None where the driver process moves the arm.
+        watchdog_hz: of the setpoint program in the controller. None where the driver process moves the arm.
         table: what the arm must not go below while it moves.
     """
 
@@ -171,7 +171,7 @@ class MotionStream:
         motion: what to do.
         supervision: of the touches meanwhile.
         now: host time [s].
-        program: that follows the setpoints; None where the driver process does.
+        program: that follows the setpoints. None where the driver process does.
         answered: True where another motion follows if this one is resisted.
         out: takes commands and events.
 

@@ -30,7 +30,7 @@ class GuardedSensor:
         place: (u [m], phi [rad]) -> point [m] and outward unit normal, in the link's DH frame.
         threshold: level from which it is touched.
         firm: level from which a touch has a place, so that one without a place is a doubtful one.
-        force: level -> force and its standard deviation [N], or None beyond what a calibration knows; None without one.
+        force: level -> force and its standard deviation [N], or None beyond what a calibration knows, or without one.
     """
 
     name: str
@@ -44,12 +44,12 @@ class GuardedSensor:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Touch on a link; its place is worked out only where it is asked for, because a stop does not wait for it.
+    """Touch on a link. Its place is worked out only where it is asked for, because a stop does not wait for it.
 
     Attributes:
         touch: as the skin reports it, in an event or in a frame.
         where: the sensor.
-        number: of the touch, from 1 on; one that begins anew has a new number.
+        number: of the touch, from 1 on. One that begins anew has a new number.
     """
 
     touch: TouchEvent | TouchReading
@@ -78,7 +78,7 @@ class Contact:
         }
 
     def details(self) -> dict[str, Any]:
-        """Return the details that an event carries of it; lengths in m, angles in rad, vectors in the link's frame."""
+        """Return the details that an event carries of it. Lengths in m, angles in rad, vectors in the link's frame."""
         touch = self.touch
         point, normal = self.where.place(touch.u, touch.phi)
         stamp = {"clock_us": touch.clock_us, "sequence": touch.sequence}
@@ -169,7 +169,7 @@ class TouchRecord:
         return self.rules.choose(link, level, self._speed)
 
     def feed(self, contacts: Sequence[Contact], stopping: bool) -> None:
-        """Take what the newest frame says of every touch that there is; ``stopping`` while the arm stops."""
+        """Take what the newest frame says of every touch that there is. ``stopping`` while the arm stops."""
         self._newest = contacts
         self.contacts = [contact.on_link() for contact in contacts]
         if contacts and stopping:  # a touch that fades keeps the place that it had; a firm one must have it now
@@ -182,7 +182,7 @@ class TouchRecord:
             ]
 
     def find(self, number: int) -> Contact | None:
-        """Return the touch with this number, or the firmest there is; None where nothing touches."""
+        """Return the touch with this number, or the firmest there is. None where nothing touches."""
         return max(self._newest, key=lambda contact: (contact.number == number, contact.touch.level), default=None)
 
     def hardest(self) -> Reaction:

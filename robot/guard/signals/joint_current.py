@@ -25,7 +25,7 @@ class JointCurrentMonitor:
         self._beyond = 0  # samples in a row
 
     def resistance(self, state: ControllerState) -> str:
-        """Take a measured state and return why the motion must end; empty where it may go on."""
+        """Take a measured state and return why the motion must end. Empty where it may go on."""
         if state.current is None or state.target_current is None:
             return ""
         off = [a - b for a, b in zip(state.current, state.target_current, strict=True)]
@@ -40,5 +40,5 @@ class JointCurrentMonitor:
 
 
 def _nearer_zero(a: float, b: float) -> float:
-    """Return the smaller of two deviations; 0 where they have changed sides."""
+    """Return the smaller of two deviations, 0 where they have changed sides."""
     return 0.0 if a * b < 0.0 else min(a, b, key=abs)

@@ -74,7 +74,7 @@ class EventName(StrEnum):
     The last six are about the guard and not from it, so that a replay does not make them (``SESSION_EVENTS``).
 
     Attributes:
-        meaning: what has happened, in a sentence for people; ``for name in EventName`` gives all of them.
+        meaning: what has happened, in a sentence for people. ``for name in EventName`` gives all of them.
     """
 
     meaning: str
@@ -137,7 +137,7 @@ class GuardEvent(NamedTuple):
     Attributes:
         name: what happened.
         time: host clock [s].
-        details: numbers and words that belong to it; SI and radians.
+        details: numbers and words that belong to it, in SI units and radians.
     """
 
     name: EventName
@@ -157,7 +157,7 @@ def stopping_contact(stop: GuardEvent, events: Sequence[GuardEvent]) -> GuardEve
         events: of the run.
 
     Returns:
-        an event "contact_located" or "contact"; None where the stop was made for something else.
+        an event "contact_located" or "contact". None where the stop was made for something else.
     """
     if not (contact := stop.details.get("contact")):
         return None
@@ -180,7 +180,7 @@ def force_block(time: float, force: float, places: Sequence[Sequence[float]] = (
 
 
 def body_places(payload: bytes) -> tuple[tuple[float, float, float], ...]:
-    """Return the places in what ``force_block`` has recorded [m]; none for another truth, and for nonsense."""
+    """Return the places in what ``force_block`` has recorded [m]. None for another truth, and for nonsense."""
     try:
         found = tuple((float(x), float(y), float(z)) for x, y, z in read_json(payload).get("bodies_m", ()))
     except (ValueError, TypeError, AttributeError):
@@ -189,7 +189,7 @@ def body_places(payload: bytes) -> tuple[tuple[float, float, float], ...]:
 
 
 def contact_force(payload: bytes) -> float | None:
-    """Return the force in what ``force_block`` has recorded [N]; None for another truth, and for nonsense."""
+    """Return the force in what ``force_block`` has recorded [N]. None for another truth, and for nonsense."""
     try:
         force = read_json(payload).get("contact_force_N")
     except (ValueError, AttributeError):
@@ -217,7 +217,7 @@ def decode_event(block: Block) -> GuardEvent:
 
 
 def encode_loss(what: str, why: str) -> bytes:
-    """Return the payload of a block that says which port is gone or missing, and why; half a letter is written out."""
+    """Return the payload of a block that says which port is gone or missing, and why. Half letters are written out."""
     return f"{what}\n{why}".encode("utf-8", "backslashreplace")
 
 
@@ -271,7 +271,7 @@ class RecordingOverflowFilter:
         self._since = self._until = 0.0
 
     def shorten(self, message: bytes) -> bytes:
-        """Return the events in a message; the rest of it is counted."""
+        """Return the events in a message. The rest of it is counted."""
         kept = []
         for _, block in decode_blocks(message):
             if block.kind == BlockKind.EVENT:
@@ -284,7 +284,7 @@ class RecordingOverflowFilter:
         return b"".join(kept)
 
     def notice(self) -> bytes:
-        """Return the event that says what was left out since the last one; empty where nothing was."""
+        """Return the event that says what was left out since the last one. Empty where nothing was."""
         if not self._left_out:
             return b""
         length = self._until - self._since

@@ -46,7 +46,7 @@ class PermissibleSpeeds:
     Attributes:
         levers: [m/rad], rising.
         patches: of its skins.
-        lowest: joint positions [rad] from which on the patches' own curves hold; empty where they never do.
+        lowest: joint positions [rad] from which on the patches' own curves hold. Empty where they never do.
         highest: joint positions [rad] up to which they do.
         between: factor by which a place between the patches may be faster than they are.
     """
@@ -134,7 +134,7 @@ def _flow(twist: Sequence[float]) -> list[float]:
 
 
 def _interpolate(levers: Sequence[float], curve: Sequence[float], lever: float) -> float:
-    """Return a value of a curve that begins at 0; the curves bend downwards, so it is never above the curve."""
+    """Return a value of a curve that begins at 0. The curves bend downwards, so it is never above the curve."""
     if lever >= levers[-1]:
         return curve[-1]
     at = bisect_left(levers, lever)

@@ -32,7 +32,7 @@ class _SliderSetting:
 
     Attributes:
         ceiling: where a person has put it.
-        fraction: where the guard has put it; None where that has not, or a person has moved it since.
+        fraction: where the guard has put it. None where that has not, or a person has moved it since.
         set_at: when that was [s].
     """
 
@@ -50,7 +50,7 @@ class _SliderSetting:
         return self.fraction is not None and len(self._expected) == 1
 
     def feed(self, now: float, slider: float) -> bool:
-        """Take where the slider is at a time [s]; return whether a person has moved it there."""
+        """Take where the slider is at a time [s]. Return whether a person has moved it there."""
         if self.fraction is None:
             if now - self.set_at <= _READ_DELAY and any(abs(slider - value) <= _READ_TOLERANCE for value in self._late):
                 self.fraction, self._expected, self._late = slider, [slider], []  # it was under way to the controller
@@ -81,7 +81,7 @@ class _SliderSetting:
             self._expected, self._resumes = [0.0, self.fraction], True
 
     def found(self, slider: float) -> float | None:
-        """Return where to put the slider back to, from ``slider``; None where it is not where the guard has put it."""
+        """Return where to put the slider back to, from ``slider``. None where it is not where the guard has put it."""
         if self.fraction is None or all(abs(slider - value) > _READ_TOLERANCE for value in self._expected):
             return None
         return self.ceiling
@@ -138,11 +138,11 @@ class SpeedLimit:
         self._demand = 0.0  # highest ratio at full slider in that time
 
     def sample(self, state: ControllerState, slider: float | None, out: Outputs) -> str:
-        """Take a measured state; return why the arm must be stopped, empty where it must not.
+        """Take a measured state. Return why the arm must be stopped, empty where it must not.
 
         Args:
             state: of the arm.
-            slider: where the controller's speed slider is; None where that is not known.
+            slider: where the controller's speed slider is. None where that is not known.
             out: takes the slider's setting, and an event.
         """
         now = state.time
@@ -186,7 +186,7 @@ class SpeedLimit:
 
         Args:
             now: host time [s].
-            slider: where it is; None where that is not known.
+            slider: where it is. None where that is not known.
             out: takes the slider's setting, and an event.
         """
         setting = self.setting
@@ -256,7 +256,7 @@ class SpeedLimit:
             self._asked = max(self._asked or 0.0, leading / highest)
 
     def _disobeys(self, now: float, qd: Joints) -> bool:
-        """Tell whether a joint turns faster than the slider has let it for a while; short strokes show only here."""
+        """Tell whether a joint turns faster than the slider has let it for a while. Short strokes show only here."""
         if now - self._sliders[0][0] < _SLIDER_MEMORY:
             return False
         top = self._highest
@@ -272,7 +272,7 @@ class SpeedLimit:
     def _lower(
         self, now: float, slider: float, ratio: float, ahead: Sequence[float], speed: float, name: str, out: Outputs
     ) -> None:
-        """Put the slider down; farther where the arm still speeds up, as its program may, or as it was seen to."""
+        """Put the slider down, and farther where the arm still speeds up, as its program may, or as it was seen to."""
         setting = self.setting
         before = slider if setting.fraction is None else min(slider, setting.fraction)
         share, top = _SPEED_MARGIN / ratio, max(map(abs, ahead))
@@ -284,7 +284,7 @@ class SpeedLimit:
         self._set(now, fraction, slider, name, ratio, out)
 
     def _relax(self, now: float, ratio: float, speed: float, out: Outputs) -> None:
-        """Let the slider go up again after motion that would have allowed it; a standing arm says nothing."""
+        """Let the slider go up again after motion that would have allowed it. A standing arm says nothing."""
         setting = self.setting
         if setting.fraction is None or not setting.shown:
             self._forget_demand()

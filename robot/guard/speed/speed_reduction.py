@@ -37,7 +37,7 @@ class _ReducedSpeedTouch:
 
     Args:
         now: when it began [s].
-        top: largest speed of the touched surface in a touch just before [m/s]; first where its place was not certain,
+        top: largest speed of the touched surface in a touch just before [m/s]. First where its place was not certain,
             so that it was a bound, then where it was.
         before: where the slider was.
         fraction: where it is to be.
@@ -71,7 +71,7 @@ class _ReducedSpeedTouch:
         self._fast = 0  # samples in a row
 
     def sample(self, time: float, speed: float, certain: bool = True) -> None:
-        """Take the measured speed of the touched surface at a time [s, m/s]; ``certain`` where it is no bound."""
+        """Take the measured speed of the touched surface at a time [s, m/s]. ``certain`` where it is no bound."""
         top = self.top
         if time < self._deadline and speed > top[certain]:
             top[certain] = speed  # it may still have been speeding up
@@ -85,7 +85,7 @@ class _ReducedSpeedTouch:
             self._free_since = now
 
     def trouble(self, now: float, slider: float | None) -> str:
-        """Return why the arm has to be stopped after all; empty where it has not.
+        """Return why the arm has to be stopped after all. Empty where it has not.
 
         Args:
             now: [s].
@@ -123,7 +123,7 @@ class SpeedReduction:
         used: True where a reaction of the scene slows the arm.
 
     Attributes:
-        slider: where the controller's speed slider was last; None where that is not known.
+        slider: where the controller's speed slider was last. None where that is not known.
         now: the touch that is under way, or None.
         approach: of the arm to what touches it, as of that touch.
     """
@@ -145,7 +145,7 @@ class SpeedReduction:
         self._halted_from: float | None = None  # where the slider was before a stop put it to 0
 
     def feed(self, time: float, slider: float | None) -> None:
-        """Take where the slider is, as read at a time [s]; None where it cannot be read any more."""
+        """Take where the slider is, as read at a time [s]. None where it cannot be read any more."""
         self.slider, self._read_at = slider, time
 
     def knows(self, time: float) -> bool:
@@ -153,7 +153,7 @@ class SpeedReduction:
         return self.slider is not None and time - self._read_at <= _MAX_SLIDER_AGE
 
     def known(self, time: float) -> float | None:
-        """Return the position of the slider; None where it is not known at a time [s]."""
+        """Return the position of the slider. None where it is not known at a time [s]."""
         return self.slider if self.knows(time) else None
 
     def begin(
@@ -165,7 +165,7 @@ class SpeedReduction:
         contacts: Sequence[ContactOnLink],
         out: Outputs,
     ) -> bool:
-        """Reduce the speed; return False where the arm has to be stopped instead.
+        """Reduce the speed. Return False where the arm has to be stopped instead.
 
         That is where it moves into the touch too fast, or where the position of the slider, or the state of the arm, is
         not known.
@@ -174,7 +174,7 @@ class SpeedReduction:
             time: host time [s].
             state: of the arm, the newest.
             reaction: its kind is "slow".
-            limits: of the monitoring; the arm has the time of a stop to become slower.
+            limits: of the monitoring. The arm has the time of a stop to become slower.
             contacts: the touches there are.
             out: takes commands and events.
         """
@@ -207,7 +207,7 @@ class SpeedReduction:
                 self._held = self._currents.resistance(state)
 
     def poll(self, time: float, touched: bool) -> str:
-        """Return why the arm has to be stopped after all; empty where it has not."""
+        """Return why the arm has to be stopped after all. Empty where it has not."""
         if self.now is None:
             return ""
         self.now.touched(time, touched)
@@ -231,7 +231,7 @@ class SpeedReduction:
             self.slider, self._last = touch.before, (time, touch)
 
     def note_stop(self, used: Collection[StopPath]) -> None:
-        """Take the paths of a stop: one puts the slider to 0; where it was is kept until ``release``."""
+        """Take the paths of a stop. Where the slider was, which one of them puts to 0, is kept until ``release``."""
         if StopPath.SLIDER not in used:
             return
         before = self.slider if self.now is None else self.now.before

@@ -73,7 +73,7 @@ class FrameInversion:
         return upper / (1.0 - (self._a + self._b) * upper), lower / (1.0 - (self._c + self._d) * lower)
 
     def invert(self, frame: Frame) -> ContactMatrix | None:
-        """Work out the contact matrix of a frame; None where nothing joins the sheets, or where they are not driven."""
+        """Work out the contact matrix of a frame. None where nothing joins the sheets, or where they are not driven."""
         lead_a, lead_b, lead_c, lead_d = self._a, self._b, self._c, self._d
         unit, load, pull = self._unit, self._input, self._pulldown
         touch_c, touch_d, touch_current, radial_c, radial_d, radial, angular_a, angular_b, angular = frame[6:15]

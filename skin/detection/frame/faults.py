@@ -8,7 +8,7 @@ __all__ = ["Fault"]
 
 
 class Fault(Enum):
-    """A reason why a reading must not be taken for "no touch"; the value is the sentence for people."""
+    """A reason why a reading must not be taken for "no touch". The value is the sentence for people."""
 
     # in one frame (reading.py)
     DEVICE = "the device reports a fault of its own in its status bits"

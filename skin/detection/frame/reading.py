@@ -20,7 +20,7 @@ __all__ = ["GUIDE_SLACK", "LEVEL_NOISE", "Reading", "TouchReading", "read"]
 
 
 class TouchReading(NamedTuple):
-    """One frame of a touch; events come only where something changes, this comes with every frame."""
+    """One frame of a touch. Events come only where something changes. This comes with every frame."""
 
     time: float  #: host clock when the frame arrived [s]
     level: float  #: how firmly, 0..1, the drift of the untouched sensor taken off
@@ -68,7 +68,7 @@ class Reading(NamedTuple):
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Place of the electrical centre (eq. 20, 24), u [m] and phi [rad]; that of an extended contact is off it."""
+        """Place of the electrical centre (eq. 20, 24), u [m] and phi [rad]. That of an extended contact is off it."""
         matrix, sensor = self.matrix, self.sensor
         if matrix is None:
             return 0.0, 0.0
@@ -85,10 +85,10 @@ def read(sensor: Sensor, frame: Frame, inversion: FrameInversion | None = None, 
         sensor: the sensor that sent the frame.
         frame: the frame.
         inversion: of this sensor, where it is at hand.
-        noise: standard deviation of a reading that was learned [counts]; thresholds may be raised by it.
+        noise: standard deviation of a reading that was learned [counts]. Thresholds may be raised by it.
 
     Returns:
-        the reading; a frame that cannot be believed has ``fault`` set, and then its other values are a guess.
+        the reading. A frame that cannot be believed has ``fault`` set, and then its other values are a guess.
     """
     values, sequence, clock_us = _pick_fields(frame), frame.sequence, frame.clock_us
     status, supply, supply1, supply2, touch_c, touch_d, _, radial_c, radial_d, _, angular_a, angular_b, _ = values

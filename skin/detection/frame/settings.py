@@ -24,13 +24,13 @@ class DetectorSettings:
         move_distance: movement along the surface that is reported [m].
         level_step: change of level that is reported.
         drift_rate: fastest drift of the untouched level that is followed [1/s].
-        drift_limit: largest drift that is followed; below the release threshold. An untouched level that rests above
+        drift_limit: largest drift that is followed, below the release threshold. An untouched level that rests above
             that threshold although so much was taken off is a fault.
         current_drift: fastest drift of the untouched drive currents that is followed, as a ratio of them [1/s].
-        second_contact: weakest second contact that a certain place excludes where its normal is 20 deg off [S]; the
+        second_contact: weakest second contact that a certain place excludes where its normal is 20 deg off [S]. The
             spreading in the sheets is part of it. 0.7 mS is what 2 N of the virtual skin's contact leave of 1.5 mS.
         largest_contact: radius up to which one contact is taken for one [m].
-        lasting_touch: a touch this long is a fault as well [s]; it is never taken for the new zero.
+        lasting_touch: a touch this long is a fault as well [s]. It is never taken for the new zero.
         stuck_frames: once the radial current, the angular current or the supply of a phase has repeated its value in
             so many frames in a row, that is a fault: each of them has noise in a working device, and a current that is
             stuck would hide an open wire. 0: off.

@@ -31,7 +31,7 @@ class TimingLimits:
         clock_slack: device time that an interval may be off the learned period, besides half of it [s].
         late: how much later than the quickest frame one may arrive [s].
         clock_drift: largest difference in speed of the device's clock and the host's, as a ratio. A lag that grows
-            more slowly is not noticed. Crystals keep 1e-4; a board whose clock is a ceramic resonator needs 5e-3.
+            more slowly is not noticed. Crystals keep 1e-4. A board whose clock is a ceramic resonator needs 5e-3.
 
     Raises:
         SensorError: a limit is not positive, or the drift is not below 1.
@@ -60,7 +60,7 @@ class FrameTiming:
         frames: frames taken.
         missing: frames that never came.
         old: frames that came twice or out of order.
-        period: device time from frame to frame, learned [s]; 0 before the second frame.
+        period: device time from frame to frame, learned [s], 0 before the second frame.
         sequence: of the newest frame.
         clock_us: of the newest frame [us].
         lag: how much later than the quickest frame the newest one arrived [s].
@@ -77,7 +77,7 @@ class FrameTiming:
         self.restart()
 
     def restart(self) -> None:
-        """Forget sequence, clock and period; the counts stay."""
+        """Forget sequence, clock and period. The counts stay."""
         self.period = self.lag = 0.0
         self._bucket = 0.0
         self._device_time = 0.0
@@ -86,7 +86,7 @@ class FrameTiming:
         self._known = self._old_run = 0
 
     def age(self, now: float) -> float:
-        """Return the time since the newest valid frame [s]; infinite before the first."""
+        """Return the time since the newest valid frame [s]. Infinite before the first."""
         return now - self._valid_at
 
     @property
@@ -188,7 +188,7 @@ class FrameTiming:
         """Judge how late a frame has arrived, and whether the device's clock runs away from the host's.
 
         The offset of the two clocks is known from the quickest frame. It may rise by the drift, and an older quickest
-        frame is then given up; where it falls faster than the drift explains, the device's clock is too fast, and a
+        frame is then given up. Where it falls faster than the drift explains, the device's clock is too fast, and a
         lag would hide behind it.
 
         Args:

@@ -48,7 +48,7 @@ class UntouchedCurrents:
     Attributes:
         radial: drive current of the radial phase over the supply [counts over counts].
         angular: drive current of the angular phase over the supply.
-        frames: frames that the means stand for; 0 before the first block: nothing is known.
+        frames: frames that the means stand for. It is 0 before the first block: nothing is known.
         noise: standard deviation of a reading, rounding included [counts].
         variance: of (angular - aspect^2 radial) from frame to frame, as the means of blocks show it.
         bias: largest error of the same quantity that averaging cannot remove: rounding where there is no noise.
@@ -72,7 +72,7 @@ class UntouchedCurrents:
         self.restart()
 
     def restart(self) -> None:
-        """Learn the currents anew; the noise stays known."""
+        """Learn the currents anew. The noise stays known."""
         self._blocks = self._count = self.frames = 0
         self._sum1 = self._sum2 = 0.0
 
@@ -89,7 +89,7 @@ class UntouchedCurrents:
             period: time from frame to frame [s].
 
         Returns:
-            a fault, where a current has changed suddenly, or where there is more noise than thresholds bear; and what.
+            a fault, where a current has changed suddenly, or where there is more noise than thresholds bear, and what.
         """
         self._sum1 += frame.radial_current / frame.radial_supply
         self._sum2 += frame.angular_current / frame.angular_supply
@@ -99,7 +99,7 @@ class UntouchedCurrents:
     def learn(
         self, radial: Sequence[float], angular: Sequence[float], supplies: Sequence[int], periods: Sequence[float]
     ) -> int:
-        """Take quiet frames in a row as ``feed`` does; return how many, up to the first that shows a change.
+        """Take quiet frames in a row as ``feed`` does. Return how many, up to the first that shows a change.
 
         Args:
             radial: currents of the radial phase over the supply.
@@ -214,10 +214,10 @@ class UntouchedGuides:
     def learn(
         self, radial: Sequence[float], angular: Sequence[float], levels: Sequence[float], periods: Sequence[float]
     ) -> int:
-        """Take frames in a row as ``contradict`` does; return how many, up to the first that may contradict.
+        """Take frames in a row as ``contradict`` does. Return how many, up to the first that may contradict.
 
         Args:
-            radial: mean potential of the guides in the radial phase over the supply; those of a pair do not differ.
+            radial: mean potential of the guides in the radial phase over the supply. Those of a pair do not differ.
             angular: the same in the angular phase.
             levels: of the frames.
             periods: time from frame to frame [s].
@@ -260,10 +260,10 @@ class UntouchedLeak:
 
     Args:
         sensor: the sensor.
-        largest: conductance that is learned at most [S]; what is more is not a leak.
+        largest: conductance that is learned at most [S]. What is more is not a leak.
 
     Attributes:
-        conductance: of the leak [S]; 0 where there is none.
+        conductance: of the leak [S], 0 where there is none.
         x: its electrical centre, as in ContactMatrix.
         y: the same around.
     """
@@ -310,7 +310,7 @@ class UntouchedLeak:
     def take_off(self, matrix: ContactMatrix) -> ContactMatrix:
         """Return the contact matrix of the touch alone.
 
-        The learned untouched currents contain the leak's own part of ``along`` and ``around``; what is taken off here
+        The learned untouched currents contain the leak's own part of ``along`` and ``around``. What is taken off here
         is the part of the distance between leak and touch.
         """
         leak, whole = self.conductance, matrix.conductance
@@ -350,7 +350,7 @@ class UntouchedLevel:
     def exhausted(self, whole: float) -> bool:
         """Tell whether a frame's whole level rests above the threshold though all was taken off that may be.
 
-        A touch passes this range; a growing leak rests in it.
+        A touch passes this range. A growing leak rests in it.
         """
         if abs(self.value) >= self._limit and whole > self._release:
             self._drifted += 1
@@ -371,7 +371,7 @@ class UntouchedLevel:
             self.value = math.copysign(self._limit, self.value)
 
     def learn(self, levels: Sequence[float], periods: Sequence[float]) -> int:
-        """Follow the drift through frames in a row; return in how many of them that is all that happens.
+        """Follow the drift through frames in a row. Return in how many of them that is all that happens.
 
         Args:
             levels: whole levels.

@@ -163,7 +163,7 @@ class SheetConductances(NamedTuple):
 
 
 class PlaceEstimate(NamedTuple):
-    """A place on the sheet with its covariance; s is the distance around, along the circle."""
+    """A place on the sheet with its covariance, where s is the distance around, along the circle."""
 
     u: float  #: slant distance from end 1 [m]
     phi: float  #: azimuth [rad]

@@ -83,7 +83,7 @@ class _SeamTest:
     def place(
         self, matrix: ContactMatrix, one: MatrixNoise, frames: float, sheets: SheetConductances
     ) -> SeamPlace | None:
-        """Return the centroid of a press over the seam; None where what presses does not lie on both its sides.
+        """Return the centroid of a press over the seam. None where what presses does not lie on both its sides.
 
         Args:
             matrix: of one frame, or the mean over some.
@@ -215,7 +215,7 @@ class SeamCertainty:
         conductance: float,
         valid: bool,
     ) -> SeamPlace | None:
-        """Return the place of a press over the seam, and why it is not certain; None where it is none.
+        """Return the place of a press over the seam, and why it is not certain. None where it is none.
 
         Args:
             mean: of the matrices of a touch that may be one.
@@ -239,7 +239,7 @@ class SeamCertainty:
         return seam._replace(doubt=self._doubt(seam, before, changes))
 
     def _doubt(self, seam: SeamPlace, before: tuple[float, float] | None, changes: bool) -> str:
-        """Return why the place is not certain; empty where it is."""
+        """Return why the place is not certain. Empty where it is."""
         if seam.doubt or before is None or (changes and not self._held):
             self._held = False
             return seam.doubt or MOVES

@@ -91,7 +91,7 @@ class SingleContactTest:
             u: where it is read [m].
 
         Returns:
-            why there may be more than one contact; empty once that is excluded.
+            why there may be more than one contact. Empty once that is excluded.
         """
         currents = self._currents
         learned = currents.frames
@@ -126,7 +126,7 @@ class SingleContactTest:
         return ""
 
     def elongation(self, conductance: float) -> tuple[float, float] | None:
-        """Return half the length [m] and the direction of the line on which the contacts lie; None where none shows.
+        """Return half the length [m] and the direction of the line on which the contacts lie. None where none shows.
 
         The length is that of two equal contacts of no extent, measured around the narrower end. How the contacts share
         the conductance is not identifiable: unequal ones are farther apart.
@@ -160,7 +160,7 @@ def weakest_pair_excluded(sensor: Sensor, frames: int = 100, noise_counts: float
     """Return how weak a second contact may be that a certain place excludes [S].
 
     A contact at least this conductive (spreading in the sheets included) whose normal is DANGEROUS_ANGLE off the place
-    that is read does not leave that place certain; farther off, at an angle b, one weaker by (DANGEROUS_ANGLE/b)^2 does
+    that is read does not leave that place certain. Farther off, at an angle b, one weaker by (DANGEROUS_ANGLE/b)^2 does
     not either. Where this is above ``DetectorSettings.second_contact``, no place is certain after so many frames.
 
     Args:
@@ -178,7 +178,7 @@ def weakest_pair_excluded(sensor: Sensor, frames: int = 100, noise_counts: float
 
 
 def frames_until_certain(sensor: Sensor, settings: DetectorSettings, noise_counts: float = 0.7) -> int | None:
-    """Return for how many frames a firm touch by one contact lasts before its place is certain; None: it never is.
+    """Return for how many frames a firm touch by one contact lasts before its place is certain. None where it never is.
 
     Args:
         sensor: the sensor.

@@ -36,7 +36,7 @@ class _MatrixMean:
     """The mean of the matrices of one touch after another.
 
     Attributes:
-        frames: in the mean; 1 where it has just begun anew, 0 before the first.
+        frames: in the mean, 1 where it has just begun anew, 0 before the first.
         values: the first six of a ``ContactMatrix``, averaged.
     """
 
@@ -50,11 +50,11 @@ class _MatrixMean:
         self._smooth_x = self._smooth_y = 0.0
 
     def begin(self, matrix: ContactMatrix) -> None:
-        """Begin with the matrix of a frame with which a touch may begin; how far the last ones lay apart is kept."""
+        """Begin with the matrix of a frame with which a touch may begin. How far the last ones lay apart is kept."""
         self.frames, self.values = 1, matrix[:6]
 
     def feed(self, matrix: ContactMatrix, noise: MatrixNoise) -> tuple[float, float, float]:
-        """Take a matrix into the mean, or begin a new mean with it where the touch has moved; return its G, X, Y."""
+        """Take a matrix into the mean, or begin a new mean with it where the touch has moved. Return its G, X, Y."""
         frames = self.frames
         g, x, y, along, cross, around = self.values
         new = matrix[:6]
@@ -102,7 +102,7 @@ class _TouchVelocity:
     """The velocity of one touch after another.
 
     Args:
-        estimator: of the sheet; says how long and broad it is.
+        estimator: of the sheet. It says how long and broad it is.
     """
 
     def __init__(self, estimator: PlaceEstimator) -> None:
@@ -114,7 +114,7 @@ class _TouchVelocity:
         self._track = None
 
     def feed(self, matrix: ContactMatrix, noise: MatrixNoise | None, period: float) -> tuple[float, float]:
-        """Return the velocity along the side and around [m/s]; zeros where noise explains what moved."""
+        """Return the velocity along the side and around [m/s]. Zeros where noise explains what moved."""
         track = self._track
         if track is None or noise is None or not period > 0.0:
             self._track = matrix.x, matrix.y, 0.0, 0.0
@@ -309,7 +309,7 @@ class TouchPlace:
         return self._of_frame.of(matrix, frame, self._currents.variance * self._count_variance)
 
     def _sheets(self, now: float) -> SheetConductances:
-        """Return the sheets as they were learned; while a touch lasts they may drift unseen."""
+        """Return the sheets as they were learned. While a touch lasts they may drift unseen."""
         currents = self._currents
         if not currents.frames:
             upper, lower = self._estimator.sheets
@@ -334,7 +334,7 @@ class TouchPlace:
         )
 
     def _doubt(self, reading: Reading, matrix: ContactMatrix, level: float, u: float) -> str:
-        """Return why the place is not certain; empty where it is."""
+        """Return why the place is not certain. Empty where it is."""
         if not reading.location_valid:
             self._newest = None
             return WEAK if reading.level < self._level else CONTRADICTS
@@ -352,7 +352,7 @@ class TouchPlace:
         return doubt or MOVES if off_x * off_x + off_y * off_y > self._settle else doubt
 
     def _over_seam(self, reading: Reading, matrix: ContactMatrix, now: float) -> SeamPlace | None:
-        """Return the place of a press over the seam, and why it is not certain; None where it is none."""
+        """Return the place of a press over the seam, and why it is not certain. None where it is none."""
         noise, mean = self._noise, self._mean
         if noise is None or not self._seam.may_be(mean.values):
             self._seam.interrupt()
