@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 from coneskin.geometry.pose import Vector
 
@@ -141,33 +140,8 @@ def _clearance_needed(model: ArmModel) -> float:
     return model.d[4]
 
 
-class _PartPair(NamedTuple):
-    """_PartPair of parts that are close to each other.
-
-    Attributes:
-        first: index of the part nearer to the base.
-        second: index of the other part.
-        distance: distance of their axes [m].
-    """
-
-    first: int
-    second: int
-    distance: float
-
-    @property
-    def why(self) -> str:
-        """Sentence about the pair for a person."""
-        first, second = _PART_NAMES[self.first], _PART_NAMES[self.second]
-        return f"the {second} would come within {1e3 * self.distance:.0f} mm of the {first}, axis to axis"
-
-    def distance_in(self, corners: Sequence[Vector]) -> float:
-        """Return the distance of the same two parts in another skeleton [m]."""
-        a, b = self.first, self.second
-        return _segment_distance(corners[a], corners[a + 1], corners[b], corners[b + 1])
-
-
-def _close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[_PartPair]:
-    """Return the pairs of parts that are closer than ``_clearance_needed``.
+def _close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[tuple[int, int, float]]:
+    """Return the pairs of parts that are closer than ``_clearance_needed``: their indices, and how far apart [m].
 
     Args:
         model: the arm.
@@ -180,7 +154,7 @@ def _close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[_PartPair]:
         if math.dist(corners[a], corners[b]) < least + sizes[a] + sizes[b]:  # else no two of their points are so close
             distance = _segment_distance(*corners[a : a + 2], *corners[b : b + 2])
             if distance < least:
-                found.append(_PartPair(a, b, distance))
+                found.append((a, b, distance))
     return found
 
 
@@ -283,7 +257,11 @@ class Workspace:
         here = skeleton(self.model, q)
         if self.table is not None and low and self.table.entered(here, there):
             return f"the table at {1e3 * self.table.height:g} mm is in the way"
-        return next((pair.why for pair in near if pair.distance < pair.distance_in(here)), "")
+        for a, b, distance in near:
+            if distance < _segment_distance(*here[a : a + 2], *here[b : b + 2]):
+                first, second = _PART_NAMES[a], _PART_NAMES[b]
+                return f"the {second} would come within {1e3 * distance:.0f} mm of the {first}, axis to axis"
+        return ""
 
 
 _LINK_RADIUS = 0.06  # m from the middle line of a link to its surface

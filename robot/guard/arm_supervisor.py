@@ -59,12 +59,10 @@ class ArmSupervisor:
         speed_limit: of the skins' surfaces. None where nothing limits them.
 
     Attributes:
-        model: the arm.
+        model, driver, heartbeat: as given.
         phase: where it is.
         state: newest measured state, or None before the first.
-        driver: of the arm's controller.
         backup_ready: True once the process that stops the arm without this one is ready: driver process or watchdog.
-        heartbeat: supervision of the program that moves the arm. None where that is the driver process.
         internal_control: True where the driver process moves the arm.
         speed_reduction: of the slow reaction. It has to know where the controller's speed slider is.
         state_age: of the controller's states.

@@ -6,6 +6,7 @@ fill the disk. None is lost in silence: each that is kept back is counted in the
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,7 +37,7 @@ class EventFolding:
 
     def __init__(self) -> None:
         self._kinds: dict[tuple[EventName, str], _Kind] = {}
-        self._due = float("inf")  # when the next count is [s]
+        self._due = math.inf  # when the next count is [s]
 
     @property
     def due(self) -> float:
@@ -70,16 +71,12 @@ class EventFolding:
         """Report the counts that are due at a host time [s]."""
         if now < self._due:
             return
-        self._due = float("inf")
         for (name, _), kind in self._kinds.items():
-            if not kind.held:
-                continue
-            if now >= kind.reported + kind.interval:
+            if kind.held and now >= kind.reported + kind.interval:
                 emit(out, name, now, **kind.details, count=kind.held)
                 kind.held, kind.reported = 0, now
                 kind.interval = min(2.0 * kind.interval, _MAX_INTERVAL)
-            else:
-                self._due = min(self._due, kind.reported + kind.interval)
+        self._due = min((kind.reported + kind.interval for kind in self._kinds.values() if kind.held), default=math.inf)
 
     def flush(self, now: float, out: Outputs) -> None:
         """Report every count, and begin anew: what comes now matters."""
@@ -87,4 +84,4 @@ class EventFolding:
             if kind.held:
                 emit(out, name, now, **kind.details, count=kind.held)
         self._kinds.clear()
-        self._due = float("inf")
+        self._due = math.inf

@@ -13,12 +13,12 @@ solved again without it. With several touches none of the touched points moves t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
-from coneskin.robot.arm.compiled_kinematics import compile_contact
+from coneskin.robot.arm.compiled_kinematics import CompiledLink, compile_contact
 from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds, damping_squared, stacked_speeds
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import REACTION_TIME, ArmSweep, JointLimits, Workspace
@@ -45,16 +45,14 @@ class _Track:
         point: in the DH frame of the link [m].
         away: unit vector that it is to move along, in the base frame.
         start: where it was at the touch, in the base frame [m].
-        drive: ``CompiledLink.drive`` of the link.
-        place: ``CompiledLink.place`` of the link.
+        compiled: functions of the link.
     """
 
     link: int
     point: Vector
     away: Vector
     start: Vector
-    drive: Callable[..., tuple[float, ...]] = field(repr=False)
-    place: Callable[..., tuple[float, ...]] = field(repr=False)
+    compiled: CompiledLink = field(repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +74,6 @@ class RetreatPlan:
     start_time: float
     space: Workspace | None = None
     sweep: ArmSweep | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class _Motion:
-    """Joint speeds for a wanted speed of 1 m/s, and the speed away from the touch that they reach."""
-
-    speeds: Sequence[float]
-    away: float
-    damping: float
 
 
 def plan_retreat(
@@ -127,7 +116,7 @@ def plan_retreat(
         link = compile_contact(model, contact.link)
         x, y, z, nx, ny, nz = link.place(*state.q, *contact.point, *contact.normal)[:6]
         away = (-nx / length, -ny / length, -nz / length)
-        tracks.append(_Track(contact.link, contact.point, away, (x, y, z), link.drive, link.place))
+        tracks.append(_Track(contact.link, contact.point, away, (x, y, z), link))
     limits = JointLimits.of(model, reaction.acceleration)
     plan = RetreatPlan(tuple(tracks), reaction, limits, state.time, space, sweep)
     first = retreat_step(plan, ArmState(state.time, state.q))  # from a standstill: the arm stops first
@@ -149,12 +138,11 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         track = plan.tracks[0]
         ux, uy, uz = track.away
         sx, sy, sz = track.start
-        x, y, z, away, damping, *speeds = track.drive(*q, *track.point, ux, uy, uz)
+        x, y, z, away, damping, *speeds = track.compiled.drive(*q, *track.point, ux, uy, uz)
         progress = (x - sx) * ux + (y - sy) * uy + (z - sz) * uz
     else:
         progress = max(_progress(track, q) for track in plan.tracks)
-        motion = _solve(plan, q, ())
-        speeds, away, damping = list(motion.speeds), motion.away, motion.damping
+        speeds, away, damping = _solve(plan, q, ())
     left = reaction.distance - progress
     if not left > DISTANCE_TOLERANCE:
         return Done("the distance is made", progress, complete=True)
@@ -173,8 +161,7 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         if not blocked:
             break
         locked += blocked
-        motion = _solve(plan, q, locked)
-        speeds, away, damping = list(motion.speeds), motion.away, motion.damping
+        speeds, away, damping = _solve(plan, q, locked)
     else:
         return Done(_why_not(plan, locked, away, damping), progress)
     if locked:
@@ -216,13 +203,17 @@ def _speed(
     return speed, clipped
 
 
-def _solve(plan: RetreatPlan, q: Sequence[float], locked: Sequence[int]) -> _Motion:
-    """Solve as ``CompiledLink.drive`` does, for any number of touches and with locked joints."""
+def _solve(plan: RetreatPlan, q: Sequence[float], locked: Sequence[int]) -> tuple[list[float], float, float]:
+    """Solve as ``CompiledLink.drive`` does, for any number of touches and with locked joints.
+
+    Returns:
+        joint speeds for a wanted speed of 1 m/s, the speed away from the touches that they reach, and the damping.
+    """
     joints = max(track.link for track in plan.tracks)
     free = [i for i in range(joints) if i not in locked]
     points = []
     for track in plan.tracks:
-        flat = track.place(*q, *track.point, 0.0, 0.0, 1.0)[6:]
+        flat = track.compiled.place(*q, *track.point, 0.0, 0.0, 1.0)[6:]
         flat += (0.0, 0.0, 0.0) * (joints - track.link)
         points.append(([(flat[3 * i], flat[3 * i + 1], flat[3 * i + 2]) for i in free], track.away))
     if len(points) == 1:
@@ -239,11 +230,11 @@ def _solve(plan: RetreatPlan, q: Sequence[float], locked: Sequence[int]) -> _Mot
     speeds = [0.0] * joints
     for i, value in zip(free, some, strict=True):
         speeds[i] = value
-    return _Motion(speeds, made / len(points), damping)
+    return speeds, made / len(points), damping
 
 
 def _progress(track: _Track, q: Sequence[float]) -> float:
-    place = track.place(*q, *track.point, 0.0, 0.0, 1.0)
+    place = track.compiled.place(*q, *track.point, 0.0, 0.0, 1.0)
     return sum((place[k] - track.start[k]) * track.away[k] for k in range(3))
 
 

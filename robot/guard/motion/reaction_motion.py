@@ -179,7 +179,7 @@ class MotionStream:
         how: as of the motion.
         began: when [s].
         progress: how far it has got [m].
-        answered: True where another motion follows if this one is resisted.
+        answered: as given.
     """
 
     def __init__(

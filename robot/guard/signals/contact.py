@@ -98,16 +98,12 @@ class Contact:
 
     def _line(self, point: Vector, half: float, direction: float) -> Vector:
         """Return the half of the line on which contacts lie about the place, in the link's frame [m]."""
-        along, around = self._axes(point)
-        x, y = half * math.cos(direction), half * math.sin(direction)
-        return x * along[0] + y * around[0], x * along[1] + y * around[1], x * along[2] + y * around[2]
+        return _in_plane(half, direction, *self._axes(point))
 
     def _axes(self, point: Vector) -> tuple[Vector, Vector]:
         """Return the unit vectors along the side and around, at the place, in the link's frame."""
-        u, phi = self.touch.u, self.touch.phi
-        return _unit(point, self.where.place(u + _AXIS_STEP, phi)[0]), _unit(
-            point, self.where.place(u, phi + _AXIS_STEP)[0]
-        )
+        u, phi, place = self.touch.u, self.touch.phi, self.where.place
+        return _unit(point, place(u + _AXIS_STEP, phi)[0]), _unit(point, place(u, phi + _AXIS_STEP)[0])
 
     def _ellipse(self, point: Vector) -> tuple[Vector, Vector] | None:
         """Return the two half axes of the ellipse that holds the place with 95 %, in the link's frame [m]."""
@@ -115,15 +111,18 @@ class Contact:
         if touch.covariance is None:
             return None
         uu, us, ss = touch.covariance
-        along, around = self._axes(point)
+        axes = self._axes(point)
         middle, apart = 0.5 * (uu + ss), math.hypot(0.5 * (uu - ss), us)
         angle = 0.5 * math.atan2(2.0 * us, uu - ss)
-        axes = []
-        for variance, turn in ((middle + apart, angle), (middle - apart, angle + 0.5 * math.pi)):
-            size = math.sqrt(_CHI_SQUARED_95 * max(variance, 0.0))
-            x, y = size * math.cos(turn), size * math.sin(turn)
-            axes.append((x * along[0] + y * around[0], x * along[1] + y * around[1], x * along[2] + y * around[2]))
-        return axes[0], axes[1]
+        longer = math.sqrt(_CHI_SQUARED_95 * max(middle + apart, 0.0))
+        shorter = math.sqrt(_CHI_SQUARED_95 * max(middle - apart, 0.0))
+        return _in_plane(longer, angle, *axes), _in_plane(shorter, angle + 0.5 * math.pi, *axes)
+
+
+def _in_plane(size: float, turn: float, along: Vector, around: Vector) -> Vector:
+    """Return the vector of a length at an angle between two axes, from the first towards the second."""
+    x, y = size * math.cos(turn), size * math.sin(turn)
+    return x * along[0] + y * around[0], x * along[1] + y * around[1], x * along[2] + y * around[2]
 
 
 def _unit(start: Vector, end: Vector) -> Vector:

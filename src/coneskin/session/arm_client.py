@@ -172,6 +172,7 @@ class ArmClient:
 
     def __init__(self, channel: Channel, check: Callable[[bool], None], model: ArmModel, host: str) -> None:
         self._requests = _ArmRequests(channel, check)
+        self._do = self._requests.do
         self._model = model
         self._host = host
 
@@ -383,9 +384,6 @@ class ArmClient:
                 f"way point {number} needs a speed and an acceleration above 0 and a blend [m] from 0 on, got {numbers}"
             )
         return point._replace(target=tuple(target))
-
-    def _do(self, **request: Any) -> dict[str, Any]:
-        return self._requests.do(**request)
 
 
 def _six(values: Sequence[float], name: str, unit: str) -> list[float]:

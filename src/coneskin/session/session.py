@@ -189,7 +189,8 @@ class Session:
             raise RobotRefused("reset refused: no stop that has latched the arm was reported to this program")
         self._resets += 1
         request, seen = self._resets, len(self._log.events)
-        self._send_guard(b"reset %d %d" % (stop, request))
+        assert self._processes.guard is not None
+        self._processes.guard.send(b"reset %d %d" % (stop, request))
         answers = (EventName.ACTIVATED, EventName.REFUSED)
         event = self._log.wait_for(answers, timeout, seen, lambda event: event.details.get("request") == request)
         if event is None or event.name != EventName.ACTIVATED:
@@ -281,10 +282,6 @@ class Session:
         """Return what is wrong with the skin's line, given why the guard waits or refuses."""
         return self._log.line.describe(self.scene, reasons, time.monotonic())
 
-    def _send_guard(self, message: bytes) -> None:
-        assert self._processes.guard is not None
-        self._processes.guard.send(message)
-
     # ---- how it starts
 
     def _open(self) -> None:
@@ -333,9 +330,7 @@ def _defer_interrupts(job: Callable[[], None]) -> None:
     """
     noted: list[int] = []
     before = {}
-    if (
-        threading.current_thread() is threading.main_thread()
-    ):  # interrupts are raised, and can be caught, in this thread only
+    if threading.current_thread() is threading.main_thread():  # interrupts are raised, and can be caught, in it alone
         for number in (signal.SIGINT, signal.SIGTERM):
             if callable(handler := signal.getsignal(number)):  # the default of the system is left alone
                 before[number] = handler

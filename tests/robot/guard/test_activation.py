@@ -75,7 +75,7 @@ def test_a_reset_again_and_again_arms_no_later():
 
 @pytest.mark.promise("P63")
 def test_a_touch_while_a_reset_settles_refuses_it():
-    rig = reset(touch(1.52, 1.8)).run(2.0)
+    rig = reset(touch(1.52, 1.8)).run(0.5)
     assert rig.core.phase is Phase.LATCHED
     assert any("it is touched" in reason for reason in rig.event("refused").details["reasons"])
     assert rig.names.count("activated") == 1
@@ -85,10 +85,10 @@ def test_a_fault_while_a_reset_settles_refuses_it_for_good():
     rig = reset()
     rig.run(0.02)
     rig.mute_skin = True
-    rig.run(1.0)
+    rig.run(0.3)
     assert any("no valid frame" in reason for reason in rig.event("refused").details["reasons"])
     rig.mute_skin = False
-    rig.run(2.0)
+    rig.run(0.6)
     assert rig.core.phase is Phase.LATCHED  # sound again, but nobody has reset it since
 
 

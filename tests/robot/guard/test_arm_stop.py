@@ -52,7 +52,7 @@ def test_a_latched_arm_that_a_program_moves_is_stopped_again(external):
     rig.arm.go([1.0, 0, 0, 0, 0, 0], 4.0)
     rig.run(0.02)
     assert rig.core.phase is Phase.LATCHED  # 0.05 rad/s, five samples long
-    rig.run(1.2)
+    rig.run(0.9)
     assert rig.core.phase is Phase.LATCHED
     assert rig.names.count("latched") == 2
     assert max(map(abs, rig.arm.qd)) < 0.01
@@ -174,10 +174,10 @@ def test_a_touched_arm_that_creeps_is_stopped_after_two_millimetres_however_ofte
 
 @pytest.mark.promise("P28")
 def test_a_person_may_jog_a_latched_arm():
-    rig = GuardRig(touch(0.5), reaction=Reaction(kind="stop"), external=True).run(1.5)
+    rig = GuardRig(touch(0.5), reaction=Reaction(kind="stop"), external=True).run(1.3)
     rig.arm.runtime_state = 1
     rig.arm.go([0.2, 0, 0, 0, 0, 0], 10.0)
-    rig.run(1.0)
+    rig.run(0.7)
     assert rig.core.phase is Phase.LATCHED
     assert rig.names.count("stopping") == 1
 

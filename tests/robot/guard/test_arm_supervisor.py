@@ -17,9 +17,9 @@ from .reactions import SLOW, comply
 
 def test_the_first_rule_that_fits_is_the_reaction():
     rules = (Rule(Reaction(kind="stop"), link=1), Rule(Reaction(kind="stop"), speed_above=0.5, link=LINK))
-    fast = GuardRig(touch(0.5, 0.7), rules=rules, speed=1.0).run(1.5)
+    fast = GuardRig(touch(0.5, 0.7), rules=rules, speed=1.0).run(0.9)
     assert "retreating" not in fast.names
-    slow = GuardRig(touch(0.5, 0.7), rules=rules, speed=0.3).run(1.5)
+    slow = GuardRig(touch(0.5, 0.7), rules=rules, speed=0.3).run(0.9)
     assert "retreating" in slow.names
 
 
@@ -62,7 +62,7 @@ def test_the_wall_clock_is_no_part_of_it(monkeypatch):
         raise AssertionError("the time of day was asked for")
 
     monkeypatch.setattr(time, "time", jumped)
-    rig = GuardRig(touch(0.5, 0.7), speed=1.0).run(2.0)
+    rig = GuardRig(touch(0.5, 0.7), speed=1.0).run(1.7)
     assert rig.core.phase is Phase.LATCHED
 
 
@@ -78,7 +78,7 @@ def test_the_wall_clock_is_no_part_of_it(monkeypatch):
     ),
 )
 def test_the_same_inputs_give_the_same_run_bit_by_bit(settings):
-    rig = GuardRig(touch(0.5, 0.7), speed=1.0, **settings).run(2.5)
+    rig = GuardRig(touch(0.5, 0.7), speed=1.0, **settings).run(1.7)
     again = make_core(
         list(rig.skin.sensors), settings.get("reaction", Reaction(kind="retreat")), external="external" in settings
     )

@@ -6,6 +6,7 @@ import pytest
 
 from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
 from coneskin.robot.driver.values import StopPath
+from coneskin.robot.guard import companion_monitor
 from coneskin.robot.guard.companion_monitor import _HeartbeatMonitor
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact
@@ -51,7 +52,7 @@ def test_a_frozen_process_is_a_fault_although_nobody_needs_it_and_another_path_s
     rig = GuardRig(speed=1.0, external=external, obeys=frozenset({StopPath.PROGRAM})).run(0.5)
     rig.companions.process_is_mute = True
     since = rig.now
-    rig.run(2.0)
+    rig.run(1.2)
     assert stopping_time(rig, since) < 0.25
     name = "the guard watchdog" if external else "the driver process"
     assert f"{name}: no heartbeat for 200 ms" in rig.event("latched").details["why"]
@@ -138,12 +139,12 @@ def test_a_release_that_nobody_acknowledges_is_taken_back_and_its_late_answer_co
 
 @pytest.mark.promise("P40")
 def test_a_reset_while_the_driver_hangs_is_refused_with_its_name():
-    rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
+    rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.0)
     rig.companions.process_is_mute = True
     rig.run(0.5)
     rig.reset()
     assert any("the driver process: no heartbeat" in reason for reason in rig.event("refused").details["reasons"])
-    rig.run(1.0)
+    rig.run(0.5)
     assert not any(output == Release(2) for output in rig.outputs)
 
 
@@ -172,7 +173,7 @@ def test_resets_that_came_before_any_stop_forgive_none_that_comes():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(0.4)
     for number in range(3):
         rig.feed(BlockKind.RESET, b"1 %d" % number)
-    rig.run(1.5)
+    rig.run(0.6)
     assert rig.core.phase is Phase.LATCHED
     refused = [event for event in rig.events if event.name == "refused"]
     assert [event.details["request"] for event in refused] == [0, 1, 2]
@@ -246,15 +247,16 @@ def test_a_restart_that_is_announced_again_and_again_has_no_more_than_5_s():
     assert "the driver's program has ended on the controller" in rig.event("latched").details["why"]
 
 
-def test_a_restart_that_was_refused_leaves_the_next_one_its_time():
+def test_a_restart_that_was_refused_leaves_the_next_one_its_time(monkeypatch):
+    monkeypatch.setattr(companion_monitor, "_RESTART_TIMEOUT", 1.0)
     rig = GuardRig(speed=0.0).run(0.5)
     report(rig, "restarts")
-    rig.run(6.0)  # the old program goes on
+    rig.run(1.2)  # the old program goes on
     report(rig, "restarts")
     rig.arm.runtime_state = 1
-    rig.run(4.9)
+    rig.run(0.9)
     assert rig.core.phase is Phase.ACTIVE
-    rig.run(0.5)
+    rig.run(0.3)
     assert rig.core.phase is Phase.LATCHED
 
 

@@ -8,7 +8,7 @@ import sys
 from types import FrameType
 
 from coneskin.robot.driver.messages import StopProgram
-from coneskin.robot.guard.signals.journal import INPUTS, EventName, GuardEvent, Output
+from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, EventName, GuardEvent, Output
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.build import build_core
 from tests.support.paths import COLLISION, ROOT
@@ -59,8 +59,12 @@ def stop_of_the_collision() -> Sink:
     run = read_run(COLLISION)
     core = build_core(run.scene(), run.place_sensors())
     before = sys.getprofile()
+    stop = next(block.time for block in run.blocks if block.kind == BlockKind.EVENT and b'"stopping"' in block.payload)
     for block in run.blocks:
         if block.kind not in INPUTS:
+            continue
+        if block.time < stop:  # the event has the time of the frame that stops the arm
+            core.feed(block, [])
             continue
         sink = Sink(Walk())
         sys.setprofile(sink.walk)

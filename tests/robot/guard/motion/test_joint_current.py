@@ -73,4 +73,4 @@ def test_a_retreat_that_a_force_resists_beside_the_skin_ends_at_once(how):
 def test_a_current_that_the_motion_needs_does_not_end_it():
     rig = GuardRig(touch(0.5), reaction=Reaction("retreat", distance=0.03), speed=0.5).run(0.5)
     rig.arm.current = [1.5, -1.5, 1.5, 0.8, -0.8, 0.8]
-    assert rig.run(1.5).event("retreated").details["complete"] is True
+    assert rig.run(1.0).event("retreated").details["complete"] is True

@@ -36,14 +36,14 @@ def test_it_gives_way_while_it_is_pushed_and_stops_with_the_push(external):
 
 
 def test_it_gives_way_no_farther_than_its_distance():
-    rig = GuardRig(touch(0.5), reaction=comply(), speed=1.0).run(3.0)
+    rig = GuardRig(touch(0.5), reaction=comply(), speed=1.0).run(1.9)
     assert rig.core.phase is Phase.LATCHED
     assert rig.event("retreated").details["why"] == "the distance is made"
     assert rig.event("retreated").details["progress"] == pytest.approx(0.04, abs=0.001)
 
 
 def test_no_longer_than_its_time():
-    rig = GuardRig(touch(0.5), reaction=comply(time_budget=0.1), speed=1.0).run(2.0)
+    rig = GuardRig(touch(0.5), reaction=comply(time_budget=0.1), speed=1.0).run(0.9)
     assert "the time of 0.1 s is over" in rig.event("retreated").details["why"]
 
 
@@ -57,7 +57,7 @@ def test_a_harder_rule_ends_it():
 
 def test_a_slow_arm_waits_at_standstill_for_the_place_of_the_touch():
     """At 12 bits a place takes some tens of frames, and this arm stands after ten."""
-    rig = GuardRig(touch(0.5, 1.5), reaction=Reaction(kind="retreat"), speed=0.05, bits=12).run(2.5)
+    rig = GuardRig(touch(0.5, 1.5), reaction=Reaction(kind="retreat"), speed=0.05, bits=12).run(1.7)
     assert rig.event("standstill").time < rig.event("contact_located").time
     assert rig.event("retreating").time >= rig.event("contact_located").time
     assert rig.event("retreated").details["progress"] > 0.01
@@ -66,7 +66,7 @@ def test_a_slow_arm_waits_at_standstill_for_the_place_of_the_touch():
 @pytest.mark.promise("P02")
 def test_it_waits_for_no_longer_where_the_place_stays_uncertain():
     both = (touch(0.5, phi=0.5), touch(0.5, phi=5.5))
-    rig = GuardRig(*both, reaction=Reaction(kind="retreat"), speed=0.05, bits=12).run(1.5)
+    rig = GuardRig(*both, reaction=Reaction(kind="retreat"), speed=0.05, bits=12).run(1.0)
     assert rig.core.phase is Phase.LATCHED
     assert "no retreat: the place" in rig.event("latched").details["why"]
     assert 0.3 <= rig.event("latched").time - rig.event("standstill").time < 0.31
@@ -113,7 +113,7 @@ def test_a_program_that_does_not_start_is_not_waited_for():
     rig.arm.feed = lambda command: None if isinstance(command, SetpointProgram) else take(command)
     rig.run(0.5)
     rig.arm.runtime_state = 1
-    rig.run(2.0)
+    rig.run(1.5)
     assert rig.core.phase is Phase.LATCHED
     assert rig.event("retreated").details["why"] == "its program does not run on the controller"
     assert rig.event("retreated").details["complete"] is False
@@ -137,7 +137,7 @@ def test_an_arm_that_something_else_moves_is_not_left_to_it(external):
 
 def test_a_slow_arm_has_its_time_to_take_up_its_speed():
     reaction = Reaction(kind="retreat", acceleration=0.25, speed=0.3, time_budget=10.0, arm_distance=0.5)
-    rig = GuardRig(touch(0.5, 0.7), reaction=reaction, external=True, speed=1.0).run(5.0)
+    rig = GuardRig(touch(0.5, 0.7), reaction=reaction, external=True, speed=1.0).run(3.6)
     assert rig.event("retreated").details["complete"] is True
 
 

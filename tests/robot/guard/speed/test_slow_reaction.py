@@ -59,7 +59,7 @@ def test_an_arm_that_does_not_become_slower_is_stopped():
 
 @pytest.mark.promise("P07")
 def test_a_touch_that_lasts_too_long_stops():
-    rig = GuardRig(touch(0.5), reaction=SLOW, speed=1.0).run(2.0)
+    rig = GuardRig(touch(0.5), reaction=SLOW, speed=1.0).run(1.7)
     assert rig.core.phase is Phase.LATCHED
     assert "lasts too long" in rig.event("stopping").details["why"]
     assert not any(isinstance(command, SetJointVelocity) for command in rig.arm.commands)
@@ -76,7 +76,7 @@ def test_a_fault_while_slow_stops():
 def test_a_firmer_touch_while_slow_gets_its_own_reaction():
     light = Reaction(kind="slow", time_budget=5.0)
     firm = Rule(Reaction(kind="retreat", distance=0.03), level_above=0.5)
-    rig = GuardRig(touch(0.5, 1.5), reaction=light, rules=(firm,), speed=1.0).run(2.5)
+    rig = GuardRig(touch(0.5, 1.5), reaction=light, rules=(firm,), speed=1.0).run(1.8)
     assert rig.names[:2] == ["activated", "stopping"] or rig.names[:3] == ["activated", "speed_reduced", "contact"]
     assert "retreated" in rig.names
     assert rig.core.phase is Phase.LATCHED
@@ -102,7 +102,7 @@ def slow_first(kind="retreat", **settings):
 @pytest.mark.parametrize("speed", sweep([1.0, 0.15]))
 def test_from_slow_to_retreat_the_slider_is_back_before_the_arm_moves_away(external, speed):
     firm = ScriptedTouch(0.5, 1.5, 0.13, 1.57, rise=0.05)
-    rig = GuardRig(firm, external=external, speed=speed, **slow_first()).run(4.0)
+    rig = GuardRig(firm, external=external, speed=speed, **slow_first()).run(3.0)
     order = [name for name in rig.names if name in ("speed_reduced", "stopping", "standstill", "retreating", "latched")]
     assert order == ["speed_reduced", "stopping", "standstill", "retreating", "standstill", "latched"]
     assert rig.event("retreated").details["complete"] is True
@@ -135,7 +135,7 @@ def test_a_slider_that_was_not_heard_for_long_is_not_known():
 def test_a_person_who_slows_the_arm_further_is_not_overruled():
     rig = GuardRig(touch(0.5, 0.8), reaction=SLOW, speed=1.0).run(0.7)
     rig.arm.slider = 0.05
-    rig.run(2.0)
+    rig.run(0.9)
     assert "resumed" in rig.names
     assert rig.arm.slider == 0.05
 
@@ -155,10 +155,10 @@ def test_a_stop_just_after_it_slowed_leaves_no_slider_low():
 
 @pytest.mark.parametrize("later", sweep([0.006, 0.001, 0.02, 0.1]))
 def test_touched_again_as_it_goes_on_it_is_slow_again(later):
-    first = GuardRig(touch(0.5, 1.0), reaction=SLOW, speed=2.0).run(2.0)
+    first = GuardRig(touch(0.5, 1.0), reaction=SLOW, speed=2.0).run(1.6)
     resumed = round(first.event("resumed").time - 100.0, 3)
     again = touch(resumed + later, resumed + 0.5)
-    rig = GuardRig(touch(0.5, 1.0), again, reaction=SLOW, speed=2.0).run(4.0)
+    rig = GuardRig(touch(0.5, 1.0), again, reaction=SLOW, speed=2.0).run(2.7)
     assert "stopping" not in rig.names
     assert rig.names.count("resumed") == 2
     assert rig.arm.slider == 1.0

@@ -123,6 +123,6 @@ def test_a_person_who_slows_the_arm_between_two_touches_is_heard(setting):
     rig.arm.slider = 0.9
     rig.run(1.8)
     rig.arm.slider, before = setting, len(rig.outputs)
-    rig.run(3.0)
+    rig.run(1.1)
     set_to = [output.fraction for output in rig.outputs[before:] if isinstance(output, SetSpeedSlider)]
     assert max(set_to, default=0.0) <= setting
