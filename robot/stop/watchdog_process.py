@@ -13,9 +13,8 @@ import time
 from collections.abc import Callable
 
 from coneskin.core.channel import Channel, decode_json, wait_readable
-from coneskin.core.child_process import inherit
+from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
-from coneskin.core.time_slice import shorten_time_slice
 from coneskin.robot.driver.messages import (
     HEARTBEAT_TIMEOUT,
     REPORT_PERIOD,

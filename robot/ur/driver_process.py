@@ -19,9 +19,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.core.child_process import inherit
+from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
-from coneskin.core.time_slice import shorten_time_slice
 from coneskin.robot.driver.deadman import Deadman
 from coneskin.robot.driver.messages import (
     HEARTBEAT_TIMEOUT,

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.core import time_slice
-from coneskin.core.time_slice import shorten_time_slice
+from coneskin.core import child_process
+from coneskin.core.child_process import shorten_time_slice
 
 OWN = Path("/proc/thread-self/sched")
 told_by_kernel = pytest.mark.skipif(
@@ -21,7 +21,7 @@ told_by_kernel = pytest.mark.skipif(
 _PROGRAM = """
 import os, subprocess, threading
 from pathlib import Path
-from coneskin.core.time_slice import shorten_time_slice
+from coneskin.core.child_process import shorten_time_slice
 tell = lambda: print(Path("/proc/thread-self/sched").read_text().partition("se.slice")[2].split()[1])
 os.nice(3)
 tell()
@@ -59,6 +59,6 @@ def test_a_thread_with_a_policy_of_its_own_keeps_it() -> None:
 
 
 def test_on_a_machine_whose_calls_are_not_known_nothing_is_called(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(time_slice, "_CALL_NUMBERS", {})
-    monkeypatch.setattr(time_slice.ctypes, "CDLL", None)
+    monkeypatch.setattr(child_process, "_CALL_NUMBERS", {})
+    monkeypatch.setattr("ctypes.CDLL", None)
     shorten_time_slice()

@@ -101,13 +101,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     jobs = parser.add_subparsers(dest="job", metavar="JOB", required=True)
 
     def job(name: str, text: str, epilog: str) -> argparse.ArgumentParser:
-        made = jobs.add_parser(
-            name,
-            help=text,
-            description=text[0].upper() + text[1:] + ".",
-            epilog=epilog,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
+        about, kind = text[0].upper() + text[1:] + ".", argparse.RawDescriptionHelpFormatter
+        made = jobs.add_parser(name, help=text, description=about, epilog=epilog, formatter_class=kind)
         made.add_argument("--json", action="store_true", help="print one JSON object")
         return made
 

@@ -34,6 +34,7 @@ __all__ = [
 
 _LENGTH_FIELD = struct.Struct("<I")
 _MAX_LENGTH = 1 << 24  # bytes of one message
+_MAX_WAITING = 1 << 22  # bytes that the other side has not taken
 _BOUND_FACTOR = 2  # bounds; the second is for what is left of a shortened message
 
 
@@ -95,10 +96,10 @@ class Channel:
         overflow: shortens what does not fit, and reports it as soon as there is room again; None drops it.
     """
 
-    def __init__(self, sock: socket.socket, limit: int = 1 << 22) -> None:
+    def __init__(self, sock: socket.socket) -> None:
         sock.setblocking(False)
         self._sock = sock
-        self._limit = limit
+        self._limit = _MAX_WAITING
         self._out = bytearray()
         self._in = b""
         self.closed = False

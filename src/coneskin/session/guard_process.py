@@ -9,10 +9,9 @@ import time
 from pathlib import Path
 
 from coneskin.core.channel import decode_json, wait_readable, wait_writable
-from coneskin.core.child_process import inherit
+from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 from coneskin.core.recording.block import encode_block
-from coneskin.core.time_slice import shorten_time_slice
 
 __all__ = ["main"]
 

@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.core.child_process import inherit
+from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
-from coneskin.core.time_slice import shorten_time_slice
 
 if TYPE_CHECKING:  # imported once the line to the program is there, which may have ended already
     from coneskin.scene.values.scene import Scene

@@ -40,21 +40,17 @@ from .scene_plant import currents_of, presses_of, sheets_of
 
 __all__ = ["PROTECTIONS", "CollisionRun", "follow_waypoints"]
 
+_MAX_FORCE = 150.0  # N, at which the imitated limit stops the arm
 _FILTER_TIME = 0.01  # s
 _ELBOW_LINK = 2  # index of the link at whose far end it is
 _MIN_LEVER = 0.1  # of the longest; shorter ones say nothing of a force
 
 
 class _ForceLimit:
-    """Force limit of one arm.
+    """Force limit of one arm."""
 
-    Args:
-        model: the arm.
-        limit: force at which it stops the arm [N].
-    """
-
-    def __init__(self, model: ArmModel, limit: float = 150.0) -> None:
-        self._model, self._limit = model, limit
+    def __init__(self, model: ArmModel) -> None:
+        self._model = model
         self._torque: Floats = np.zeros(JOINTS)
 
     def exceeded(self, q: Sequence[float], torque: Sequence[float], step: float) -> bool:
@@ -63,7 +59,7 @@ class _ForceLimit:
         self._torque = share * self._torque + (1.0 - share) * np.asarray(torque, float)
         if not self._torque.any():
             return False
-        return max(self._force(q, JOINTS), self._force(q, _ELBOW_LINK)) > self._limit
+        return max(self._force(q, JOINTS), self._force(q, _ELBOW_LINK)) > _MAX_FORCE
 
     def _force(self, q: Sequence[float], link: int) -> float:
         """Return the force at the end of a link that explains the torques best [N]."""

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LivePlant"]
 
-_ANSWER_TIMEOUT = 5.0  # s
+_START_TIMEOUT, _ANSWER_TIMEOUT = 30.0, 5.0  # s
 
 
 class LivePlant(OwnedProcess):
@@ -37,7 +37,6 @@ class LivePlant(OwnedProcess):
     Args:
         scene: with an arm, a virtual skin and bodies.
         q: joint positions at the start [rad].
-        ready_within: time allowed until the plant stands there [s].
 
     Attributes:
         controller: line for ``SimulatedController(plant=...)``.
@@ -54,9 +53,8 @@ class LivePlant(OwnedProcess):
     controller: socket.socket
     skin: socket.socket
 
-    def __init__(self, scene: Scene, q: Sequence[float], ready_within: float = 30.0) -> None:
+    def __init__(self, scene: Scene, q: Sequence[float]) -> None:
         self._start = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve()), "q": list(q)}
-        self._ready_within = ready_within
         self._channel: Channel | None = None
 
     def __enter__(self) -> LivePlant:
@@ -67,7 +65,7 @@ class LivePlant(OwnedProcess):
             self._process = spawn("coneskin.impact.simulation.plant_process", theirs, of_controller, of_skin)
             self._channel = Channel(ours)
             self._channel.send(encode_json(self._start))
-            answer = self._receive(self._ready_within)
+            answer = self._receive(_START_TIMEOUT)
             if "refused" in answer:
                 if answer["missing"]:
                     raise MissingExtra("mujoco", "physics in the loop", "physics")
