@@ -35,19 +35,6 @@ def _complete(parser: argparse.ArgumentParser) -> None:
     argcomplete.autocomplete(parser)
 
 
-def _shell_code(shell: str) -> str:
-    """Return what a shell runs at its start, so that it completes the words of `coneskin`.
-
-    Raises:
-        MissingExtra: argcomplete is not installed.
-    """
-    try:
-        from argcomplete.shell_integration import shellcode
-    except ImportError as exc:
-        raise MissingExtra("argcomplete", "completion in a shell", "completion") from exc
-    return str(shellcode(["coneskin"], shell=shell))
-
-
 #: heading -> its commands, each with what it does in plain words; its module follows from its name
 _GROUPS = {
     "design a skin": {
@@ -171,10 +158,13 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _print_completion(shell: str) -> int:
+    """Print what a shell runs at its start, so that it completes the words of `coneskin`."""
     try:
-        print(_shell_code(shell), flush=True)
-    except ConeSkinError as exc:
-        print(f"coneskin: {exc}", file=sys.stderr)
+        from argcomplete.shell_integration import shellcode
+
+        print(shellcode(["coneskin"], shell=shell), flush=True)
+    except ImportError:
+        print(f"coneskin: {MissingExtra('argcomplete', 'completion in a shell', 'completion')}", file=sys.stderr)
         return 1
     except BrokenPipeError:
         return _lose_reader()

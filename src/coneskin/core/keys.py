@@ -167,7 +167,10 @@ def check(table: Mapping[str, Any], keys: Sequence[Key], where: str, problems: l
     for name in table:
         if name not in known:
             near = _nearest(name, known)
-            problems.append(f"{where}: unknown key {name}; " + (f"did you mean {near}?" if near else _list(known)))
+            problems.append(
+                f"{where}: unknown key {name}; "
+                + (f"did you mean {near}?" if near else f"known here: {', '.join(known)}")
+            )
     values: dict[str, Any] = {}
     for key in keys:
         if key.default is not ...:
@@ -186,10 +189,6 @@ def _nearest(name: str, known: Mapping[str, Key]) -> str | None:
     stem = name.rsplit("_", 1)[0]
     same = [other for other, key in known.items() if key.plain == stem or key.plain == name]
     return next(iter(same or difflib.get_close_matches(name, known, 1, 0.6)), None)
-
-
-def _list(known: Mapping[str, Key]) -> str:
-    return "known here: " + ", ".join(known)
 
 
 def _convert(key: Key, value: Any, where: str, report: Callable[[str], None]) -> Any:

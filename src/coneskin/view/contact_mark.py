@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from coneskin.geometry.pose import Vector
@@ -43,17 +44,12 @@ class ContactMark(NamedTuple):
     strength: float
 
 
-class _Place(NamedTuple):
-    time: float
-    mark: ContactMark
-
-
+@dataclass(slots=True)
 class _Touch:
-    """Touch: the places that were told of it, and when it ended."""
+    """Touch: the places that were told of it, each with its time [s], and when it ended."""
 
-    def __init__(self) -> None:
-        self.places: list[_Place] = []
-        self.ended = math.inf
+    places: list[tuple[float, ContactMark]] = field(default_factory=list)
+    ended: float = math.inf
 
 
 class ContactLog:
@@ -69,14 +65,14 @@ class ContactLog:
         """Take an event; those that tell of no touch are passed over."""
         if event.name == EventName.TOUCH_ENDED:
             for touch in self._touches.values():
-                if touch.places[-1].mark.sensor == event.details.get("sensor"):
+                if touch.places[-1][1].sensor == event.details.get("sensor"):
                     touch.ended = min(touch.ended, event.time)
             return
         number = event.details.get("number")
         if not isinstance(number, int):
             return
         if event.name in _PLACE_EVENTS and (mark := _mark(number, event.details)) is not None:
-            self._touches.setdefault(number, _Touch()).places.append(_Place(event.time, mark))
+            self._touches.setdefault(number, _Touch()).places.append((event.time, mark))
             while len(self._touches) > _MAX_TOUCHES:
                 del self._touches[next(iter(self._touches))]
 
@@ -90,7 +86,7 @@ class ContactLog:
         """Return the marks that are seen at a time [s, host clock], the strongest first."""
         found = []
         for touch in self._touches.values():
-            told = [place.mark for place in touch.places if place.time <= time]
+            told = [mark for then, mark in touch.places if then <= time]
             age = time - touch.ended
             if told and age < FADING:
                 found.append(told[-1]._replace(strength=min(1.0, 1.0 - age / FADING)))

@@ -201,9 +201,8 @@ def _any_positions() -> list[tuple[float, ...]]:
 def _most(extras: Sequence[ExtraWay], link: int, patches: Sequence[ArmPatch]) -> ExtraWay:
     """Return the most of the ways of a link's patches, and what a sample may miss."""
     own = [extra for extra, patch in zip(extras, (*patches, *patches), strict=True) if patch.link == link]
-    return ExtraWay(
-        _SAMPLING_FACTOR * max(extra.lag for extra in own), _SAMPLING_FACTOR * max(extra.bend for extra in own)
-    )
+    lag, bend = max(extra.lag for extra in own), max(extra.bend for extra in own)
+    return ExtraWay(_SAMPLING_FACTOR * lag, _SAMPLING_FACTOR * bend)
 
 
 _Contacts = list[TwoMassContact]
