@@ -22,8 +22,8 @@ from coneskin.scene.values import calibration_file
 from coneskin.scene.values.calibration_file import (
     CalibrationRecord,
     TouchResult,
+    _read_calibrations,
     add_calibration,
-    read_calibrations,
     sensor_fingerprint,
 )
 from coneskin.testing.scenes import forearm_scene
@@ -57,7 +57,7 @@ def test_a_scene_takes_the_newest_calibration_of_its_device(tmp_path: Path) -> N
     add_calibration(file, 7, a_record(map_along=(0.04, 0.0, 0.0, 0.0, 0.0)))
     add_calibration(file, 7, a_record())
     add_calibration(file, 7, a_record(sensor=1, map_along=(0.03, 0.0, 0.0, 0.0, 0.0)))
-    assert [item.map_along[0] for item in read_calibrations(file, 7)] == [0.04, 0.001, 0.03]
+    assert [item.map_along[0] for item in _read_calibrations(file, 7)] == [0.04, 0.001, 0.03]
     scene = load_scene(saved(tmp_path))
     found = scene.sensors[0].sensor.place_map
     assert found is not None
@@ -160,10 +160,10 @@ def test_a_long_history_is_kept_beside_a_new_file(tmp_path: Path, monkeypatch: p
     file = tmp_path / "device-7.json"
     for number in range(12):
         add_calibration(file, 7, a_record(sensor=number % 2, by=f"person {number}"))
-    kept = [read_calibrations(path, 7) for path in sorted(tmp_path.iterdir())]
+    kept = [_read_calibrations(path, 7) for path in sorted(tmp_path.iterdir())]
     assert len(kept) > 1
     assert {record.by for records in kept for record in records} == {f"person {number}" for number in range(12)}
-    assert {record.sensor for record in read_calibrations(file, 7)} == {0, 1}
+    assert {record.sensor for record in _read_calibrations(file, 7)} == {0, 1}
     assert all(path.stat().st_size <= 12_000 for path in tmp_path.iterdir())
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.scene.reader import load_scene
-from coneskin.scene.values.calibration_file import read_calibrations
+from coneskin.scene.values.calibration_file import _read_calibrations
 from coneskin.testing.scenes import forearm_scene
 
 TEXT = forearm_scene().replace("[[link.sensor]]", '[[link.sensor]]\nname = "forearm skin"\nwrap_deg = 350\ndevice = 7')
@@ -37,7 +37,7 @@ def test_unknown_leads_are_found_and_taken_off(tmp_path: Path, capsys: Output) -
     assert end["after_rms_mm"] < 0.3
     assert end["extra_ohm"] == pytest.approx([3.0, 11.0, 8.0, 5.0], abs=1.5)  # 1 ohm is 0.2 mm
     assert end["file"] == str(tmp_path / "own" / "device-7.json")
-    (record,) = read_calibrations(tmp_path / "own" / "device-7.json", 7)
+    (record,) = _read_calibrations(tmp_path / "own" / "device-7.json", 7)
     assert (record.by, record.simulated, len(record.touches)) == ("a test", True, 4)
     assert picture.read_bytes().startswith(b"\x89PNG")
     sensor = load_scene(scene).sensors[0].sensor

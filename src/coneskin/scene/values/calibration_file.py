@@ -29,7 +29,6 @@ __all__ = [
     "add_calibration",
     "calibration_keys",
     "calibration_path",
-    "read_calibrations",
     "sensor_fingerprint",
 ]
 
@@ -125,7 +124,7 @@ def calibration_path(place: Path, device_id: int) -> Path:
     return place if place.suffix.lower() == ".json" else place / f"device-{device_id}.json"
 
 
-def read_calibrations(path: Path, device_id: int) -> tuple[CalibrationRecord, ...]:
+def _read_calibrations(path: Path, device_id: int) -> tuple[CalibrationRecord, ...]:
     """Read all calibrations of a device, oldest first.
 
     Raises:
@@ -182,7 +181,7 @@ def add_calibration(path: Path, device_id: int, record: CalibrationRecord) -> No
     """
     try:
         try:
-            records: Sequence[CalibrationRecord] = read_calibrations(path, device_id)
+            records: Sequence[CalibrationRecord] = _read_calibrations(path, device_id)
         except FileNotFoundError:
             records = ()
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -217,7 +216,7 @@ def _find_calibration(path: Path, sensor: Sensor, simulated: bool) -> Calibratio
         ValueError: none applies; the message says why.
     """
     try:
-        records = read_calibrations(path, sensor.device_id)
+        records = _read_calibrations(path, sensor.device_id)
     except FileNotFoundError as exc:
         raise ValueError(f"there is no calibration {path}: {_HOW_TO}") from exc
     kind = "virtual" if simulated else "real"
