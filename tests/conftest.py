@@ -17,8 +17,7 @@ _TASKS = Path("/proc/self/task")  # Linux; elsewhere only threads are looked at
 _HERE = Path(__file__).parent
 _WITH_PROCESSES = (  # tests that take turns with a few others; below this folder
     *("guarded", "robot/sim/test_command.py", "robot/sim/test_wheel.py", "test_demos.py", "test_measure_controller.py"),
-    *("impact/simulation/test_live_plant.py", "robot/ur/test_examination.py", "robot/ur/test_input_writers.py"),
-    *("robot/ur/test_model_check.py", "robot/ur/test_program_io.py", "robot/ur/test_state_reader.py"),
+    *("impact/simulation/test_live_plant.py", "robot/ur/test_program_io.py"),
 )
 _SHORT = "not long"  # the marker expression of the short run, as in pyproject.toml
 

@@ -167,7 +167,8 @@ def _start_worker() -> subprocess.Popen[bytes]:
 
 
 def _end(worker: subprocess.Popen[bytes]) -> None:
-    """Let the translating process come to its end: it reads until its pipe is closed."""
+    """End the translating process, which holds nothing and may just be starting."""
+    worker.kill()
     with contextlib.suppress(OSError):
         worker.communicate()
 

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,16 @@ def ends(pid: int) -> bool:
 needs_proc = pytest.mark.skipif(not (PROC / "self" / "stat").exists(), reason="looks at processes through /proc")
 
 
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedController]:
+    """One that every test leaves as it may be found: running."""
+    folder = tmp_path_factory.mktemp("simulated")
+    program = folder / "play.script"
+    program.write_text("def loaded():\n  movej([0.2,-1.5,1.5,-1.5,-1.5,0], a=20, v=2)\nend\n")
+    with SimulatedController(host=free_host(), log=folder / "log.jsonl", program=program) as made:
+        yield made
+
+
 @needs_proc
 def test_two_arms_run_side_by_side_and_end_with_their_context() -> None:
     with SimulatedController(host=free_host()) as one, SimulatedController("ur5", free_host(), (0.5,) * 6) as two:
@@ -47,6 +58,7 @@ def test_two_arms_run_side_by_side_and_end_with_their_context() -> None:
         assert (one.facts["model"], two.facts["model"]) == ("UR5e", "UR5")
         assert two.state()["q"] == pytest.approx([0.5] * 6)
         pids = [one.pid, two.pid]
+        one.freeze()  # one that is frozen when its context ends must end too
     assert all(ends(pid) for pid in pids)
 
 
@@ -101,16 +113,16 @@ def test_it_ends_when_its_parent_has_gone() -> None:
     assert ends(facts["pid"])
 
 
-def test_a_taken_port_is_one_line_that_names_it() -> None:
+def test_a_taken_port_is_one_line_that_names_it(capfd: pytest.CaptureFixture[str]) -> None:
     host = free_host()
     with socket.socket() as taken:
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # an earlier test may just have left the port
         taken.bind((host, 29999))
         taken.listen()
-        done = subprocess.run([*COMMAND, "--host", host], capture_output=True, text=True, timeout=60, check=False)
-        assert done.returncode == 1
-        assert done.stdout == ""
-        (line,) = done.stderr.splitlines()
+        assert main(["--host", host]) == 1
+        said = capfd.readouterr()
+        assert said.out == ""
+        (line,) = said.err.splitlines()
         assert f"cannot listen on {host} port 29999 (dashboard)" in line
         with pytest.raises(RobotConnectionError, match=r"did not start: .*port 29999"):
             SimulatedController(host=host).__enter__()
@@ -151,47 +163,35 @@ def test_one_that_is_not_ready_in_time_is_ended() -> None:
         _ = simulated.pid
 
 
-@needs_proc
-def test_freeze_and_thaw_keep_the_arm_where_it_was() -> None:
-    with SimulatedController(host=free_host()) as simulated:
-        simulated.freeze()
-        with pytest.raises(RobotConnectionError, match="does not answer"):
-            simulated.call("state", timeout=0.05)
-        simulated.thaw()
-        before = simulated.state()["cycle"]
-        assert simulated.state()["cycle"] >= before
-        simulated.freeze()  # and one that is frozen when its context ends must end too
-        pid = simulated.pid
-    assert ends(pid)
+def test_freeze_and_thaw_keep_the_arm_where_it_was(simulated: SimulatedController) -> None:
+    simulated.freeze()
+    with pytest.raises(RobotConnectionError, match="does not answer"):
+        simulated.call("state", timeout=0.05)
+    simulated.thaw()
+    before = simulated.state()["cycle"]
+    assert simulated.state()["cycle"] >= before
 
 
-def test_an_unknown_fault_lists_those_there_are() -> None:
-    with (
-        SimulatedController(host=free_host()) as simulated,
-        pytest.raises(RobotConnectionError, match="refuses 'earthquake'"),
-    ):
+def test_an_unknown_fault_lists_those_there_are(simulated: SimulatedController) -> None:
+    with pytest.raises(RobotConnectionError, match="refuses 'earthquake'"):
         simulated.call("earthquake")
 
 
-def test_raw_programs_on_all_script_ports_and_play(tmp_path: Path) -> None:
-    program = tmp_path / "play.script"
-    program.write_text("def loaded():\n  movej([0.2,-1.5,1.5,-1.5,-1.5,0], a=20, v=2)\nend\n")
-    log = tmp_path / "log.jsonl"
-    with SimulatedController(host=free_host(), log=log, program=program) as simulated:
-        for number, port in enumerate((30001, 30002, 30003)):
-            with socket.create_connection((simulated.host, port)) as sock:
-                sock.sendall(f"def p{number}():\n  set_standard_digital_out({number}, True)\nend\n".encode())
-                while simulated.state()["digital_outputs"] < 2 ** (number + 1) - 1:
-                    pass
-        with socket.create_connection((simulated.host, 29999)) as sock:
-            lines = sock.makefile("rw", newline="\n")
-            assert lines.readline() == "Connected: Universal Robots Dashboard Server\n"
-            lines.write("play\n")
-            lines.flush()
-            assert lines.readline() == "Starting program\n"
-        while simulated.state()["q"][0] != pytest.approx(0.2):
-            pass
-        names = [event["program"] for event in simulated.events("program")]
+def test_raw_programs_on_all_script_ports_and_play(simulated: SimulatedController) -> None:
+    for number, port in enumerate((30001, 30002, 30003)):
+        with socket.create_connection((simulated.host, port)) as sock:
+            sock.sendall(f"def p{number}():\n  set_standard_digital_out({number}, True)\nend\n".encode())
+            while simulated.state()["digital_outputs"] < 2 ** (number + 1) - 1:
+                pass
+    with socket.create_connection((simulated.host, 29999)) as sock:
+        lines = sock.makefile("rw", newline="\n")
+        assert lines.readline() == "Connected: Universal Robots Dashboard Server\n"
+        lines.write("play\n")
+        lines.flush()
+        assert lines.readline() == "Starting program\n"
+    while simulated.state()["q"][0] != pytest.approx(0.2):
+        pass
+    names = [event["program"] for event in simulated.events("program")]
     assert names == ["p0", "p1", "p2", "loaded"]
 
 

@@ -5,9 +5,10 @@ import pytest
 from coneskin.core.finding import Finding
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.protocol import ExaminationScope
-from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.sim.process import free_host
 from coneskin.robot.ur.examination import examine
 from coneskin.robot.ur.rtde_connection import RtdeConnection
+from tests.support.served_controller import served
 
 ALL = ExaminationScope(control=True, slider=True, setpoints=True, heartbeat=True)
 
@@ -25,7 +26,7 @@ def test_where_no_controller_is_the_rest_is_not_tried() -> None:
 
 @pytest.mark.long
 def test_a_controller_is_examined_and_what_others_hold_is_named() -> None:
-    with SimulatedController("UR5e", free_host()) as simulated:
+    with served() as simulated:
         found = examine(arm_model("UR5e"), simulated.host, ALL)
         assert {name for name, verdict in verdicts(found).items() if verdict not in ("ok", "warning")} == set()
         assert verdicts(found).keys() >= {"RTDE", "model", "power", "safety", "dashboard", "remote control", "latency"}

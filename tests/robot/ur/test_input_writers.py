@@ -1,6 +1,5 @@
 """Setpoint program in the simulated controller, and which client may write to its registers."""
 
-import math
 import time
 
 import pytest
@@ -8,12 +7,12 @@ import pytest
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram
-from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.input_writers import SETPOINT_INPUTS, RegisterWriter, _register_values, program_text
 from coneskin.robot.ur.rtde_connection import RtdeConnection
 from coneskin.robot.ur.state_reader import StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
 from tests.robot.sim.machine.test_controller import Bench
+from tests.support.served_controller import served
 
 QD = (0.3, -0.2, 0.1, 0.0, 0.4, -0.5)
 CYCLE = 0.002
@@ -94,10 +93,9 @@ def test_a_stop_replaces_it(bench):
 # ---- the connection
 
 
-@pytest.fixture
-def simulated(tmp_path):
-    start = [math.radians(q) for q in (0, -90, 90, -90, -90, 0)]
-    with SimulatedController("UR5e", free_host(), start, log=tmp_path / "log.jsonl") as controller:
+@pytest.fixture(scope="module")
+def simulated():
+    with served() as controller:
         yield controller
 
 

@@ -9,8 +9,9 @@ import pytest
 from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
-from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.sim.process import free_host
 from coneskin.robot.ur.model_check import _ArmPose, _flange_distance, check_model, read_pose
+from tests.support.served_controller import served
 
 Q = (0.3, -1.2, 1.1, -1.4, -1.5, 0.4)
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -65,7 +66,7 @@ def test_an_unknown_arm_fits_no_model():
 
 
 def test_the_simulated_controller_is_asked():
-    with SimulatedController(model="ur10e", host=free_host(), start_q=Q) as simulated:
+    with served(model="ur10e", start_q=Q) as simulated:
         pose = read_pose(simulated.host)
         check_model(arm_model("UR10e"), pose, simulated.host)
         with pytest.raises(RobotRefused, match=r"is no UR5e: its flange is .* mm .* UR10e"):
