@@ -7,7 +7,6 @@ network leaves the arm alive: no packet goes through in either direction, nothin
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -67,7 +66,7 @@ class FaultInjector:
         """Act on one line; return JSON: the result, or an error and the known lines."""
         command = line.strip()
         self._c.log("fault", line=command)
-        action = self._lines.get(command) or self._resisting(command) or self._applying(command)
+        action = self._lines.get(command) or self._with_number(command)
         if action is None:
             return json.dumps({"error": f"unknown fault {command!r}", "known": [*sorted(self._lines), *_WITH_NUMBERS]})
         try:
@@ -75,29 +74,17 @@ class FaultInjector:
         except RobotRefused as exc:
             return json.dumps({"error": str(exc)})
 
-    def _applying(self, command: str) -> Callable[[], Any] | None:
-        """Return what applies a value to an input, where a line says so."""
-        match = re.fullmatch(r"(digital|analog) input (\d{1,3}) (\d+(?:\.\d*)?)", command)
+    def _with_number(self, command: str) -> Callable[[], Any] | None:
+        """Return what a line does that gives a number to a joint or to an input."""
+        match = re.fullmatch(r"(resist|digital input|analog input) (\d{1,3}) (-?\d+(?:\.\d*)?(?:e-\d+)?)", command)
         if match is None:
             return None
         index, value, terminals = int(match[2]), float(match[3]), self._c.terminals
-        if match[1] == "analog":
+        if match[1] == "resist":
+            return partial(self._resist, index - 1, value) if 1 <= index <= 6 else None
+        if match[1] == "analog input":
             return partial(terminals.apply_analog, index, value)
         return partial(terminals.apply_digital, index, value != 0.0) if value in (0.0, 1.0) else None
-
-    def _resisting(self, command: str) -> Callable[[], Any] | None:
-        """Return what adds a current to a joint, where a line says so: ``resist JOINT AMPERES``."""
-        word, _, numbers = command.partition(" ")
-        joint, _, amperes = numbers.partition(" ")
-        if word != "resist" or joint not in tuple("123456"):
-            return None
-        try:
-            current = float(amperes)
-        except ValueError:
-            return None
-        if not math.isfinite(current):
-            return None
-        return partial(self._resist, int(joint) - 1, current)
 
     def _resist(self, joint: int, current: float) -> list[float]:
         """Let a motor, counted from 0, take so much current beyond the model of the arm [A]; return all of them."""

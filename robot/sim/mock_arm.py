@@ -54,7 +54,7 @@ class MockArm:
             self.following, self.runtime_state = command.token, 2
         elif isinstance(command, StopPath):
             if command in self.obeys:
-                self._go([0.0] * 6, 10.0)
+                self.go([0.0] * 6, 10.0)
                 if command is StopPath.SLIDER:
                     self.slider = 0.0
                 if command is StopPath.PROTECTIVE:
@@ -62,15 +62,12 @@ class MockArm:
         elif StopPath.DRIVER not in self.obeys:
             return
         elif isinstance(command, StopProgram | EndReaction):
-            self._go([0.0] * 6, command.deceleration)
+            self.go([0.0] * 6, command.deceleration)
         elif isinstance(command, SetJointVelocity):
-            self._go(list(command.qd), command.acceleration)
+            self.go(list(command.qd), command.acceleration)
 
     def go(self, target: list[float], acceleration: float) -> None:
         """Let the joints go to these speeds."""
-        self._go(target, acceleration)
-
-    def _go(self, target: list[float], acceleration: float) -> None:
         self.target, self.acceleration = target, acceleration
         self.following = 0
 

@@ -252,7 +252,7 @@ class DriverProcess:
                 case StopProgram(deceleration) | EndReaction(deceleration):
                     self._allowed, self._patience = False, math.inf
                     self._deceleration = deceleration
-                    self._refuse_waiting("the guard has stopped the arm")
+                    self._answer_waiting(ok=False, stopped=True, why="the guard has stopped the arm")
                     self._stop(deceleration)
                     self._guard.send(StatusReport("done").encode())
                 case SetJointVelocity(qd, acceleration):
@@ -269,7 +269,7 @@ class DriverProcess:
     def _forbid(self, why: str) -> None:
         """Stop the arm because the guard itself, or a stop, has failed."""
         self._allowed, self._patience = False, math.inf
-        self._refuse_waiting(why)
+        self._answer_waiting(ok=False, stopped=True, why=why)
         self._guard.send(StatusReport("error", why).encode())
         try:
             self._stop(self._deceleration)
@@ -334,9 +334,6 @@ class DriverProcess:
 
     def _report_restart(self, over: bool) -> None:
         self._guard.send(StatusReport("restarted" if over else "restarts").encode())
-
-    def _refuse_waiting(self, why: str) -> None:
-        self._answer_waiting(ok=False, stopped=True, why=why)
 
     def _answer_waiting(self, **answer: Any) -> None:
         waiting, self._waiting = self._waiting, []

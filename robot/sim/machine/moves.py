@@ -195,22 +195,20 @@ class MoveFunctions:
     def stopj(self, a: float = 2.0) -> Wait:
         """Slow down all joints in proportion; return at standstill, at once if the arm stands."""
         (a,) = _numbers(a)
-        self._program.drive()
-        if self._arm.moving:
-            yield from self._move(lambda: StopJoints(a), a=a)
-        else:
-            self._arm.motion = None
-            self._host.log("motion", kind="StopJoints", program=self._program.name, a=a, moving=False)
+        yield from self._stop(StopJoints, lambda: StopJoints(a), a)
 
     def stopl(self, a: float = 20.0, aRot: float | None = None) -> Wait:
         """Slow down the tool; return at standstill, at once if the arm stands."""
         a, aRot = _numbers(a, a if aRot is None else aRot)
+        yield from self._stop(StopTool, lambda: StopTool(self._arm, a, aRot), a)
+
+    def _stop(self, kind: type[Motion], make: Callable[[], Motion], a: float) -> Wait:
         self._program.drive()
         if self._arm.moving:
-            yield from self._move(lambda: StopTool(self._arm, a, aRot), a=a)
+            yield from self._move(make, a=a)
         else:
             self._arm.motion = None
-            self._host.log("motion", kind="StopTool", program=self._program.name, a=a, moving=False)
+            self._host.log("motion", kind=kind.__name__, program=self._program.name, a=a, moving=False)
 
     def set_pos(self, q: Any) -> None:
         """Put a simulated arm that stands at joint positions, without a motion."""

@@ -137,34 +137,22 @@ class ProgramFolder:
             raise FileNotFoundError(name)
         return path
 
-    def read(self, name: str) -> bytes:
-        """Return the content of a file.
-
-        Raises:
-            FileNotFoundError: there is no such file.
-            OSError: it cannot be read, or is too long.
-        """
-        path = self.locate(name)
-        if not path.is_file():
-            raise FileNotFoundError(name)
-        return read_file(path, _MAX_PROGRAM_SIZE)
-
     def load(self, name: str) -> ProgramFile:
         """Return a program.
 
         Raises:
             FileNotFoundError: there is no such file.
-            OSError: it cannot be read.
+            OSError: it cannot be read, or is too long.
             ScriptError: it is not a program, or not one that is simulated.
         """
-        path, source = self.locate(name), name
-        data = self.read(name)
-        beside = path.with_suffix(".script")
-        if path.suffix == ".urp" and beside.is_file():
-            data, source = read_file(beside, _MAX_PROGRAM_SIZE), beside.name
+        path = source = self.locate(name)
+        if not path.is_file():
+            raise FileNotFoundError(name)
+        if path.suffix == ".urp" and (beside := path.with_suffix(".script")).is_file():
+            source = beside
         assert self.root is not None
         shown = f"{_PROGRAM_ROOTS[1]}{path.relative_to(self.root).as_posix()}"
-        return ProgramFile(path.name, shown, _read_program(Path(source).name, data))
+        return ProgramFile(path.name, shown, _read_program(source.name, read_file(source, _MAX_PROGRAM_SIZE)))
 
     def has(self, name: str) -> bool:
         """Return whether there is such a file."""

@@ -208,13 +208,9 @@ def text_of(value: Any) -> str:
 
 
 def _text_of(value: Any) -> str:
-    if isinstance(value, str | bool):
-        return str(value)
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            return str(value)
+    if isinstance(value, float) and math.isfinite(value):
         return f"{value:.6f}".rstrip("0").removesuffix(".")
-    if isinstance(value, int):
+    if isinstance(value, str | int | float):
         return str(value)
     if isinstance(value, list):
         return f"{'p' * isinstance(value, PoseValue)}[{', '.join(map(_text_of, value))}]"
