@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coneskin.robot.sim.machine import program
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import _MAX_SECONDARY, Controller
 from coneskin.robot.sim.machine.states import Options
@@ -132,9 +133,9 @@ class Watched:
     def run(self, text: str, cycles: int = 30) -> str:
         """Run what arrives on a script port; return why it could not, or an empty string."""
         programs, _ = complete_programs(text)
-        for program in programs:
+        for text in programs:
             try:
-                made = translate(program, Builtins.names(), Builtins.blocking())
+                made = translate(text, Builtins.names(), Builtins.blocking())
             except ScriptError as exc:
                 return str(exc)
             if not made.secondary:
@@ -149,7 +150,8 @@ class Watched:
 
 @pytest.mark.parametrize("kind", ["def", "sec"])
 @pytest.mark.parametrize("name", BOMBS)
-def test_a_bomb_ends_itself_and_the_next_program_runs(name: str, kind: str) -> None:
+def test_a_bomb_ends_itself_and_the_next_program_runs(name: str, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "_MAX_TURN_TIME", 0.02)
     watched = Watched()
     watched.run(f"{kind} bomb():\n {BOMBS[name]}\nend\n")
     watched.controller.stop_program("test")

@@ -67,7 +67,7 @@ def test_an_unknown_arm_fits_no_model():
 
 def test_the_simulated_controller_is_asked():
     with served(model="ur10e", start_q=Q) as simulated:
-        pose = read_pose(simulated.host)
+        pose = read_pose(simulated.host, 30.0)
         check_model(arm_model("UR10e"), pose, simulated.host)
         with pytest.raises(RobotRefused, match=r"is no UR5e: its flange is .* mm .* UR10e"):
             check_model(arm_model("UR5e"), pose, simulated.host)

@@ -14,6 +14,7 @@ from coneskin.robot.ur.state_reader import RECIPE, StateReader, decode_state
 from coneskin.robot.ur.stop_sockets import StopSockets
 from tests.support.served_controller import served
 
+PATIENCE = 30.0  # s; a slow machine is no failure
 ZEROS = (0.0,) * 6
 Q = (0.1, -1.2, 1.3, -1.4, -1.5, 0.6)
 
@@ -25,8 +26,8 @@ def controller():
 
 
 def test_it_reads_what_the_controller_does(controller):
-    with StateReader(controller.host) as reader:
-        first, second = reader.wait(2.0), reader.wait(2.0)
+    with StateReader(controller.host, PATIENCE) as reader:
+        first, second = reader.wait(PATIENCE), reader.wait(PATIENCE)
     assert first.q == Q
     assert first.speed == 0.0
     assert first.powered
@@ -41,8 +42,8 @@ def test_it_reads_what_the_controller_does(controller):
 
 def test_it_reads_the_currents_that_the_motors_take(controller):
     controller.call("resist 2 3.5")
-    with StateReader(controller.host) as reader:
-        state = reader.wait(2.0)
+    with StateReader(controller.host, PATIENCE) as reader:
+        state = reader.wait(PATIENCE)
     controller.call("resist 2 0")
     assert state.current == (0.0, 3.5, 0.0, 0.0, 0.0, 0.0)
     assert state.target_current == ZEROS
@@ -77,14 +78,14 @@ def test_safety_bits_and_modes_mean_what_the_manual_says():
 
 
 def test_external_stops_reach_the_arm(controller):
-    with StopSockets(controller.host) as stops, StateReader(controller.host) as reader:
+    with StopSockets(controller.host, PATIENCE) as stops, StateReader(controller.host, PATIENCE) as reader:
         assert list(stops.sockets()) == ["program", "command"]
         stops.drain()
         for path in (StopPath.PROGRAM, StopPath.COMMAND):
             assert stops.use(path, 5.0)
         assert stops.use(StopPath.PROTECTIVE, 5.0)
         for _ in range(500):
-            if reader.wait(2.0).stopped_by_safety:
+            if reader.wait(PATIENCE).stopped_by_safety:
                 break
         else:
             pytest.fail("the protective stop did not reach the controller")
