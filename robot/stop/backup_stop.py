@@ -124,8 +124,8 @@ class BackupStop:
 
     def reconnect(self, deceleration: float) -> None:
         """Open what is missing; where a stop path comes back, a stop with this deceleration goes through it."""
-        if self._connections.reopen():  # what was sent over the old ones may be lost
-            self._use(StopPath.PROGRAM, deceleration)
+        if self._connections.reopen() and not self._use(StopPath.PROGRAM, deceleration):
+            self._use(StopPath.COMMAND, deceleration)  # what was sent over the old ones may be lost
         now = self._clock()
         if now - max(self._fresh, self._opened) < (_BLIND_TIMEOUT if self._reader is not None else _CONNECT_TIMEOUT):
             return
