@@ -11,12 +11,22 @@ from coneskin.geometry.drawing.cut_sheet import cut_sheets, make_test_piece
 from coneskin.geometry.drawing.dxf import to_dxf
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
+from tests.support.sweep import sweep
 
 from ..drawing_readers import dxf_entities, dxf_header, dxf_layers, dxf_pairs, dxf_texts, read_dxf
 from ..sheet_cases import SHEETS
 
 mp.mp.dps = 40
 SEAM = 0.01  # mm, what the seam may be off: the promise to the maker
+
+#: a cone, a tube, a disc, and a cone that is cut as a tube; then every sheet that closes
+KINDS = [
+    ("widening", "loose"),
+    ("cylinder", "bonded"),
+    ("flipped disc", "loose"),
+    ("nearer cylinder, snapped", "bonded"),
+]
+EVERY_KIND = [(name, how) for name in SHEETS if name != "partial wrap" for how in ("loose", "bonded")]
 
 
 def surface(point, radius1, radius2, height, wrap, mirrored):
@@ -58,8 +68,7 @@ def seam_edges(strokes, cone, mirrored):
     return edges[0][1], edges[-1][1]
 
 
-@pytest.mark.parametrize("assembly", ["loose", "bonded"])
-@pytest.mark.parametrize("name", [name for name in SHEETS if name != "partial wrap"])
+@pytest.mark.parametrize(("name", "assembly"), sweep(dict.fromkeys([*KINDS, *EVERY_KIND]), short=len(KINDS)))
 def test_cut_outlines_rolled_onto_the_cone_meet_at_the_seam_on_every_layer(name, assembly):
     link, stack = SHEETS[name], LayerStack(PAPER_STACK.layers, assembly)
     plan = ElectrodePlan()
@@ -133,7 +142,9 @@ def test_rims_are_true_arcs_with_the_radius_of_the_sector():
     assert sorted(found) == pytest.approx(sorted(wanted), rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["cylinder", "near cylinder, 0.0008 deg", "flipped", "theta0 of 276 deg", "disc"])
+@pytest.mark.parametrize(
+    "name", sweep(["near cylinder, 0.0008 deg", "theta0 of 276 deg", "cylinder", "flipped", "disc"], short=2)
+)
 def test_styles_of_arcs_draw_the_same(name):
     sheets = cut_sheets(lay_out_sheet(SHEETS[name]), PAPER_STACK)
     bulge = read_dxf(to_dxf(sheets))
