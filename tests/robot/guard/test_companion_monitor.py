@@ -153,10 +153,10 @@ def test_a_reset_while_the_driver_hangs_is_refused_with_its_name():
 
 @pytest.mark.promise("P62")
 def test_a_reset_of_another_stop_than_the_newest_forgives_nothing():
-    rig = GuardRig(touch(0.5, 0.7), touch(2.5, 2.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
+    rig = GuardRig(touch(0.5, 0.7), touch(1.7, 1.9), reaction=Reaction(kind="stop"), speed=1.0).run(1.0)
     rig.reset()
     rig.arm.target = None
-    rig.run(2.0)
+    rig.run(1.2)
     assert [event.details["stop"] for event in rig.events if event.name == "latched"] == [1, 2]
     for payload in (b"", b"0 1", b"1 1", b"3 1", b"99 1", b"x y", b"2", b"2 1 1", b"-2 1"):
         rig.feed(BlockKind.RESET, payload)
