@@ -17,6 +17,7 @@ import pytest
 
 from coneskin import __version__
 from coneskin.cli import COMMANDS, main
+from coneskin.core.version import code_build
 
 from .scene.scenes import SKIN_ONLY, record
 
@@ -93,7 +94,7 @@ def test_the_help_of_the_program_names_all_commands(capsys: Output) -> None:
     assert "Not a safety-rated device" in text
     assert "example:" in text
     assert run("--version") == 0
-    assert capsys.readouterr().out == f"coneskin {__version__}\n"
+    assert capsys.readouterr().out == f"coneskin {__version__} ({code_build()})\n"
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -124,7 +124,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory, wheel: Path) -> Path:
 
 def test_the_installed_wheel_runs_without_the_tree(installed: Path, tmp_path: Path) -> None:
     programs = installed
-    assert run(programs / "coneskin", "--version", cwd=tmp_path) == f"coneskin {coneskin.__version__}\n"
+    assert run(programs / "coneskin", "--version", cwd=tmp_path) == f"coneskin {coneskin.__version__} (pure)\n"
     cone = ("--radius1-mm", "40", "--radius2-mm", "70", "--height-mm", "150")
     assert "203.960781 mm" in run(programs / "coneskin", "unroll", *cone, cwd=tmp_path)  # as in demos/01_unroll.py
     if sys.platform != "win32":  # the demo's virtual skin needs a pseudo-terminal

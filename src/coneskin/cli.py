@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from .core.errors import ConeSkinError, MissingExtra
 from .core.text import printable
-from .core.version import __version__
+from .core.version import __version__, code_build
 
 __all__ = ["COMMANDS", "main"]
 
@@ -109,7 +109,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     parser.add_argument(
         "--completion", metavar="SHELL", choices=_SHELLS, help=f"print the completion code of {', '.join(_SHELLS)}"
     )
-    parser.add_argument("--version", action="version", version=f"coneskin {__version__}")
+    parser.add_argument("--version", action="version", version=f"coneskin {__version__} ({code_build()})")
     said = "one of the above; `coneskin COMMAND --help` explains it"
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, prog="coneskin", help=said)
     chosen = next((word for word in words if not word.startswith("-")), None)

@@ -7,7 +7,7 @@ import pytest
 
 from coneskin import __version__
 from coneskin.core import version
-from coneskin.core.version import code_commit, recorded_version, running_version
+from coneskin.core.version import code_commit, code_versions, recorded_version, running_version
 
 
 def commit_of(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
@@ -43,11 +43,12 @@ def test_code_that_was_installed_without_git_has_its_version_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert commit_of(tmp_path, monkeypatch) == ""
-    monkeypatch.setattr(version, "code_commit", lambda: "")
-    assert running_version() == __version__
+    assert recorded_version({"coneskin": __version__, "commit": "", "build": "pure"}) == f"{__version__} (pure)"
 
 
 def test_a_header_says_who_recorded() -> None:
     assert recorded_version({"coneskin": "0.1.0", "commit": "984714cdeadbeef"}) == "0.1.0 (984714c)"
     assert recorded_version({"coneskin": "0.1.0", "commit": ""}) == "0.1.0"
+    assert recorded_version({"coneskin": "0.1.0", "commit": "984714c", "build": "pure"}) == "0.1.0 (984714c, pure)"
+    assert recorded_version(code_versions()) == running_version()
     assert recorded_version({"coneskin": 7}) == recorded_version({}) == ""

@@ -1,4 +1,4 @@
-"""Version of the code that runs: that of the package, and the commit where it runs from a repository."""
+"""Version of the code that runs: that of the package, its commit in a repository, and whether it is compiled."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["code_commit", "recorded_version", "running_version"]
+__all__ = ["code_build", "code_commit", "code_versions", "recorded_version", "running_version"]
 
 __version__ = "0.1.0"  # the one place: pyproject.toml reads it from here
 
 _COMMIT_DIGITS = 7  # digits of a commit, for people
+_HEADER_KEYS = ("coneskin", "commit", "build")  # of a recording
 
 
 @cache
@@ -38,18 +39,23 @@ def code_commit() -> str:
         return ""
 
 
+def code_build() -> str:
+    """Return what the live path and replays run as: ``compiled`` by mypyc, or ``pure`` Python. Both decide the same."""
+    return "pure" if __file__.endswith((".py", ".pyc")) else "compiled"
+
+
+def code_versions() -> dict[str, str]:
+    """Return what a recording's header says of this code."""
+    return dict(zip(_HEADER_KEYS, (__version__, code_commit(), code_build()), strict=True))
+
+
 def running_version() -> str:
-    """Return the version of this code for people, such as ``0.1.0 (984714c)``."""
-    return _words(__version__, code_commit())
+    """Return the version of this code for people, such as ``0.1.0 (984714c, pure)``."""
+    return recorded_version(code_versions())
 
 
 def recorded_version(header: Mapping[str, Any]) -> str:
     """Return the version of the code that made a recording, from its header; empty where that does not tell."""
-    version, commit = header.get("coneskin"), header.get("commit")
-    if not isinstance(version, str) or not version:
-        return ""
-    return _words(version, commit if isinstance(commit, str) else "")
-
-
-def _words(version: str, commit: str) -> str:
-    return f"{version} ({commit[:_COMMIT_DIGITS]})" if commit else version
+    version, commit, build = (found if isinstance(found := header.get(key), str) else "" for key in _HEADER_KEYS)
+    details = ", ".join(filter(None, (commit[:_COMMIT_DIGITS], build)))
+    return f"{version} ({details})" if version and details else version

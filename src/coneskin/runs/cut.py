@@ -18,7 +18,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
-from coneskin.core.version import __version__, code_commit
+from coneskin.core.version import code_versions
 from coneskin.robot.driver.messages import Release, StatusReport
 from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, Command, EventName, GuardEvent, Output
 from coneskin.scene.settings import resolved_settings
@@ -115,7 +115,7 @@ def cut_run(
     if run.gap <= until:
         raise RecordingError(f"the part up to {until - start:.3f} s is not whole, so nothing is cut out: {run.missing}")
     cut = {"from": name, "around_s": around, "keep_s": length}
-    made_by = {"coneskin": __version__, "commit": code_commit(), "resolved": resolved_settings(run.scene())}
+    made_by = {**code_versions(), "resolved": resolved_settings(run.scene())}
     header = {**run.header, **made_by, "cut": cut}  # its events are those of today's code
     all_of_it: Decisions | None = None
     while True:

@@ -21,7 +21,7 @@ from coneskin.core.errors import ConeSkinError, RecordingError
 from coneskin.core.recording.block import Block, decode_blocks
 from coneskin.core.recording.reader import parts_of
 from coneskin.core.recording.recorder import Recorder
-from coneskin.core.version import __version__, code_commit
+from coneskin.core.version import code_versions
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, decode_event
 from coneskin.scene.values.scene import RecordingScene
 
@@ -87,8 +87,7 @@ class EventLog:
             return
         self._recorder.__enter__()
         clocks = {"monotonic": self.began, "unix": time.time()}
-        versions = {"coneskin": __version__, "commit": code_commit(), "python": sys.version.split()[0]}
-        full = {**header, **versions, "clocks": clocks}
+        full = {**header, **code_versions(), "python": sys.version.split()[0], "clocks": clocks}
         self._recorder.write(Block(BlockKind.HEADER, clocks["monotonic"], json.dumps(full).encode()))
 
     def feed(self, data: bytes) -> None:
