@@ -3,9 +3,12 @@
 # make check   what CI runs: format, lint, types, all tests
 # make docs    the site, in build/site
 # make fuzz    the property tests with new random examples; SEED=123 repeats a run, MINUTES=5 goes on with new seeds
-# make dist    wheel and source distribution, in dist/
+# make dist    wheel and source distribution, in dist/; where there is a C compiler, a compiled wheel too
+# make compiled  compile the live path in place, by mypyc; make pure takes that back; neither is needed for anything
+# make check-compiled  the short tests, and all bit-exact replays, on a compiled copy in build/compiled
 VENV ?= .venv
 BIN := $(VENV)/bin
+CORES ?= $(shell nproc 2>/dev/null || echo 2)
 # ur-rtde ships wheels for Python 3.11 and 3.12
 PYTHON ?= $(shell for p in python3.12 python3.11 python3; do \
 	$$p -c 'import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' 2>/dev/null && echo $$p && break; done)
@@ -13,7 +16,7 @@ PYTHON ?= $(shell for p in python3.12 python3.11 python3; do \
 # hundreds of Python processes start in the tests: without bytecode on the disk each of them compiles all modules anew
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test check docs fuzz dist clean
+.PHONY: demo test check docs fuzz dist compiled pure check-compiled clean
 demo: $(VENV)/demo.stamp
 	$(BIN)/coneskin demo
 
@@ -32,6 +35,22 @@ fuzz: $(VENV)/test.stamp
 dist: $(VENV)/dev.stamp
 	rm -rf dist
 	$(BIN)/python -m build
+	! command -v cc >/dev/null || CONESKIN_COMPILE=1 $(BIN)/python -m build --wheel
+
+compiled: $(VENV)/dev.stamp
+	CONESKIN_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace --parallel $(CORES)
+
+pure:
+	find -L src \( -name '*.so' -o -name '*.pyd' \) -delete
+
+# a copy of the package with the compiled modules beside their sources
+build/compiled/done: setup.py $(shell find -L src/coneskin -name '*.py') | $(VENV)/dev.stamp
+	rm -rf build/compiled
+	CONESKIN_COMPILE=1 $(BIN)/python setup.py -q build --build-lib build/compiled --parallel $(CORES)
+	touch $@
+
+check-compiled: $(VENV)/dev.stamp build/compiled/done
+	PATH="$(CURDIR)/$(BIN):$$PATH" PYTHONPATH="$(CURDIR)/build/compiled" scripts/tests "not long" $(COMPILED_TESTS)
 
 $(VENV)/bin/python:
 	@test -n "$(PYTHON)" || { echo "coneskin needs Python 3.11 or 3.12 with venv: name one with make PYTHON=..."; exit 1; }

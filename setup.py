@@ -3,17 +3,66 @@
 With ``"" = "src"`` an editable install is one plain path, which type checkers and editors follow. A git without
 symbolic links (Windows) writes the links as small files. The three folders at the root are then named one by one, which
 works as well, but hides an editable install from type checkers.
+
+With ``CONESKIN_COMPILE=1`` in the environment, mypyc compiles the modules of ``COMPILED``. Everything else, and every
+other build, is pure Python. ``CONESKIN_OPTIMIZE`` is the C compiler's level, 3 where it is not set.
 """
 
+import os
+import shutil
+import sys
 from pathlib import Path
 
 from setuptools import find_packages, setup
 
 ROOT = Path(__file__).parent
+#: modules of the live path and of replays, by the library that they become; each library is one run of the C compiler
+COMPILED = {
+    "skin": ("core/version", "core/channel", "core/recording/*", "skin/*", "skin/detection/*", "skin/detection/*/*"),
+    "robot": ("robot/driver/*", "robot/stop/*", "robot/guard/*", "robot/guard/*/*", "robot/ur/*"),
+    "motion": ("robot/arm/*", "robot/reaction/*"),
+}
+#: what stays Python there: mypyc cannot translate its kinds of class
+UNFIT = {"journal", "messages", "deadman", "protocol"}
+#: ... and what no touch waits for: preparation, other processes, ports, arrays
+PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_functions", "wiring_hypothesis", "inertia"}
+PREPARATION |= {"inverse_kinematics", "compiled_kinematics", "registry", "defects", "retention"}
+PROCESSES = {"backup_stop", "watchdog_process", "driver", "driver_process", "examination", "input_writers"}
+PROCESSES |= {"model_check", "program_io", "rtde_connection", "state_reader", "stop_sockets", "ur_rtde"}
+ARRAYS = {"frame_batch", "quiet_frames", "quiet_inputs"}
+PURE = UNFIT | PREPARATION | PROCESSES | ARRAYS
+
 packages, package_dir = find_packages(str(ROOT / "src")), {"": "src"}
+linked = True
 for folder in ("geometry", "skin", "robot"):
     if not (ROOT / "src" / "coneskin" / folder).is_dir():
+        linked = False
         name = f"coneskin.{folder}"
         packages += [name, *(f"{name}.{inner}" for inner in find_packages(str(ROOT / folder)))]
         package_dir[name] = folder
-setup(packages=packages, package_dir=package_dir)
+
+
+def extensions() -> list:
+    """Translate the modules to C."""
+    from mypyc.build import mypycify
+
+    if not linked:
+        sys.exit("src/coneskin lacks its links, as in a git without them: compile from the source distribution")
+    groups = []
+    for name, patterns in COMPILED.items():
+        files = [path for pattern in patterns for path in Path("src/coneskin").glob(f"{pattern}.py")]
+        groups.append((sorted(str(path) for path in files if path.stem not in PURE), f"coneskin_{name}"))
+    shutil.rmtree("build/c", ignore_errors=True)  # mypy's cache of other modules would be taken for these
+    level = os.environ.get("CONESKIN_OPTIMIZE", "3")
+    paths = [path for files, _ in groups for path in files]
+    words = ["--cache-dir=build/c/mypy", *paths]
+    return mypycify(words, separate=groups, opt_level=level, debug_level="0", target_dir="build/c")
+
+
+compiling = os.environ.get("CONESKIN_COMPILE") == "1"
+setup(
+    packages=packages,
+    package_dir=package_dir,
+    ext_modules=extensions() if compiling and {"build", "build_ext", "bdist_wheel"} & set(sys.argv) else [],
+    setup_requires=["mypy>=1.18", "numpy>=1.26"] if compiling else [],
+)

@@ -28,6 +28,7 @@ class Bench:
 BENCHES = {
     # the guard's loop
     "loop": Bench("bench.loop.stages", "ur_rtde, the controller, the arm, a real serial adapter, a busy machine."),
+    "compiled": Bench("bench.loop.compiled", "Ports, processes and the driver: inputs come from memory."),
     "publish": Bench("bench.loop.publish", "Subscribers on another computer."),
     "start": Bench("bench.loop.start", "The start of an arm's driver."),
     "endurance": Bench("bench.loop.endurance", "Sockets, the disk and ur_rtde: frames come from memory."),

@@ -38,9 +38,14 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(tryfirst=True)  # before -m selects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests with real processes: they mostly wait, and need a share of the computer when they do not."""
+    from coneskin.core.version import code_build
+
+    compiled = code_build() == "compiled"
     for item in items:
         if _has_processes(item.path):
             item.add_marker(pytest.mark.processes)
+        if compiled and item.get_closest_marker("pure"):
+            item.add_marker(pytest.mark.skip("of the pure Python code: it is patched, or its calls are counted"))
 
 
 @cache
@@ -48,11 +53,22 @@ def _has_processes(path: Path) -> bool:
     return any(path.is_relative_to(_HERE / place) for place in _WITH_PROCESSES)
 
 
-def pytest_report_header(config: pytest.Config) -> str | None:
-    """Say in the first lines what the short run leaves out."""
+def pytest_report_header(config: pytest.Config) -> list[str]:
+    """Say in the first lines which build is tested, and what the short run leaves out.
+
+    Raises:
+        pytest.UsageError: compiled modules are not those of the sources beside them.
+    """
+    from coneskin.core import version
+
+    for path in Path(version.__file__).parents[1].rglob("*.so"):
+        source = path.with_name(f"{path.name.partition('.')[0]}.py")
+        if source.exists() and source.stat().st_mtime > path.stat().st_mtime:
+            raise pytest.UsageError(f"{source} is newer than its compiled module: make compiled, or make pure")
+    lines = [f"coneskin: {version.code_build()}"]
     if config.option.markexpr == _SHORT:
-        return "short run: tests marked long are deselected; `make check` or `pytest -m ''` runs them too"
-    return None
+        lines.append("short run: tests marked long are deselected; `make check` or `pytest -m ''` runs them too")
+    return lines
 
 
 def _children() -> frozenset[str]:

@@ -91,6 +91,7 @@ def test_where_there_is_no_contact_nothing_is_cut(
     assert not (tmp_path / "cut.rec").exists()
 
 
+@pytest.mark.pure
 def test_a_cut_that_the_disk_does_not_take_leaves_nothing(
     collision: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

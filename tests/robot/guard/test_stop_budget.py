@@ -7,6 +7,8 @@ import os
 import sys
 from types import FrameType
 
+import pytest
+
 from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, EventName, GuardEvent, Output
 from coneskin.runs.replay.run import read_run
@@ -77,6 +79,7 @@ def stop_of_the_collision() -> Sink:
     raise AssertionError("nothing has stopped the arm")
 
 
+@pytest.mark.pure  # compiled calls are not seen by a profiler
 def test_the_way_of_a_stop_keeps_its_budget() -> None:
     sink = stop_of_the_collision()
     names = [os.path.basename(path).removesuffix(".py") for path in sink.way]

@@ -278,6 +278,7 @@ def test_a_touch_that_begins_or_ends_between_two_phases_is_a_touch(seed):
     assert [type(event) for event in events if not isinstance(event, TouchMoved)] == [TouchBegan, TouchEnded]
 
 
+@pytest.mark.pure
 def test_the_alarm_sounds_before_the_place_is_worked_out(monkeypatch):
     bench, order, begin = DetectorBench(), [], TouchPlace.begin
     bench.feed(times=100)

@@ -29,6 +29,8 @@ COUNTS = Frame._fields[6:-1]
 LEARNED = 200  # frames
 OFTEN = 8  # frames; an estimate serves for as many
 
+pytestmark = pytest.mark.pure  # they count calls
+
 
 class CountedTouch:
     """A detector that has learned, and how often its decoder works out a place."""
