@@ -18,15 +18,15 @@ from setuptools import find_packages, setup
 ROOT = Path(__file__).parent
 #: modules of the live path and of replays, by the library that they become; each library is one run of the C compiler
 COMPILED = {
-    "skin": ("core/version", "core/channel", "core/recording/*", "skin/*", "skin/detection/*", "skin/detection/*/*"),
+    "skin": ("core/version", "skin/*", "skin/detection/*", "skin/detection/*/*"),
     "robot": ("robot/driver/*", "robot/stop/*", "robot/guard/*", "robot/guard/*/*", "robot/ur/*"),
     "motion": ("robot/arm/*", "robot/reaction/*"),
 }
-#: what stays Python there: mypyc cannot translate its kinds of class
+#: what stays Python there: an enumeration with a __new__, empty named tuples, protocols, a keyword of C as a name
 UNFIT = {"journal", "messages", "deadman", "protocol"}
 #: ... and what no touch waits for: preparation, other processes, ports, arrays
 PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_functions", "wiring_hypothesis", "inertia"}
-PREPARATION |= {"inverse_kinematics", "compiled_kinematics", "registry", "defects", "retention"}
+PREPARATION |= {"inverse_kinematics", "compiled_kinematics", "registry"}
 PROCESSES = {"backup_stop", "watchdog_process", "driver", "driver_process", "examination", "input_writers"}
 PROCESSES |= {"model_check", "program_io", "rtde_connection", "state_reader", "stop_sockets", "ur_rtde"}
 ARRAYS = {"frame_batch", "quiet_frames", "quiet_inputs"}
