@@ -96,7 +96,7 @@ def test_a_silent_controller_is_a_fault_and_every_way_is_tried():
 def test_a_stop_that_does_not_show_is_followed_by_the_next_way(works):
     rig = GuardRig(touch(0.5), obeys=frozenset([works]), speed=0.0)
     rig.run(0.3)
-    rig.arm._go([1.0, 0, 0, 0, 0, 0], 100.0)  # somebody else moves it; the driver's stop does nothing
+    rig.arm.go([1.0, 0, 0, 0, 0, 0], 100.0)  # somebody else moves it; the driver's stop does nothing
     rig.run(1.5)
     paths = [o for o in rig.arm.commands if isinstance(o, StopPath)]
     assert paths == list(INTERNAL_PATHS[1 : INTERNAL_PATHS.index(works) + 1])
@@ -110,7 +110,7 @@ def test_a_stop_that_does_not_show_is_followed_by_the_next_way(works):
 def test_an_arm_that_nothing_stops_is_never_called_standing():
     rig = GuardRig(touch(0.5), obeys=frozenset(), speed=0.0)
     rig.run(0.3)
-    rig.arm._go([1.0, 0, 0, 0, 0, 0], 100.0)
+    rig.arm.go([1.0, 0, 0, 0, 0, 0], 100.0)
     rig.run(3.0)
     assert rig.core.phase is Phase.STOPPING
     assert "standstill" not in rig.names
@@ -121,7 +121,7 @@ def test_an_arm_that_nothing_stops_is_never_called_standing():
 
 def test_a_dead_driver_is_not_waited_for():
     rig = GuardRig(touch(0.5), obeys=frozenset([StopPath.PROGRAM]), speed=0.0).run(0.3)
-    rig.arm._go([1.0, 0, 0, 0, 0, 0], 100.0)
+    rig.arm.go([1.0, 0, 0, 0, 0, 0], 100.0)
     rig.run(0.203)
     assert isinstance(rig.arm.commands[-1], StopProgram)
     rig.feed(BlockKind.LOST, b"driver\nthe driver process has ended")
