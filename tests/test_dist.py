@@ -4,6 +4,7 @@ pip fetches the tools and the dependencies of these environments, so these tests
 """
 
 import json
+import os
 import shutil
 import socket
 import subprocess
@@ -15,7 +16,7 @@ from pathlib import Path
 import pytest
 
 import coneskin
-from tests.support.paths import ROOT
+from tests.support.paths import COLLISION, ROOT
 
 pytestmark = pytest.mark.long
 
@@ -33,8 +34,9 @@ Frustum("40", 0.07, 0.15)
 """
 
 
-def run(*command: str | Path, cwd: Path) -> str:
-    done = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True, timeout=600)
+def run(*command: str | Path, cwd: Path, **variables: str) -> str:
+    words, variables = [str(word) for word in command], {**os.environ, **variables}
+    done = subprocess.run(words, cwd=cwd, env=variables, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -154,6 +156,20 @@ def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tm
     assert said.pop("dashboard") == b"Conn"
     assert set(said) == {"primary", "secondary", "realtime"}
     assert all(len(data) == 4 for data in said.values())
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+def test_a_compiled_wheel_replays_what_pure_python_has_recorded(tools: Path, built: Path, tmp_path: Path) -> None:
+    """Made from the source distribution, as the workflow does; only faster to translate."""
+    with tarfile.open(next(built.glob("*.tar.gz"))) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (tree,) = tmp_path.iterdir()
+    run(tools / "python", "-m", "build", "-q", "--wheel", cwd=tree, CONESKIN_COMPILE="1", CONESKIN_OPTIMIZE="0")
+    (compiled,) = (tree / "dist").glob("*.whl")
+    assert "-none-any" not in compiled.name
+    programs = environment(tmp_path / "venv", compiled)
+    assert run(programs / "coneskin", "--version", cwd=tmp_path) == f"coneskin {coneskin.__version__} (compiled)\n"
+    assert "the same, bit by bit" in run(programs / "coneskin", "replay", COLLISION, cwd=tmp_path)
 
 
 def test_type_checkers_see_an_editable_install(tmp_path: Path) -> None:
