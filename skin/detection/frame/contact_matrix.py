@@ -17,6 +17,7 @@ the noise of their currents.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from coneskin.skin.sensor import Sensor
@@ -72,12 +73,16 @@ class FrameInversion:
         upper, lower = radial * self._unit, angular * self._unit
         return upper / (1.0 - (self._a + self._b) * upper), lower / (1.0 - (self._c + self._d) * lower)
 
-    def invert(self, frame: Frame) -> ContactMatrix | None:
-        """Work out the contact matrix of a frame. None where nothing joins the sheets, or where they are not driven."""
+    def invert(self, counts: Sequence[float]) -> ContactMatrix | None:
+        """Work out the contact matrix. None where nothing joins the sheets, or where they are not driven.
+
+        Args:
+            counts: fields ``touch_c`` to ``angular_supply`` of a frame, or their means over several frames.
+        """
         lead_a, lead_b, lead_c, lead_d = self._a, self._b, self._c, self._d
         unit, load, pull = self._unit, self._input, self._pulldown
-        touch_c, touch_d, touch_current, radial_c, radial_d, radial, angular_a, angular_b, angular = frame[6:15]
-        supply0, supply1, supply2 = frame[15:18]
+        touch_c, touch_d, touch_current, radial_c, radial_d, radial = counts[:6]
+        angular_a, angular_b, angular, supply0, supply1, supply2 = counts[6:]
         # potentials as fractions of the supply, currents over it [S]; into the sensor positive
         scale = 1.0 / supply1
         c1, d1, drive = radial_c * scale, radial_d * scale, radial * unit * scale

@@ -103,7 +103,7 @@ def read(sensor: Sensor, frame: Frame, inversion: FrameInversion | None = None, 
         fault = Fault.LEAD
     if level < limits.release_level:
         return Reading(sensor, sequence, clock_us, level, None, False, fault)
-    matrix = (inversion or FrameInversion(sensor)).invert(frame)
+    matrix = (inversion or FrameInversion(sensor)).invert(frame[6:18])
     if matrix is None:
         return Reading(sensor, sequence, clock_us, level, None, False, fault)
     slack = limits.overshoot

@@ -293,10 +293,9 @@ class UntouchedLeak:
             self._close()
 
     def _close(self) -> None:
-        sums = [sum(counts) / LEAK_BLOCK for counts in zip(*[frame[6:18] for frame in self._frames], strict=True)]
-        mean = Frame._make((*self._frames[-1][:6], *sums, None))
+        means = [sum(counts) / LEAK_BLOCK for counts in zip(*[frame[6:18] for frame in self._frames], strict=True)]
         self._frames.clear()
-        matrix = self._inversion.invert(mean)
+        matrix = self._inversion.invert(means)
         self._blocks = min(self._blocks + 1, _LEAK_MEMORY)
         share = 1.0 / self._blocks
         if matrix is None or matrix.conductance < _MIN_LEAK:

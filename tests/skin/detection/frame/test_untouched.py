@@ -33,7 +33,7 @@ def learned(leak: float, blocks: int = 8) -> UntouchedLeak:
 def centre_of(frames: list[Frame]) -> ContactMatrix:
     """The matrix of the mean of some frames."""
     sums = [sum(counts) / len(frames) for counts in zip(*[frame[6:18] for frame in frames], strict=True)]
-    matrix = FrameInversion(FOREARM).invert(Frame._make((*frames[-1][:6], *sums, None)))
+    matrix = FrameInversion(FOREARM).invert(sums)
     assert matrix is not None
     return matrix
 

@@ -44,7 +44,7 @@ def errors(shape: str, bits: int, radius: float, ka: float, off: float, places: 
             for name, v in inputs.items()
         }
         frame = Frame(40, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]])
-        matrix = inversion.invert(frame)
+        matrix = inversion.invert(frame[6:18])
         assert matrix is not None
         one = noise.of(matrix, frame, NOISE**2 + 1.0 / 12.0)
         learned = SheetConductances(

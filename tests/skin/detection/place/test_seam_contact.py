@@ -37,20 +37,24 @@ def follow():
     return take
 
 
+@pytest.mark.pure
 def test_it_is_certain_where_it_rests_and_not_in_its_first_frame(follow):
     assert [follow(ALIKE), follow(ALIKE), follow(ALIKE, u=0.2), follow(ALIKE, u=0.2)] == [MOVES, "", MOVES, ""]
 
 
+@pytest.mark.pure
 def test_a_press_that_changes_is_doubted_until_it_was_certain_and_not_after(follow):
     assert [follow(ALIKE), follow(HARDER), follow(ALIKE), follow(HARDER)] == [MOVES, MOVES, "", ""]
 
 
+@pytest.mark.pure
 def test_after_the_touch_it_has_to_be_shown_anew(follow):
     assert [follow(ALIKE), follow(ALIKE)] == [MOVES, ""]
     follow.certainty.end()
     assert [follow(ALIKE), follow(HARDER)] == [MOVES, MOVES]
 
 
+@pytest.mark.pure
 def test_a_frame_that_contradicts_itself_says_so(follow):
     assert [follow(ALIKE), follow(ALIKE, valid=False)] == [MOVES, CONTRADICTS]
 
