@@ -46,6 +46,7 @@ def ends():
         channel.close()
 
 
+@pytest.mark.pure  # its core is a stub
 def test_a_connection_that_talks_does_not_stop_the_clock(ends):
     core, stops = Core(), Talkative()
     loop = GuardLoop(core, GuardPorts(ends[0], None, stops=stops))
@@ -59,6 +60,7 @@ def test_a_connection_that_talks_does_not_stop_the_clock(ends):
     stops.far.close()
 
 
+@pytest.mark.pure  # its core is a stub
 def test_a_program_that_has_gone_does_not_stop_the_clock(ends):
     core = Core()
     loop = GuardLoop(core, GuardPorts(ends[0], None))
@@ -70,6 +72,7 @@ def test_a_program_that_has_gone_does_not_stop_the_clock(ends):
     loop._close()
 
 
+@pytest.mark.pure  # its core is a stub
 @pytest.mark.promise("P59")
 @pytest.mark.parametrize("asleep", [False, True])
 def test_a_guard_that_was_suspended_says_so_to_its_core_before_anything_else(ends, asleep):

@@ -92,7 +92,7 @@ def comply(level, reaction=None):
 
 
 def list_of(contact):
-    return [getattr(contact, name) for name in contact.__slots__]
+    return [getattr(contact, name) for name in contact.__dataclass_fields__]
 
 
 def test_half_a_push_is_half_the_speed_and_it_comes_up_as_the_damping_says():

@@ -111,6 +111,7 @@ def test_a_frame_that_cannot_be_is_not_inverted_or_leaves_a_remainder(dead):
     assert remainder > 0.05
 
 
+@pytest.mark.pure  # it steps by parts of a count
 @pytest.mark.parametrize("polarity", POLARITIES)
 @pytest.mark.parametrize("touch", TOUCHES)
 @pytest.mark.parametrize("length", [36, 40])
