@@ -186,6 +186,7 @@ def session() -> Iterator[Channel]:
         channel.close()
 
 
+@pytest.mark.pure  # its core is a stub
 def test_the_loop_opens_it_only_once_the_arm_is_latched(session):
     core, attempts, source = _Latched(), [], _Pulled()
     ports = GuardPorts(session, source, reopen=lambda gone: attempts.append(_Attempt(gone)) or attempts[-1])
@@ -218,6 +219,7 @@ def test_the_loop_opens_it_only_once_the_arm_is_latched(session):
     loop._close()
 
 
+@pytest.mark.pure  # its core is a stub
 def test_a_loop_that_ends_stops_the_attempts(session):
     core, attempts = _Latched(), []
     core.phase = Phase.LATCHED
@@ -230,6 +232,7 @@ def test_a_loop_that_ends_stops_the_attempts(session):
     assert attempts[0].stopped
 
 
+@pytest.mark.pure  # its core is a stub
 @pytest.mark.promise("P09")
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
 def test_a_real_port_that_comes_back_is_read_again(session, tmp_path: Path):
