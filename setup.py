@@ -55,8 +55,8 @@ def extensions() -> list:
     shutil.rmtree("build/c", ignore_errors=True)  # mypy's cache of other modules would be taken for these
     level = os.environ.get("CONESKIN_OPTIMIZE", "3")
     paths = [path for files, _ in groups for path in files]
-    words = ["--cache-dir=build/c/mypy", *paths]
-    return mypycify(words, separate=groups, opt_level=level, debug_level="0", target_dir="build/c")
+    words = ["--config-file=", "--ignore-missing-imports", "--follow-imports=silent", "--cache-dir=build/c/mypy"]
+    return mypycify([*words, *paths], separate=groups, opt_level=level, debug_level="0", target_dir="build/c")
 
 
 compiling = os.environ.get("CONESKIN_COMPILE") == "1"
@@ -64,5 +64,5 @@ setup(
     packages=packages,
     package_dir=package_dir,
     ext_modules=extensions() if compiling and {"build", "build_ext", "bdist_wheel"} & set(sys.argv) else [],
-    setup_requires=["mypy>=1.18", "numpy>=1.26"] if compiling else [],
+    setup_requires=["mypy>=1.18"] if compiling else [],
 )

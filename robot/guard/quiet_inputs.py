@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RobotConnectionError
 from coneskin.core.recording.block import Block
+from coneskin.core.version import code_build
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.skin.detection.quiet_frames import QuietFrames, find_quiet_frames
 from coneskin.skin.frame_batch import find_frames
@@ -48,6 +49,10 @@ def take_inputs(core: GuardCore, blocks: Sequence[Block], take: Callable[[Block]
         blocks: inputs in a row, best ``BATCH`` of them. Numpy has to be there.
         take: gives the guard one input, which may make something happen.
     """
+    if code_build() == "compiled":  # one by one it is faster, and what is learned cannot be handed over
+        for block in blocks:
+            take(block)
+        return
     if not blocks:
         return
     batch = _Batch(core, blocks)

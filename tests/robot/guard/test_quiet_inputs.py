@@ -31,6 +31,9 @@ from .guard_state import state_of
 Blocks = list[Block]
 
 
+pytestmark = pytest.mark.pure
+
+
 def recorded(text: str, end: float = 1.2) -> tuple[Callable[[], GuardCore], Blocks]:
     scene = parse_scene(text, "scene.toml")
     touch = ScriptedTouch(0.9, 1.0, 0.07, math.pi / 2, sensor=scene.sensors[-1].sensor.name)
