@@ -224,16 +224,6 @@ class FrameDecoder:
             return [_read(layout, data, 0)]
         return self._search(self._rest + data)
 
-    @property
-    def rest(self) -> bytes:
-        """The bytes kept because they may be the beginning of a frame."""
-        return self._rest
-
-    def skip_to(self, frames: int, rest: bytes) -> None:
-        """Go on where so many more good frames were found elsewhere, and these bytes are left."""
-        self.frames += frames
-        self._rest = rest
-
     def _search(self, data: bytes) -> list[Frame]:
         """Look for frames from the beginning of data and keep the unfinished end: the slow path."""
         found: list[Frame] = []

@@ -125,7 +125,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
         "",
         "from coneskin.cli import main; assert main(['replay', {run!r}]) == 0",
         {*LOADED, "coneskin.runs.replay.run", "coneskin.robot.guard.core"},
-        (HEAVY - {"numpy"})  # which replays what is quiet many inputs at once
+        HEAVY
         | FIELD
         | SIMULATOR
         | {

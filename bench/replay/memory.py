@@ -14,12 +14,7 @@ from coneskin.runs.replay.run import read_run
 
 __all__ = ["memory"]
 
-_SCAN_PROGRAM = """
-import sys
-from coneskin.runs.replay.run import read_run
-from coneskin.runs.replay.touch_scan import scan_touches
-scan_touches(read_run(sys.argv[1]))
-"""
+_TOUCHES_PROGRAM = "import sys; from coneskin import read_run; read_run(sys.argv[1]).touches()"
 
 
 def memory(model: Path, folder: Path, megabytes: int) -> Iterator[str]:
@@ -35,7 +30,7 @@ def memory(model: Path, folder: Path, megabytes: int) -> Iterator[str]:
         "runs info": [*coneskin, "runs", "info", name],
         "runs verify": [*coneskin, "runs", "verify", name],
         "runs cut": [*coneskin, "runs", "cut", name, "--around", around, "-o", str(folder / "cut.out")],
-        "scan": [sys.executable, "-c", _SCAN_PROGRAM, name],
+        "touches": [sys.executable, "-c", _TOUCHES_PROGRAM, name],
         "replay": [*coneskin, "replay", name],
         "runs diff": [*coneskin, "runs", "diff", name],
         **{

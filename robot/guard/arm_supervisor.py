@@ -284,17 +284,6 @@ class ArmSupervisor:
         elif stop.watch.under_way and self.state_age.silent(now):
             self._stop_now(now, stop.again("the controller fell silent"), False, out)
 
-    def quiet_until(self) -> float:
-        """Return the host time before which a moving arm under guard makes nothing happen [s]; -inf in another phase.
-
-        That is as long as its states show the same of power, safety system and program.
-        """
-        at_work = self._stop.under_way or self._away.under_way or self._stop.watch.under_way
-        heard = self.heartbeat is None or self.heartbeat.silent
-        if self.phase is not Phase.ACTIVE or at_work or not heard or self._speed_limit is not None:
-            return -math.inf
-        return self.state_age.quiet_until()
-
     # ---- what it does
 
     def _stop_now(self, now: float, why: str, may_move: bool, out: Outputs, contact: Contact | None = None) -> None:

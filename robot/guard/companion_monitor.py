@@ -16,9 +16,9 @@ from coneskin.robot.stop.limits import MonitoringLimits
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
-__all__ = ["HELD_UP", "CompanionMonitor"]
+__all__ = ["CompanionMonitor"]
 
-HELD_UP = 0.02  #: s between two looks, from which on the guard itself was held up
+_MIN_STALL = 0.02  # s between two looks, from which on the guard itself was held up
 
 
 class _HeartbeatMonitor:
@@ -45,24 +45,13 @@ class _HeartbeatMonitor:
         """Monitor a process no longer: it is known to be gone."""
         self._limits.pop(process, None)
 
-    def quiet_until(self) -> float:
-        """Return the host time before which nobody becomes silent [s], whether or not more is heard."""
-        if not self._heard.keys() >= self._limits.keys():
-            return -math.inf
-        ends = (self._heard[name] + self._held_up[name] + limit for name, limit in self._limits.items())
-        return min(ends, default=math.inf)
-
-    def skip_to(self, now: float) -> None:
-        """Note a look at a host time [s] before which it was looked often, and nobody was silent."""
-        self._looked = now
-
     def silent(self, now: float) -> dict[str, str]:
         """Return what is wrong with each process that is silent. Empty where all are heard. To be asked continuously.
 
         Args:
             now: host time [s].
         """
-        if self._looked is not None and (held_up := now - self._looked) > HELD_UP:
+        if self._looked is not None and (held_up := now - self._looked) > _MIN_STALL:
             self._held_up = {process: max(held_up, longest) for process, longest in self._held_up.items()}
         self._looked = now
         found = {}
@@ -153,14 +142,6 @@ class CompanionMonitor:
             self._ran, self._restart_end = False, math.inf
             return "the driver's program has ended on the controller: its process may hang"
         return ""
-
-    def quiet_until(self) -> float:
-        """Return the host time before which no process is missed [s]; -inf where one is now."""
-        return -math.inf if self._silent else min(self._heartbeats.quiet_until(), self._restart_end)
-
-    def skip_to(self, now: float) -> None:
-        """Note a look at a host time [s] before which it was looked often, and no process was missed."""
-        self._heartbeats.skip_to(now)
 
     def poll(self, now: float) -> list[tuple[str, frozenset[StopPath]]]:
         """Return each process that has fallen silent since the last look: why, and what a stop must not count on.

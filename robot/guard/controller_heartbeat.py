@@ -59,11 +59,6 @@ class ControllerHeartbeat:
         self._reported = True
         return _NO_HEARTBEAT
 
-    @property
-    def silent(self) -> bool:
-        """True where nothing is said before a program starts, ends, or reports."""
-        return not self._running or self._reported or self._depends()
-
     def _depends(self) -> bool:
         if self._began is None or not self._echo:
             return False

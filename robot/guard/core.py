@@ -10,7 +10,6 @@ worked out after the command is out.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -30,8 +29,6 @@ from .signals.contact import Contact, GuardedSensor
 from .signals.journal import BlockKind, EventName, Outputs, decode_loss, emit
 
 if TYPE_CHECKING:
-    from coneskin.robot.driver.values import ControllerState
-
     from .arm_supervisor import ArmSupervisor
 
 __all__ = ["GuardCore"]
@@ -97,16 +94,6 @@ class GuardCore:
         return self._phase if self._arm is None else self._arm.phase
 
     @property
-    def stream(self) -> TouchStream:
-        """Skin's stream, with its detectors."""
-        return self._stream
-
-    @property
-    def arm(self) -> ArmSupervisor | None:
-        """Supervisor of the arm, or None."""
-        return self._arm
-
-    @property
     def needs(self) -> ControllerNeeds:
         """What it needs of the arm's controller."""
         return ControllerNeeds() if self._arm is None else self._arm.needs
@@ -144,34 +131,6 @@ class GuardCore:
             elif not detector.ready:
                 blockers.append(f"{name}: {fault.value if fault else 'settling'}")
         return blockers if self._arm is None else blockers + self._arm.blockers(now)
-
-    def quiet_until(self) -> float:
-        """Return the host time before which nothing is decided [s], whatever quiet input comes (``quiet_inputs``)."""
-        activating = self.phase is not Phase.ACTIVE or self._activation.resetting
-        if activating or self._contacts or not self._stream.settled:
-            return -math.inf
-        valid = [detector.timing.valid_at + self._limits.skin_silence for detector in self._stream.detectors]
-        arm = () if self._arm is None else (self._arm.quiet_until(), self._companions.quiet_until())
-        return min(self._folding.due, *valid, *arm)
-
-    def feed_quiet(self, block: Block, state: ControllerState | None, out: Outputs) -> None:
-        """Take a quiet input other than the skin's, without a look at what the passing of time shows.
-
-        Args:
-            block: the input.
-            state: in it, where it is one.
-            out: takes nothing.
-        """
-        if state is not None:
-            assert self._arm is not None
-            self._feed_state(self._arm, state, out)
-        elif (feeder := self._feeders.get(block.kind)) is not None:
-            feeder(block, out)
-
-    def skip_to(self, now: float) -> None:
-        """Go on at a host time [s], that of the last of many quiet inputs."""
-        if self._arm is not None:
-            self._companions.skip_to(now)
 
     # ---- the skin
 
@@ -253,10 +212,8 @@ class GuardCore:
     def _feed_arm(self, arm: ArmSupervisor, block: Block, out: Outputs) -> None:
         """Take a state of the arm, as it was sent."""
         what, decode = "the controller's state cannot be read", partial(arm.driver.decode_state, block.time)
-        if (state := self._decode(block, what, decode, out)) is not None:
-            self._feed_state(arm, state, out)
-
-    def _feed_state(self, arm: ArmSupervisor, state: ControllerState, out: Outputs) -> None:
+        if (state := self._decode(block, what, decode, out)) is None:
+            return
         now = state.time
         arm.sample(state, out)
         if state.stopped_by_safety and arm.phase.watched:

@@ -39,11 +39,6 @@ class EventFolding:
         self._kinds: dict[tuple[EventName, str], _Kind] = {}
         self._due = math.inf  # when the next count is [s]
 
-    @property
-    def due(self) -> float:
-        """Host time from which on a count is reported [s]. Infinite where none is."""
-        return self._due
-
     def emit(self, out: Outputs, name: EventName, about: str, now: float, **details: Any) -> None:
         """Put an event out, of a host time [s], or hold it back and count it.
 

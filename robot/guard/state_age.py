@@ -80,10 +80,6 @@ class StateAge:
         """Tell whether the newest state is too old at a host time [s]. One whose time does not go on is."""
         return now - self._fresh > self._limit
 
-    def quiet_until(self) -> float:
-        """Return the host time before which there is no trouble [s], whatever comes."""
-        return min(self._fresh, self._very_late_since) + self._limit
-
     def trouble(self, now: float) -> str:
         """Return what is wrong with how the states come, at a host time [s]. Empty where nothing is."""
         limit = f"{1e3 * self._limit:g} ms"

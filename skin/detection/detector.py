@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
@@ -28,9 +27,6 @@ from .frame.timing import FrameTiming
 from .frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak, UntouchedLevel
 from .place.touch_place import TouchPlace
 from .self_test import FrameSelfTest
-
-if TYPE_CHECKING:  # for replays only
-    from .quiet_frames import QuietFrames
 
 __all__ = ["Contradictions", "Detector", "TouchAlarm"]
 
@@ -103,23 +99,6 @@ class _StuckValues:
             still[k] = still[k] + 1 if counts[k] == last[k] else 0
         self._last = counts
         return max(still) >= self._most
-
-    def learn(self, frames: QuietFrames, begin: int, end: int) -> int:
-        """Take frames in a row. Return how many are taken: none where a value may be stuck."""
-        if not self._most:
-            return end - begin
-        last, still = end - 1, []
-        for k, (values, repeats) in enumerate(zip(frames.lively, frames.repeats, strict=True)):
-            here = repeats[last]
-            if here >= last - begin:  # it has had this value since the first frame
-                here = last - begin + (self._still[k] + 1 if values[begin] == self._last[k] else 0)
-            still.append(here)
-        longest = max(max(self._still) + end - begin, max(max(repeats[begin:end]) for repeats in frames.repeats))
-        if longest >= self._most:
-            return 0
-        self._still = still
-        self._last = tuple([values[last] for values in frames.lively])
-        return end - begin
 
 
 class Detector:
@@ -246,40 +225,6 @@ class Detector:
     def baseline(self) -> float:
         """Drift of the untouched level that is taken off."""
         return self._level.value
-
-    @property
-    def settled(self) -> bool:
-        """True while a quiet frame changes nothing but what is learned, which ``learn`` does."""
-        waiting = (
-            self.touched
-            or self._fault
-            or self._reported
-            or self._above
-            or self._contradictions.count
-            or self._diagnosis.active
-        )
-        return self.ready and not waiting
-
-    def learn(self, frames: QuietFrames, begin: int, end: int, final: bool = True) -> int:
-        """Take plain frames in a row as ``feed`` does, where the detector is settled and all of them are quiet.
-
-        Args:
-            frames: of this sensor.
-            begin: the first of them.
-            end: the one behind the last.
-            final: False: only tell what would be returned.
-
-        Returns:
-            ``end``, or the number of the first frame that is not quiet, or may not be. Then nothing was taken.
-        """
-        from .quiet_frames import learn_quiet_frames
-
-        parts = self.timing, self._guides, self._currents, self._level, self._stuck, self._leak
-        reached = learn_quiet_frames(parts, frames, begin, end, final)
-        if reached == end and final:
-            self._fed = frames.times[end - 1]
-            self._quiet += end - begin
-        return reached
 
     def distrust(self, fault: Fault, now: float, detail: str) -> list[SkinEvent]:
         """Report a fault of what this sensor's frames come through: it has to become ready anew.

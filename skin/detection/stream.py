@@ -96,12 +96,6 @@ class TouchStream:
             self._versions = self.decoder.unknown_versions
         return events
 
-    @property
-    def settled(self) -> bool:
-        """True while good frames change nothing but what the detectors learn."""
-        counted = self.decoder.bytes_skipped == self._skipped and self.decoder.unknown_versions == self._versions
-        return counted and not self._bad and all(detector.settled for detector in self.detectors)
-
     def silence(self, now: float, longest: float) -> list[SkinEvent]:
         """Report a fault, once, for each sensor that has sent no valid frame for longer than allowed [s]."""
         events: list[SkinEvent] = []

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from coneskin.core.progress import Progress, ProgressBar
 from coneskin.runs.cut import cut_run
 from coneskin.runs.decisions import decide_again
 from coneskin.runs.export.export import export_run
-from coneskin.runs.progress import Progress, ProgressBar
 from coneskin.runs.replay.run import Run
 from coneskin.runs.run_files import summarise_run
 from coneskin.runs.what_if.batch import judge_runs

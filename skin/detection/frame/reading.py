@@ -16,7 +16,7 @@ from coneskin.skin.wire import Frame, Status
 from .contact_matrix import ContactMatrix, FrameInversion
 from .faults import Fault
 
-__all__ = ["GUIDE_SLACK", "LEVEL_NOISE", "Reading", "TouchReading", "read"]
+__all__ = ["Reading", "TouchReading", "read"]
 
 
 class TouchReading(NamedTuple):
@@ -48,8 +48,8 @@ _pick_fields = itemgetter(
     *(Frame._fields.index(name) for name in _READING_FIELDS)
 )  # as fast as unpacking the whole frame
 _STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
-LEVEL_NOISE = 1.5  #: counts; noise of the level in the bound on what a leak between the layers puts on a guide
-GUIDE_SLACK = 0.05  #: part of the supply that a guide may stand above that bound
+_LEVEL_NOISE = 1.5  # counts; noise of the level in the bound on what a leak between the layers puts on a guide
+_GUIDE_SLACK = 0.05  # part of the supply that a guide may stand above that bound
 _NOISE_DEVIATIONS = 7.0  # standard deviations of noise that are no contradiction
 _DRIVE_LOSS = 0.03  # part of the supply that a driven electrode may lose beyond what its lead is told to
 _RECIPROCITY_ERROR = 0.5  # part of the larger side; beyond it two guides contradict each other
@@ -152,7 +152,7 @@ def _fault(sensor: Sensor, values: tuple[int, ...], level: float, noise: float) 
     lacking = bounds.weaker_guide * high - low
     if lacking > bounds.noise and lacking > _NOISE_DEVIATIONS * noise:
         return Fault.GUIDES_DISAGREE
-    most = 1.0 / (1.0 + bounds.load_ratio * (1.0 / (level + LEVEL_NOISE / supply) - 1.0)) + GUIDE_SLACK
+    most = 1.0 / (1.0 + bounds.load_ratio * (1.0 / (level + _LEVEL_NOISE / supply) - 1.0)) + _GUIDE_SLACK
     if radial_c + radial_d > 2.0 * most * supply1 or angular_a + angular_b > 2.0 * most * supply2:
         return Fault.GUIDE_DRIVEN
     if touched:

@@ -7,7 +7,6 @@ read as signed, so a frame from the past has a negative difference.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from coneskin.core.errors import SensorError
@@ -89,11 +88,6 @@ class FrameTiming:
         """Return the time since the newest valid frame [s]. Infinite before the first."""
         return now - self._valid_at
 
-    @property
-    def valid_at(self) -> float:
-        """Host time of the newest valid frame [s]; -inf before the first."""
-        return self._valid_at
-
     def measured_age(self, now: float) -> float:
         """Return for how long the newest valid frame has been history, its way to this computer included [s]."""
         return now - self._valid_at + self.lag
@@ -135,54 +129,6 @@ class FrameTiming:
         settled = now - self._started > _BACKLOG_TIME
         arrival = self._judge_arrival(now - self._device_time, elapsed * self._drift, settled)
         return self._judge_interval(steps, elapsed) or arrival
-
-    def learn(self, sequences: Sequence[int], clocks: Sequence[int], times: Sequence[float]) -> list[float]:
-        """Take valid frames in a row as ``feed`` does, up to the first that is not in time, or not the next.
-
-        Args:
-            sequences: sequence numbers.
-            clocks: device clock [us].
-            times: host clock when each arrived [s].
-
-        Returns:
-            the period after each frame that was taken [s].
-        """
-        periods: list[float] = []
-        if self._known < _LEARNING_FRAMES:
-            return periods
-        limits, started = self.limits, self._started
-        late, share, slack, drifts = limits.late, limits.missing_share, limits.clock_slack, self._drift
-        before, clock_before, valid_at = self.sequence, self.clock_us, self._valid_at
-        period, lag, bucket, device_time = self.period, self.lag, self._bucket, self._device_time
-        offset, gained = self._offset, self._gained
-        for sequence, clock_us, now in zip(sequences, clocks, times, strict=True):
-            elapsed = ((clock_us - clock_before + 0x80000000 & 0xFFFFFFFF) - 0x80000000) * 1e-6
-            if sequence != before + 1 & 0xFFFF or elapsed <= 0.0:
-                break
-            new_time, drift = device_time + elapsed, elapsed * drifts
-            here, newest, gain = now - new_time, offset + drift, gained - 2.0 * drift
-            if gain < 0.0:
-                gain = 0.0
-            if here < newest:
-                gain += newest - here if now - started > _BACKLOG_TIME else 0.0
-                newest = here
-            off = elapsed - period if elapsed > period else period - elapsed
-            if here - newest > late or gain > late or off > 0.5 * period + slack:
-                break
-            before, clock_before, valid_at = sequence, clock_us, now
-            device_time, offset, gained, lag = new_time, newest, gain, here - newest
-            bucket -= share
-            if bucket < 0.0:
-                bucket = 0.0
-            period += (elapsed - period) / _LEARNING_FRAMES
-            periods.append(period)
-        if periods:
-            self.frames += len(periods)
-            self._old_run = 0
-        self.sequence, self.clock_us, self._valid_at = before, clock_before, valid_at
-        self.period, self.lag, self._bucket, self._device_time = period, lag, bucket, device_time
-        self._offset, self._gained = offset, gained
-        return periods
 
     def _judge_arrival(self, offset: float, drift: float, settled: bool) -> Fault | None:
         """Judge how late a frame has arrived, and whether the device's clock runs away from the host's.

@@ -15,7 +15,6 @@ compared with what is left, so that no press is lost by it, however slowly it co
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
@@ -24,7 +23,7 @@ from .contact_matrix import ContactMatrix, FrameInversion
 from .faults import Fault
 from .settings import DetectorSettings
 
-__all__ = ["GUIDE_JUMP", "UntouchedCurrents", "UntouchedGuides", "UntouchedLeak", "UntouchedLevel"]
+__all__ = ["UntouchedCurrents", "UntouchedGuides", "UntouchedLeak", "UntouchedLevel"]
 
 CURRENT_BLOCK = 32  # frames that are averaged at once; noise that lasts as long, as mains hum does, shows in the means
 _CURRENT_MEMORY = 64  # blocks that the mean remembers
@@ -96,32 +95,6 @@ class UntouchedCurrents:
         self._count += 1
         return None if self._count < CURRENT_BLOCK else self._close(frame.touch_supply, period)
 
-    def learn(
-        self, radial: Sequence[float], angular: Sequence[float], supplies: Sequence[int], periods: Sequence[float]
-    ) -> int:
-        """Take quiet frames in a row as ``feed`` does. Return how many, up to the first that shows a change.
-
-        Args:
-            radial: currents of the radial phase over the supply.
-            angular: the same of the angular phase.
-            supplies: in the touch phase [counts].
-            periods: time from frame to frame [s].
-        """
-        at, end = 0, len(periods)
-        while at < end:
-            stop = min(at + CURRENT_BLOCK - self._count, end)
-            sum1, sum2 = self._sum1, self._sum2
-            for value in radial[at:stop]:
-                sum1 += value
-            for value in angular[at:stop]:
-                sum2 += value
-            self._sum1, self._sum2 = sum1, sum2
-            self._count += stop - at
-            at = stop
-            if self._count == CURRENT_BLOCK and self._close(supplies[at - 1], periods[at - 1]):
-                return at - 1
-        return at
-
     def _close(self, supply: int, period: float) -> tuple[Fault, str] | None:
         mean1, mean2 = self._sum1 / CURRENT_BLOCK, self._sum2 / CURRENT_BLOCK
         self.skip()
@@ -162,7 +135,7 @@ def bounded(step: float, most: float) -> float:
     return most if step > most else -most if step < -most else step
 
 
-GUIDE_JUMP = 0.01  #: part of the supply; a sudden potential of a guide, or a difference of two, that nothing explains
+_GUIDE_JUMP = 0.01  # part of the supply; a sudden potential of a guide, or a difference of two, that nothing explains
 _MAX_JUMP = 0.03  # part of the supply; what noise raises that to at most
 _GUIDE_DEVIATIONS = 7.0  # standard deviations of noise that are no potential
 _MAX_GUIDE_GROWTH = 0.1  # parts of the supply a second; the fastest growth that is learned, a leak's
@@ -196,10 +169,10 @@ class UntouchedGuides:
             self._radial, self._angular, self._level, self._known = radial, angular, level, True
         step1, step2 = radial - self._radial, angular - self._angular
         split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
-        differ = GUIDE_JUMP * supply
+        differ = _GUIDE_JUMP * supply
         if (
-            step1 > GUIDE_JUMP
-            or step2 > GUIDE_JUMP
+            step1 > _GUIDE_JUMP
+            or step2 > _GUIDE_JUMP
             or not (-differ <= split1 <= differ and -differ <= split2 <= differ)
         ):
             return (level - self._level) * supply < _LEVEL_COUNTS and self._exceed_noise(
@@ -211,39 +184,12 @@ class UntouchedGuides:
         self._level += bounded(0.1 * (level - self._level), most)  # a step of the noise is not followed
         return False
 
-    def learn(
-        self, radial: Sequence[float], angular: Sequence[float], levels: Sequence[float], periods: Sequence[float]
-    ) -> int:
-        """Take frames in a row as ``contradict`` does. Return how many, up to the first that may contradict.
-
-        Args:
-            radial: mean potential of the guides in the radial phase over the supply. Those of a pair do not differ.
-            angular: the same in the angular phase.
-            levels: of the frames.
-            periods: time from frame to frame [s].
-        """
-        if not self._known:
-            return 0
-        count, mine, others, known = 0, self._radial, self._angular, self._level
-        for count, (one, other, level, period) in enumerate(zip(radial, angular, levels, periods, strict=True), 1):
-            step1, step2 = one - mine, other - others
-            if step1 > GUIDE_JUMP or step2 > GUIDE_JUMP:
-                count -= 1
-                break
-            most = _MAX_GUIDE_GROWTH * period
-            mine += most if step1 > most else -most if step1 < -most else step1
-            others += most if step2 > most else -most if step2 < -most else step2
-            step = 0.1 * (level - known)
-            known += most if step > most else -most if step < -most else step
-        self._radial, self._angular, self._level = mine, others, known
-        return count
-
     def _exceed_noise(self, step1: float, step2: float, split1: float, split2: float, supply: int) -> bool:
         """Tell whether steps, or differences, are more than noise leaves in as many readings."""
         noise = _GUIDE_DEVIATIONS * self._currents.noise / supply
         step, split = (
-            min(max(0.7 * noise, GUIDE_JUMP), _MAX_JUMP),
-            min(max(1.4 * noise, GUIDE_JUMP), _MAX_JUMP),
+            min(max(0.7 * noise, _GUIDE_JUMP), _MAX_JUMP),
+            min(max(1.4 * noise, _GUIDE_JUMP), _MAX_JUMP),
         )
         return step1 > step or step2 > step or abs(split1) > split or abs(split2) > split
 
@@ -279,10 +225,6 @@ class UntouchedLeak:
         """Forget the block that was under way: the sensor is not quiet any more."""
         if self._frames:
             self._frames.clear()
-
-    def wants(self, highest: float) -> bool:
-        """Tell whether anything is learned from quiet frames with at most this level."""
-        return highest >= _MIN_LEAK_LEVEL or bool(self.conductance)
 
     def feed(self, frame: Frame, level: float) -> None:
         """Take a quiet frame and its level."""
@@ -368,23 +310,3 @@ class UntouchedLevel:
         self.value += most if level > most else -most if level < -most else level
         if not -self._limit <= self.value <= self._limit:
             self.value = math.copysign(self._limit, self.value)
-
-    def learn(self, levels: Sequence[float], periods: Sequence[float]) -> int:
-        """Follow the drift through frames in a row. Return in how many of them that is all that happens.
-
-        Args:
-            levels: whole levels.
-            periods: times from frame to frame [s].
-        """
-        value, release, limit, rate, count = self.value, self._release, self._limit, self._rate, 0
-        for count, (whole, period) in enumerate(zip(levels, periods, strict=False), 1):
-            level = whole - value
-            if level >= release:
-                count -= 1
-                break
-            most = rate * period
-            value += most if level > most else -most if level < -most else level
-            if not -limit <= value <= limit:
-                value = math.copysign(limit, value)
-        self.value, self._drifted = value, 0
-        return count

@@ -89,7 +89,7 @@ def _list_runs(folder: Path) -> int:
 
 
 def _replay_one(args: argparse.Namespace) -> int:
-    from coneskin.runs.progress import ProgressBar
+    from coneskin.core.progress import ProgressBar
     from coneskin.runs.replay.run import read_run, replay
 
     recorded = read_run(args.runs[0], ProgressBar("read"))
@@ -153,10 +153,10 @@ def _replay_with_settings(
     path: Path, words: Sequence[str], scene_file: Path | None, listed: bool, as_json: bool
 ) -> int:
     """Say what a run would have been with other settings, or another scene, and return the exit code 0."""
+    from coneskin.core.progress import ProgressBar
     from coneskin.runs.comparison import compare_decisions, comparison_facts, comparison_lines, without_invented
     from coneskin.runs.decisions import decide_again, recorded_decisions
     from coneskin.runs.event_file import event_facts
-    from coneskin.runs.progress import ProgressBar
     from coneskin.runs.replay.event_text import describe
     from coneskin.runs.replay.run import read_run
     from coneskin.scene.reader import load_scene
@@ -186,7 +186,7 @@ def _replay_with_settings(
 
 def _replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
     """Replay many runs with each variant; return 0, 1 for a difference or an error, or 4 for a damaged run."""
-    from coneskin.runs.progress import ProgressBar
+    from coneskin.core.progress import ProgressBar
     from coneskin.runs.what_if.batch import judge_runs
     from coneskin.runs.what_if.variant_table import score_variants, variant_lines, write_rows
 

@@ -12,8 +12,8 @@ from coneskin.core.errors import ConeSkinError, RecordingError
 from coneskin.core.text import printable
 
 if TYPE_CHECKING:
+    from coneskin.core.progress import ProgressBar
     from coneskin.runs.decisions import Decisions
-    from coneskin.runs.progress import ProgressBar
     from coneskin.runs.replay.run import Run
     from coneskin.runs.run_files import RunSummary
 
@@ -189,7 +189,7 @@ def _read(path: Path) -> Run:
 
 
 def _bar(what: str) -> ProgressBar:
-    from coneskin.runs.progress import ProgressBar
+    from coneskin.core.progress import ProgressBar
 
     return ProgressBar(what)
 

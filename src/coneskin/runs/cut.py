@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of
+from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.version import code_versions
@@ -25,7 +26,6 @@ from coneskin.scene.settings import resolved_settings
 
 from .comparison import Comparison, compare_decisions
 from .decisions import SKIN_EVENTS, Decisions, command_block, decide_again, recorded_decisions
-from .progress import Progress, silent
 from .replay.event_details import Tolerances
 
 if TYPE_CHECKING:
@@ -195,14 +195,11 @@ def _of_window(decisions: Decisions, since: float, until: float) -> Decisions:
 
 def _written(run: Run, since: float, until: float) -> list[Block]:
     """Return the blocks of the cut: its inputs, and what today's guard makes of them."""
-    from coneskin.scene.build import build_core
-
-    scene = run.scene()
-    core, outputs = build_core(scene, run.place_sensors()), list[Output]()
-    external = scene.arm is not None and scene.arm.control == "external"
+    arm, core, outputs = run.scene().arm, run.build_core(), list[Output]()
+    external = arm is not None and arm.control == "external"
     process = "watchdog" if external else "driver"
     blocks = []
-    for block in _cut_inputs(run, since, until, ready=scene.arm is not None):
+    for block in _cut_inputs(run, since, until, ready=arm is not None):
         queue = [block]
         while queue:
             taken = queue.pop(0)

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import Release, SetJointVelocity, decode_command
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, UseStopPath
@@ -21,10 +22,8 @@ from coneskin.robot.guard.signals.journal import (
     Command,
     EventName,
     GuardEvent,
-    Output,
 )
 
-from .progress import Progress, silent, watch
 from .replay.event_details import Tolerances
 
 if TYPE_CHECKING:
@@ -271,74 +270,21 @@ def decide_again(
         SceneError: the scene cannot be read or built with these settings.
         RecordingError: a block holds what no guard records.
     """
-    from coneskin.scene.build import build_core, place_on_arm
-    from coneskin.scene.settings import override_detector
-    from coneskin.scene.surface_record import decode_surfaces
-
-    if scene is None:
-        scene = _scene_with(run, settings or {})
-        surfaces = frozenset({BlockKind.SURFACE})
-        carried = (block for block in (*run.copies, *run.select(kinds=surfaces)) if block.kind in surfaces)
-        placed = place_on_arm(scene, decode_surfaces(carried))
-    else:
-        if scene.commissioning is None:
-            scene = replace(scene, commissioning=run.commissioning)
-        placed = place_on_arm(scene)
-    core, sink, gap = build_core(scene, placed, override_detector(settings or {})), _Sink(), run.gap
-    for block in watch(run, run.select(kinds=INPUTS), progress):
-        if block.time < gap:
-            sink.now = block.time
-            core.feed(block, sink)
+    events: list[GuardEvent] = []
+    commands: list[ArmCommand] = []
+    for block, outputs in run.decide(run.build_core(scene, settings), progress):
+        for output in outputs:
+            if isinstance(output, GuardEvent):
+                events.append(output)
+            else:
+                commands.append(_command_of(output, block.time))
     label = label or ", ".join(f"{name} = {value}" for name, value in (settings or {}).items()) or "replayed"
-    return replace(_decisions(run, label, tuple(sink.events), tuple(sink.commands)), other_code=run.other_code())
-
-
-def _scene_with(run: Run, settings: Mapping[str, Any]) -> Scene:
-    """Return the scene of a run with other settings. No file that it names is opened.
-
-    Raises:
-        SceneError: with them it is no scene.
-    """
-    from pathlib import Path
-
-    from coneskin.scene.reader import parse_scene
-    from coneskin.scene.settings import override_settings
-
-    if not settings:
-        return run.scene()
-    header = run.header
-    text = override_settings(header["scene"], settings)
-    folder = Path(header["folder"])
-    return parse_scene(text, header["name"], folder, recorded=True, commissioning=run.commissioning)
+    return replace(_decisions(run, label, tuple(events), tuple(commands)), other_code=run.other_code())
 
 
 def _decisions(run: Run, label: str, events: tuple[GuardEvent, ...], commands: tuple[ArmCommand, ...]) -> Decisions:
     window = -math.inf, math.inf
     if "cut" in run.header:
-        window = _ends(run)
+        window = run.span
         commands = tuple(command for command in commands if command.what != Release.__name__)  # the cut's own
     return Decisions(label, events, commands, run.start, run.gap, run.missing, window)
-
-
-def _ends(run: Run) -> tuple[float, float]:
-    """Return the times of the first block and of the last [s]."""
-    first, last = math.inf, -math.inf
-    for block in run.blocks:
-        first, last = min(first, block.time), max(last, block.time)
-    return first, last
-
-
-class _Sink:
-    """Sink of a core's outputs, which gives each command the time of its input."""
-
-    def __init__(self) -> None:
-        self.now = math.nan
-        self.events: list[GuardEvent] = []
-        self.commands: list[ArmCommand] = []
-
-    def append(self, output: Output, /) -> None:
-        """Take one output."""
-        if isinstance(output, GuardEvent):
-            self.events.append(output)
-        else:
-            self.commands.append(_command_of(output, self.now))

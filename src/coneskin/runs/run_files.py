@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError
+from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
 from coneskin.robot.guard.signals.journal import BlockKind, EventName
-
-from .progress import Progress, silent, watch
 
 if TYPE_CHECKING:
     from .replay.run import Run
@@ -154,11 +153,9 @@ def summarise_run(path: Path, run: Run, progress: Progress = silent) -> RunSumma
         RecordingError: an event cannot be read.
     """
     scene, header, kinds = run.scene(), run.header, Counter[int]()
-    first = last = None
-    for block in watch(run, run.blocks, progress):
+    for block in run.select(progress=progress):
         kinds[block.kind] += 1
-        first = block.time if first is None else first
-        last = block.time
+    since, until = run.span
     names = Counter(event.name for event in run.events)
     unix = header["clocks"].get("unix")
     began = ""
@@ -171,8 +168,8 @@ def summarise_run(path: Path, run: Run, progress: Progress = silent) -> RunSumma
         path=file,
         size=file.stat().st_size,
         began=began,
-        first=0.0 if first is None else first - run.start,
-        duration=0.0 if first is None or last is None else last - first,
+        first=since - run.start,
+        duration=until - since,
         contacts=names[EventName.CONTACT],
         stops=names[EventName.STOPPING],
         faults=names[EventName.FAULT],

@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.core import GuardCore
     from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
+    from coneskin.skin.detection.stream import TouchStream
 
     from .values.scene import Scene, SpeedLimitScene
 
-__all__ = ["SensorOnArm", "build_core", "place_on_arm", "withheld_motion"]
+__all__ = ["SensorOnArm", "build_core", "build_stream", "place_on_arm", "withheld_motion"]
 
 _MAX_DEPTH = 0.012  # m that a mesh may lie below the sensor on it: five layers, and the deviation of the fit
 
@@ -47,14 +48,8 @@ def build_core(
         raise SceneError(["a guard needs a [[link]] with a [[link.sensor]]"], scene.name)
     from coneskin.robot.guard.core import GuardCore
     from coneskin.robot.guard.signals.contact import GuardedSensor
-    from coneskin.skin.detection.frame.settings import DetectorSettings
-    from coneskin.skin.detection.frame.timing import TimingLimits
-    from coneskin.skin.detection.stream import TouchStream
 
-    limits = scene.monitoring_limits
-    timing = TimingLimits(late=limits.skin_late, clock_drift=limits.clock_drift)
-    settings = DetectorSettings(stuck_frames=limits.stuck_frames, timing=timing, **(detector or {}))
-    stream = TouchStream([item.sensor for item in scene.sensors], settings)
+    limits, stream = scene.monitoring_limits, build_stream(scene, detector)
     levels = {item.sensor.name: item.sensor.thresholds for item in scene.sensors}
     tables = {item.sensor.name: item.sensor.force_table for item in scene.sensors}
     sensors = [
@@ -66,6 +61,18 @@ def build_core(
         for at in (levels[item.name],)
     ]
     return GuardCore(stream, sensors, limits, _arm(scene) if scene.arm else None, withheld_motion(scene))
+
+
+def build_stream(scene: Scene, detector: Mapping[str, Any] | None = None) -> TouchStream:
+    """Build the detectors of a scene's sensors, as ``build_core`` does."""
+    from coneskin.skin.detection.frame.settings import DetectorSettings
+    from coneskin.skin.detection.frame.timing import TimingLimits
+    from coneskin.skin.detection.stream import TouchStream
+
+    limits = scene.monitoring_limits
+    timing = TimingLimits(late=limits.skin_late, clock_drift=limits.clock_drift)
+    settings = DetectorSettings(stuck_frames=limits.stuck_frames, timing=timing, **(detector or {}))
+    return TouchStream([item.sensor for item in scene.sensors], settings)
 
 
 def withheld_motion(scene: Scene) -> str:

@@ -23,16 +23,15 @@ from coneskin.robot.guard.signals.journal import (
     contact_force,
     decode_event,
 )
+from coneskin.skin.wire import Frame, FrameDecoder
 
 from .contact_mark import ContactLog
 
 if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats
     from coneskin.geometry.pose import Vector
     from coneskin.robot.arm.model import Joints
     from coneskin.robot.driver.values import ControllerState
     from coneskin.scene.values.scene import Scene
-    from coneskin.skin.sensor import Sensor
 
 __all__ = ["CHANNELS", "UNKNOWN", "History", "PhaseWords", "Series"]
 
@@ -85,8 +84,6 @@ def _phase_after(before: PhaseWords, name: str) -> PhaseWords:
 
 #: channels of a frame that are drawn, as fractions of the supply
 CHANNELS = ("touch_c", "touch_d", "radial_c", "radial_d", "angular_a", "angular_b")
-_LONGEST_FRAME = 64  # bytes
-_BATCH_SIZE = 1 << 21  # bytes of a skin's stream that are looked at together
 _MAX_EVENTS = 2000  # that a page keeps
 _KEEP_FACTOR = 1.5  # times what is kept, before the older part is dropped
 _HEALTH_EVENTS = frozenset(
@@ -161,9 +158,8 @@ class History:
         self.since, self.until = math.inf, -math.inf
         self.contacts = ContactLog()
         self._keep = keep
-        self._pending: list[tuple[float, bytes]] = []
-        self._pending_size = 0
-        self._rest = b""
+        self._names = {(sensor.device_id, sensor.sensor_id): sensor.name for sensor in self.sensors}
+        self._decoder = FrameDecoder()
         self._decode = _state_decoder(scene)
 
     def feed(self, block: Block) -> None:
@@ -173,10 +169,9 @@ class History:
         if block.time < self.since:
             self.since = block.time
         if block.kind == BlockKind.SKIN:
-            self._pending.append((block.time, block.payload))
-            self._pending_size += len(block.payload)
-            if self._pending_size >= _BATCH_SIZE:
-                self.settle()
+            for frame in self._decoder.feed(block.payload):
+                if (name := self._names.get((frame.device, frame.sensor))) is not None:
+                    self._take_frame(name, block.time, frame)
         elif block.kind == BlockKind.ARM and self._decode is not None:
             with suppress(RobotConnectionError):
                 state = self._decode(block.time, block.payload)
@@ -189,26 +184,21 @@ class History:
             self.forces.append(block.time, (force,))
             if places := body_places(block.payload):
                 self.bodies.append(block.time, tuple(chain.from_iterable(places)))
+        if self.until - self.since > _KEEP_FACTOR * self._keep:
+            self._forget()
 
     def feed_all(self, blocks: Iterable[Block]) -> History:
-        """Take blocks, read the skin's bytes among them, and return itself."""
+        """Take blocks and return itself."""
         for block in blocks:
             self.feed(block)
-        self.settle()
         return self
 
-    def settle(self) -> None:
-        """Read the skin's bytes that were taken, and forget what is too old."""
-        if self._pending:
-            times = [time for time, _ in self._pending]
-            parts = [part for _, part in self._pending]
-            self._pending, self._pending_size = [], 0
-            self._read_skin(times, parts)
-        if math.isfinite(self._keep) and self.until - self.since > _KEEP_FACTOR * self._keep:
-            self.since = self.until - self._keep
-            for series in (self.joints, self.speeds, self.forces, *self.levels.values(), *self.channels.values()):
-                series.drop_before(self.since)
-            self.bodies.drop_before(self.since, but_last=True)  # a body that rests is told of no more
+    def _forget(self) -> None:
+        """Drop what is older than is kept."""
+        self.since = self.until - self._keep
+        for series in (self.joints, self.speeds, self.forces, *self.levels.values(), *self.channels.values()):
+            series.drop_before(self.since)
+        self.bodies.drop_before(self.since, but_last=True)  # a body that rests is told of no more
 
     def q(self, time: float) -> Joints | None:
         """Return the joint positions at a time [rad]; the first ones before they were measured, None without any."""
@@ -257,42 +247,19 @@ class History:
         if (phase := _phase_after(before, event.name)) != before:
             self.phases.append(_PhaseChange(event.time, phase))
 
-    def _read_skin(self, times: list[float], parts: list[bytes]) -> None:
-        import numpy as np
-
-        from coneskin.skin.frame_batch import find_frames
-
-        data = self._rest + b"".join(parts)
-        batch = find_frames(data)
-        ends = len(self._rest) + np.cumsum([len(part) for part in parts])
-        arrived = np.array(times)[np.minimum(np.searchsorted(ends, batch.ends, side="left"), len(times) - 1)]
-        for sensor in self.sensors:
-            own = batch.of(sensor.device_id, sensor.sensor_id)
-            if own.any():
-                frames = batch.pick(own)
-                self._take_frames(
-                    sensor, arrived[own].tolist(), {n: frames.field(n).astype(float) for n in _FRAME_FIELDS}
-                )
-        read = int(batch.ends[-1]) if len(batch.ends) else 0
-        self._rest = data[max(read, len(data) - _LONGEST_FRAME) :]
-
-    def _take_frames(self, sensor: Sensor, times: list[float], fields: dict[str, Floats]) -> None:
-        import numpy as np
-
-        supply = np.maximum(fields["touch_supply"], 1.0)
-        level = np.clip((fields["touch_c"] + fields["touch_d"]) / (2.0 * supply), 0.0, 1.0)
-        series, channels = self.levels[sensor.name], self.channels[sensor.name]
-        series.times += times
-        series.values += [(value,) for value in level.tolist()]
-        columns = [
-            np.clip(fields[name] / np.maximum(fields[f"{name.split('_')[0]}_supply"], 1.0), 0.0, 1.1).tolist()
-            for name in CHANNELS
-        ]
-        channels.times += times
-        channels.values += list(zip(*columns, strict=True))
-
-
-_FRAME_FIELDS = (*CHANNELS, "touch_supply", "radial_supply", "angular_supply")
+    def _take_frame(self, sensor: str, time: float, frame: Frame) -> None:
+        supplies = frame.touch_supply or 1, frame.radial_supply or 1, frame.angular_supply or 1
+        level = min((frame.touch_c + frame.touch_d) / (2.0 * supplies[0]), 1.0)
+        channels = (
+            min(frame.touch_c / supplies[0], 1.1),
+            min(frame.touch_d / supplies[0], 1.1),
+            min(frame.radial_c / supplies[1], 1.1),
+            min(frame.radial_d / supplies[1], 1.1),
+            min(frame.angular_a / supplies[2], 1.1),
+            min(frame.angular_b / supplies[2], 1.1),
+        )
+        self.levels[sensor].append(time, (level,))
+        self.channels[sensor].append(time, channels)
 
 
 def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState] | None:

@@ -24,7 +24,6 @@ __all__ = [
     "decode_body",
     "decode_chunk_head",
     "decode_file_head",
-    "decode_payloads",
     "encode_chunk",
     "encode_file_head",
 ]
@@ -160,29 +159,6 @@ def decode_body(head: ChunkHead, stored: bytes) -> list[Block]:
     except struct.error:
         raise _wrong(head, f"{size - at} bytes are left behind its last block") from None
     return blocks
-
-
-def decode_payloads(head: ChunkHead, stored: bytes, kind: int) -> list[tuple[float, bytes]]:
-    """Return time and payload of the blocks of one kind, without making blocks of the others.
-
-    Raises:
-        RecordingError: as of ``decode_body``.
-    """
-    body = _unpacked(head, stored)
-    at, size, since, until = 0, len(body), head.since, head.until
-    unpack, skip = _BLOCK_HEAD.unpack_from, _BLOCK_HEAD.size
-    found: list[tuple[float, bytes]] = []
-    try:
-        while at < size:
-            length, this, time = unpack(body, at)
-            at += skip + length
-            if this == kind:
-                if at > size or not since <= time <= until:
-                    raise _wrong(head, f"a block of {length} bytes has the time {time} s")
-                found.append((time, body[at - length : at]))
-    except struct.error:
-        raise _wrong(head, "bytes are left behind its last block") from None
-    return found
 
 
 def _unpacked(head: ChunkHead, stored: bytes) -> bytes:

@@ -14,7 +14,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import open_file
 
 from .block import COPY, DROPPED, FILE_KINDS, Block, decode_copy
-from .chunk import FILE_HEAD_SIZE, MAGIC, bits, decode_body, decode_file_head, decode_payloads
+from .chunk import FILE_HEAD_SIZE, MAGIC, bits, decode_body, decode_file_head
 from .defects import Defect, decode_drop, find_defects
 from .scan import Chunk, Damage, Extent, holds_chunk, scan_extents, walk
 
@@ -74,11 +74,6 @@ class RecordedBlocks:
             kind = block.kind
             if kind not in hidden and (kinds is None or kind in kinds) and since <= block.time <= until:
                 yield block
-
-    def payloads(self, kind: int) -> Iterator[tuple[float, bytes]]:
-        """Yield time [s, host clock] and payload of each block of a kind, faster than ``select``."""
-        for chunk in self.chunks(kinds=bits((kind,))):
-            yield from decode_payloads(chunk.head, chunk.stored, kind)
 
     def own(self) -> Iterator[Block]:
         """Yield the blocks that the file has for itself: copies and notes of retention."""

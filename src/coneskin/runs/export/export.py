@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of
-from coneskin.runs.progress import Progress, silent
+from coneskin.core.progress import Progress, silent
 
 from .tables import Pieces, Table, table_pieces
 

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import ConeSkinError, MissingExtra
+from coneskin.core.progress import Progress, silent
 from coneskin.core.text import printable
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import skeleton
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.decisions import recorded_commands
-from coneskin.runs.progress import Progress, silent
 from coneskin.skin.detection.frame.reading import read
 
 from .tables import arm_states, skin_frames, slider_positions, wall_clock

@@ -13,12 +13,12 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RobotConnectionError
+from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.decisions import recorded_commands
-from coneskin.runs.progress import Progress, silent, watch
 from coneskin.runs.replay.event_details import QUANTITIES
 from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame, FrameDecoder
 
@@ -95,7 +95,7 @@ def wall_clock(run: Run) -> float:
 def skin_frames(run: Run, progress: Progress = silent) -> Iterator[tuple[float, Frame]]:
     """Yield the frames of the skin, each with the host time at which its last byte was read [s]."""
     decoder = FrameDecoder()
-    for block in watch(run, run.select(kinds=frozenset({BlockKind.SKIN})), progress):
+    for block in run.select(kinds=frozenset({BlockKind.SKIN}), progress=progress):
         for frame in decoder.feed(block.payload):
             yield block.time, frame
 

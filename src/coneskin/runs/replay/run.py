@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import SequenceMatcher
 from enum import StrEnum
-from functools import partial
 from itertools import islice, zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import RecordingError
+from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block, is_time
 from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.reader import RecordedBlocks, read_recording
@@ -32,11 +32,13 @@ from coneskin.robot.guard.signals.journal import (
     decode_event,
 )
 from coneskin.scene.values.scene import Commissioning, Scene
+from coneskin.skin.detection.events import TouchBegan, TouchEnded
 
 from .event_details import EXACT, describe_differences, milliseconds
 from .event_text import describe
 
 if TYPE_CHECKING:
+    from coneskin.robot.guard.core import GuardCore
     from coneskin.scene.build import SensorOnArm
 
 __all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "event_differences", "read_run", "replay"]
@@ -131,8 +133,24 @@ class Replay:
         return not self.differences
 
 
-_PROGRESS_PERIOD = 1.0  # s of a run between two words on how far it is
+_PROGRESS_PERIOD = 1.0  # s of a run between two calls
 _HEADER_TYPES = {"scene": str, "name": str, "folder": str, "clocks": dict}
+
+
+class _FoundTouch(NamedTuple):
+    """Touch that was found in what is left of a run.
+
+    Attributes:
+        sensor: its name.
+        began: host time of the frame with which it began [s].
+        ended: of the frame with which it ended [s]; inf where the run ended first.
+        peak: the largest level.
+    """
+
+    sensor: str
+    began: float
+    ended: float
+    peak: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,8 +198,22 @@ class Run:
         """Events of the run, as they were recorded."""
         return [decode_event(block) for block in self.select(kinds=frozenset({BlockKind.EVENT}))]
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """Times of the first block and of the newest [s, host clock]; the start of the run where there is none."""
+        first = next(iter(self.blocks), None)
+        if first is None:
+            return self.start, self.start
+        blocks = self.blocks
+        until = blocks.until if isinstance(blocks, RecordedBlocks) else max(block.time for block in blocks)
+        return first.time, until
+
     def select(
-        self, since: float = -math.inf, until: float = math.inf, kinds: frozenset[int] | None = None
+        self,
+        since: float = -math.inf,
+        until: float = math.inf,
+        kinds: frozenset[int] | None = None,
+        progress: Progress = silent,
     ) -> Iterator[Block]:
         """Yield blocks of a time and of kinds; what is outside is not read from the file, as far as it can be.
 
@@ -189,25 +221,39 @@ class Run:
             since: the smallest time [s, host clock].
             until: the largest.
             kinds: of block, see ``BlockKind``; None for all.
+            progress: called now and then with the fraction of a run in a file that is done.
         """
-        if isinstance(self.blocks, RecordedBlocks):
-            yield from self.blocks.select(since, until, kinds)
+        if not isinstance(self.blocks, RecordedBlocks):
+            for block in self.blocks:
+                if since <= block.time <= until and (kinds is None or block.kind in kinds):
+                    yield block
             return
-        for block in self.blocks:
-            if since <= block.time <= until and (kinds is None or block.kind in kinds):
-                yield block
+        begin = self.blocks.since
+        duration = max(self.blocks.until - begin, _PROGRESS_PERIOD)
+        due = math.inf if progress is silent else begin + _PROGRESS_PERIOD
+        for block in self.blocks.select(since, until, kinds):
+            if block.time >= due:
+                due = block.time + _PROGRESS_PERIOD
+                progress(min((block.time - begin) / duration, 1.0))
+            yield block
+        progress(1.0)
 
-    def scene(self) -> Scene:
+    def scene(self, settings: Mapping[str, Any] | None = None) -> Scene:
         """Return the scene of the run. No file that it names is looked for or opened.
 
+        Args:
+            settings: values to set in it first, such as ``{"reaction.kind": "stop"}``.
+
         Raises:
-            SceneError: this version of coneskin cannot read it.
+            SceneError: this version of coneskin cannot read it, or with these settings it is no scene.
         """
         from coneskin.scene.reader import parse_scene
+        from coneskin.scene.settings import override_settings
 
         header = self.header
+        text = override_settings(header["scene"], settings) if settings else header["scene"]
         folder = Path(header["folder"])
-        return parse_scene(header["scene"], header["name"], folder, recorded=True, commissioning=self.commissioning)
+        return parse_scene(text, header["name"], folder, recorded=True, commissioning=self.commissioning)
 
     @property
     def commissioning(self) -> Commissioning | None:
@@ -232,8 +278,11 @@ class Run:
         changed = changed_settings(self.header.get("resolved"), self.scene())
         return *words, *(f"the scene is filled in otherwise than when it was recorded: {what}" for what in changed)
 
-    def place_sensors(self) -> list[SensorOnArm]:
+    def place_sensors(self, scene: Scene | None = None) -> list[SensorOnArm]:
         """Return the places of the sensors on the arm, with the surfaces of links that the recording carries.
+
+        Args:
+            scene: that of the run with other settings.
 
         Raises:
             SceneError: this version of coneskin cannot read the scene, or a sensor lies on a mesh that is not carried.
@@ -244,7 +293,72 @@ class Run:
 
         surfaces = frozenset({BlockKind.SURFACE})
         carried = [*self.copies, *self.select(kinds=surfaces)]
-        return place_on_arm(self.scene(), decode_surfaces(block for block in carried if block.kind in surfaces))
+        return place_on_arm(scene or self.scene(), decode_surfaces(b for b in carried if b.kind in surfaces))
+
+    def build_core(self, scene: Scene | None = None, settings: Mapping[str, Any] | None = None) -> GuardCore:
+        """Return a new guard's core, of today's code, for the inputs of the run.
+
+        Args:
+            scene: another scene than the run's own; no setting changes it.
+            settings: values to set in the run's scene first, such as ``{"reaction.kind": "stop"}``.
+
+        Raises:
+            SceneError: the scene cannot be read or built.
+        """
+        from coneskin.scene.build import build_core
+        from coneskin.scene.settings import override_detector
+
+        placed = None
+        if scene is None:
+            scene = self.scene(settings)
+            placed = self.place_sensors(scene)
+        elif scene.commissioning is None:
+            scene = replace(scene, commissioning=self.commissioning)
+        return build_core(scene, placed, override_detector(settings or {}))
+
+    def decide(self, core: GuardCore, progress: Progress = silent) -> Iterator[tuple[Block, list[Output]]]:
+        """Feed the inputs of the run to a guard's core, one at a time, up to the first gap.
+
+        Args:
+            core: of a new guard.
+            progress: called now and then with the fraction of a run in a file that is done.
+
+        Yields:
+            each input and what the guard puts out for it; the list is used again.
+        """
+        gap, outputs = self.gap, list[Output]()
+        for block in self.select(kinds=INPUTS, progress=progress):
+            if block.time < gap:
+                core.feed(block, outputs)
+                yield block, outputs
+                outputs.clear()
+
+    def touches(self) -> list[_FoundTouch]:
+        """Return the touches in what is left of the run, in the order of their beginnings.
+
+        Only the detectors run, on the skin's bytes. So it serves a long run of which retention has dropped parts, too,
+        which cannot be replayed as a whole.
+
+        Raises:
+            SceneError: this version of coneskin cannot read the scene.
+            RecordingError: a file of the run has changed since it was opened.
+        """
+        from coneskin.scene.build import build_stream
+
+        stream = build_stream(self.scene())
+        lasting: dict[str, _FoundTouch] = {}
+        over: list[_FoundTouch] = []
+        for _, time, payload in self.select(kinds=frozenset({BlockKind.SKIN})):
+            for event in stream.feed(payload, time):
+                if isinstance(event, TouchBegan):
+                    lasting[event.sensor] = _FoundTouch(event.sensor, event.time, math.inf, event.level)
+                elif isinstance(event, TouchEnded):
+                    over.append(lasting.pop(event.sensor)._replace(ended=event.time))
+            for detector in stream.detectors if lasting else ():
+                name, reading = detector.sensor.name, detector.reading_now
+                if reading is not None and reading.level > lasting[name].peak:
+                    lasting[name] = lasting[name]._replace(peak=reading.level)
+        return sorted([*over, *lasting.values()], key=lambda touch: touch.began)
 
     def replay(self, scene: Scene | None = None) -> Replay:
         """Run the recording again through today's guard; arguments and errors as of ``replay``."""
@@ -261,7 +375,7 @@ class Run:
         return [describe(event, self.start) for event in (self.events if events is None else events)]
 
 
-def read_run(path: Path | str, progress: Callable[[float], None] | None = None) -> Run:
+def read_run(path: Path | str, progress: Progress = silent) -> Run:
     """Read a recorded run.
 
     Args:
@@ -291,16 +405,12 @@ def read_run(path: Path | str, progress: Callable[[float], None] | None = None) 
         Commissioning.from_message(header.get("commissioning"))
     except (ValueError, TypeError, KeyError) as exc:
         raise RecordingError(f"{path} has a header that this coneskin cannot read: {exc}") from exc
-    blocks: Iterable[Block] = recording.blocks
-    if isinstance(blocks, RecordedBlocks):
-        blocks = replace(blocks, hidden=blocks.hidden | {BlockKind.HEADER})
-    else:
-        blocks = tuple(block for block in blocks if block.kind != BlockKind.HEADER)
+    blocks = replace(recording.blocks, hidden=recording.blocks.hidden | {BlockKind.HEADER})
     run = Run(header, blocks, recording.defects, recording.copies)
     return replace(run, defects=tuple(sorted((*_left_out(run.events), *run.defects), key=lambda found: found.since)))
 
 
-def replay(run: Run, scene: Scene | None = None, progress: Callable[[float], None] = lambda _: None) -> Replay:
+def replay(run: Run, scene: Scene | None = None, progress: Progress = silent) -> Replay:
     """Feed the run's inputs to a new guard.
 
     Args:
@@ -312,42 +422,20 @@ def replay(run: Run, scene: Scene | None = None, progress: Callable[[float], Non
         SceneError: the scene cannot be read or built.
         RecordingError: a block holds what no guard records.
     """
-    from coneskin.robot.guard.quiet_inputs import BATCH, take_inputs
-    from coneskin.scene.build import build_core
-
-    if scene is not None and scene.commissioning is None:
-        scene = replace(scene, commissioning=run.commissioning)
-    core = build_core(run.scene(), run.place_sensors()) if scene is None else build_core(scene)
-    outputs: list[Output] = []
-    take = partial(core.feed, out=outputs)
-    gap, recorded = run.gap, run.events
-    first = last = None
+    events: list[GuardEvent] = []
     frames = 0
-    begin, end = (run.blocks.since, run.blocks.until) if isinstance(run.blocks, RecordedBlocks) else (0.0, math.inf)
-    told = begin
-    inputs: list[Block] = []
-    for block in run.blocks:
-        if block.time - told > _PROGRESS_PERIOD:
-            told = block.time
-            progress((told - begin) / (end - begin))
-        first, last = block.time if first is None else first, block.time
-        if block.kind in INPUTS and block.time < gap:
-            inputs.append(block)
-            if block.kind == BlockKind.SKIN:
-                frames += len(block.payload)
-            if len(inputs) == BATCH:
-                take_inputs(core, inputs, take)
-                inputs.clear()
-    take_inputs(core, inputs, take)
-    progress(1.0)
-    events = [output for output in outputs if isinstance(output, GuardEvent)]
+    for block, outputs in run.decide(run.build_core(scene), progress):
+        if outputs:
+            events += [output for output in outputs if isinstance(output, GuardEvent)]
+        if block.kind == BlockKind.SKIN:
+            frames += len(block.payload)
+    gap, recorded = run.gap, run.events
     then = [event for event in recorded if event.name not in SESSION_EVENTS and event.time < gap]
-    again = events
-    if gap < math.inf:  # an input is recorded before its events, so a run that was cut off may lack the last of these
-        again = again[: len(then)]
+    # an input is recorded before its events, so a run that was cut off may lack the last of these
+    again = events if gap == math.inf else events[: len(then)]
     differences = list(islice(event_differences(then, again, run.start), MOST_DIFFERENCES))
-    duration = 0.0 if first is None or last is None else last - first
-    return Replay(events, recorded, len(then), differences, frames, duration, run.missing, run.other_code())
+    since, until = run.span
+    return Replay(events, recorded, len(then), differences, frames, until - since, run.missing, run.other_code())
 
 
 def _kind_name(kind: int) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import MissingExtra, RecordingError
-from coneskin.runs.progress import Progress, silent
+from coneskin.core.progress import Progress, silent
 
 from .what_if import broken_rows, judge_run
 

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import ConeSkinError, RecordingError
 from coneskin.core.files import read_file
+from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
 from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, contact_force
 from coneskin.runs.comparison import Comparison, compare_decisions
 from coneskin.runs.decisions import Decisions, decide_again, recorded_decisions
-from coneskin.runs.progress import Progress, silent
 from coneskin.runs.replay.event_details import Tolerances
 from coneskin.runs.replay.run import read_run
 from coneskin.runs.run_files import run_name
@@ -231,15 +231,11 @@ def judge_run(
     try:
         run = read_run(path)
         recorded = recorded_decisions(run)
-        first = last = None
-        for block in run.select():
-            first, last = block.time if first is None else first, block.time
-        span = (0.0, 0.0) if first is None or last is None else (first, last)
-        labels, truth = _truth(path, run, recorded, span)
+        labels, truth = _truth(path, run, recorded)
     except ConeSkinError as exc:
         return broken_rows(path, variants, str(exc))
     fixed |= {"truth": truth}
-    duration = span[1] - span[0]
+    duration = run.span[1] - run.span[0]
     rows = []
     for number, settings in enumerate(variants):
         name = _variant_name(settings)
@@ -262,15 +258,15 @@ def broken_rows(path: Path, variants: Sequence[Mapping[str, Any]], why: str) -> 
     return [_row(run=run_name(path), path=str(path), variant=_variant_name(one), error=why) for one in variants]
 
 
-def _truth(path: Path, run: Run, recorded: Decisions, span: tuple[float, float]) -> tuple[list[TouchLabel], str]:
-    """Return the touches that there were between two times [s, host clock], and who says so."""
+def _truth(path: Path, run: Run, recorded: Decisions) -> tuple[list[TouchLabel], str]:
+    """Return the touches that there were in the time of a run, and who says so."""
     labels = _label_path(path)
     if labels.is_file():
         return read_labels(labels), "labels"
     touches = true_touches(run)
     if touches is None:
         return recorded_labels(recorded), "recorded"
-    since, until = (time - run.start for time in span)
+    since, until = (time - run.start for time in run.span)
     return [touch for touch in touches if touch.end > since and touch.start < until - _SEEING_TIME], "virtual skin"
 
 

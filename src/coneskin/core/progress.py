@@ -4,40 +4,16 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Callable
+from typing import TextIO
 
-from coneskin.core.recording.block import Block
-from coneskin.core.recording.reader import RecordedBlocks
-
-if TYPE_CHECKING:
-    from .replay.run import Run
-
-__all__ = ["Progress", "ProgressBar", "silent", "watch"]
+__all__ = ["Progress", "ProgressBar", "silent"]
 
 Progress = Callable[[float], None]  #: takes the fraction that is done, from 0 to 1
-
-_CALL_PERIOD = 1.0  # s of a run between two calls
 
 
 def silent(fraction: float) -> None:
     """Show nothing."""
-
-
-def watch(run: Run, blocks: Iterable[Block], progress: Progress) -> Iterator[Block]:
-    """Yield blocks of a run, and tell from their times how much of it is done; of a run in a file only."""
-    if progress is silent or not isinstance(run.blocks, RecordedBlocks):
-        yield from blocks
-        return
-    since = run.blocks.since
-    duration = max(run.blocks.until - since, _CALL_PERIOD)
-    due = since + _CALL_PERIOD
-    for block in blocks:
-        if block.time >= due:
-            due = block.time + _CALL_PERIOD
-            progress(min((block.time - since) / duration, 1.0))
-        yield block
-    progress(1.0)
 
 
 _BAR_WIDTH = 30  # characters
