@@ -29,8 +29,7 @@ PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_funct
 PREPARATION |= {"inverse_kinematics", "compiled_kinematics", "registry"}
 PROCESSES = {"backup_stop", "watchdog_process", "driver", "driver_process", "examination", "input_writers"}
 PROCESSES |= {"model_check", "program_io", "rtde_connection", "state_reader", "stop_sockets", "ur_rtde"}
-ARRAYS = {"frame_batch", "quiet_frames", "quiet_inputs"}
-PURE = UNFIT | PREPARATION | PROCESSES | ARRAYS
+PURE = UNFIT | PREPARATION | PROCESSES
 
 packages, package_dir = find_packages(str(ROOT / "src")), {"": "src"}
 linked = True
