@@ -91,7 +91,7 @@ def _nothing_is_left() -> Iterator[None]:
     yield
     for thread in set(threading.enumerate()) - threads:
         if "pool" not in thread.name.lower() and "executor" not in thread.name.lower():
-            thread.join(1.0)
+            thread.join(30.0)
             assert not thread.is_alive(), f"the test leaves the thread {thread.name!r}"
     left = _children() - children
     assert not left, f"the test leaves the processes {', '.join(sorted(left))}"
