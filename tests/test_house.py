@@ -87,7 +87,7 @@ HOT = {
     "skin/detection/place": "touch_place place_estimate single_contact seam_contact",
     "robot/arm": "kinematics compiled_kinematics damped_least_squares workspace",
     "robot/reaction": "retreat types",
-    "robot/guard": "core arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop state_age "
+    "robot/guard": "core arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
     "signals/contact signals/journal",
     "robot/guard/motion": "motion_away reaction_motion",
     "robot/stop": "stop_monitor",

@@ -19,8 +19,8 @@ import sys
 from dataclasses import replace
 
 from bench.report import head, quantile, show
+from coneskin.commissioning.calibration.calibrate import MARK_COUNTS, calibration_marks
 from coneskin.commissioning.calibration.fit import KnownTouch, fit_map
-from coneskin.commissioning.calibration.marks import MARK_COUNTS, calibration_marks
 from coneskin.commissioning.misreadings import Place
 from coneskin.core.errors import SkinError
 from coneskin.geometry.frustum import Frustum

@@ -5,24 +5,118 @@ The three are used in the same way: ``step`` returns in each control cycle how t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, Workspace
 
-from .admittance import AdmittanceMotion
 from .backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
-from .contact_supervision import clamped
-from .retreat import RetreatPlan, plan_retreat, retreat_step
+from .contact_supervision import clamped, opposed
+from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
-__all__ = [
-    "ReactionMotion",
-    "plan_reaction_motion",
-    "plan_way_back",
-]
+__all__ = ["ReactionMotion", "plan_reaction_motion", "plan_way_back"]
+
+_DAMPING_TIME = 0.05  # s; a person's push rises in 50 ms and more
+_MIN_SPEED = 1e-3  # m/s; slower counts as standing
+
+
+class _AdmittanceMotion:
+    """Compliant motion of an arm that stands as it begins: it gives way as firmly as the skin is pushed.
+
+        v_wanted = speed * min(1, (level - threshold) / (full_level - threshold))    along -n, of the touched point
+        v       += (v_wanted - v) * (1 - exp(-dt / _DAMPING_TIME))                   so that it neither jumps nor rings
+
+    Point and normal are taken anew in each cycle, where the touch is then. Where that is not known, or where touches
+    push against each other, the arm stands. Each cycle is one step of a retreat (``retreat``) from where the arm is, so
+    its limits are the same. It ends with the touch, or when the distance or the time is used up.
+
+    Args:
+        model: the arm.
+        state: of the arm, standing.
+        reaction: the settings.
+        space: the room that the arm has, or None.
+
+    Attributes:
+        how: the arm leaves: "push".
+        speed: of the touched point that was wanted in the last step [m/s].
+        plan: of the last step, whose tracks start where the touched points were then; None where nothing pushed.
+    """
+
+    how = "push"
+
+    def __init__(self, model: ArmModel, state: ArmState, reaction: Reaction, space: Workspace | None = None) -> None:
+        self._model = model
+        self._reaction = reaction
+        self._space = space
+        self._sweep = ArmSweep.begin(model, state.q)
+        self._began = self._newest = state.time
+        self._progress = 0.0  # how far touched points have given way so far [m]
+        self.speed = 0.0
+        self.plan: RetreatPlan | None = None
+
+    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
+        """Return what to do in this control cycle, as firm as the current push.
+
+        Args:
+            state: the arm as measured.
+            contacts: the touches there are. Without one it is over.
+        """
+        reaction = self._reaction
+        progress = self._progress
+        if self.plan is not None:
+            progress += max(0.0, _made(self.plan, state))
+        if not contacts:
+            return Done("the touch is over", progress, complete=True)
+        if not progress < reaction.distance - DISTANCE_TOLERANCE:
+            return Done("the distance is made", progress)
+        if not state.time - self._began < reaction.time_budget:
+            return Done(f"the time of {reaction.time_budget} s is over", progress)
+        placed = all(contact.location_valid for contact in contacts)  # as a push ends, its place is lost before itself
+        against = placed and opposed(self._model, state.q, contacts)
+        wanted = _wanted_speed(reaction, contacts) if placed and not against else 0.0
+        share = 1.0 - math.exp(-max(0.0, state.time - self._newest) / _DAMPING_TIME)
+        speed = self.speed + share * (wanted - self.speed)
+        if speed < _MIN_SPEED or not placed or against:
+            self._newest, self.speed, self._progress, self.plan = state.time, speed, progress, None
+            clipped_by = ("opposed" if against else "level" if placed else "place",)
+            # what is not known, or on the other side, may be pressed now: brake as a stop does, not as a push ends
+            gentle = placed and not against
+            rate = reaction.acceleration if gentle else max(reaction.acceleration, reaction.deceleration)
+            return JointVelocity(ZERO_VELOCITY, rate, 0.0, progress, clipped_by)
+        setting = replace(reaction, speed=speed, distance=reaction.distance - progress)
+        plan = plan_retreat(self._model, state, contacts, setting, self._space, self._sweep)
+        step = plan if isinstance(plan, Done) else retreat_step(plan, state)
+        if isinstance(plan, Done) or isinstance(step, Done):
+            assert isinstance(step, Done)
+            return Done(step.reason, progress)
+        clipped = step.clipped_by
+        if wanted < reaction.speed:
+            clipped += ("level",)
+        if speed < 0.99 * wanted:  # it gets there, but never quite
+            clipped += ("damping",)
+        self._newest, self.speed, self._progress, self.plan = state.time, speed, progress, plan
+        return replace(step, progress=progress, clipped_by=clipped)
+
+
+def _wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> float:
+    """Return the speed at which to give way to the firmest of these touches [m/s]."""
+    most = 0.0
+    for contact in contacts:
+        span = reaction.full_level - contact.threshold
+        above = contact.level - contact.threshold
+        share = above / span if span > 0.0 else 1.0 if above > 0.0 else 0.0
+        most = max(most, min(1.0, share))
+    return reaction.speed * most
+
+
+def _made(plan: RetreatPlan, state: ArmState) -> float:
+    """Return how far the touched points of a plan have come since it was made [m]; the farthest."""
+    step = retreat_step(replace(plan, reaction=replace(plan.reaction, time_budget=60.0)), state)
+    return step.progress
 
 
 class ReactionMotion(Protocol):
@@ -70,7 +164,7 @@ def plan_reaction_motion(
         space: the room that the arm has.
     """
     if reaction.kind == "comply":
-        return AdmittanceMotion(model, state, reaction, space)
+        return _AdmittanceMotion(model, state, reaction, space)
     if clamped(contacts):
         return "touches on opposite sides, or on two links, may hold the arm between them"
     plan = plan_retreat(model, at_touch, contacts, reaction, space, ArmSweep.begin(model, state.q))

@@ -1,6 +1,6 @@
 """Monitor of one stop: it judges the stop by measured joint speed and names the next stop path while it fails. Pure.
 
-A host that is held up reads states late, all at once. So time is what the samples themselves say (``guard.state_age``):
+A host that is held up reads states late, all at once. So time is what the samples themselves say (``arm_supervisor``):
 a stop path counts as ineffective when samples measured so long after it show no slowdown, and not because none was
 read. Only where no sample arrives at all does the host's clock count.
 """

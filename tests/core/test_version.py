@@ -7,16 +7,16 @@ import pytest
 
 from coneskin import __version__
 from coneskin.core import version
-from coneskin.core.version import code_commit, code_versions, recorded_version, running_version
+from coneskin.core.version import _code_commit, code_versions, recorded_version, running_version
 
 
 def commit_of(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.setattr(version, "__file__", str(folder / "src" / "coneskin" / "core" / "version.py"))
-    code_commit.cache_clear()
+    _code_commit.cache_clear()
     try:
-        return code_commit()
+        return _code_commit()
     finally:
-        code_commit.cache_clear()
+        _code_commit.cache_clear()
 
 
 def git(folder: Path, *words: str) -> str:

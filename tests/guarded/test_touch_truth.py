@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.robot.guard.signals.journal import EventName
 from coneskin.runs.replay.run import read_run
-from coneskin.runs.what_if.what_if import judge_run, true_touches
+from coneskin.runs.what_if.what_if import _true_touches, judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 
@@ -46,7 +46,7 @@ def test_the_script_and_the_programs_touches_are_recorded_as_they_were(tmp_path:
         assert session.wait_for((EventName.TOUCH_ENDED,), DEADLINE, after=seen) is not None
     run = read_run(tmp_path / "run.rec")
     assert run.start == session.began
-    touches = true_touches(run)
+    touches = _true_touches(run)
     assert touches is not None
     assert [one.sensor for one in touches] == ["skin", "skin"]
     assert [one.end - one.start for one in touches] == pytest.approx([0.1, 0.1])

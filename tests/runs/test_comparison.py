@@ -11,8 +11,8 @@ from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.comparison import compare_decisions, comparison_facts, comparison_lines
 from coneskin.runs.cut import CUT_TOLERANCES, cut_run
 from coneskin.runs.decisions import (
-    ArmCommand,
     Decisions,
+    _ArmCommand,
     decide_again,
     first_divergence,
     recorded_commands,
@@ -130,7 +130,7 @@ def test_one_command_more_or_otherwise_is_a_divergence(collision: Run, place: in
     assert first_divergence(commands, other) == commands[place].time
     last_bits = [c._replace(numbers=tuple(n * (1 + 1e-15) for n in c.numbers)) for c in commands]
     assert first_divergence(commands, last_bits) == float("inf")
-    assert not ArmCommand(1.0, "a", ()).equals(ArmCommand(1.001, "a", ()), Tolerances())
+    assert not _ArmCommand(1.0, "a", ()).equals(_ArmCommand(1.001, "a", ()), Tolerances())
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_one_command_more_or_otherwise_is_a_divergence(collision: Run, place: in
     ],
 )
 def test_a_command_has_the_tolerance_of_its_quantity(what: str, tolerances: Tolerances) -> None:
-    one, near, far = (ArmCommand(1.0, what, (0.5 + step,)) for step in (0.0, 0.009, 0.011))
+    one, near, far = (_ArmCommand(1.0, what, (0.5 + step,)) for step in (0.0, 0.009, 0.011))
     assert one.equals(near, tolerances)
     assert not one.equals(near, Tolerances())
     assert not one.equals(far, tolerances)

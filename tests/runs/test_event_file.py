@@ -7,19 +7,19 @@ import pytest
 
 from coneskin.core.errors import RecordingError
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
-from coneskin.runs.event_file import read_events, write_events
+from coneskin.runs.event_file import _read_events, _write_events
 
 
 def test_reviewed_events_survive_a_full_disk(tmp_path: Path) -> None:
     path = tmp_path / "run.events.json"
     reviewed = [GuardEvent(EventName.CONTACT, 1.5, {"sensor": "forearm"})]
-    write_events(path, reviewed, 1.0)
+    _write_events(path, reviewed, 1.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
     try:
         with pytest.raises(RecordingError, match="cannot write the events"):
-            write_events(path, reviewed * 10, 1.0)
+            _write_events(path, reviewed * 10, 1.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert read_events(path, 1.0) == reviewed
+    assert _read_events(path, 1.0) == reviewed
     assert list(tmp_path.iterdir()) == [path]

@@ -10,7 +10,7 @@ from coneskin.cli import main
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.signals.journal import BlockKind
-from coneskin.runs.event_file import read_events, write_events
+from coneskin.runs.event_file import _read_events, _write_events
 from coneskin.runs.replay.run import Run, read_run
 
 HALF = "/skins/caf\udce9"  # a name in Latin-1, as Python reads it
@@ -64,7 +64,7 @@ def test_it_is_drawn_on_a_page(recording: Path, tmp_path: Path) -> None:
 
 def test_its_events_say_what_a_review_reads_back(recording: Path, tmp_path: Path) -> None:
     run = read_run(recording)
-    write_events(tmp_path / "run.events.json", run.events, run.start)
-    assert [event.details["what"] for event in read_events(tmp_path / "run.events.json", run.start)] == [
+    _write_events(tmp_path / "run.events.json", run.events, run.start)
+    assert [event.details["what"] for event in _read_events(tmp_path / "run.events.json", run.start)] == [
         TOLD for event in run.events
     ]

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["code_build", "code_commit", "code_versions", "recorded_version", "running_version"]
+__all__ = ["code_build", "code_versions", "recorded_version", "running_version"]
 
 __version__ = "0.1.0"  # the one place: pyproject.toml reads it from here
 
@@ -16,7 +16,7 @@ _HEADER_KEYS = ("coneskin", "commit", "build")  # of a recording
 
 
 @cache
-def code_commit() -> str:
+def _code_commit() -> str:
     """Return the commit that the code was checked out from; empty where it was installed otherwise.
 
     It is read from the files of git, without git. Changes that are not committed do not show.
@@ -46,7 +46,7 @@ def code_build() -> str:
 
 def code_versions() -> dict[str, str]:
     """Return what a recording's header says of this code."""
-    return dict(zip(_HEADER_KEYS, (__version__, code_commit(), code_build()), strict=True))
+    return dict(zip(_HEADER_KEYS, (__version__, _code_commit(), code_build()), strict=True))
 
 
 def running_version() -> str:

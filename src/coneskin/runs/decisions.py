@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "SKIN_EVENTS",
-    "ArmCommand",
     "Decisions",
     "EventPair",
     "command_block",
@@ -51,7 +50,7 @@ _SPEED_COMMANDS = frozenset({"setpoint", SetJointVelocity.__name__})  # commands
 _ABSOLUTE_TOLERANCE = 1e-12  # rad/s and the like, for numbers near zero
 
 
-class ArmCommand(NamedTuple):
+class _ArmCommand(NamedTuple):
     """Command of a guard.
 
     Attributes:
@@ -64,7 +63,7 @@ class ArmCommand(NamedTuple):
     what: str
     numbers: tuple[float, ...]
 
-    def equals(self, other: ArmCommand, tolerances: Tolerances) -> bool:
+    def equals(self, other: _ArmCommand, tolerances: Tolerances) -> bool:
         """Tell whether the other does the same to the arm at the same time, within tolerances."""
         absolute = _ABSOLUTE_TOLERANCE
         if self.what in _SPEED_COMMANDS:
@@ -81,12 +80,12 @@ class ArmCommand(NamedTuple):
         )
 
 
-def _command_of(output: Command, time: float) -> ArmCommand:
+def _command_of(output: Command, time: float) -> _ArmCommand:
     """Return the command that a guard's core puts out at a time [s]."""
     if isinstance(output, UseStopPath):
-        return ArmCommand(time, output.path.value, ())  # a recording does not tell with which deceleration
+        return _ArmCommand(time, output.path.value, ())  # a recording does not tell with which deceleration
     if isinstance(output, JointVelocitySetpoint | SetpointProgram | SetSpeedSlider):
-        return ArmCommand(time, _OWN_NAMES[type(output)], _numbers(str(tuple(output))))
+        return _ArmCommand(time, _OWN_NAMES[type(output)], _numbers(str(tuple(output))))
     return _of_message(time, output.encode())
 
 
@@ -107,7 +106,7 @@ def command_block(output: Command, time: float, process: str) -> Block:
     return Block(BlockKind.COMMAND, time, payload)
 
 
-def recorded_commands(blocks: Iterable[Block]) -> Iterator[ArmCommand]:
+def recorded_commands(blocks: Iterable[Block]) -> Iterator[_ArmCommand]:
     """Yield the commands of a recording, each with the time of the input before it."""
     time = math.nan
     for block in blocks:
@@ -117,15 +116,15 @@ def recorded_commands(blocks: Iterable[Block]) -> Iterator[ArmCommand]:
             head, _, body = block.payload.partition(b"\n")
             name = head.decode("utf-8", "replace").removesuffix(", not sent")
             if body in (b"sent", b"not sent"):
-                yield ArmCommand(time, name, ())
+                yield _ArmCommand(time, name, ())
             elif name in ("driver", "watchdog"):
                 yield _of_message(time, body)
             else:
-                yield ArmCommand(time, name, _numbers(body.decode("utf-8", "replace")))
+                yield _ArmCommand(time, name, _numbers(body.decode("utf-8", "replace")))
 
 
 def first_divergence(
-    one: Sequence[ArmCommand], other: Sequence[ArmCommand], tolerances: Tolerances | None = None
+    one: Sequence[_ArmCommand], other: Sequence[_ArmCommand], tolerances: Tolerances | None = None
 ) -> float:
     """Return from when on two guards command otherwise [s]; infinite where they do not.
 
@@ -143,12 +142,12 @@ def first_divergence(
     return rest[0].time if rest else math.inf
 
 
-def _of_message(time: float, message: bytes) -> ArmCommand:
+def _of_message(time: float, message: bytes) -> _ArmCommand:
     try:
         command = decode_command(message)
     except ValueError:
-        return ArmCommand(time, repr(message), ())
-    return ArmCommand(time, type(command).__name__, _numbers(str(tuple(command))))
+        return _ArmCommand(time, repr(message), ())
+    return _ArmCommand(time, type(command).__name__, _numbers(str(tuple(command))))
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -236,7 +235,7 @@ class Decisions:
 
     label: str
     events: tuple[GuardEvent, ...]
-    commands: tuple[ArmCommand, ...] | None
+    commands: tuple[_ArmCommand, ...] | None
     start: float
     until: float = math.inf
     missing: str = ""
@@ -271,7 +270,7 @@ def decide_again(
         RecordingError: a block holds what no guard records.
     """
     events: list[GuardEvent] = []
-    commands: list[ArmCommand] = []
+    commands: list[_ArmCommand] = []
     for block, outputs in run.decide(run.build_core(scene, settings), progress):
         for output in outputs:
             if isinstance(output, GuardEvent):
@@ -282,7 +281,7 @@ def decide_again(
     return replace(_decisions(run, label, tuple(events), tuple(commands)), other_code=run.other_code())
 
 
-def _decisions(run: Run, label: str, events: tuple[GuardEvent, ...], commands: tuple[ArmCommand, ...]) -> Decisions:
+def _decisions(run: Run, label: str, events: tuple[GuardEvent, ...], commands: tuple[_ArmCommand, ...]) -> Decisions:
     window = -math.inf, math.inf
     if "cut" in run.header:
         window = run.span

@@ -30,9 +30,7 @@ __all__ = [
     "describe_failure",
     "event_facts",
     "golden_path",
-    "read_events",
     "update_golden",
-    "write_events",
 ]
 
 _MAX_SIZE = 1 << 28  # bytes
@@ -73,7 +71,7 @@ def _parse_events(facts: Any, start: float, where: str) -> list[GuardEvent]:
     return events
 
 
-def read_events(path: Path, start: float) -> list[GuardEvent]:
+def _read_events(path: Path, start: float) -> list[GuardEvent]:
     """Return the events in a file; arguments and errors as of ``parse_events``."""
     try:
         facts = read_json(read_file(path, _MAX_SIZE))
@@ -84,7 +82,7 @@ def read_events(path: Path, start: float) -> list[GuardEvent]:
     return _parse_events(facts, start, str(path))
 
 
-def write_events(path: Path, events: Iterable[GuardEvent], start: float) -> None:
+def _write_events(path: Path, events: Iterable[GuardEvent], start: float) -> None:
     """Write events into a file, one a line, so that a review sees which have changed; it is replaced at once, or not.
 
     Raises:
@@ -113,7 +111,7 @@ def check_golden(recording: Path, tolerances: Tolerances) -> Comparison:
     golden = golden_path(recording)
     if not golden.is_file():
         return compare_decisions(recorded, again, tolerances)
-    events = read_events(golden, recorded.start)
+    events = _read_events(golden, recorded.start)
     reviewed = replace(recorded, label=golden.name, events=tuple(events), commands=None)
     return compare_decisions(reviewed, without_invented(again, recorded), tolerances)
 
@@ -123,7 +121,7 @@ def update_golden(recording: Path, tolerances: Tolerances) -> bool:
     if check_golden(recording, tolerances).same:
         return False
     recorded, again = _decide(recording)
-    write_events(golden_path(recording), without_invented(again, recorded).events, recorded.start)
+    _write_events(golden_path(recording), without_invented(again, recorded).events, recorded.start)
     return True
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
+from coneskin.commissioning.calibration.calibrate import MARK_COUNTS, calibration_marks
 from coneskin.commissioning.calibration.fit import KnownTouch, fit_map
-from coneskin.commissioning.calibration.marks import MARK_COUNTS, calibration_marks
 from coneskin.commissioning.misreadings import WRONG, Place, misread
 from coneskin.core.errors import SkinError
 from coneskin.geometry.frustum import Frustum

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from coneskin.commissioning.calibration.marks import calibration_marks
+from coneskin.commissioning.calibration.calibrate import calibration_marks
 from coneskin.commissioning.calibration.touches import SensorTouches, TouchSequence
 from coneskin.commissioning.misreadings import Place
 from coneskin.commissioning.touching import Notice, Touching

@@ -14,7 +14,7 @@ from coneskin.design.link_design import LinkMesh, design_link
 from coneskin.design.sheets.sheet_design import DesignOptions
 from coneskin.design.studio.design_text import design_facts, deviation_bands, flat_drawing, warning_list
 from coneskin.design.studio.studio_page import StudioPage
-from coneskin.design.studio.workbench import Handles, Workbench, adjusted
+from coneskin.design.studio.workbench import Handles, Workbench, _adjusted
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
@@ -43,7 +43,7 @@ HANDLES = Handles(0.03, 0.05, math.radians(150.0), math.radians(20.0))
 
 @pytest.mark.parametrize("found", [FULL, PART, OVAL], ids=["a full wrap", "a partial wrap", "an oval"])
 def test_an_adjusted_sheet_lies_within_the_found_one(found: PlacedFrustum) -> None:
-    sheet = adjusted(found, HANDLES)
+    sheet = _adjusted(found, HANDLES)
     for u in (0.0, sheet.frustum.slant):
         for phi in (0.0, 1.0, sheet.frustum.wrap):
             was_u, was_phi, off = found.locate(sheet.point(u, phi))
@@ -56,11 +56,11 @@ def test_an_adjusted_sheet_lies_within_the_found_one(found: PlacedFrustum) -> No
 
 @pytest.mark.parametrize("found", [FULL, OVAL], ids=["a cone", "an oval"])
 def test_nothing_set_changes_nothing(found: PlacedFrustum) -> None:
-    assert adjusted(found, Handles()) == found
+    assert _adjusted(found, Handles()) == found
 
 
 def test_a_seam_that_is_turned_on_an_oval_leaves_it_where_it_was() -> None:
-    turned = adjusted(OVAL, Handles(seam=math.radians(60.0)))
+    turned = _adjusted(OVAL, Handles(seam=math.radians(60.0)))
     assert turned.frustum == OVAL.frustum
     assert turned.point(0.05, 0.4) == pytest.approx(OVAL.point(0.05, 0.4 + math.radians(60.0)), abs=1e-12)
 
@@ -100,7 +100,7 @@ def test_what_nobody_touched_is_written_as_by_design(tmp_path: Path) -> None:
 
 
 def test_a_partial_wrap_is_not_turned_beyond_what_was_found() -> None:
-    sheet = adjusted(PART, Handles(wrap=math.radians(150.0), seam=math.radians(170.0)))
+    sheet = _adjusted(PART, Handles(wrap=math.radians(150.0), seam=math.radians(170.0)))
     _, last, _ = PART.locate(sheet.point(0.05, sheet.frustum.wrap))
     assert last == pytest.approx(PART.frustum.wrap)
 
@@ -108,7 +108,7 @@ def test_a_partial_wrap_is_not_turned_beyond_what_was_found() -> None:
 @pytest.mark.parametrize("handles", [Handles(0.1, 0.095), Handles(-0.01), Handles(0.0, -0.01), Handles(wrap=0.0)])
 def test_what_is_no_sheet_is_refused(handles: Handles) -> None:
     with pytest.raises(GeometryError):
-        adjusted(FULL, handles)
+        _adjusted(FULL, handles)
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ from coneskin.robot.arm.workspace import (
     reach,
     skeleton,
 )
-from coneskin.robot.reaction.admittance import AdmittanceMotion
+from coneskin.robot.reaction.motion import _AdmittanceMotion
 from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 from tests.robot.arms import FAR_UR10, arms, joints
@@ -320,7 +320,7 @@ def test_an_arm_that_something_else_has_moved_so_far_gets_no_step() -> None:
 
 
 def test_giving_way_is_bounded_too() -> None:
-    motion = AdmittanceMotion(arm_model("UR10e"), ArmState(0.0, STRETCHED), Reaction("comply"))
+    motion = _AdmittanceMotion(arm_model("UR10e"), ArmState(0.0, STRETCHED), Reaction("comply"))
     for time in (0.0, 0.1):
         assert not isinstance(motion.update(ArmState(time, STRETCHED), [NEAR_SHOULDER]), Done)
     over = motion.update(ArmState(0.2, TURNED), [NEAR_SHOULDER])

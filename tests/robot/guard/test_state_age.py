@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import ControllerState
+from coneskin.robot.guard.arm_supervisor import _ControllerClock, _StateAge
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
-from coneskin.robot.guard.state_age import StateAge, _ControllerClock
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from tests.support.guard_rig import GuardRig, touch
@@ -149,7 +149,7 @@ def test_a_controller_whose_time_runs_backwards_or_stands_still_is_silent(step):
 @pytest.mark.parametrize("period", [0.002, 0.008], ids=["e-Series", "CB3"])
 @pytest.mark.parametrize("drift", [-1e-3, 1e-3])  # ten times what quartz does
 def test_neither_drift_nor_a_busy_reader_is_a_lag(period, drift):
-    age, seen = StateAge(0.05), []
+    age, seen = _StateAge(0.05), []
     for k in range(round(60.0 / period)):
         measured = k * period
         held = measured % 0.1 < 0.03  # the reader takes up to 30 ms of them at once, ten times a second
@@ -160,7 +160,7 @@ def test_neither_drift_nor_a_busy_reader_is_a_lag(period, drift):
 
 
 def test_a_simulator_that_falls_behind_is_a_lag_that_says_so():
-    age = StateAge(0.05)
+    age = _StateAge(0.05)
     for k in range(4000):
         age.feed(ControllerState(0.002 * k, 0.98 * 0.002 * k, *STANDING))
     assert "does not keep up with its clock" in age.trouble(8.0)

@@ -12,9 +12,8 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.ur_models import arm_model
 from coneskin.robot.arm.workspace import _LIMIT_MARGIN, TablePlane, Workspace, skeleton
-from coneskin.robot.reaction.admittance import _DAMPING_TIME, AdmittanceMotion, _wanted_speed
 from coneskin.robot.reaction.backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
-from coneskin.robot.reaction.motion import _PlannedMotion
+from coneskin.robot.reaction.motion import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed
 from coneskin.robot.reaction.retreat import plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
@@ -81,7 +80,7 @@ def test_the_speed_rises_with_the_level_and_never_above_what_is_set(level, thres
 def comply(level, reaction=None):
     """A complying arm that is pushed at the forearm, so firmly at each time."""
     reaction = reaction or Reaction(kind="comply", speed=0.1, arm_speed=0.5)
-    motion = AdmittanceMotion(ARM, ArmState(0.0, Q), reaction)
+    motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), reaction)
 
     def step(state):
         push = level(state.time)
@@ -124,7 +123,7 @@ def test_no_push_no_motion_and_the_end_of_the_push_is_the_end():
 
 @pytest.mark.promise("P31")
 def test_a_push_whose_place_is_not_known_holds_the_arm():
-    motion = AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply"))
+    motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply"))
     lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
     step = motion.update(ArmState(0.1, Q), [FOREARM, lost])
     assert step.qd == ZERO_VELOCITY
@@ -138,7 +137,7 @@ def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_wher
     reaction = Reaction(kind="comply", acceleration=4.0, deceleration=12.0)
 
     def complying(speed):
-        motion = AdmittanceMotion(ARM, ArmState(0.0, Q), reaction)
+        motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), reaction)
         motion.speed = speed
         return motion
 

@@ -18,7 +18,7 @@ from coneskin.core.version import code_versions, running_version
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.comparison import compare_decisions, comparison_lines
 from coneskin.runs.decisions import decide_again, recorded_decisions
-from coneskin.runs.replay.run import Run, Verdict, event_differences, read_run, replay
+from coneskin.runs.replay.run import Run, Verdict, _event_differences, read_run, replay
 from coneskin.scene.settings import resolved_settings
 from tests.scene.scenes import FULL, SKIN_ONLY, record
 from tests.support.sweep import sweep
@@ -231,16 +231,16 @@ STANDING = GuardEvent(EventName.STANDSTILL, 102.0, {"speed": 0.001, "paths": ["d
 )
 def test_what_differs_is_told_with_its_unit(time: float, details: dict[str, Any], line: str) -> None:
     other = GuardEvent(EventName.STANDSTILL, time, {**STANDING.details, **details})
-    assert list(event_differences([STANDING], [other], 100.0)) == [line]
+    assert list(_event_differences([STANDING], [other], 100.0)) == [line]
 
 
 def test_an_event_without_a_partner_does_not_move_the_others() -> None:
     ended = GuardEvent(EventName.ENDING, 103.0, {"what": "the guard was told to end"})
     both = [STANDING, ended]
-    assert list(event_differences(both, both, 100.0)) == []
-    (line,) = event_differences([ended], both, 100.0)
+    assert list(_event_differences(both, both, 100.0)) == []
+    (line,) = _event_differences([ended], both, 100.0)
     assert line == "2.0000 s  standstill: 0.0010 rad/s, by the path driver: is new"
-    assert list(event_differences([STANDING], [ended], 100.0)) == [
+    assert list(_event_differences([STANDING], [ended], 100.0)) == [
         "2.0000 s  standstill: 0.0010 rad/s, by the path driver: "
         "replayed as 3.0000 s  ending: the guard was told to end"
     ]

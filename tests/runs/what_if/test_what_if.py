@@ -17,12 +17,12 @@ from coneskin.runs.cut import cut_run
 from coneskin.runs.decisions import Decisions
 from coneskin.runs.replay.run import Run, read_run
 from coneskin.runs.what_if.what_if import (
-    TouchLabel,
+    _read_labels,
+    _recorded_labels,
+    _score_detection,
+    _TouchLabel,
+    _true_touches,
     judge_run,
-    read_labels,
-    recorded_labels,
-    score_detection,
-    true_touches,
 )
 
 SKIN = "forearm skin"
@@ -46,10 +46,10 @@ def write(path: Path, run: Run) -> Path:
 
 
 def test_touches_end_where_all_is_released_and_nothing_told_is_not_untouched(collision: Run) -> None:
-    assert true_touches(collision) is None
-    assert true_touches(told(collision, {"touches": []})) == []
+    assert _true_touches(collision) is None
+    assert _true_touches(told(collision, {"touches": []})) == []
     touches = [touch(collision, 1.0, 2.0), touch(collision, 3.0, None), touch(collision, 9.0, None, "b")]
-    found = true_touches(told(collision, {"touches": touches}, {"released": collision.start + 4.0}))
+    found = _true_touches(told(collision, {"touches": touches}, {"released": collision.start + 4.0}))
     assert found is not None
     assert [(one.sensor, pytest.approx(one.start), pytest.approx(one.end)) for one in found] == [
         (SKIN, 1.0, 2.0),
@@ -62,7 +62,7 @@ def test_what_bodies_press_is_told_twice_counts_once_and_is_not_taken_off(collis
     begun, over = touch(collision, 3.0, None), touch(collision, 3.0, 5.0)
     resting, script = touch(collision, 6.0, None, "b"), touch(collision, 3.5, None, "c")
     facts = ({"pressed": []}, {"pressed": [begun]}, {"touches": [script]}, {"pressed": [over, resting]})
-    found = true_touches(told(collision, *facts, {"released": collision.start + 6.5}))
+    found = _true_touches(told(collision, *facts, {"released": collision.start + 6.5}))
     assert found is not None
     assert [(one.sensor, pytest.approx(one.start), pytest.approx(one.end)) for one in found] == [
         (SKIN, 3.0, 5.0),
@@ -83,13 +83,13 @@ DAMAGED = [
 @pytest.mark.parametrize("facts", DAMAGED, ids=range(len(DAMAGED)))
 def test_a_damaged_word_about_touches_is_refused(collision: Run, facts: Any) -> None:
     with pytest.raises(RecordingError, match="does not say what touched the skin"):
-        true_touches(told(collision, facts))
+        _true_touches(told(collision, facts))
 
 
 def test_words_about_touches_that_are_nested_without_end_are_refused(collision: Run) -> None:
     block = Block(BlockKind.TRUTH, collision.start + 1.0, b'{"touches":' + b"[" * 100_000)
     with pytest.raises(RecordingError, match="nested too deep"):
-        true_touches(replace(collision, blocks=(block, *collision.blocks)))
+        _true_touches(replace(collision, blocks=(block, *collision.blocks)))
 
 
 def judged(path: Path, run: Run, touches: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -109,7 +109,7 @@ def test_missed_touches_false_alarms_and_delay_need_no_labels(collision: Run, tm
 def test_a_cut_keeps_what_touched_the_skin_in_its_time(collision: Run, tmp_path: Path) -> None:
     touches = [touch(collision, 0.1, 0.2), touch(collision, TOUCHED, TOUCHED + 0.15)]
     cut = cut_run(told(collision, {"touches": touches}), tmp_path / "cut.rec", around=2.95)
-    found = true_touches(read_run(cut.path))
+    found = _true_touches(read_run(cut.path))
     assert found is not None
     assert len(found) == 2
     (row,) = judge_run(cut.path)
@@ -122,20 +122,20 @@ def contacts(*times: float, sensor: str = "a", until: float = float("inf")) -> D
 
 
 def test_each_touch_is_seen_once_missed_or_a_false_alarm() -> None:
-    labels = [TouchLabel(1.0, 1.5, "a"), TouchLabel(2.0, 2.5, "a"), TouchLabel(3.0, 3.5, "a")]
-    score = score_detection(contacts(0.5, 1.01, 1.2, 3.002), labels)  # one too early, one twice
+    labels = [_TouchLabel(1.0, 1.5, "a"), _TouchLabel(2.0, 2.5, "a"), _TouchLabel(3.0, 3.5, "a")]
+    score = _score_detection(contacts(0.5, 1.01, 1.2, 3.002), labels)  # one too early, one twice
     assert (score.touches, score.missed, score.false_alarms) == (3, 1, 1)
     assert score.delays == pytest.approx((0.01, 0.002))
     assert score.median_delay == pytest.approx(0.006)
 
 
 def test_a_contact_on_another_sensor_is_a_false_alarm_and_an_unnamed_sensor_is_any() -> None:
-    assert score_detection(contacts(1.1, sensor="b"), [TouchLabel(1.0, 1.5, "a")]).false_alarms == 1
-    assert score_detection(contacts(1.1, sensor="b"), [TouchLabel(1.0, 1.5)]).missed == 0
+    assert _score_detection(contacts(1.1, sensor="b"), [_TouchLabel(1.0, 1.5, "a")]).false_alarms == 1
+    assert _score_detection(contacts(1.1, sensor="b"), [_TouchLabel(1.0, 1.5)]).missed == 0
 
 
 def test_a_touch_after_the_recording_was_lost_does_not_count() -> None:
-    score = score_detection(contacts(1.1, until=102.0), [TouchLabel(1.0, 1.5), TouchLabel(2.5, 3.0)])
+    score = _score_detection(contacts(1.1, until=102.0), [_TouchLabel(1.0, 1.5), _TouchLabel(2.5, 3.0)])
     assert (score.touches, score.missed) == (1, 0)
 
 
@@ -145,10 +145,10 @@ def test_recorded_contacts_are_labels_until_the_touch_is_over() -> None:
         GuardEvent(EventName.TOUCH_ENDED, 101.5, {"sensor": "a"}),
         GuardEvent(EventName.CONTACT, 103.0, {"sensor": "a"}),
     ]
-    first, second = recorded_labels(Decisions("", tuple(events), None, start=100.0))
+    first, second = _recorded_labels(Decisions("", tuple(events), None, start=100.0))
     assert first[:3] == (1.0, 1.5, "a")
     assert second[:2] == (3.0, float("inf"))
-    early = score_detection(contacts(0.9, 3.0), [first, second])
+    early = _score_detection(contacts(0.9, 3.0), [first, second])
     assert (early.missed, early.false_alarms) == (0, 0)
     assert early.delays == pytest.approx((-0.1, 0.0))
 
@@ -156,7 +156,7 @@ def test_recorded_contacts_are_labels_until_the_touch_is_over() -> None:
 def test_labels_are_read_from_a_file_beside_the_run(tmp_path: Path) -> None:
     path = tmp_path / "run.touches.toml"
     path.write_text('[[touch]]\nstart_s = 2\nend_s = 2.5\n[[touch]]\nstart_s = 1\nend_s = 1.5\nsensor = "a"\n')
-    assert read_labels(path) == [TouchLabel(1, 1.5, "a"), TouchLabel(2, 2.5, "")]
+    assert _read_labels(path) == [_TouchLabel(1, 1.5, "a"), _TouchLabel(2, 2.5, "")]
 
 
 @pytest.mark.parametrize(
@@ -172,4 +172,4 @@ def test_labels_are_read_from_a_file_beside_the_run(tmp_path: Path) -> None:
 def test_a_file_of_labels_with_a_mistake_is_refused(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "run.touches.toml").write_text(text)
     with pytest.raises(RecordingError, match=said):
-        read_labels(tmp_path / "run.touches.toml")
+        _read_labels(tmp_path / "run.touches.toml")

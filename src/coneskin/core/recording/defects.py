@@ -21,7 +21,7 @@ from coneskin.core.text import read_json
 from .block import DROPPED, END, Block, is_time
 from .scan import Damage, Extent
 
-__all__ = ["Defect", "DefectKind", "decode_drop", "encode_drop", "find_defects", "kinds_of"]
+__all__ = ["Defect", "DefectKind", "decode_drop", "encode_drop", "find_defects"]
 
 
 class DefectKind(StrEnum):
@@ -116,7 +116,7 @@ class Defect:
 _END_BIT = 1 << END
 
 
-def kinds_of(mask: int) -> frozenset[int]:
+def _kinds_of(mask: int) -> frozenset[int]:
     """Return the kinds of block that bits stand for; what is the file's own is no kind."""
     return frozenset(kind for kind in range(1, 63) if mask >> kind & 1)
 
@@ -215,7 +215,7 @@ class _Hole:
             self.size,
             chunks,
             self.blocks,
-            kinds_of(self.kinds) if all_known else None,
+            _kinds_of(self.kinds) if all_known else None,
             "" if self.path is None else self.path.name,
         )
 

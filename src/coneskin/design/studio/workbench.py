@@ -15,7 +15,7 @@ from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-__all__ = ["Handles", "Workbench", "adjusted"]
+__all__ = ["Handles", "Workbench"]
 
 _MIN_LENGTH = 0.010  # m; a sheet cannot be shorter than this
 _TIGHT_SHARE = 0.9  # of the tolerance, from which on a deviation is worth a warning
@@ -41,7 +41,7 @@ class Handles:
     seam: float = 0.0
 
 
-def adjusted(placed: PlacedFrustum, handles: Handles) -> PlacedFrustum:
+def _adjusted(placed: PlacedFrustum, handles: Handles) -> PlacedFrustum:
     """Return a sheet with its handles applied; it never covers what the found one does not.
 
     Raises:
@@ -130,7 +130,7 @@ class Workbench:
             if handles == Handles():
                 sheets.append(sheet)
                 continue
-            placed = adjusted(sheet.placed, handles)
+            placed = _adjusted(sheet.placed, handles)
             share = placed.frustum.height / sheet.frustum.height
             area = share * placed.frustum.wrap / sheet.frustum.wrap
             length, covered = sheet.length_share * share, sheet.area_share * area

@@ -41,10 +41,10 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.core import GuardCore
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "event_differences", "read_run", "replay"]
+__all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "read_run", "replay"]
 
 
-def event_differences(recorded: Sequence[GuardEvent], replayed: Sequence[GuardEvent], start: float) -> Iterator[str]:
+def _event_differences(recorded: Sequence[GuardEvent], replayed: Sequence[GuardEvent], start: float) -> Iterator[str]:
     """Yield a line for each event that is not the same, bit by bit, or has no partner.
 
     Args:
@@ -433,7 +433,7 @@ def replay(run: Run, scene: Scene | None = None, progress: Progress = silent) ->
     then = [event for event in recorded if event.name not in SESSION_EVENTS and event.time < gap]
     # an input is recorded before its events, so a run that was cut off may lack the last of these
     again = events if gap == math.inf else events[: len(then)]
-    differences = list(islice(event_differences(then, again, run.start), MOST_DIFFERENCES))
+    differences = list(islice(_event_differences(then, again, run.start), MOST_DIFFERENCES))
     since, until = run.span
     return Replay(events, recorded, len(then), differences, frames, until - since, run.missing, run.other_code())
 

@@ -31,13 +31,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AS_RECORDED",
-    "TouchLabel",
     "broken_rows",
     "judge_run",
-    "read_labels",
-    "recorded_labels",
-    "score_detection",
-    "true_touches",
     "what_if",
 ]
 
@@ -47,7 +42,7 @@ _TRUTH_FIELDS = {"touches", "pressed", "released"}  # of what touched the skin
 _EARLY_TIME = 0.25  # s before a recorded contact in which a more sensitive guard may see the same touch
 
 
-class TouchLabel(NamedTuple):
+class _TouchLabel(NamedTuple):
     """One touch that there was.
 
     Attributes:
@@ -68,7 +63,7 @@ def _label_path(recording: Path) -> Path:
     return recording.with_suffix(".touches.toml")
 
 
-def read_labels(path: Path) -> list[TouchLabel]:
+def _read_labels(path: Path) -> list[_TouchLabel]:
     """Return the touches in a TOML file: tables ``[[touch]]`` with ``start_s``, ``end_s`` and, if wanted, ``sensor``.
 
     Raises:
@@ -76,7 +71,7 @@ def read_labels(path: Path) -> list[TouchLabel]:
     """
     try:
         tables = tomllib.loads(read_file(path, _MAX_SIZE).decode("utf-8-sig")).get("touch", [])
-        labels = [TouchLabel(item["start_s"], item["end_s"], str(item.get("sensor", ""))) for item in tables]
+        labels = [_TouchLabel(item["start_s"], item["end_s"], str(item.get("sensor", ""))) for item in tables]
     except OSError as exc:
         raise RecordingError(f"cannot read the labels {path}: {exc.strerror or exc}") from exc
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as exc:
@@ -87,7 +82,7 @@ def read_labels(path: Path) -> list[TouchLabel]:
     return sorted(labels)
 
 
-def true_touches(run: Run) -> list[TouchLabel] | None:
+def _true_touches(run: Run) -> list[_TouchLabel] | None:
     """Return with what the virtual skin of a run was touched, by a script or by bodies; None where nothing tells.
 
     Raises:
@@ -96,8 +91,8 @@ def true_touches(run: Run) -> list[TouchLabel] | None:
     told = [block for block in run.select(kinds=_TRUTH_KINDS) if contact_force(block.payload) is None]
     if not told:
         return None
-    labels: list[TouchLabel] = []
-    by_bodies: dict[tuple[str, float], TouchLabel] = {}  # each told as it begins, and again once it is over
+    labels: list[_TouchLabel] = []
+    by_bodies: dict[tuple[str, float], _TouchLabel] = {}  # each told as it begins, and again once it is over
     for block in told:
         try:
             facts = read_json(block.payload)
@@ -116,24 +111,24 @@ def true_touches(run: Run) -> list[TouchLabel] | None:
     return sorted([*labels, *by_bodies.values()])
 
 
-def _label(touch: dict[str, Any], began: float) -> TouchLabel:
+def _label(touch: dict[str, Any], began: float) -> _TouchLabel:
     start, end = touch["start"], math.inf if touch["end"] is None else touch["end"]
     if not (is_time(start) and isinstance(end, int | float) and start <= end):
         raise ValueError(f"a touch from {start} to {end} s")
-    return TouchLabel(start - began, end - began, str(touch["sensor"]))
+    return _TouchLabel(start - began, end - began, str(touch["sensor"]))
 
 
-def recorded_labels(recorded: Decisions) -> list[TouchLabel]:
+def _recorded_labels(recorded: Decisions) -> list[_TouchLabel]:
     """Return the contacts that the guard saw when the run was recorded, as if they were all that there was."""
-    labels: list[TouchLabel] = []
+    labels: list[_TouchLabel] = []
     open_since: dict[str, float] = {}
     for event in recorded.events:
         sensor, time = str(event.details.get("sensor", "")), event.time - recorded.start
         if event.name == EventName.CONTACT:
             open_since.setdefault(sensor, time)
         elif event.name == EventName.TOUCH_ENDED and sensor in open_since:
-            labels.append(TouchLabel(open_since.pop(sensor), time, sensor, _EARLY_TIME))
-    labels += [TouchLabel(start, math.inf, sensor, _EARLY_TIME) for sensor, start in open_since.items()]
+            labels.append(_TouchLabel(open_since.pop(sensor), time, sensor, _EARLY_TIME))
+    labels += [_TouchLabel(start, math.inf, sensor, _EARLY_TIME) for sensor, start in open_since.items()]
     return sorted(labels)
 
 
@@ -162,7 +157,7 @@ class _DetectionScore:
         return statistics.median(self.delays) if self.delays else None
 
 
-def score_detection(decisions: Decisions, labels: Sequence[TouchLabel]) -> _DetectionScore:
+def _score_detection(decisions: Decisions, labels: Sequence[_TouchLabel]) -> _DetectionScore:
     """Compare the contacts that a guard sees with the touches that there were.
 
     A contact belongs to the touch of its sensor in whose time it begins; a second one in the same touch is no false
@@ -170,7 +165,7 @@ def score_detection(decisions: Decisions, labels: Sequence[TouchLabel]) -> _Dete
     """
     known = decisions.until - decisions.start
     counted = [label for label in labels if label.start < known]
-    first: dict[TouchLabel, float] = {}
+    first: dict[_TouchLabel, float] = {}
     false_alarms = 0
     for event in decisions.events:
         if event.name != EventName.CONTACT:
@@ -258,21 +253,21 @@ def broken_rows(path: Path, variants: Sequence[Mapping[str, Any]], why: str) -> 
     return [_row(run=run_name(path), path=str(path), variant=_variant_name(one), error=why) for one in variants]
 
 
-def _truth(path: Path, run: Run, recorded: Decisions) -> tuple[list[TouchLabel], str]:
+def _truth(path: Path, run: Run, recorded: Decisions) -> tuple[list[_TouchLabel], str]:
     """Return the touches that there were in the time of a run, and who says so."""
     labels = _label_path(path)
     if labels.is_file():
-        return read_labels(labels), "labels"
-    touches = true_touches(run)
+        return _read_labels(labels), "labels"
+    touches = _true_touches(run)
     if touches is None:
-        return recorded_labels(recorded), "recorded"
+        return _recorded_labels(recorded), "recorded"
     since, until = (time - run.start for time in run.span)
     return [touch for touch in touches if touch.end > since and touch.start < until - _SEEING_TIME], "virtual skin"
 
 
-def _judge(recorded: Decisions, again: Decisions, labels: Sequence[TouchLabel]) -> dict[str, Any]:
+def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel]) -> dict[str, Any]:
     comparison = compare_decisions(recorded, again)
-    score = score_detection(again, labels)
+    score = _score_detection(again, labels)
     median = score.median_delay
     return {
         "same": comparison.same,
