@@ -70,7 +70,7 @@ def drawing() -> str:
         *folder(682, 82, 161, "robot.driver", "messages.py"),
         *folder(682, 137, 161, "robot.ur", "driver_process.py", "ur_rtde.py"),
         *process(670, 350, 185, 130, "guard watchdog", "external control"),
-        *folder(682, 402, 161, "robot.stop", "watchdog_process.py", "standstill_hold.py"),
+        *folder(682, 402, 161, "robot.stop", "guard_watchdog.py", "standstill_hold.py"),
         *process(245, 545, 610, 115, "your program"),
         *folder(260, 585, 160, "session", "session.py", "event_log.py"),
         *folder(440, 585, 160, "coneskin", "recording.py"),

@@ -129,6 +129,12 @@ def test_a_command_with_a_slip_is_named(word: str, near: str, capsys: Output) ->
     assert capsys.readouterr().err.endswith(f"there is no command {word}; did you mean {near}?\n")
 
 
+@pytest.mark.parametrize("word", ["check", "validate"])
+def test_who_wants_to_check_a_scene_is_sent_to_the_doctor(word: str, capsys: Output) -> None:
+    assert run(word, "scene.toml") == 2
+    assert capsys.readouterr().err.endswith("coneskin doctor SCENE --check does that\n")
+
+
 @pytest.mark.parametrize("words", [(), ("xyz",)])
 def test_without_a_command_all_are_named(words: tuple[str, ...], capsys: Output) -> None:
     assert run(*words) == 2

@@ -31,7 +31,7 @@ from .arm_stop import ArmStop
 from .motion.motion_away import MotionAway
 from .phase import Phase
 from .signals.contact import Contact, TouchRecord
-from .signals.journal import EventName, Outputs, emit
+from .signals.journal import TOUCH_CAUSE, EventName, Outputs, emit
 from .speed.speed_reduction import SpeedReduction
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
@@ -283,19 +283,19 @@ class ArmSupervisor:
             ):
                 self.phase = Phase.SLOWED
             else:
-                self._stop_now(now, "touch", True, out, contact)
+                self._stop_now(now, TOUCH_CAUSE, True, out, contact)
             return
         reaction, away = touches.update(contact), self._away
         if phase is Phase.SLOWED and reaction.kind != "slow":
             self._reaction = reaction
-            self._stop_now(now, "touch", True, out, contact)
+            self._stop_now(now, TOUCH_CAUSE, True, out, contact)
         elif away.yields:
             if reaction.kind not in ("slow", "comply", self._reaction.kind):
                 self._reaction = reaction
-                self._halt(now, "touch", out, contact)
+                self._halt(now, TOUCH_CAUSE, out, contact)
         elif away.under_way and began:
             away.oppose()
-            self._halt(now, "touch", out, contact)
+            self._halt(now, TOUCH_CAUSE, out, contact)
 
     def feed_contacts(self, now: float, contacts: Sequence[Contact], out: Outputs) -> None:
         """Take what the newest frames say of every touch that there is, at a host time [s]."""

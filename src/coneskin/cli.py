@@ -84,6 +84,9 @@ def _listing() -> str:
     return "\n".join(lines)
 
 
+_CHECKS = {"check", "validate", "verify"}
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return the exit code: 0 done, 1 failed, 2 wrong usage, 130 interrupted."""
     try:
@@ -135,7 +138,13 @@ def _run(arguments: Sequence[str] | None) -> int:
         near = difflib.get_close_matches(chosen, COMMANDS, 1, 0.5)
         parser.error(
             f"there is no command {chosen}; "
-            + (f"did you mean {near[0]}?" if near else f"there are {', '.join(COMMANDS)}")
+            + (
+                "coneskin doctor SCENE --check does that"
+                if chosen in _CHECKS
+                else f"did you mean {near[0]}?"
+                if near
+                else f"there are {', '.join(COMMANDS)}"
+            )
         )
     args = parser.parse_args(words)
     assert run is not None  # argparse has ended the program otherwise

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "INPUTS",
     "SESSION_EVENTS",
+    "TOUCH_CAUSE",
     "BlockKind",
     "Command",
     "EventName",
@@ -43,6 +44,10 @@ __all__ = [
     "force_block",
     "stopping_contact",
 ]
+
+
+#: ``why`` of a stop for a touch; what else is there stops the arm without a ``Collision``
+TOUCH_CAUSE = "touch"
 
 
 class BlockKind(IntEnum):

@@ -347,7 +347,7 @@ class _Transcript:
 
     def event(self, event: GuardEvent) -> None:
         """Print an event of the guard."""
-        from coneskin.runs.replay.event_text import describe
+        from coneskin.robot.guard.signals.event_text import describe
 
         self._say(describe(event, self._began()))
         with self._changed:

@@ -86,8 +86,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPublisher]) -> int:
+    from coneskin.robot.guard.signals.event_text import EventLines
     from coneskin.robot.guard.signals.journal import GuardEvent
-    from coneskin.runs.replay.event_text import EventLines
     from coneskin.session.session import guard
 
     lines = EventLines()

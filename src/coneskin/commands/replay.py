@@ -121,7 +121,7 @@ def _replay_one(args: argparse.Namespace) -> int:
 
 def _report(result: Replay, start: float, listed: bool) -> None:
     from coneskin.core.text import printable
-    from coneskin.runs.replay.event_text import describe
+    from coneskin.robot.guard.signals.event_text import describe
     from coneskin.runs.replay.run import MOST_DIFFERENCES
 
     if listed:
@@ -154,10 +154,10 @@ def _replay_with_settings(
 ) -> int:
     """Say what a run would have been with other settings, or another scene, and return the exit code 0."""
     from coneskin.core.progress import ProgressBar
+    from coneskin.robot.guard.signals.event_text import describe
     from coneskin.runs.comparison import compare_decisions, comparison_facts, comparison_lines, without_invented
     from coneskin.runs.decisions import decide_again, recorded_decisions
     from coneskin.runs.event_file import event_facts
-    from coneskin.runs.replay.event_text import describe
     from coneskin.runs.replay.run import read_run
     from coneskin.scene.reader import load_scene
     from coneskin.scene.settings import parse_settings

@@ -86,7 +86,7 @@ class ChildProcesses:
             internal = scene.arm.control == "internal"
             name = "driver" if internal else "watchdog"
             arm = arm_model(scene.arm.model)
-            module = load_driver(arm.family).process if internal else "coneskin.robot.stop.watchdog_process"
+            module = load_driver(arm.family).process if internal else "coneskin.robot.stop.guard_watchdog"
             self.children[name] = spawn(module, other_guard_end, other_program_end)
             lifetime = scene.monitoring_limits.process_silence
             driver_settings = {"watchdog_hz": scene.arm.watchdog_hz, "request_lifetime": lifetime}

@@ -204,7 +204,7 @@ class FallbackStop:
         return self._hold is not None and self._hold.stands
 
     def end(self) -> None:
-        """Close the connections; ``look`` opens new ones. For when the guard lives again, or nothing is left to do."""
+        """Close the connections; ``poll`` opens new ones. For when the guard lives again, or nothing is left to do."""
         self._close()
         self._hold = None
 

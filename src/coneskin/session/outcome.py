@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.core import errors
 from coneskin.core.errors import Collision, ConeSkinError, MissingExtra, RobotConnectionError, RobotRefused, SceneError
-from coneskin.robot.guard.signals.journal import EventName
+from coneskin.robot.guard.signals.journal import TOUCH_CAUSE, EventName
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -88,7 +88,7 @@ def stop_error(
         outcome: STANDS, STILL_RETREATING or NOT_CONFIRMED.
         reaction: what the reaction did, as the event "latched" says it; empty where that is not known.
     """
-    if contact is None or stop.details["why"] != "touch":
+    if contact is None or stop.details["why"] != TOUCH_CAUSE:
         return RobotRefused(f"the guard has stopped the arm: {stop.details['why']}; {outcome}")
     where = contact.details
     return Collision(
@@ -156,7 +156,7 @@ def exit_code(events: Sequence[GuardEvent], arm: bool) -> int:
     on_purpose = {event.details["what"] for event in events if event.name == EventName.ENDING}
     stops = [event.details["why"] for event in events if event.name == EventName.STOPPING]
     names = {event.name for event in events}
-    if "touch" in stops or (not arm and EventName.CONTACT in names):
+    if TOUCH_CAUSE in stops or (not arm and EventName.CONTACT in names):
         return 3
     if not arm and EventName.FAULT in names:
         return 1

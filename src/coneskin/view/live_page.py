@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from coneskin.core.errors import ConeSkinError
-from coneskin.runs.replay.event_text import describe
+from coneskin.robot.guard.signals.event_text import describe
 
 from .field_choice import FieldChoice
 from .history import UNKNOWN, PhaseWords

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.core.errors import RecordingError
 from coneskin.geometry.pose import Pose, Vector
+from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
-from coneskin.runs.replay.event_text import describe
 from coneskin.runs.replay.run import Run, read_run
 
 from .history import History

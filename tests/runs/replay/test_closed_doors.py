@@ -17,8 +17,8 @@ from coneskin.cli import main
 from coneskin.core.errors import ConeSkinError, SceneError
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.reader import read_recording
+from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
-from coneskin.runs.replay.event_text import describe
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene

@@ -22,6 +22,7 @@ from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.reader import RecordedBlocks, read_recording
 from coneskin.core.text import read_json
 from coneskin.core.version import recorded_version, running_version
+from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import (
     INPUTS,
     SESSION_EVENTS,
@@ -35,7 +36,6 @@ from coneskin.scene.values.scene import Commissioning, Scene
 from coneskin.skin.detection.events import TouchBegan, TouchEnded
 
 from .event_details import EXACT, describe_differences, milliseconds
-from .event_text import describe
 
 if TYPE_CHECKING:
     from coneskin.robot.guard.core import GuardCore
@@ -370,7 +370,7 @@ class Run:
         Args:
             events: those of a replay; by default the recorded ones.
         """
-        from .event_text import describe
+        from coneskin.robot.guard.signals.event_text import describe
 
         return [describe(event, self.start) for event in (self.events if events is None else events)]
 

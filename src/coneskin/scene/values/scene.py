@@ -126,7 +126,7 @@ class SpeedLimitScene:
     """Permissible speeds of the skins of a scene.
 
     Attributes:
-        fingerprint: of what they hold for; see ``speed_limit_table.limit_fingerprint``.
+        fingerprint: of what they hold for; see ``speed_limit_tables.limit_fingerprint``.
         date: when they were computed, UTC.
         coneskin: the version.
         edition: document and edition that the limits of the force are from.

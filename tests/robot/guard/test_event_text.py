@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
+from coneskin.robot.guard.signals import event_text
+from coneskin.robot.guard.signals.event_text import EventLines, describe
 from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName, GuardEvent
-from coneskin.runs.replay import event_text as timeline
-from coneskin.runs.replay.event_text import EventLines, describe
 from tests.support.paths import ROOT
 
 TOUCH = {"sensor": "skin", "link": "forearm", "u": 0.0701, "phi": 1.5708, "level": 0.6, "location_valid": True}
@@ -129,11 +129,11 @@ def test_what_is_no_retreat_is_not_called_one(name: str, details: dict[str, Any]
 
 
 def test_the_words_are_those_of_the_robot() -> None:
-    assert timeline._END_CAUSE in (ROOT / "robot" / "guard" / "loop.py").read_text(encoding="utf-8")
+    assert event_text._END_CAUSE in (ROOT / "robot" / "guard" / "loop.py").read_text(encoding="utf-8")
     comply = (ROOT / "robot" / "reaction" / "admittance.py").read_text(encoding="utf-8")
-    assert all(f'"{word}"' in comply for word in (timeline._RELEASE_CAUSE, *timeline._PUSH_LIMITS))
-    others = [path for path in (ROOT / "robot").rglob("*.py") if path.name != "admittance.py"]
-    assert not [path.name for path in others if timeline._RELEASE_CAUSE in path.read_text(encoding="utf-8")]
+    assert all(f'"{word}"' in comply for word in (event_text._RELEASE_CAUSE, *event_text._PUSH_LIMITS))
+    others = [path for path in (ROOT / "robot").rglob("*.py") if path.name not in ("admittance.py", "event_text.py")]
+    assert not [path.name for path in others if event_text._RELEASE_CAUSE in path.read_text(encoding="utf-8")]
 
 
 ELLIPSE = {"ellipse": ((0.0, 3e-4, 4e-4), (0.0, 1e-5, 0.0))}

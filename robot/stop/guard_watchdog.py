@@ -105,7 +105,7 @@ class _GuardWatchdog:
 
 
 def main(arguments: list[str]) -> int:
-    """Run as ``python -m coneskin.robot.stop.watchdog_process``: take the channels, wait for the settings, serve."""
+    """Run as ``python -m coneskin.robot.stop.guard_watchdog``: take the channels, wait for the settings, serve."""
     shorten_time_slice()
     lifeline, (guard, session) = inherit(arguments, parent=1)
     while not (hello := session.receive()) and not session.closed:
