@@ -24,6 +24,7 @@ from coneskin.core.errors import GeometryError
 
 from .bend import Bend, BentStrip, RulingFrame, bends_between, check_bends, frames_along
 from .frustum import Frustum
+from .placed_frustum import PlacedFrustum
 from .pose import Pose, Vector
 
 if TYPE_CHECKING:
@@ -33,19 +34,21 @@ if TYPE_CHECKING:
 __all__ = ["Developable"]
 
 _AT_EDGE = 1e-9  # rad; a foot so close to an edge may lie beyond it
+_NORMAL_COUNT = 360  # by which the middle of a section is found
 _MAX_OPENING = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer
 
 
 @dataclass(frozen=True, slots=True)
-class Developable:
-    """A side that is bent along rulings, in a frame of its own.
+class Developable(PlacedFrustum):
+    """A side that is bent along rulings, and its pose on a link; what is flat of it is that of its frustum.
 
-    The frame is that of a frustum which it touches along the ruling phi = 0: that ruling begins at (radius1, 0, 0), and
+    Its frame is that of a frustum which it touches along the ruling phi = 0: that ruling begins at (radius1, 0, 0), and
     its outward normal lies in the plane of x and z.
 
     Attributes:
         frustum: the frustum to whose side it is isometric, but for ``mismatch``; its u, phi, lengths and areas are
             those of this side.
+        link_frustum: pose of the side's frame in the link's frame.
         bends: strips from phi = 0 to phi = wrap.
         lift: height above the general cone to which this side is parallel [m]; 0 where it is one itself.
 
@@ -54,8 +57,7 @@ class Developable:
             lift.
     """
 
-    frustum: Frustum
-    bends: tuple[Bend, ...]
+    bends: tuple[Bend, ...] = ()
     lift: float = 0.0
     _strips: tuple[BentStrip, ...] = field(init=False, repr=False, compare=False)
     _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)  # azimuths
@@ -94,8 +96,13 @@ class Developable:
         return math.fsum(bend.turn for bend in self.bends)
 
     @property
+    def kind(self) -> str:
+        """Kind of the side, in words."""
+        return f"general {'cylinder' if self.is_straight else 'cone'}"
+
+    @property
     def growth(self) -> float:
-        """Growth of the mean radius per height of a parallel side; cos a of a frustum."""
+        """Growth of the mean radius per height above the side; cos a of a frustum."""
         return self.turn / self.frustum.wrap
 
     @property
@@ -104,7 +111,17 @@ class Developable:
         return self.frustum.wrap == math.tau
 
     @property
-    def closing_gap(self) -> tuple[float, float]:
+    def closing_gap(self) -> float:
+        """Distance between the ends of the arc of end 1 of a full wrap [m]."""
+        return self._opening[0]
+
+    @property
+    def sharpest_bend(self) -> float:
+        """Largest turn of the normal per azimuth."""
+        return max(abs(bend.turn) / bend.width for bend in self.bends)
+
+    @property
+    def _opening(self) -> tuple[float, float]:
         """Distance between the ends of the arc of end 1 [m], and the angle between the normals there [rad]."""
         last, first = self.edge(), self._frame(0, 0.0)
         turned = math.hypot(math.dist(last.n, first.n), math.dist(last.t, first.t)) / math.sqrt(2.0)
@@ -123,7 +140,7 @@ class Developable:
         """
         if not self.closed:
             return
-        gap, angle = self.closing_gap
+        gap, angle = self._opening
         around = math.tau * self.frustum.radius1
         if gap > _MAX_OPENING * around or angle > math.tau * _MAX_OPENING or not 0.0 < self.turn < 1.5 * math.tau:
             raise GeometryError(
@@ -150,34 +167,33 @@ class Developable:
         return self._frame(number, (phi - self._starts[number]) * strip.arc / bend.width)
 
     def point(self, u: float, phi: float) -> Vector:
-        """Return the point at u [m] and phi [rad], in the frame of the side [m]."""
+        """Return the point at u [m] and phi [rad], in the link's frame [m]."""
         (x, y, z), _, (ux, uy, uz), _ = self._ruling(phi)
-        return x + u * ux, y + u * uy, z + u * uz
+        return self.link_frustum.apply((x + u * ux, y + u * uy, z + u * uz))
 
     def normal(self, phi: float) -> Vector:
-        """Return the outward unit normal at azimuth phi [rad]; it is the same all along a ruling."""
-        return self._ruling(phi).n
+        """Return the outward unit normal at azimuth phi [rad] in the link's frame; the same all along a ruling."""
+        return self.link_frustum.rotate(self._ruling(phi).n)
 
-    def locate(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """Return the surface coordinates of the nearest foot of a point, the inverse of ``point``.
+    def locate(self, p_link: Vector) -> Vector:
+        """Return u [m], phi [rad] and the signed distance [m] of the nearest foot of a point of the link's frame.
 
-        Args:
-            x: first coordinate in the frame of the side [m].
-            y: second coordinate [m].
-            z: third coordinate [m].
-
-        Returns:
-            u [m], phi [rad] and the signed distance [m], positive outside. The foot is on the continuation of the
-            rulings, so u may lie outside [0, slant]; phi outside [0, wrap] where the outer strips continue.
+        The foot is on the continuation of the rulings, so u may lie outside [0, slant]; phi outside [0, wrap] where the
+        outer strips continue.
         """
-        u, phi, distance = (float(one[0]) for one in self.locate_all([[x, y, z]]))
-        return u, phi, distance
+        import numpy as np
+
+        u, phi, distance = self._feet(np.array([self.link_frustum.inverse().apply(p_link)]))
+        return float(u[0]), float(phi[0]), float(distance[0])
 
     def rulings(self, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return the points of end 1 [m], the directions of the rulings and the normals: shapes (..., 3).
+        """Return the points of end 1 [m], the directions of the rulings and the normals, in the frame of the side.
 
         Args:
             phi: azimuths [rad].
+
+        Returns:
+            three arrays of shape (..., 3).
         """
         import numpy as np
 
@@ -189,19 +205,29 @@ class Developable:
         at, way, normal = frames_along(self._strips, number, (phi - np.array(self._starts)[number]) * share[number])
         return at + self.lift * normal, way, normal
 
-    def points(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-        """Return the points for arrays u [m] and phi [rad] that broadcast: shape (..., 3) [m]."""
+    def place(self, u: ArrayLike, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return points [m] and outward unit normals in the link's frame, shapes (..., 3)."""
         import numpy as np
 
         u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
-        base, way, _ = self.rulings(phi)
-        return np.asarray(base + u[..., None] * way)
+        base, way, normal = self.rulings(phi)
+        return self.link_frustum.apply_all(base + u[..., None] * way), normal @ np.array(self.link_frustum.rotation).T
 
     def locate_all(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return u [m], phi [rad] and the signed distance [m] of many points, shape (n, 3), as ``locate`` does."""
+        """Return u [m], phi [rad] and the signed distance [m] of many points, the inverse of ``place``."""
         import numpy as np
 
         points = np.asarray(points, float)
+        u, phi, distance = self._feet(self.link_frustum.inverse().apply_all(points.reshape(-1, 3)))
+        shape = points.shape[:-1]
+        return u.reshape(shape), phi.reshape(shape), distance.reshape(shape)
+
+    def _feet(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return u, phi and the distance of points in the frame of the side, shape (n, 3)."""
+        import numpy as np
+
         best, phi = np.full(len(points), np.inf), np.zeros(len(points))
         for number, strip in enumerate(self._strips):
             along, gap = strip.feet(points, 0.0, strip.arc)
@@ -216,8 +242,29 @@ class Developable:
         at, way, normal = self.rulings(phi)
         return np.einsum("ij,ij->i", points - at, way), phi, np.einsum("ij,ij->i", points - at, normal)
 
-    def parallel(self, height: float) -> tuple[Developable, Pose]:
-        """Return the side parallel to this one at a height [m] along the normals, and its frame in the frame of this.
+    def centre(self, u: float) -> Vector:
+        """Return the middle of the section at u [m], in the link's frame [m]: the point nearest to its normals.
+
+        It is the centre of an oval, and that of the circle where a part of one is covered.
+        """
+        import numpy as np
+
+        phi = (np.arange(_NORMAL_COUNT) + 0.5) * self.frustum.wrap / _NORMAL_COUNT
+        base, way, normal = self.rulings(phi)
+        along = way.sum(axis=0) / np.linalg.norm(way.sum(axis=0))
+        level = normal - np.outer(normal @ along, along)
+        level /= np.linalg.norm(level, axis=1)[:, None]
+        across = np.eye(3) - level[:, :, None] * level[:, None, :]
+        points = base + u * way
+        x, y, z = np.linalg.lstsq(across.sum(axis=0), np.einsum("ijk,ik->j", across, points), rcond=1e-9)[0].tolist()
+        return self.link_frustum.apply((x, y, z))
+
+    def moved(self, frame: Pose) -> Developable:
+        """Return the side in another frame, in which ``frame`` is the pose of the link's."""
+        return Developable(self.frustum, frame @ self.link_frustum, self.bends, self.lift)
+
+    def parallel(self, height: float) -> Developable:
+        """Return the side parallel to this one at a height [m] along the normals.
 
         A bend grows by height * turn, a plane does not.
 
@@ -232,10 +279,13 @@ class Developable:
         bends = tuple(Bend(width, bend.turn) for width, bend in zip(widths, self.bends, strict=True))
         shift = Pose(translation=(height * (f.cos_half_angle - self.growth), 0.0, -height * f.sin_half_angle))
         frustum = Frustum(f.radius1 + grow, f.radius2 + grow, f.height, f.wrap)
-        return Developable(frustum, bends, self.lift + height), shift
+        return Developable(frustum, self.link_frustum @ shift, bends, self.lift + height)
 
     def azimuth_above(self, height: float, phi: float) -> float:
-        """Return the azimuth [rad] on the parallel side at a height [m] of the ruling that has the azimuth phi here."""
+        """Return the azimuth [rad] on the parallel side at a height [m] of the ruling that has the azimuth phi here.
+
+        A bend grows with the height and a plane does not, so that they take other shares of the wrap there.
+        """
         middle = self._middle
         turns, left = divmod(phi, math.tau) if self.closed else (0.0, phi)
         arc = 0.0
@@ -249,7 +299,7 @@ class Developable:
 
     def mismatch(self, height: float) -> float:
         """Return how far the parallel side at a height [m] is from being a sector, in arc at end 1 or 2 [m]."""
-        below, _ = self.parallel(-self.lift)
+        below = self.parallel(-self.lift)
         f, arc, turned, worst = below.frustum, 0.0, 0.0, 0.0
         lift = self.lift + height
         for bend in below.bends:
@@ -258,8 +308,8 @@ class Developable:
             worst = max(worst, abs(self.growth * arc - turned))
         return abs(0.5 * lift * worst * f.slant * f.sin_half_angle / (below._middle + lift * self.growth))
 
-    def turned(self, turn: float) -> tuple[Developable, Pose]:
-        """Return a closed side whose phi = 0 lies where phi was ``turn`` [rad], and its frame in the frame of this.
+    def turned(self, turn: float) -> Developable:
+        """Return a full wrap whose seam lies at the azimuth that was ``turn`` [rad].
 
         Raises:
             GeometryError: the side is not closed.
@@ -268,7 +318,7 @@ class Developable:
             raise GeometryError("only a full wrap can be turned: a partial one has edges where it ends")
         turn %= math.tau
         bends = bends_between(self.bends, turn, turn + math.tau, around=True)
-        return Developable(self.frustum, bends, self.lift), self._frame_at(0.0, turn)
+        return Developable(self.frustum, self.link_frustum @ self._frame_at(0.0, turn), bends, self.lift)
 
     def _frame_at(self, u: float, phi: float) -> Pose:
         """Return the frame of a side that begins at u [m], phi [rad], in the frame of this side."""
@@ -281,18 +331,18 @@ class Developable:
         px, py, pz = (p + u * a - rho * b for p, a, b in zip(at, way, x, strict=True))
         return Pose(((x[0], t[0], z[0]), (x[1], t[1], z[1]), (x[2], t[2], z[2])), (px, py, pz))
 
-    def part(self, u1: float, u2: float, phi1: float, phi2: float) -> tuple[Developable, Pose]:
-        """Return the part between two arcs u [m] and two rulings phi [rad], and its frame in the frame of this side.
+    def part(self, u1: float, u2: float, phi1: float, phi2: float) -> Developable:
+        """Return the part between two arcs u [m] and two rulings phi [rad].
 
         The part of a lifted side has the sector of its own arcs, its rulings at their places in its own middle.
         """
         if not 0.0 <= phi1 < phi2:
             raise GeometryError(f"phi1 must not be below 0 and phi2 above it, got {phi1!r} and {phi2!r} rad")
         if self.lift:
-            below, down = self.parallel(-self.lift)
-            piece, at = below.part(u1, u2, *(self.azimuth_above(-self.lift, phi) for phi in (phi1, phi2)))
-            above, up = piece.parallel(self.lift)
-            return above, down @ at @ up
+            own = Developable(self.frustum, Pose(), self.bends, self.lift)
+            phis = (self.azimuth_above(-self.lift, phi) for phi in (phi1, phi2))
+            return own.parallel(-self.lift).part(u1, u2, *phis).parallel(self.lift).moved(self.link_frustum)
         f = self.frustum
         frustum = Frustum(f.radius_at(u1), f.radius_at(u2), (u2 - u1) * f.cos_half_angle, phi2 - phi1)
-        return Developable(frustum, bends_between(self.bends, phi1, phi2, self.closed)), self._frame_at(u1, phi1)
+        pose = self.link_frustum @ self._frame_at(u1, phi1)
+        return Developable(frustum, pose, bends_between(self.bends, phi1, phi2, self.closed))

@@ -11,7 +11,7 @@ import pytest
 import coneskin as cs
 from coneskin.design.folder import FileOptions
 from coneskin.geometry.bend import Bend
-from coneskin.geometry.placed_developable import PlacedDevelopable
+from coneskin.geometry.developable import Developable
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.build import place_on_arm
 from coneskin.skin.detection.events import TouchEnded
@@ -22,7 +22,7 @@ TURN = 2.0 * math.pi
 POSE = cs.Pose.from_xyz_rpy((0.01, 0.02, 0.05), (0.1, -0.2, 0.3))
 
 
-def stadium(flat: float = 0.04, radius: float = 0.03) -> PlacedDevelopable:
+def stadium(flat: float = 0.04, radius: float = 0.03) -> Developable:
     around = 2.0 * (flat + math.pi * radius)
     pieces = [
         (0.5 * flat, 0.0),
@@ -32,7 +32,7 @@ def stadium(flat: float = 0.04, radius: float = 0.03) -> PlacedDevelopable:
         (0.5 * flat, 0.0),
     ]
     bends = tuple(Bend(TURN * arc / around, turn) for arc, turn in pieces)
-    return PlacedDevelopable(cs.Frustum(around / TURN, around / TURN, 0.2), POSE, bends)
+    return Developable(cs.Frustum(around / TURN, around / TURN, 0.2), POSE, bends)
 
 
 def test_layers_of_a_stadium_are_cut_for_their_own_arc() -> None:
@@ -62,14 +62,14 @@ def test_the_active_area_lies_at_its_height_above_the_stadium() -> None:
     assert feet == pytest.approx(normals, abs=1e-9)
 
 
-def tapered() -> PlacedDevelopable:
+def tapered() -> Developable:
     """Return three quarters of a box with two sharp corners, tapered."""
     bends = tuple(Bend(width, turn) for width, turn in ((1.0, 0.1), (0.5, 1.5), (1.6, 0.0), (0.5, 1.6), (1.1, 0.9)))
-    return PlacedDevelopable(cs.Frustum(0.05, 0.06, 0.2, 4.7), POSE, bends)
+    return Developable(cs.Frustum(0.05, 0.06, 0.2, 4.7), POSE, bends)
 
 
 @pytest.mark.parametrize("place", [stadium(), tapered()], ids=["stadium", "tapered box"])
-def test_printed_crosses_lie_above_the_places_that_a_calibration_expects(place: PlacedDevelopable) -> None:
+def test_printed_crosses_lie_above_the_places_that_a_calibration_expects(place: Developable) -> None:
     """Each cross is folded with its cover back onto the link; its foot on the active side is the place of its mark."""
     (design,) = cs.design_sheets([place], cs.DesignOptions(face_up="outside"))
     cover, active = design.cuts[6], design.active.frustum
@@ -101,8 +101,8 @@ def test_radii_that_differ_by_rounding_make_no_cone() -> None:
     """The radii of a fit are sums of floats: an oval tube was called a general cone of 0.0000 deg."""
     place = stadium()
     radius = place.frustum.radius1
-    assert PlacedDevelopable(cs.Frustum(radius, radius + 1e-12, 0.2), POSE, place.bends).kind == "general cylinder"
-    assert PlacedDevelopable(cs.Frustum(radius, radius + 1e-5, 0.2), POSE, place.bends).kind == "general cone"
+    assert Developable(cs.Frustum(radius, radius + 1e-12, 0.2), POSE, place.bends).kind == "general cylinder"
+    assert Developable(cs.Frustum(radius, radius + 1e-5, 0.2), POSE, place.bends).kind == "general cone"
     assert PlacedFrustum(cs.Frustum(radius, radius - 1e-12, 0.2), POSE).kind == "cylinder"
 
 

@@ -11,7 +11,6 @@ from coneskin.core.errors import GeometryError
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 
@@ -34,7 +33,7 @@ def bent(frustum: Frustum, even: bool = False) -> Developable:
         widths * frustum.cos_half_angle if even else np.array([0.0, 0.9, 0.2, 0.7, 0.1, 0.8, 0.3]) * frustum.wrap / 3.0
     )
     return Developable(
-        frustum, tuple(Bend(float(width), float(turn)) for width, turn in zip(widths, turns, strict=True))
+        frustum, bends=tuple(Bend(float(width), float(turn)) for width, turn in zip(widths, turns, strict=True))
     )
 
 
@@ -49,7 +48,7 @@ def stadium(flat: float = 0.04, radius: float = 0.03) -> Developable:
         (0.5 * flat, 0.0),
     ]
     bends = tuple(Bend(TURN * arc / around, turn) for arc, turn in pieces)
-    return Developable(Frustum(around / TURN, around / TURN, 0.2), bends)
+    return Developable(Frustum(around / TURN, around / TURN, 0.2), bends=bends)
 
 
 def places(side: Developable, count: int = 300) -> tuple[np.ndarray, np.ndarray]:
@@ -64,7 +63,7 @@ each_frustum = pytest.mark.parametrize("frustum", FRUSTA.values(), ids=FRUSTA)
 def test_an_even_bend_is_the_frustum(frustum: Frustum) -> None:
     side = bent(frustum, even=True)
     u, phi = places(side)
-    assert side.points(u, phi) == pytest.approx(frustum.points(u, phi), abs=1e-15)
+    assert side.place(u, phi)[0] == pytest.approx(frustum.points(u, phi), abs=1e-15)
     assert side.rulings(phi)[2] == pytest.approx(frustum.normals(phi), abs=1e-14)
     assert side.growth == pytest.approx(frustum.cos_half_angle, rel=1e-14)
 
@@ -74,8 +73,8 @@ def test_lengths_are_those_of_the_frustum(frustum: Frustum) -> None:
     """The first fundamental form, by differences: du^2 + rho^2 dphi^2."""
     side, h = bent(frustum), 1e-6
     u, phi = places(side)
-    along = (side.points(u + h, phi) - side.points(u - h, phi)) / (2.0 * h)
-    around = (side.points(u, phi + h) - side.points(u, phi - h)) / (2.0 * h)
+    along = (side.place(u + h, phi)[0] - side.place(u - h, phi)[0]) / (2.0 * h)
+    around = (side.place(u, phi + h)[0] - side.place(u, phi - h)[0]) / (2.0 * h)
     rho = np.array([frustum.radius_at(value) for value in u])
     inner = np.abs(phi[:, None] - np.cumsum([bend.width for bend in side.bends])).min(axis=1) > 2.0 * h
     assert (along**2).sum(axis=1) == pytest.approx(1.0, abs=1e-8)
@@ -91,7 +90,7 @@ def test_a_straight_line_of_the_flat_pattern_keeps_its_length_and_is_a_geodesic(
     parts = np.linspace(0.0, 1.0, 20_001)
     flat = np.outer(1.0 - parts, one) + np.outer(parts, two)
     u, phi = np.array([frustum.locate_flat(x, y) for x, y in flat]).T
-    line = side.points(u, phi)
+    line = side.place(u, phi)[0]
     assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() == pytest.approx(math.dist(one, two), rel=1e-8)
     before, at, after = line[100:19800:400], line[150:19850:400], line[200:19900:400]
     sideways = np.cross(side.rulings(phi[150:19850:400])[2], after - before)
@@ -103,8 +102,8 @@ def test_a_straight_line_of_the_flat_pattern_keeps_its_length_and_is_a_geodesic(
 def test_a_ruling_has_one_normal_so_the_gaussian_curvature_is_zero(frustum: Frustum) -> None:
     side, h = bent(frustum), 1e-6
     u, phi = places(side)
-    along = (side.points(u + h, phi) - side.points(u - h, phi)) / (2.0 * h)
-    around = (side.points(u, phi + h) - side.points(u, phi - h)) / (2.0 * h)
+    along = (side.place(u + h, phi)[0] - side.place(u - h, phi)[0]) / (2.0 * h)
+    around = (side.place(u, phi + h)[0] - side.place(u, phi - h)[0]) / (2.0 * h)
     normal = np.cross(around, along)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     assert normal == pytest.approx(side.rulings(phi)[2], abs=1e-7)
@@ -114,16 +113,16 @@ def test_a_ruling_has_one_normal_so_the_gaussian_curvature_is_zero(frustum: Frus
 def test_locate_undoes_point(frustum: Frustum) -> None:
     side = bent(frustum)
     u, phi = places(side)
-    found = side.locate_all(side.points(u, phi) + 0.004 * side.rulings(phi)[2])
+    found = side.locate_all(side.place(u, phi)[0] + 0.004 * side.rulings(phi)[2])
     assert found[0] == pytest.approx(u, abs=1e-12)
     assert found[1] == pytest.approx(phi, abs=1e-11)
     assert found[2] == pytest.approx(0.004, abs=1e-12)
-    assert side.locate(*side.point(0.01, 1.0)) == pytest.approx((0.01, 1.0, 0.0), abs=1e-12)
+    assert side.locate(side.point(0.01, 1.0)) == pytest.approx((0.01, 1.0, 0.0), abs=1e-12)
 
 
 def test_beyond_an_open_edge_the_strip_goes_on_but_not_over_the_side() -> None:
     """Nearly all of a stadium, cut open in a flat: what is high above the bend beside it has its foot on that bend."""
-    whole = PlacedDevelopable.of(stadium(), POSE)
+    whole = stadium().moved(POSE)
     part = whole.part(0.0, 0.2, 0.3, TURN - 0.3)
     phi = np.linspace(0.0, part.frustum.wrap, 60)
     points, normals = part.place(np.full(60, 0.1), phi)
@@ -136,15 +135,15 @@ def test_numbers_and_arrays_agree() -> None:
     side = bent(FRUSTA["widening"])
     u, phi = places(side, 40)
     assert np.array([side.point(*at) for at in zip(u, phi, strict=True)]) == pytest.approx(
-        side.points(u, phi), abs=1e-15
+        side.place(u, phi)[0], abs=1e-15
     )
     assert np.array([side.normal(at) for at in phi]) == pytest.approx(side.rulings(phi)[2], abs=1e-14)
 
 
 def test_a_stadium_closes_and_is_a_stadium() -> None:
     side = stadium()
-    assert side.closing_gap == pytest.approx((0.0, 0.0), abs=1e-14)
-    points = side.points(0.05, np.linspace(0.0, TURN, 400))
+    assert side._opening == pytest.approx((0.0, 0.0), abs=1e-14)
+    points = side.place(0.05, np.linspace(0.0, TURN, 400))[0]
     across = points[:, 1]
     assert np.ptp(across) == pytest.approx(0.04 + 2 * 0.03, abs=1e-4)
     assert np.ptp(points[:, 0]) == pytest.approx(2 * 0.03, abs=1e-12)
@@ -154,9 +153,9 @@ def test_a_stadium_closes_and_is_a_stadium() -> None:
 
 def test_a_parallel_side_of_a_tube_is_a_tube_at_its_height() -> None:
     """Every point lies at the height above the same ruling, whose azimuth there grows by what the bends have grown."""
-    placed, height = PlacedDevelopable.of(stadium(), POSE), 0.004
+    placed, height = stadium().moved(POSE), 0.004
     above = placed.parallel(height)
-    u, phi = places(placed.side)
+    u, phi = places(placed)
     points, normals = placed.place(u, phi)
     raised = np.array([placed.azimuth_above(height, value) for value in phi])
     assert above.place(u, raised)[0] == pytest.approx(points + height * normals, abs=1e-14)
@@ -167,9 +166,9 @@ def test_a_parallel_side_of_a_tube_is_a_tube_at_its_height() -> None:
 @pytest.mark.parametrize("lift", [0.0, 0.002])
 @each_frustum
 def test_a_parallel_side_lies_at_its_height_whatever_the_section(frustum: Frustum, lift: float) -> None:
-    placed, height = PlacedDevelopable.of(bent(frustum), POSE).parallel(lift), 0.003
+    placed, height = bent(frustum).moved(POSE).parallel(lift), 0.003
     above = placed.parallel(height)
-    u, phi = places(placed.side)
+    u, phi = places(placed)
     points, normals = placed.place(u, phi)
     raised = np.array([placed.azimuth_above(height, value) for value in phi])
     assert above.place(u, raised)[0] == pytest.approx(points + height * normals, abs=1e-14)
@@ -186,7 +185,7 @@ def test_a_parallel_side_lies_at_its_height_whatever_the_section(frustum: Frustu
 @each_frustum
 def test_what_a_parallel_cone_misses_is_stated(frustum: Frustum) -> None:
     """Arcs are measured with chords of the true parallel side; at the ends they miss the sector's by the mismatch."""
-    placed, height = PlacedDevelopable.of(bent(frustum), POSE), 0.003
+    placed, height = bent(frustum).moved(POSE), 0.003
     phi = np.linspace(0.0, frustum.wrap * (1.0 - 1e-12), 40_001)
     raised = np.array([placed.azimuth_above(height, value) for value in phi[::200]])
     sector = placed.parallel(height).frustum
@@ -206,7 +205,7 @@ def test_what_a_parallel_cone_misses_is_stated(frustum: Frustum) -> None:
 
 @each_frustum
 def test_a_part_of_a_lifted_side_lies_within_its_mismatch_of_it(frustum: Frustum) -> None:
-    whole = PlacedDevelopable.of(bent(frustum), POSE).parallel(0.003)
+    whole = bent(frustum).moved(POSE).parallel(0.003)
     part = whole.part(0.2 * frustum.slant, 0.7 * frustum.slant, 0.3, 2.5)
     side = part.frustum
     u, phi = np.linspace(0.0, side.slant, 9)[:, None], np.linspace(0.0, side.wrap, 50)[None]
@@ -221,9 +220,9 @@ def test_a_part_of_a_lifted_side_lies_within_its_mismatch_of_it(frustum: Frustum
 
 @pytest.mark.parametrize("make", [lambda: stadium(), lambda: bent(FRUSTA["narrowing"])], ids=["tube", "cone"])
 def test_a_part_lies_where_it_was(make: object) -> None:
-    placed = PlacedDevelopable.of(make(), POSE)  # type: ignore[operator]
+    placed = make().moved(POSE)  # type: ignore[operator]
     part = placed.part(0.02, 0.1, 0.3, 2.5)
-    u, phi = places(part.side)
+    u, phi = places(part)
     assert part.place(u, phi)[0] == pytest.approx(placed.place(u + 0.02, phi + 0.3)[0], abs=1e-14)
     assert part.frustum.radius1 == pytest.approx(placed.frustum.radius_at(0.02))
     moved = part.moved(POSE)
@@ -232,13 +231,13 @@ def test_a_part_lies_where_it_was(make: object) -> None:
 
 @pytest.mark.parametrize("turn", [0.0, 0.7, 4.0])
 def test_a_turned_tube_lies_where_it_was(turn: float) -> None:
-    placed = PlacedDevelopable.of(stadium(), POSE)
+    placed = stadium().moved(POSE)
     moved = placed.turned(turn)
-    u, phi = places(placed.side)
+    u, phi = places(placed)
     assert moved.frustum == placed.frustum
     assert moved.place(u, phi)[0] == pytest.approx(placed.place(u, phi + turn)[0], abs=1e-13)
     with pytest.raises(GeometryError, match=r"only a full wrap"):
-        PlacedDevelopable.of(bent(FRUSTA["narrowing"]), POSE).turned(turn)
+        bent(FRUSTA["narrowing"]).moved(POSE).turned(turn)
 
 
 def test_a_placed_cone_has_the_same_parts() -> None:
@@ -254,13 +253,13 @@ def test_a_placed_cone_has_the_same_parts() -> None:
 
 def test_mistakes_are_said() -> None:
     with pytest.raises(GeometryError, match=r"radius1 must be above 0 m"):
-        Developable(Frustum(0.0, 0.05, 0.1), (Bend(TURN, 1.0),))
+        Developable(Frustum(0.0, 0.05, 0.1), bends=(Bend(TURN, 1.0),))
     with pytest.raises(GeometryError, match=r"add up to the wrap of 360 deg, they are 180 deg"):
-        Developable(FRUSTA["cylinder"], (Bend(math.pi, 1.0),))
+        Developable(FRUSTA["cylinder"], bends=(Bend(math.pi, 1.0),))
     with pytest.raises(GeometryError, match=r"a width above 0 rad"):
-        Developable(FRUSTA["cylinder"], (Bend(0.0, 1.0), Bend(TURN, 1.0)))
+        Developable(FRUSTA["cylinder"], bends=(Bend(0.0, 1.0), Bend(TURN, 1.0)))
     with pytest.raises(GeometryError, match=r"a full turn"):
-        Developable(FRUSTA["cylinder"], (Bend(TURN, 7.0),))
+        Developable(FRUSTA["cylinder"], bends=(Bend(TURN, 7.0),))
     with pytest.raises(GeometryError, match=r"too sharp for a parallel side at -40 mm"):
         stadium().parallel(-0.04)
     with pytest.raises(GeometryError, match=r"phi1 must not be below 0"):

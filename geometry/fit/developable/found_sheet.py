@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.core.errors import GeometryError
+from coneskin.geometry.developable import Developable
 from coneskin.geometry.fit.candidates import SampledLink
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
@@ -22,7 +23,6 @@ from coneskin.geometry.fit.side import longest_run
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 from coneskin.geometry.hole_bridging import bridge_holes
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
 from .ruling_candidates import RulingCandidate
@@ -228,7 +228,7 @@ def fit_sheet(
 
 def _side(
     profile: RadialProfile, region: RuledRegion, candidate: RulingCandidate, options: FitOptions
-) -> PlacedDevelopable | None:
+) -> Developable | None:
     """Fit a side to a region."""
     columns = columns_of(region, len(profile.phi))
     full = region.columns == len(profile.phi)
@@ -262,7 +262,7 @@ def _side(
         return None
 
 
-def _rise(mesh: Mesh, placed: PlacedDevelopable, tolerance: float) -> float:
+def _rise(mesh: Mesh, placed: Developable, tolerance: float) -> float:
     """Return by how much the corners of the facets lie outside the side, which was fitted to the facets [m]."""
     corners = mesh.vertices if len(mesh.vertices) <= 20_000 else mesh.vertices[:: len(mesh.vertices) // 20_000 + 1]
     u, phi, off = placed.locate_all(corners)
@@ -298,7 +298,7 @@ def covered_by(sheets: Iterable[FittedSheet], hull: SurfaceSamples, distance: fl
 def _checked(
     profile: RadialProfile,
     region: RuledRegion,
-    placed: PlacedDevelopable,
+    placed: Developable,
     hull: SurfaceSamples,
     worth: Floats,
     options: FitOptions,
@@ -350,10 +350,10 @@ def _checked(
     return FoundSheet(sheet, covers)
 
 
-def _span(placed: PlacedDevelopable, profile: RadialProfile, low: float, high: float) -> tuple[float, float]:
+def _span(placed: Developable, profile: RadialProfile, low: float, high: float) -> tuple[float, float]:
     """Return the arcs between which all rulings lie between two heights of a profile [m]."""
     phi = np.linspace(0.0, placed.frustum.wrap, 241)
-    base, way, _ = placed.side.rulings(phi * (1.0 - 1e-12))
+    base, way, _ = placed.rulings(phi * (1.0 - 1e-12))
     pose = placed.link_frustum
     z = profile.frame.local(pose.apply_all(base))[:, 2]
     climb = (way @ np.array(pose.rotation).T) @ profile.frame.axis

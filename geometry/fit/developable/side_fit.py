@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.geometry.bend import Bend
+from coneskin.geometry.developable import Developable
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.pose import Pose
 
 __all__ = ["fit_developable"]
@@ -37,7 +37,7 @@ class _Trial:
     wrap: float
     slant: float
 
-    def side(self) -> PlacedDevelopable:
+    def side(self) -> Developable:
         radius = self.arc / self.wrap
         cosine = math.sqrt(max(0.0, 1.0 - self.sine**2))
         frustum = Frustum(radius, max(radius + self.slant * self.sine, 0.0), self.slant * cosine, self.wrap)
@@ -48,7 +48,7 @@ class _Trial:
         origin = self.at - radius * x
         pose = Pose.trusted((rows[0], rows[1], rows[2]), (float(origin[0]), float(origin[1]), float(origin[2])))
         width = self.wrap / len(self.turns)
-        return PlacedDevelopable(frustum, pose, tuple(Bend(width, float(turn)) for turn in self.turns))
+        return Developable(frustum, pose, tuple(Bend(width, float(turn)) for turn in self.turns))
 
     def moved(self, step: Floats) -> _Trial:
         """Return the trial after a step: rotation (3), shift (3), arc, sine, turns."""
@@ -71,7 +71,7 @@ class _Trial:
 
 def fit_developable(
     section: Floats, rulings: Floats, points: Floats, full: bool, common_apex: bool, tolerance: float
-) -> PlacedDevelopable | None:
+) -> Developable | None:
     """Fit a developable side to points.
 
     Args:
@@ -197,7 +197,7 @@ def _step(trial: _Trial, points: Floats, full: bool, common_apex: bool, toleranc
     return step
 
 
-def _motions(trial: _Trial, side: PlacedDevelopable, points: Floats, ways: Floats, phi: Floats) -> Floats:
+def _motions(trial: _Trial, side: Developable, points: Floats, ways: Floats, phi: Floats) -> Floats:
     """Return how points of a side at azimuths phi move along given ways with each number of a trial, shape (n, count).
 
     A ruling moves with all bends before it: more turn there is a rotation about the rulings there, more angle of the
@@ -205,7 +205,7 @@ def _motions(trial: _Trial, side: PlacedDevelopable, points: Floats, ways: Float
     """
     count = len(trial.turns)
     nodes = trial.wrap * (np.arange(_STRIP_NODES * count) + 0.5) / (_STRIP_NODES * count)
-    base, u, n = side.side.rulings(nodes)
+    base, u, n = side.rulings(nodes)
     pose = side.link_frustum
     turn = np.array(pose.rotation).T
     base, u, n = pose.apply_all(base), u @ turn, n @ turn
@@ -226,13 +226,13 @@ def _motions(trial: _Trial, side: PlacedDevelopable, points: Floats, ways: Float
     return motions
 
 
-def _ends(trial: _Trial, side: PlacedDevelopable) -> tuple[Floats, Floats]:
+def _ends(trial: _Trial, side: Developable) -> tuple[Floats, Floats]:
     """Return how the gap between the last ruling and the first depends on each number, shape (6, count), and the gap.
 
     The gap is a shift [m], and a turn as a shift at the mean radius.
     """
     pose, radius = side.link_frustum, trial.arc / math.tau
-    at, *rest = side.side.edge()
+    at, *rest = side.edge()
     end, (t, u, _) = np.array(pose.apply(at)), (np.array(pose.rotate(vector)) for vector in rest)
     first_u, first_n = trial.frame[1], trial.frame[2]
     gap = np.concatenate([end - trial.at, radius * np.array([t @ first_n, t @ first_u, u @ first_n])])

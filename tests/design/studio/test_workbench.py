@@ -16,11 +16,11 @@ from coneskin.design.studio.design_text import design_facts, deviation_bands, fl
 from coneskin.design.studio.studio_page import StudioPage
 from coneskin.design.studio.workbench import Handles, Workbench, _adjusted
 from coneskin.geometry.bend import Bend
+from coneskin.geometry.developable import Developable
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
@@ -36,7 +36,7 @@ BENDS = tuple(
     Bend(math.tau * arc / ROUND, turn)
     for arc, turn in ((0.02, 0.0), (math.pi * 0.03, math.pi), (0.04, 0.0), (math.pi * 0.03, math.pi), (0.02, 0.0))
 )
-OVAL = PlacedDevelopable(Frustum(ROUND / math.tau, ROUND / math.tau, 0.20), FULL.link_frustum, BENDS)
+OVAL = Developable(Frustum(ROUND / math.tau, ROUND / math.tau, 0.20), FULL.link_frustum, BENDS)
 PART = PlacedFrustum(Frustum(0.04, 0.06, 0.20, math.radians(200.0)), FULL.link_frustum)
 HANDLES = Handles(0.03, 0.05, math.radians(150.0), math.radians(20.0))
 

@@ -13,13 +13,12 @@ from coneskin.design.workshop.bill_of_materials import bill_of_materials
 from coneskin.design.workshop.build_figures import LOOP, BuildFigures, _cable_exit, measure_build
 from coneskin.design.workshop.build_guide import guide_lines
 from coneskin.design.workshop.placement import find_placement, sharpest_bends
-from coneskin.geometry.developable import Bend
+from coneskin.geometry.developable import Bend, Developable
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.surface_shape import SheetSide, drawing_point
 from coneskin.geometry.drawing.touch_marks import CoverMarks
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.geometry.pose import Pose
 from coneskin.skin.sensor import sheet_resistances
@@ -190,7 +189,7 @@ def test_the_bends_of_an_oval_and_of_a_rounded_box_show_where_edge_0_is() -> Non
     radius = sum(arcs) / (2 * math.pi)
     turns = [math.pi / 2 if k % 2 else 0.0 for k in range(9)]
     bends = tuple(Bend(arc / radius, turn) for arc, turn in zip(arcs, turns, strict=True))
-    place = PlacedDevelopable(Frustum(radius, radius, 0.2), Pose(), bends)
+    place = Developable(Frustum(radius, radius, 0.2), Pose(), bends)
     middles = [0.5 * long + 0.5 * corner]
     for plane in (short, long, short):
         middles.append(middles[-1] + plane + corner)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from coneskin.geometry.bend import Bend
+from coneskin.geometry.developable import Developable
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.seam_place import place_seams
 from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.placed_developable import PlacedDevelopable
 from coneskin.geometry.pose import Pose
 from tests.support.ruled_tube import RuledTube, stadium_section
 
@@ -104,7 +104,7 @@ def test_the_seam_of_a_stadium_lies_on_a_flat_of_it() -> None:
     arcs = (half * 0.03, half), (0.04, 0.0), (math.pi * 0.03, math.pi), (0.04, 0.0), (half * 0.03, half)
     bends = tuple(Bend(math.tau * arc / around, turn) for arc, turn in arcs)
     radius = around / math.tau
-    side = PlacedDevelopable(Frustum(radius, radius, 0.2), TILTED @ Pose(translation=(0.05 - radius, 0.0, 0.0)), bends)
+    side = Developable(Frustum(radius, radius, 0.2), TILTED @ Pose(translation=(0.05 - radius, 0.0, 0.0)), bends)
     assert tube.distances(side.place(0.1, np.linspace(0.0, math.tau, 90))[0]).max() < 1e-6
     before = LinkFit((FittedSheet(side, 1e-4, 1e-4, 0.0, 0.0, 1.0, 1.0, 0.0),), None, (), 1e-3, 0.2, 0.05, (), "", 1)
     after, (place,) = place_seams(before, tube.mesh())

@@ -152,14 +152,14 @@ def _place(frustum: Frustum, pose: Pose, wraps: Sequence[float], turns: Sequence
             raise GeometryError(f"bend_lift_mm = {1e3 * lift:g} needs bend_wrap_deg and bend_turn_deg: a cone has none")
         return PlacedFrustum(frustum, pose)
     from coneskin.geometry.bend import Bend
-    from coneskin.geometry.placed_developable import PlacedDevelopable
+    from coneskin.geometry.developable import Developable
 
     if len(wraps) != len(turns):
         raise GeometryError(
             f"bend_wrap_deg and bend_turn_deg must have a number each for every bend, got {len(wraps)} and {len(turns)}"
         )
-    placed = PlacedDevelopable(frustum, pose, tuple(Bend(*bend) for bend in zip(wraps, turns, strict=True)), lift)
-    placed.side.check_closed()
+    placed = Developable(frustum, pose, tuple(Bend(*bend) for bend in zip(wraps, turns, strict=True)), lift)
+    placed.check_closed()
     return placed
 
 
