@@ -85,7 +85,7 @@ HOT = {
     "skin/detection": "stream detector events",
     "skin/detection/frame": "contact_matrix reading timing untouched",
     "skin/detection/place": "touch_place place_estimate single_contact seam_contact",
-    "robot/arm": "kinematics compiled_kinematics damped_least_squares workspace",
+    "robot/arm": "kinematics compiled_kinematics damped_least_squares vectors workspace",
     "robot/reaction": "retreat types",
     "robot/guard": "core arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
     "signals/contact signals/journal",

@@ -20,6 +20,8 @@ from collections.abc import Sequence
 
 from coneskin.geometry.pose import Vector
 
+from .vectors import dot
+
 __all__ = ["DAMPING_FLOOR", "SINGULAR_BELOW", "SINGULAR_DAMPING", "damped_speeds", "damping_squared", "stacked_speeds"]
 
 #: damping at every position [m^2]; keeps the equations regular for a link that one or two joints move
@@ -33,10 +35,10 @@ SINGULAR_BELOW = 0.1**2
 def damping_squared(columns: Sequence[Vector]) -> float:
     """Return the square of the damping for a point with these Jacobian columns [m^2]."""
     if len(columns) == 1:
-        smallest = _dot(columns[0], columns[0]) + DAMPING_FLOOR
+        smallest = dot(columns[0], columns[0]) + DAMPING_FLOOR
     elif len(columns) == 2:
-        a, b = _dot(columns[0], columns[0]) + DAMPING_FLOOR, _dot(columns[1], columns[1]) + DAMPING_FLOOR
-        smallest = (a * b - _dot(columns[0], columns[1]) ** 2) / (a + b)
+        a, b = dot(columns[0], columns[0]) + DAMPING_FLOOR, dot(columns[1], columns[1]) + DAMPING_FLOOR
+        smallest = (a * b - dot(columns[0], columns[1]) ** 2) / (a + b)
     else:
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = _gram(columns, DAMPING_FLOOR)
         kx, ky, kz = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
@@ -57,8 +59,8 @@ def damped_speeds(columns: Sequence[Vector], velocity: Vector) -> list[float]:
         return []
     damping = damping_squared(columns)
     if len(columns) < 3:  # fewer joints than rows: solve in the joints
-        normal = [[_dot(a, b) + damping * (i == j) for j, b in enumerate(columns)] for i, a in enumerate(columns)]
-        return _solve(normal, [_dot(column, velocity) for column in columns])
+        normal = [[dot(a, b) + damping * (i == j) for j, b in enumerate(columns)] for i, a in enumerate(columns)]
+        return _solve(normal, [dot(column, velocity) for column in columns])
     y = _solve(_gram(columns, damping), list(velocity))
     return [column[0] * y[0] + column[1] * y[1] + column[2] * y[2] for column in columns]
 
@@ -79,8 +81,8 @@ def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[l
     if not joints:
         return [], DAMPING_FLOOR
     damping = max(damping_squared([c for c in columns if any(c)] or [(0.0, 0.0, 0.0)]) for columns, _ in points)
-    normal = [[sum(_dot(c[i], c[j]) for c, _ in points) + damping * (i == j) for j in joints] for i in joints]
-    along = [[_dot(column, v) for column in columns] for columns, v in points]
+    normal = [[sum(dot(c[i], c[j]) for c, _ in points) + damping * (i == j) for j in joints] for i in joints]
+    along = [[dot(column, v) for column in columns] for columns, v in points]
     wanted = [sum(row[i] for row in along) for i in joints]
     free = speeds = _solve(normal, wanted)
     held: list[list[float]] = []  # rows along which a point is held, because it would move backwards
@@ -126,7 +128,3 @@ def _solve(matrix: Sequence[Sequence[float]], right: Sequence[float]) -> list[fl
 
 def _inner(a: Sequence[float], b: Sequence[float]) -> float:
     return sum(x * y for x, y in zip(a, b, strict=True))
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -32,6 +32,7 @@ from coneskin.geometry.pose import Vector
 from .kinematics import JOINTS, link_poses, point_jacobian
 from .model import ArmModel, Joints
 from .ur_models import arm_model
+from .vectors import added, cross, dot, minus, scaled
 
 __all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "joint_torques", "mass_matrix"]
 
@@ -92,7 +93,7 @@ def mass_matrix(model: ArmModel, inertia: ArmInertia, q: Sequence[float]) -> lis
         turned = [_apply(link.tensor, spin) for spin in spins]
         for i in range(index):
             for j in range(i + 1):
-                value = link.mass * sum(row[i] * row[j] for row in rows) + _dot(spins[i], turned[j])
+                value = link.mass * sum(row[i] * row[j] for row in rows) + dot(spins[i], turned[j])
                 m[i][j] += value
                 m[j][i] += value if i != j else 0.0
     return m
@@ -120,26 +121,26 @@ def joint_torques(
     loads = []  # of each link: its centre of mass, what its acceleration takes of force and of torque
     for i, link in enumerate(inertia.links):
         axis, pose = poses[i].rotate((0.0, 0.0, 1.0)), poses[i + 1]
-        rate = _sum(rate, _sum(_scaled(axis, qdd[i]), _scaled(_cross(spin, axis), qd[i])))
-        spin = _sum(spin, _scaled(axis, qd[i]))
-        step = _minus(pose.translation, poses[i].translation)
+        rate = added(rate, added(scaled(axis, qdd[i]), scaled(cross(spin, axis), qd[i])))
+        spin = added(spin, scaled(axis, qd[i]))
+        step = minus(pose.translation, poses[i].translation)
         arm = pose.rotate(link.centre)
-        before, lift = lift, _sum(lift, _swept(rate, spin, step))
-        centre = _sum(pose.translation, arm)
-        force = _scaled(_sum(before, _swept(rate, spin, _sum(step, arm))), link.mass)
+        before, lift = lift, added(lift, _swept(rate, spin, step))
+        centre = added(pose.translation, arm)
+        force = scaled(added(before, _swept(rate, spin, added(step, arm))), link.mass)
         back = _columns(pose.rotation)
         local = _apply(back, spin)
-        turning = _sum(_apply(link.tensor, _apply(back, rate)), _cross(local, _apply(link.tensor, local)))
+        turning = added(_apply(link.tensor, _apply(back, rate)), cross(local, _apply(link.tensor, local)))
         loads.append((centre, force, pose.rotate(turning)))
     torques = [0.0] * JOINTS
     carried: Vector = (0.0, 0.0, 0.0)  # force of all links beyond a joint, and their torque about the base's origin
     turned: Vector = (0.0, 0.0, 0.0)
     for i in reversed(range(JOINTS)):
         centre, force, turning = loads[i]
-        carried = _sum(carried, force)
-        turned = _sum(turned, _sum(turning, _cross(centre, force)))
-        about = _minus(turned, _cross(poses[i].translation, carried))
-        torques[i] = _dot(poses[i].rotate((0.0, 0.0, 1.0)), about) + inertia.rotor[i] * qdd[i]
+        carried = added(carried, force)
+        turned = added(turned, added(turning, cross(centre, force)))
+        about = minus(turned, cross(poses[i].translation, carried))
+        torques[i] = dot(poses[i].rotate((0.0, 0.0, 1.0)), about) + inertia.rotor[i] * qdd[i]
     return torques
 
 
@@ -149,32 +150,12 @@ def _columns(rows: Tensor) -> Tensor:
 
 
 def _apply(rows: Tensor, v: Vector) -> Vector:
-    return _dot(rows[0], v), _dot(rows[1], v), _dot(rows[2], v)
+    return dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)
 
 
 def _swept(rate: Vector, spin: Vector, arm: Vector) -> Vector:
     """Return the acceleration of the end of an arm that turns, against its beginning."""
-    return _sum(_cross(rate, arm), _cross(spin, _cross(spin, arm)))
-
-
-def _sum(a: Vector, b: Vector) -> Vector:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _scaled(a: Vector, factor: float) -> Vector:
-    return a[0] * factor, a[1] * factor, a[2] * factor
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return added(cross(rate, arm), cross(spin, cross(spin, arm)))
 
 
 _ROTOR_PER_TORQUE = 0.1 / 150.0  # kg m^2 of reflected inertia for each N m of highest torque

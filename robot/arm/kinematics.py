@@ -43,6 +43,7 @@ from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 
 from .model import ArmModel, Joints
+from .vectors import added, cross, scaled
 
 __all__ = [
     "JOINTS",
@@ -111,8 +112,8 @@ def point_jacobian(
     """
     frames = _frames(model, q, link)
     x, y, z, o = frames[-1]
-    p = _sum(o, _sum(_times(p_link[0], x), _sum(_times(p_link[1], y), _times(p_link[2], z))))
-    return _rows([_cross(z, _sum(p, _times(-1.0, o))) for _, _, z, o in frames[:-1]])
+    p = added(o, added(scaled(x, p_link[0]), added(scaled(y, p_link[1]), scaled(z, p_link[2]))))
+    return _rows([cross(z, added(p, scaled(o, -1.0))) for _, _, z, o in frames[:-1]])
 
 
 def flange_jacobian(model: ArmModel, q: Sequence[float]) -> tuple[Joints, Joints, Joints, Joints, Joints, Joints]:
@@ -143,7 +144,7 @@ def _frames(model: ArmModel, q: Sequence[float], last: int) -> list[_Frame]:
     for i in range(last):
         turn = q[i] + model.theta[i]
         x, y = _turned(x, y, math.cos(turn), math.sin(turn))
-        o = _sum(o, _sum(_times(model.d[i], z), _times(model.a[i], x)))
+        o = added(o, added(scaled(z, model.d[i]), scaled(x, model.a[i])))
         y, z = _turned(y, z, *cos_sin(model.alpha[i]))
         frames.append((x, y, z, o))
     return frames
@@ -151,19 +152,7 @@ def _frames(model: ArmModel, q: Sequence[float], last: int) -> list[_Frame]:
 
 def _turned(u: Vector, v: Vector, c: float, s: float) -> tuple[Vector, Vector]:
     """Turn two axes in their own plane from u towards v."""
-    return _sum(_times(c, u), _times(s, v)), _sum(_times(-s, u), _times(c, v))
-
-
-def _sum(a: Vector, b: Vector) -> Vector:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def _times(factor: float, a: Vector) -> Vector:
-    return factor * a[0], factor * a[1], factor * a[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return added(scaled(u, c), scaled(v, s)), added(scaled(u, -s), scaled(v, c))
 
 
 def _pose(frame: _Frame) -> Pose:

@@ -16,6 +16,7 @@ from coneskin.geometry.pose import Vector
 from .kinematics import LINK_INDEX, dh_mesh, link_poses
 from .model import ArmModel, Joints
 from .ur_models import MODEL_NAMES, arm_model
+from .vectors import dot, minus
 
 __all__ = [
     "REACTION_TIME",
@@ -165,8 +166,8 @@ def _segment_distance(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
     where both feet are inside. All are tried, so that parallel segments need no case of their own.
     """
     best = min(_to_segment(a, c, d), _to_segment(b, c, d), _to_segment(c, a, b), _to_segment(d, a, b))
-    u, v, w = _minus(b, a), _minus(d, c), _minus(a, c)
-    uu, uv, vv, uw, vw = _dot(u, u), _dot(u, v), _dot(v, v), _dot(u, w), _dot(v, w)
+    u, v, w = minus(b, a), minus(d, c), minus(a, c)
+    uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     det = uu * vv - uv * uv
     if det <= 0.0:
         return best  # parallel, or a point: the least distance is at a corner
@@ -178,18 +179,10 @@ def _segment_distance(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
 
 
 def _to_segment(p: Vector, a: Vector, b: Vector) -> float:
-    along, from_a = _minus(b, a), _minus(p, a)
-    length = _dot(along, along)
-    share = min(1.0, max(0.0, _dot(from_a, along) / length)) if length > 0.0 else 0.0
+    along, from_a = minus(b, a), minus(p, a)
+    length = dot(along, along)
+    share = min(1.0, max(0.0, dot(from_a, along) / length)) if length > 0.0 else 0.0
     return math.dist(p, (a[0] + share * along[0], a[1] + share * along[1], a[2] + share * along[2]))
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @dataclass(frozen=True, slots=True)

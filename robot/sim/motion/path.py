@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.inverse_kinematics import nearest
+from coneskin.robot.arm.vectors import cross, dot, minus, scaled
 from coneskin.robot.sim.urscript.values import interpolate
 
 from .arm import CYCLE, DEFAULT_DECELERATION, INVALID_SETPOINT, JOINT_ACCELERATION, MotionFault, SimulatedArm, max_abs
@@ -250,24 +251,24 @@ class ToolArc(_ToolPath):
     ) -> None:
         self._begin(arm, acceleration)
         a, c = self.start.translation, target.translation
-        u, w = _minus(via, a), _minus(c, a)
-        normal = _cross(u, w)
-        area = _dot(normal, normal)
+        u, w = minus(via, a), minus(c, a)
+        normal = cross(u, w)
+        area = dot(normal, normal)
         self.fixed = fixed
         self.turn = (self.start.inverse() @ target).rotation_vector
         self.shift = w
         if math.sqrt(area) < _STRAIGHT_SINE:
-            self.angle, length = 0.0, math.sqrt(_dot(w, w))
+            self.angle, length = 0.0, math.sqrt(dot(w, w))
         else:
-            uu, ww = _dot(u, u), _dot(w, w)
+            uu, ww = dot(u, u), dot(w, w)
             to_centre = [
-                (ww * x + uu * y) / (2.0 * area) for x, y in zip(_cross(normal, u), _cross(w, normal), strict=True)
+                (ww * x + uu * y) / (2.0 * area) for x, y in zip(cross(normal, u), cross(w, normal), strict=True)
             ]
-            self.axis: Vector = _scaled(normal, 1.0 / math.sqrt(area))
+            self.axis: Vector = scaled(normal, 1.0 / math.sqrt(area))
             self.centre: Vector = (a[0] + to_centre[0], a[1] + to_centre[1], a[2] + to_centre[2])
-            self.arm_length: Vector = _minus(a, self.centre)
-            end = _minus(c, self.centre)
-            angle = math.atan2(_dot(self.axis, _cross(self.arm_length, end)), _dot(self.arm_length, end))
+            self.arm_length: Vector = minus(a, self.centre)
+            end = minus(c, self.centre)
+            angle = math.atan2(dot(self.axis, cross(self.arm_length, end)), dot(self.arm_length, end))
             self.angle = angle % (2.0 * math.pi)  # about this axis the way leads over via
             length = self.angle * math.hypot(*self.arm_length)
         self.goal = self._pose(1.0)
@@ -276,26 +277,10 @@ class ToolArc(_ToolPath):
     def _pose(self, share: float) -> Pose:
         if not self.angle:
             return interpolate(self.start, self.shift, self.turn, share)
-        spin = Pose.from_rotation_vector(_scaled(self.axis, self.angle * share))
+        spin = Pose.from_rotation_vector(scaled(self.axis, self.angle * share))
         x, y, z = spin.rotate(self.arm_length)
         here = (self.centre[0] + x, self.centre[1] + y, self.centre[2] + z)
         if self.fixed:
             return Pose((spin @ Pose(self.start.rotation)).rotation, here)
-        turned = Pose(self.start.rotation) @ Pose.from_rotation_vector(_scaled(self.turn, share))
+        turned = Pose(self.start.rotation) @ Pose.from_rotation_vector(scaled(self.turn, share))
         return Pose(turned.rotation, here)
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _scaled(a: Vector, factor: float) -> Vector:
-    return a[0] * factor, a[1] * factor, a[2] * factor

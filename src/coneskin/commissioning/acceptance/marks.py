@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.commissioning.misreadings import power, shifts
 from coneskin.commissioning.touching import Mark
+from coneskin.robot.arm.vectors import added, cross, scaled
 from coneskin.scene.build import place_on_arm
 
 if TYPE_CHECKING:
@@ -130,11 +131,11 @@ def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float
     cone = sensor.frustum
     base_link = link_pose(placed.model, q, placed.link)
     ends = [base_link.apply(placed.frustum.centre(u)) for u in (0.0, cone.slant)]
-    axis = _times(_sum(ends[1], _times(ends[0], -1.0)), 1.0 / math.dist(*ends))
+    axis = scaled(added(ends[1], scaled(ends[0], -1.0)), 1.0 / math.dist(*ends))
     from_end1 = _begins_at_end1(placed, q)
-    along = axis if from_end1 else _times(axis, -1.0)  # from the joint nearer the base to the farther one
+    along = axis if from_end1 else scaled(axis, -1.0)  # from the joint nearer the base to the farther one
     twelve, reference = _twelve(along)
-    right = _cross(along, twelve)
+    right = cross(along, twelve)
     near, far = _JOINT_NAMES[placed.link], _JOINT_NAMES[placed.link + 1]
     margin, marks = _azimuth_margin(sensor), []
     for u in _rounded(sensor, placed, placed.model):
@@ -142,7 +143,7 @@ def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float
         azimuth = _azimuths(placed, u)
         for number in range(round(360.0 / step)):
             angle = math.radians(number * step)
-            side = _sum(_times(twelve, math.cos(angle)), _times(right, math.sin(angle)))
+            side = added(scaled(twelve, math.cos(angle)), scaled(right, math.sin(angle)))
             phi = azimuth(base_link.inverse().rotate(side))
             if margin <= phi <= cone.wrap - margin:
                 where = (
@@ -165,16 +166,16 @@ def _azimuths(placed: SensorOnArm, u: float) -> Callable[[Vector], float]:
 
         return azimuth
     centre, first = side.centre(u), side.normal(0.0)
-    ahead = _cross(_sum(side.centre(side.frustum.slant), _times(side.centre(0.0), -1.0)), first)
+    ahead = cross(added(side.centre(side.frustum.slant), scaled(side.centre(0.0), -1.0)), first)
     length = math.hypot(*ahead)
 
     def angle(way: Vector) -> float:
         """Return the angle of a direction about the middle [rad], from the normal of edge 0 on."""
-        y, x = (sum(a * b for a, b in zip(way, one, strict=True)) for one in (_times(ahead, 1.0 / length), first))
+        y, x = (sum(a * b for a, b in zip(way, one, strict=True)) for one in (scaled(ahead, 1.0 / length), first))
         return math.atan2(y, x)
 
     steps = [side.frustum.wrap * k / _SIDE_STEPS for k in range(_SIDE_STEPS + 1)]
-    angles = [angle(_sum(side.point(u, phi), _times(centre, -1.0))) for phi in steps]
+    angles = [angle(added(side.point(u, phi), scaled(centre, -1.0))) for phi in steps]
 
     def bent_azimuth(way: Vector) -> float:
         sought = angle(way)
@@ -235,8 +236,8 @@ def _twelve(along: Vector) -> tuple[Vector, str]:
         ((1.0, 0.0, 0.0), "towards the base's +x") if abs(along[2]) > _UPRIGHT_COSINE else ((0.0, 0.0, 1.0), "up")
     )
     across = sum(a * b for a, b in zip(up, along, strict=True))
-    rest = _sum(up, _times(along, -across))
-    return _times(rest, 1.0 / math.hypot(*rest)), name
+    rest = added(up, scaled(along, -across))
+    return scaled(rest, 1.0 / math.hypot(*rest)), name
 
 
 def _direction(side: Vector) -> str:
@@ -251,15 +252,3 @@ def _direction(side: Vector) -> str:
 def _clock(angle: float) -> str:
     minutes = round(2.0 * math.degrees(angle)) % 720
     return f"{minutes // 60 or 12}:{minutes % 60:02d}"
-
-
-def _times(v: Vector, factor: float) -> Vector:
-    return v[0] * factor, v[1] * factor, v[2] * factor
-
-
-def _sum(v: Vector, w: Vector) -> Vector:
-    return v[0] + w[0], v[1] + w[1], v[2] + w[2]
-
-
-def _cross(v: Vector, w: Vector) -> Vector:
-    return v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]
