@@ -41,6 +41,8 @@ def test_what_stays_bare_is_said() -> None:
     told = bare_lengths(profile, [side], 0.001, 0.025)
     assert [(round(a * 1e3, 1), round(b * 1e3, 1)) for a, b, _ in told] == [(-10.5, -0.5), (39.5, 89.5)]
     assert "round, but shorter than 25 mm" in told[0][2]
+    ((_, _, opened),) = bare_lengths(profile, [StraightSide(0, 90, 0, 31, 0.05, 0.0)], 0.001, 0.025)
+    assert opened == "open: no surface on one side of the axis"
     assert (
         "not round: the radius varies by 30.0 mm"
         in bare_lengths(profile, [StraightSide(10, 60, 0, 31, 0.05, 0)], 1e-3, 0.025)[1][2]

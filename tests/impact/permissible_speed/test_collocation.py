@@ -8,7 +8,7 @@ from numpy.polynomial import polynomial
 from scipy.linalg import expm
 
 from coneskin.impact.permissible_speed import taylor_integrator
-from coneskin.impact.permissible_speed.contact_course import ContactState
+from coneskin.impact.permissible_speed.contact_course import ContactState, greatest
 from coneskin.impact.permissible_speed.taylor_integrator import POINTS, _collocate, integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
@@ -143,3 +143,9 @@ def test_however_light_it_is_it_rests_as_springs_in_series_say(arm: float, body:
     course = integrate(model, 1.0)
     assert course.last == pytest.approx(model.static(course.stopping_distance)[0], rel=1e-9)
     assert course.peak < 1.5 * course.rest
+
+
+def test_the_greatest_value_is_found_in_the_first_part_of_a_step_and_not_behind_it() -> None:
+    two_tops = polynomial.polyint(-polynomial.polyfromroots([0.1, 0.4, 0.55]))  # it falls from 0.1 to 0.4
+    assert greatest(list(two_tops), 1.0) == pytest.approx((0.1, polynomial.polyval(0.1, two_tops)))
+    assert greatest([0.0, 2.2, -1.0], 1.0) == pytest.approx((1.0, 1.2))  # its top is at 1.1

@@ -158,9 +158,18 @@ def test_a_reset_of_another_stop_than_the_newest_forgives_nothing():
     rig.arm.target = None
     rig.run(1.2)
     assert [event.details["stop"] for event in rig.events if event.name == "latched"] == [1, 2]
-    for payload in (b"", b"0 1", b"1 1", b"3 1", b"99 1", b"x y", b"2", b"2 1 1", b"-2 1"):
+    unreadable = dict.fromkeys((b"", b"x y", b"2", b"2 1 1", b"-2 1"), (0, 0))  # for no stop at all
+    for payload, (stop, request) in {
+        b"0 1": (0, 1),
+        b"1 1": (1, 1),
+        b"3 1": (3, 1),
+        b"99 1": (99, 1),
+        **unreadable,
+    }.items():
         rig.feed(BlockKind.RESET, payload)
-        assert "stop 2 has latched the arm" in rig.events[-1].details["reasons"][0]
+        details = rig.events[-1].details
+        assert details["request"] == request
+        assert details["reasons"] == [f"it is for stop {stop}, and stop 2 has latched the arm: look at that first"]
     rig.run(0.3)
     assert rig.core.phase is Phase.LATCHED
     rig.feed(BlockKind.RESET, b"2 5")

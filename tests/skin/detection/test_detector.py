@@ -8,8 +8,9 @@ import pytest
 from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Contradictions, Detector
-from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchMoved
+from coneskin.skin.detection.events import ReportedTouch, SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchMoved
 from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.untouched import CURRENT_BLOCK
 from coneskin.skin.detection.place.touch_place import TouchPlace
@@ -151,6 +152,14 @@ def test_after_a_frame_that_cannot_be_believed_the_place_waits_for_two():
     (moved,) = bench.feed(FIRM)
     assert isinstance(moved, TouchMoved)
     assert moved.location_valid
+
+
+def test_events_of_a_touch_have_all_that_its_frame_says():
+    told = ReportedTouch(SENSOR, DetectorSettings())
+    first = TouchReading(1.0, 0.5, 0.1, 1.0, True, "", 7, 8, (1e-6, 2e-7, 3e-6), 0.004, 0.2, None, (0.01, -0.02))
+    line = first._replace(location_valid=False, doubt="a line", elongation=(0.03, 0.7), u=0.2, phi=2.0)
+    for frame, event in ((first, told.begin(first)), (line, told.move(line))):
+        assert {name: getattr(event, name) for name in TouchReading._fields} == frame._asdict()
 
 
 def test_an_uncertain_place_does_not_replace_a_certain_one():

@@ -127,10 +127,12 @@ def test_kinematics_and_configuration_come_once():
 def test_it_says_where_the_arm_is_and_what_it_does():
     controller = Controller(Options(model="ur5e", start_q=Q))
     controller.safety_system.mode, controller.slider = SafetyMode.PROTECTIVE_STOP, 0.5
+    controller.update()
     state = sub_packages(_encode_state(controller))
     joints = [struct.unpack(">dddffffB", state[1][41 * i : 41 * i + 41]) for i in range(6)]
     assert [joint[0] for joint in joints] == list(Q)
     mode = struct.unpack(">Q7BBBdddB", state[0])
+    assert mode[0] == round(1e6 * controller.timestamp) > 0
     assert mode[5] == 1  # protective stop
     assert (mode[8], mode[10], mode[11]) == (7, 0.5, 0.0)  # running; slider; but nothing moves
     assert state[3][-10] == 3  # safety mode, before three bytes, a word and three bytes
