@@ -62,25 +62,6 @@ class PlacedFrustum:
         normals = np.broadcast_to(self.frustum.normals(phi) @ np.array(self.link_frustum.rotation).T, points.shape)
         return points, normals.copy()
 
-    def place_polar(self, r: ArrayLike, theta: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return points and outward unit normals as ``place`` does, from polar coordinates on the flat sector.
-
-        Args:
-            r: radius on the flat sector [m], any shape; the paper's r.
-            theta: angle on the flat sector [rad], of a shape that broadcasts with r; the paper's theta.
-
-        Raises:
-            GeometryError: the frustum is a cylinder, whose flat pattern has no apex.
-        """
-        import numpy as np
-
-        frustum = self.frustum
-        q = frustum.sin_half_angle
-        if q == 0.0:
-            raise GeometryError("a cylinder has no polar coordinates: its flat pattern is a rectangle; use u and phi")
-        u = (np.asarray(r, float) * abs(q) - frustum.radius1) / q
-        return self.place(u, np.asarray(theta, float) / abs(q))
-
     def locate_all(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return u [m], phi [rad] and the signed distance [m] of many points, the inverse of ``place``.
 

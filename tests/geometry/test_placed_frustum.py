@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.geometry.pose import Pose
@@ -42,31 +41,10 @@ def test_back_from_a_point_beside_the_surface(placed: PlacedFrustum, a: float, b
     np.testing.assert_allclose(np.ravel(found), [u, phi, out], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("placed", [CONE, NARROWING])
-@given(a=shares, b=shares)
-def test_the_papers_coordinates_name_the_same_place(placed: PlacedFrustum, a: float, b: float) -> None:
-    u, phi = a * placed.frustum.slant, b * placed.frustum.wrap
-    there = placed.place_polar(*placed.frustum.polar(u, phi))
-    for one, other in zip(there, placed.place(u, phi), strict=True):
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-14)
-
-
-def test_a_published_size() -> None:
-    """Radii 40 and 70 mm, height 150 mm, by hand: r1 = 40 s/30, s = sqrt(30^2 + 150^2) mm; r1 is at end 1, z = 0."""
-    slant = math.hypot(0.03, 0.15)
-    point, _ = PlacedFrustum(CONE.frustum).place_polar(0.04 * slant / 0.03, 0.0)
-    np.testing.assert_allclose(point, (0.04, 0.0, 0.0), rtol=0, atol=1e-16)
-
-
 def test_shapes_broadcast() -> None:
     points, normals = CONE.place(np.linspace(0.0, 0.1, 5)[:, None], np.linspace(0.0, 1.0, 7))
     assert points.shape == normals.shape == (5, 7, 3)
     assert CONE.locate_all(points)[0].shape == (5, 7)
-
-
-def test_a_cylinder_has_no_polar_coordinates() -> None:
-    with pytest.raises(GeometryError, match="a cylinder has no polar coordinates"):
-        TUBE.place_polar(1.0, 0.0)
 
 
 def test_double_cone_shares_its_belt() -> None:
