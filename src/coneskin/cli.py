@@ -84,7 +84,7 @@ def _listing() -> str:
     return "\n".join(lines)
 
 
-_CHECKS = {"check", "validate", "verify"}
+_CHECK_WORDS = {"check", "validate", "verify"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -140,7 +140,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             f"there is no command {chosen}; "
             + (
                 "coneskin doctor SCENE --check does that"
-                if chosen in _CHECKS
+                if chosen in _CHECK_WORDS
                 else f"did you mean {near[0]}?"
                 if near
                 else f"there are {', '.join(COMMANDS)}"
