@@ -110,8 +110,8 @@ def _serve(args: argparse.Namespace) -> int:
         model=args.model,
         version=_version(args.version),
         start_q=_start_q(args.model, args.start_q_deg),
-        start_delay=args.start_delay_ms / 1000.0,
-        unlock_after=args.unlock_after_s,
+        start_delay=_time("--start-delay-ms", args.start_delay_ms, 60_000) / 1000.0,
+        unlock_after=_time("--unlock-after-s", args.unlock_after_s, 3_600),
         after_protective_stop=args.protective_stop,
         program=_read(args.program) if args.program else "",
         programs=_folder(args.programs) if args.programs else None,
@@ -185,6 +185,12 @@ def _start_q(name: str, degrees: Sequence[float]) -> list[float]:
                 f"{math.degrees(high):g} deg, got {math.degrees(q):g} deg"
             )
     return start
+
+
+def _time(option: str, value: float, most: int) -> float:
+    if not 0.0 <= value <= most:
+        raise RobotRefused(f"{option} must be from 0 to {most}, got {value:g}")
+    return value
 
 
 def _version(text: str) -> Version:
