@@ -61,9 +61,7 @@ class Bounds(NamedTuple):
     touch_current_slack: float  #: allowed difference [counts of drive current]
     weaker_guide: float  #: in a touch, the lower guide is at least this ratio of the higher
     noise: int  #: counts that mean nothing
-    radial_ground_drop: float  #: counts of potential lost on the lead to ground for one count of drive current
-    radial_drop: float  #: the same on both leads together
-    angular_ground_drop: float
+    radial_drop: float  #: counts of potential lost on both leads together for one count of drive current
     angular_drop: float
     load_ratio: float  #: pull-down over guide input resistance
 
@@ -251,9 +249,7 @@ class Sensor:
             # the worst place is an edge electrode: the other guide is behind the whole sheet
             weaker_guide=0.5 * parts.pulldown_ohms / (parts.pulldown_ohms + self.angular_ohms),
             noise=max(2, full // 100),
-            radial_ground_drop=(leads.a if self.b_positive else leads.b) * ohm,
             radial_drop=(leads.a + leads.b) * ohm,
-            angular_ground_drop=(leads.d if self.c_positive else leads.c) * ohm,
             angular_drop=(leads.c + leads.d) * ohm,
             load_ratio=parts.pulldown_ohms / parts.input_ohms,
         )

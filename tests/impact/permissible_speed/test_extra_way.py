@@ -18,9 +18,8 @@ from coneskin.impact.permissible_speed.extra_way import (
     _worst_lag,
     extra_ways,
 )
-from coneskin.impact.permissible_speed.limits_file import BodyRegion, MeasuredReaction
+from coneskin.impact.permissible_speed.limits_file import BodyRegion, ForceLimits, MeasuredReaction
 from coneskin.impact.permissible_speed.speed_map import contact_at
-from coneskin.impact.permissible_speed.speed_search import ForceLimits
 from coneskin.impact.permissible_speed.two_mass_contact import StruckBody
 from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import link_pose

@@ -14,9 +14,8 @@ import pytest
 from coneskin.impact.permissible_speed.arm_patches import ArmPatch
 from coneskin.impact.permissible_speed.contact_course import ContactCourse
 from coneskin.impact.permissible_speed.extra_way import extra_ways
-from coneskin.impact.permissible_speed.limits_file import BodyRegion, MeasuredReaction
+from coneskin.impact.permissible_speed.limits_file import BodyRegion, ForceLimits, MeasuredReaction
 from coneskin.impact.permissible_speed.speed_map import contact_at
-from coneskin.impact.permissible_speed.speed_search import ForceLimits
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.robot.arm.inertia import arm_inertia

@@ -12,9 +12,8 @@ from coneskin.core.errors import SceneError
 from coneskin.impact.permissible_speed import speed_map
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.impact.permissible_speed.extra_way import ExtraWay, extra_ways
-from coneskin.impact.permissible_speed.limits_file import _parse_limits
-from coneskin.impact.permissible_speed.speed_map import LEVERS, contact_at, map_speeds, write_map
-from coneskin.impact.permissible_speed.speed_search import ForceLimits, keeps
+from coneskin.impact.permissible_speed.limits_file import ForceLimits, _parse_limits
+from coneskin.impact.permissible_speed.speed_map import LEVERS, contact_at, keeps, map_speeds, write_map
 from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
 from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.kinematics import link_pose

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.impact.permissible_speed.speed_search import ForceLimits, keeps, permissible_speed
+from coneskin.impact.permissible_speed.limits_file import ForceLimits
+from coneskin.impact.permissible_speed.speed_map import keeps, permissible_speed
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
 

@@ -20,10 +20,9 @@ from coneskin.core.keys import Key, check
 from coneskin.robot.arm.kinematics import link_index
 from coneskin.scene.tables.keys import MAX_SIZE
 
-from .speed_search import ForceLimits
 from .two_mass_contact import StruckBody
 
-__all__ = ["BodyRegion", "LimitsFile", "MeasuredReaction", "read_limits"]
+__all__ = ["BodyRegion", "ForceLimits", "LimitsFile", "MeasuredReaction", "read_limits"]
 
 _LIMIT_KEYS = (Key("edition", str), Key("transcribed_by", str), Key("verified_by", str), Key("region", dict))
 _MEASURED_KEYS = (
@@ -45,6 +44,19 @@ _REGION_KEYS = (
     Key("lasting_pressure_n_per_cm2", float, None, low=0.1, high=10_000.0),
     Key("area_cm2", float, None, low=0.01, high=1000.0),
 )
+
+
+@dataclass(frozen=True, slots=True)
+class ForceLimits:
+    """Limits of the force on a body.
+
+    Attributes:
+        transient: of the peak within the first 0.5 s [N].
+        lasting: of what is left then, and at rest [N].
+    """
+
+    transient: float
+    lasting: float
 
 
 @dataclass(frozen=True, slots=True)

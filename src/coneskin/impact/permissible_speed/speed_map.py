@@ -30,8 +30,8 @@ from coneskin.skin.materials import Padding
 
 from .arm_patches import motion_positions, patches_of, weigh
 from .extra_way import ExtraWay, extra_ways
-from .limits_file import BodyRegion, LimitsFile, MeasuredReaction
-from .speed_search import LEAST_SPEED, TOP_SPEED, keeps, permissible_speed
+from .limits_file import BodyRegion, ForceLimits, LimitsFile, MeasuredReaction
+from .taylor_integrator import integrate
 from .two_mass_contact import DrivenArm, TwoMassContact
 
 if TYPE_CHECKING:
@@ -39,7 +39,76 @@ if TYPE_CHECKING:
 
     from .arm_patches import ArmPatch
 
-__all__ = ["LEVERS", "SpeedMap", "contact_at", "map_speeds", "map_table", "write_map"]
+__all__ = [
+    "LEVERS",
+    "SpeedMap",
+    "contact_at",
+    "keeps",
+    "map_speeds",
+    "map_table",
+    "permissible_speed",
+    "write_map",
+]
+
+#: m/s; no faster speed is looked at
+_TOP_SPEED = 5.0
+#: m/s; below, no speed counts as permissible
+_LEAST_SPEED = 1e-3
+_SPEED_TOLERANCE = 4e-3  # of the speed that is found
+
+
+def keeps(model: TwoMassContact, limits: ForceLimits) -> bool:
+    """Tell whether a contact keeps limits."""
+    distance = _stopping_distance(model)
+    if model.static(distance)[0] > limits.lasting:
+        return False  # known without a look at the course
+    course = integrate(model, keep=False, stop_above=limits.transient)
+    return course.peak <= limits.transient and max(course.last, course.rest) <= limits.lasting
+
+
+def permissible_speed(
+    at_speed: Callable[[float], Sequence[TwoMassContact]],
+    limits: ForceLimits,
+    least: float = _LEAST_SPEED,
+    top: float = _TOP_SPEED,
+) -> float:
+    """Return the highest speed up to which contacts keep limits [m/s]; 0 where none of 1 mm/s or more does.
+
+    Force grows with speed; so it is searched by halving, and what is returned was looked at and keeps them.
+
+    Args:
+        at_speed: makes the contacts at a speed [m/s], all of which must keep them.
+        limits: to be kept.
+        least: speed from which to look on [m/s]; where it does not keep them, from the lowest on.
+        top: highest speed to look at [m/s].
+    """
+
+    def all_keep(speed: float) -> bool:
+        return all(keeps(contact, limits) for contact in at_speed(speed))
+
+    if all_keep(top):
+        return top
+    low, high = least, top
+    if not all_keep(low):
+        low, high = _LEAST_SPEED, least
+        if low == high or not all_keep(low):
+            return 0.0
+    while high > low * (1.0 + _SPEED_TOLERANCE):
+        middle = math.sqrt(low * high)
+        if all_keep(middle):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _stopping_distance(model: TwoMassContact) -> float:
+    """Return a lower bound of the way that the arm is driven into the body [m]: without the time to the closing."""
+    arm = model.arm
+    if math.isinf(arm.reaction):
+        return 0.0
+    return arm.speed * arm.reaction + arm.speed**2 / (2.0 * arm.deceleration)
+
 
 #: m/rad; a UR20 reaches 1.75 m
 LEVERS = (0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28, 1.8)
@@ -246,9 +315,9 @@ class _CurveMaker:
                     common = region, self._limits.measured, self._padding
                     return [contact_at(speed, lever, mass, *common, way) for way in ways]
 
-                least, top = LEAST_SPEED, TOP_SPEED
+                least, top = _LEAST_SPEED, _TOP_SPEED
                 if number and speeds[-1] > 0.0:  # a longer lever brakes sooner, but not by more than it is longer
-                    least, top = speeds[-1], min(TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
+                    least, top = speeds[-1], min(_TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
                 found = permissible_speed(contacts, region.limits, least, top)
                 both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
                 if found > 0.0 and not all(keeps(contact, region.limits) for contact in both(found)):
