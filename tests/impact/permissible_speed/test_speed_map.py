@@ -13,7 +13,7 @@ from coneskin.impact.permissible_speed import speed_map
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.impact.permissible_speed.extra_way import ExtraWay, extra_ways
 from coneskin.impact.permissible_speed.limits_file import ForceLimits, _parse_limits
-from coneskin.impact.permissible_speed.speed_map import LEVERS, contact_at, keeps, map_speeds, write_map
+from coneskin.impact.permissible_speed.speed_map import LEVERS, _keeps, contact_at, map_speeds, write_map
 from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
 from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.kinematics import link_pose
@@ -65,7 +65,7 @@ def test_a_map_keeps_the_limits_it_was_made_for_and_a_scene_takes_it(tmp_path: P
         assert all(a <= b for a, b in zip(curve.speeds, curve.speeds[1:], strict=False))
         for lever, speed in zip(LEVERS[::3], curve.speeds[::3], strict=True):
             contact = contact_at(speed, lever, curve.mass, hand, limits.measured, scene.padding, curve.extra)  # type: ignore[arg-type]
-            assert keeps(contact, hand.limits)
+            assert _keeps(contact, hand.limits)
     ways = extra_ways(arm_model("UR5e"), found.patches, motion_positions(scene))
     for row, mass, way in zip(found.table.patches, found.masses, ways, strict=True):
         assert found.curves[row.curve].mass >= mass

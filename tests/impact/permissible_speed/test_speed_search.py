@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coneskin.impact.permissible_speed.limits_file import ForceLimits
-from coneskin.impact.permissible_speed.speed_map import keeps, permissible_speed
+from coneskin.impact.permissible_speed.speed_map import _keeps, permissible_speed
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
 
@@ -44,10 +44,10 @@ def test_no_slower_speed_breaks_the_limits(
 
     found = permissible_speed(lambda v: [contact(v)], limits)
     assert found > 0.0
-    assert keeps(contact(found), limits)
-    assert keeps(contact(share * found), limits)
+    assert _keeps(contact(found), limits)
+    assert _keeps(contact(share * found), limits)
     if found < 4.9:
-        assert not keeps(contact(1.02 * found), limits)
+        assert not _keeps(contact(1.02 * found), limits)
 
 
 def test_a_hard_wall_with_a_slow_reaction_lets_nothing_move() -> None:

@@ -43,7 +43,6 @@ __all__ = [
     "LEVERS",
     "SpeedMap",
     "contact_at",
-    "keeps",
     "map_speeds",
     "map_table",
     "permissible_speed",
@@ -57,7 +56,7 @@ _LEAST_SPEED = 1e-3
 _SPEED_TOLERANCE = 4e-3  # of the speed that is found
 
 
-def keeps(model: TwoMassContact, limits: ForceLimits) -> bool:
+def _keeps(model: TwoMassContact, limits: ForceLimits) -> bool:
     """Tell whether a contact keeps limits."""
     distance = _stopping_distance(model)
     if model.static(distance)[0] > limits.lasting:
@@ -84,7 +83,7 @@ def permissible_speed(
     """
 
     def all_keep(speed: float) -> bool:
-        return all(keeps(contact, limits) for contact in at_speed(speed))
+        return all(_keeps(contact, limits) for contact in at_speed(speed))
 
     if all_keep(top):
         return top
@@ -320,7 +319,7 @@ class _CurveMaker:
                     least, top = speeds[-1], min(_TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
                 found = permissible_speed(contacts, region.limits, least, top)
                 both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
-                if found > 0.0 and not all(keeps(contact, region.limits) for contact in both(found)):
+                if found > 0.0 and not all(_keeps(contact, region.limits) for contact in both(found)):
                     found = permissible_speed(both, region.limits, least, top)
                 speeds.append(found)
             for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
