@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -174,6 +175,11 @@ def test_no_share_is_said_that_prints_as_none(
 @pytest.mark.parametrize(("value", "text"), [(0.00412, "0.0041"), (0.0996, "0.10"), (0.5, "0.50"), (12.3, "12")])
 def test_a_small_count_keeps_two_digits(value: float, text: str) -> None:
     assert command._two_digits(value) == text
+
+
+def test_the_size_of_a_count_is_that_of_the_worst_place() -> None:
+    steps = [SimpleNamespace(along=along, around=around) for along, around in ((1e-4, 3e-4), (2.5e-4, 2e-4))]
+    assert command._count_size(SimpleNamespace(forecasts=lambda: steps)) == "0.25 mm along, 0.30 mm around"  # type: ignore[arg-type]
 
 
 def test_a_step_file_that_cannot_be_written_is_refused_before_the_search(

@@ -1,11 +1,14 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from coneskin.cli import main
+from coneskin.commands import permissible
 from coneskin.impact.permissible_speed import speed_map
 from coneskin.testing.scenes import forearm_scene
 
@@ -63,3 +66,15 @@ def test_a_mistake_is_one_line_and_not_a_traceback(tmp_path: Path, capsys: pytes
     assert "[padding]" in capsys.readouterr().err
     assert main([*write(tmp_path), "-o", str(tmp_path / "no" / "impact.toml")]) == 1
     assert "there is no folder" in capsys.readouterr().err
+
+
+def test_a_patch_is_told_where_it_lies_and_what_mass_meets_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed_map, "map_table", lambda _: {"speed_limit": {"digest": "1", "patch": [{}, {}]}})
+    patches = [SimpleNamespace(link=k, point=(0.1, -0.2, 0.3 * k), normal=(0.0, 1.0, 0.0)) for k in (2, 4)]
+    found = SimpleNamespace(patches=patches, masses=(5.5, math.inf))
+    assert permissible._plain(found) == {  # type: ignore[arg-type]
+        "patch": [
+            {"link": 2, "mass_kg": 5.5, "point_mm": pytest.approx([100.0, -200.0, 600.0]), "normal": [0.0, 1.0, 0.0]},
+            {"link": 4, "mass_kg": None, "point_mm": pytest.approx([100.0, -200.0, 1200.0]), "normal": [0.0, 1.0, 0.0]},
+        ]
+    }

@@ -85,6 +85,7 @@ def with_changes(text: str, *changes: tuple[str, str]) -> str:
         ("height_mm = 120", "height_mm = 500", "towards the elbow: height_mm must be at most 392.2 mm, the distance"),
         ("id = 2", "id = 1", "sensor 1 of device 0 is already on link forearm; give each sensor its own id"),
         ('"towards the wrist"', '"towards the elbow"', "the name towards the elbow is already on link forearm"),
+        ("id = 2", "id = 256", "sensor 256.id must be a whole number from 0 to 255, got 256"),
         ("id = 2", "id = 2\nsupply_v = 3.3", "link forearm, sensor 2: supply_v must be at most 95 %"),
         ("id = 2", "id = 2\nrelease_level = 0.5", "release_level < touch_level"),
         ("id = 2", "id = 2\nrelease_level = 0.03", "release_level must be above 0.03 to 1, got 0.03"),

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coneskin.impact.permissible_speed import taylor_integrator
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact, _CompressionLaw
 from coneskin.skin.materials import Padding
@@ -178,3 +179,11 @@ def test_a_free_body_that_is_pushed_along_has_no_force_at_rest() -> None:
     course = integrate(TwoMassContact(DrivenArm(1e-3, 8.0, 72e3, 1500.0, 0.01, 5.0), StruckBody(1.0)))
     assert math.isinf(course.closed)
     assert course.rest == 0.0
+
+
+@pytest.mark.parametrize(("part", "mode"), [(0.5, taylor_integrator._SOFT), (1.5, taylor_integrator._HARD)])
+def test_a_padding_that_follows_again_is_bottomed_out_only_beyond_its_thickness(part: float, mode: int) -> None:
+    run = taylor_integrator._Integration(model(padding=Padding()), 1.0, True, math.inf)
+    run.mode, run.s = taylor_integrator._RELEASED, part * run.law.end
+    run._switch("follow")
+    assert run.mode == mode

@@ -64,3 +64,33 @@ def test_an_arm_without_a_known_inertia_is_refused() -> None:
     bare = ArmModel("other", *((0.0,) * 6,) * 3, (-1.0,) * 6, (1.0,) * 6, (1.0,) * 6)
     with pytest.raises(KinematicsError, match="inertias are known for"):
         arm_inertia(bare)
+
+
+def test_shoulder_and_wrists_of_the_ur30_have_the_tensors_of_the_ur20() -> None:
+    """Their masses are the same, and the published tensors are those of another arm."""
+    one, other = arm_inertia("UR30").links, arm_inertia("UR20").links
+    assert [(one[k].mass, one[k].tensor) for k in (0, 3, 4, 5)] == [
+        (other[k].mass, other[k].tensor) for k in (0, 3, 4, 5)
+    ]
+
+
+#: sum of all numbers of a table, without signs, in units of 1e-9: a digit that changes by accident changes it
+_TABLE_SUMS = {
+    "UR3": 9_112_341_802,
+    "UR5": 18_018_369_271,
+    "UR10": 31_766_270_000,
+    "UR3e": 9_311_901_700,
+    "UR5e": 19_142_858_470,
+    "UR7e": 19_142_858_470,
+    "UR10e": 32_435_270_000,
+    "UR16e": 29_510_200_000,
+    "UR20": 73_700_550_000,
+    "UR30": 66_332_380_000,
+}
+
+
+@ARMS
+def test_no_digit_of_a_table_has_changed(name: str) -> None:
+    links = arm_inertia(name).links
+    numbers = [value for link in links for row in ((link.mass,), link.centre, *link.tensor) for value in row]
+    assert round(1e9 * sum(map(abs, numbers))) == _TABLE_SUMS[name]
