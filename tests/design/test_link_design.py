@@ -1,6 +1,7 @@
 """One call from a mesh, or from dimensions, to the sheets and to the folder for the workshop."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 import coneskin as cs
-from coneskin.design.link_design import load_link
+from coneskin.design import link_design
+from coneskin.design.link_design import NothingFits, design_link, load_link
 from coneskin.geometry.mesh import Mesh, make_mesh
 
 
@@ -120,3 +122,12 @@ def test_drawings_name_their_extents(tmp_path: Path) -> None:
         box = bbox.extents(lines, fast=False)
         assert tuple(document.header["$EXTMIN"])[:2] == pytest.approx(tuple(box.extmin)[:2], abs=0.02)
         assert tuple(document.header["$EXTMAX"])[:2] == pytest.approx(tuple(box.extmax)[:2], abs=0.02)
+
+
+def test_a_mesh_on_which_nothing_fits_is_refused_with_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = SimpleNamespace(mesh=SimpleNamespace(source="box.stl"))
+    fit = SimpleNamespace(sheets=(), reason="it is a box")
+    monkeypatch.setattr(link_design, "_fit_link", lambda *_, **__: (source, fit))
+    with pytest.raises(NothingFits, match="there is no sheet to design: it is a box") as caught:
+        design_link("box.stl")
+    assert (caught.value.source, caught.value.fit) == ("box.stl", fit)

@@ -122,6 +122,25 @@ def test_a_live_page_moves_bodies_with_the_arm(tmp_path: Path) -> None:
     page.close()
 
 
+@pytest.mark.parametrize(
+    ("ended", "silence", "follows"), [(False, 29.0, False), (False, 31.0, True), (True, 0.0, True), (True, 31.0, True)]
+)
+def test_a_live_page_follows_the_next_run_once_its_own_has_ended_or_is_silent(
+    ended: bool, silence: float, follows: bool, tmp_path: Path
+) -> None:
+    course = read_courses([recorded(tmp_path)])[0]
+    server = SimpleNamespace(scene=Scene(), gui=MagicMock(), on_viewer=lambda _: None, look_from=lambda *_: None)
+    own, following = (
+        MagicMock(course=course, ended=over, silence=quiet) for over, quiet in ((ended, silence), (False, 0.0))
+    )
+    runs = [own, following]
+    page = LivePage(server, course.stage, lambda: runs.pop(0))  # type: ignore[arg-type]
+    page.poll(0.0)
+    assert page.poll(1.0) is follows
+    assert own.close.called is follows
+    assert not following.close.called
+
+
 def test_a_page_that_forgets_still_knows_where_a_body_came_to_rest() -> None:
     blocks = blocks_of((101.0, PUSHED))
     history = History(Run(json.loads(blocks[0].payload), blocks).scene(), 60.0)

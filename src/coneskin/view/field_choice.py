@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -125,10 +124,7 @@ def _contact_on(sheet: SheetSurface, moment: Moment) -> ContactOnSheet | None:
     for mark in moment.marks:
         if mark.sensor == sheet.name and mark.strength >= 1.0 and level > 0.0:
             u, phi, _ = sheet.item.frustum.locate(mark.point)
-            wrap = sheet.sensor.frustum.wrap
-            if phi > wrap:  # in the gap of a partial wrap: at the nearer of its two edges
-                phi = wrap if phi - wrap < 2.0 * math.pi - phi else 0.0
-            return ContactOnSheet(u, phi, level)
+            return ContactOnSheet(u, phi, level)  # beside the sheet: drawn at its nearer edge
     return None
 
 

@@ -47,6 +47,11 @@ def test_of_force_and_pressure_the_lower_counts() -> None:
     assert _parse_limits(both).regions[0].limits.transient == pytest.approx(100.0)
 
 
+@pytest.mark.parametrize("line", ["", "support_n_per_mm = 0"])
+def test_a_body_without_support_is_free(line: str) -> None:
+    assert _parse_limits(TEXT.replace("support_n_per_mm = 20", line)).regions[0].body.support == 0.0
+
+
 def test_a_clamped_body_needs_no_mass() -> None:
     assert math.isinf(_parse_limits(TEXT.replace("mass_kg = 0.6", "clamped = true")).regions[0].body.mass)
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.special import ellipe
 
+from coneskin.geometry.fit.cones import LEAST_GAIN
+from coneskin.geometry.fit.developable import packing
 from coneskin.geometry.fit.developable.packing import find_sheets
 from coneskin.geometry.fit.developable.side_fit import fit_developable
 from coneskin.geometry.mesh import make_mesh
@@ -117,3 +120,24 @@ def test_the_second_of_two_ovals_is_bare_for_want_of_a_sheet() -> None:
         two.sheets[1].area_share, abs=0.02
     )
     assert not any("sheet more" in area.reason for area in two.bare_areas)
+
+
+@pytest.mark.parametrize(("gain", "taken"), [(0.9 * LEAST_GAIN, False), (1.1 * LEAST_GAIN, True)])
+def test_other_sheets_take_the_place_of_cones_only_for_a_clear_gain(
+    gain: float, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cone, other = (SimpleNamespace(touch_share=share, area_share=0.1) for share in (0.5, 0.5 + gain))
+    cones = SimpleNamespace(sheets=(cone,))
+    ruled = SimpleNamespace(regions=lambda _: [], packed=lambda others, _: [] if others else [other])
+    refused = []
+    for name, value in {
+        "covered_by": np.zeros(4, bool),
+        "find_ruling_candidates": [],
+        "_RuledLink": ruled,
+        "hull_note": "a hull",  # which is asked for only where they would be taken
+    }.items():
+        monkeypatch.setattr(packing, name, lambda *_, name=name, value=value: (refused.append(name), value)[1])
+    options = SimpleNamespace(wrap=None, most_sheets=1, tolerance=1e-3, allow_hull=False)
+    link = SimpleNamespace(counted=range(4), worth=None, hull=None, axes=None, mesh=None)
+    assert packing.with_developables(link, cones, options) is cones  # type: ignore[arg-type]
+    assert ("hull_note" in refused) is taken
