@@ -178,3 +178,11 @@ def test_without_an_arm_the_words_name_the_electrodes() -> None:
         assert int(match[1]) == pytest.approx(1e3 * mark.u, abs=0.6)
         arc = 1e3 * item.sensor.frustum.radius_at(mark.u) * mark.phi
         assert int(match[2]) == pytest.approx(arc, abs=0.6)
+
+
+def test_a_request_tells_programs_the_place_to_a_tenth() -> None:
+    (item,) = scene().sensors
+    notice = Mark(0.04836, 1.0, "in the middle").request(item.sensor, 2, 5, again=True)
+    assert (notice.kind, notice.text) == ("again", f"once more, 2 of 5: touch {item.sensor.name} in the middle")
+    wanted = {"number": 2, "of": 5, "sensor": item.sensor.name, "where": "in the middle", "u_mm": 48.4, "phi_deg": 57.3}
+    assert notice.details == wanted
