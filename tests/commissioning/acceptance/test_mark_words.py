@@ -182,7 +182,7 @@ def test_without_an_arm_the_words_name_the_electrodes() -> None:
 
 def test_a_request_tells_programs_the_place_to_a_tenth() -> None:
     (item,) = scene().sensors
-    notice = Mark(0.04836, 1.0, "in the middle").request(item.sensor, 2, 5, again=True)
+    notice = Mark(0.04836, 1.01, "in the middle").request(item.sensor, 2, 5, again=True)
     assert (notice.kind, notice.text) == ("again", f"once more, 2 of 5: touch {item.sensor.name} in the middle")
-    wanted = {"number": 2, "of": 5, "sensor": item.sensor.name, "where": "in the middle", "u_mm": 48.4, "phi_deg": 57.3}
+    wanted = {"number": 2, "of": 5, "sensor": item.sensor.name, "where": "in the middle", "u_mm": 48.4, "phi_deg": 57.9}
     assert notice.details == wanted
