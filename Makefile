@@ -57,7 +57,8 @@ $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/demo.stamp: $(VENV)/bin/python pyproject.toml setup.py
-	$(BIN)/python -m pip install -q -e '.[pictures,design]'
+	@echo "installing, about a minute"
+	$(BIN)/python -m pip install -q -e '.[pictures,design]' pytest
 	touch $@
 
 $(VENV)/test.stamp: $(VENV)/bin/python pyproject.toml setup.py

@@ -23,7 +23,7 @@ EXTERNAL = (
 def packed(nodes: str, once: str = "false") -> bytes:
     """Return a ``.urp`` file with these nodes."""
     main = f'<MainProgram runOnlyOnce="{once}"><children>{nodes}</children></MainProgram>'
-    return gzip.compress(f"<URProgram><children><InitVariablesNode/>{main}</children></URProgram>".encode())
+    return gzip.compress(f"<URProgram><children><InitVariablesNode/>{main}</children></URProgram>".encode(), mtime=0)
 
 
 class Console:
