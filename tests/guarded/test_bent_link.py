@@ -64,7 +64,7 @@ def test_a_guard_reports_a_touch_where_it_is_on_the_mesh(name: str, tmp_path: Pa
         for u, part in ((0.03, 0.15), (0.06, 0.5), (0.1, 0.8)):
             before = len(session.events)
             phi = part * side.frustum.wrap
-            session.touch(u, phi, 10.0, 0.4)
+            session.touch(u, phi, 10.0, 1.5)
             found = session.wait_for(("contact_located",), DEADLINE, before)
             assert found is not None
             normal = np.array(side.normal(phi))

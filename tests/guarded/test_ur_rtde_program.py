@@ -111,4 +111,4 @@ def test_both_drive_the_same_way(tmp_path) -> None:
     assert len(way) > 500, "half a metre and more"
     apart = max(distance(way, guarded_way), distance(guarded_way, way))
     print(f"the ways are at most {1e3 * apart:.2f} mm apart")
-    assert apart < 0.002  # speedL ends when the program notices, which takes longer on a busy machine
+    assert apart < 0.01  # speedL ends when the program notices, which takes longer on a busy machine
