@@ -33,6 +33,7 @@ mesh = "link.stl"
 file = "skin/sensor.toml"
 [source]
 kind = "virtual"
+rate_hz = 300
 [monitoring]
 skin_silence_ms = 900
 skin_late_ms = 900
