@@ -78,7 +78,7 @@ def until_undisturbed(attempt):
     Args:
         attempt: returns the guard's events.
     """
-    end = time.monotonic() + DEADLINE
+    end = time.monotonic() + 3.0 * DEADLINE
     while True:
         events = attempt()
         said = " ".join(str(event.details) for event in events)
